@@ -1,0 +1,58 @@
+"""Checks of array arguments, shared by every floor."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pathcontrol.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+def as_array(name: str, value: ArrayLike) -> Array:
+    """``value`` as a float array, or an error that names it."""
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} = {value!r} is not an array of numbers") from error
+
+
+def joint_array(name: str, value: ArrayLike, n: int) -> Array:
+    """``value`` as an array of shape (*batch, n)."""
+    array = as_array(name, value)
+    if array.ndim == 0 or array.shape[-1] != n:
+        raise InputError(
+            f"{name} has shape {array.shape}, expected (*batch, {n}): one value for each of the {n} joints last"
+        )
+    return array
+
+
+def finite(name: str, array: Array) -> Array:
+    """``array`` itself if all of it is finite."""
+    if not np.isfinite(array).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise InputError(f"{name}{list(where) if where else ''} is {array[where]}, expected finite numbers")
+    return array
+
+
+def scalar(name: str, value: Any, *, positive: bool = False, least: float | None = None) -> float:
+    """``value`` as a finite float, optionally positive or not below ``least``."""
+    array = as_array(name, value)
+    if array.ndim != 0 or not np.isfinite(array):
+        raise InputError(f"{name} = {value!r}, expected one finite number")
+    number = float(array)
+    if positive and number <= 0:
+        raise InputError(f"{name} = {number:g}, expected a number greater than 0")
+    if least is not None and number < least:
+        raise InputError(f"{name} = {number:g}, expected a number not below {least:g}")
+    return number
+
+
+def readonly(array: Array) -> Array:
+    """A copy that cannot be written to, so that values stay values."""
+    copy = np.array(array)
+    copy.setflags(write=False)
+    return copy

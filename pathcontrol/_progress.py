@@ -1,0 +1,39 @@
+"""A progress bar on standard error for what takes longer than two seconds."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator
+
+_PATIENCE = 2.0
+
+
+@contextlib.contextmanager
+def progress_bar(description: str, total: float, enabled: bool = True) -> Iterator[Callable[[float], None]]:
+    """A function that takes how much of ``total`` is done; the bar shows up once two seconds have passed."""
+    began = time.monotonic()
+    shown = None
+
+    def update(done: float) -> None:
+        nonlocal shown
+        if shown is None and enabled and time.monotonic() - began > _PATIENCE:
+            shown = _start()
+            shown.add_task(description, total=total)
+        if shown is not None:
+            shown.update(shown.task_ids[0], completed=done)
+
+    try:
+        yield update
+    finally:
+        if shown is not None:
+            shown.stop()
+
+
+def _start():  # type: ignore[no-untyped-def]
+    from rich.console import Console
+    from rich.progress import Progress
+
+    bar = Progress(console=Console(stderr=True), transient=True)
+    bar.start()
+    return bar

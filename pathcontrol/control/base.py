@@ -1,0 +1,151 @@
+"""What a controller is: a law whose state goes in and comes out."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly
+from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.check import check_task
+
+FrictionCompensation = Literal["none", "viscous", "full"]
+Start = Literal["s0", "nearest"]
+
+
+class ControlOutput(NamedTuple):
+    """What a law says at one moment.
+
+    Attributes:
+        tau: torque demand τ [N m], (*batch, n).
+        zdot: rate of the law's state, (*batch, m).
+        s: path parameter in use, (*batch,).
+        sdot: its rate [1/s], (*batch,).
+        slope: ∂ṡ/∂s with the arm held still [1/s], (*batch,).
+        e_p: position error q_d(s) − q [rad], (*batch, n).
+        e_v: velocity error q_d'(s)ϑ(s) − q̇ [rad/s], (*batch, n).
+        regular: False where the path parameter is not defined by the law and the last one was kept, (*batch,).
+    """
+
+    tau: Array
+    zdot: Array
+    s: Array
+    sdot: Array
+    slope: Array
+    e_p: Array
+    e_v: Array
+    regular: Array
+
+
+class Controller(ABC):
+    """A control law for any arm and any task.
+
+    :meth:`start` gives the state z, (*batch, m); :meth:`law` maps (t, q, q̇, z) to torques and ż and keeps nothing;
+    :meth:`advance` takes z over one control period. The state of the controllers here is the path parameter, m = 1.
+
+    Args:
+        robot: the model the law uses, which need not be the simulated arm.
+        task: path and velocity profile, for as many joints.
+        friction: what the torque compensates of ``robot.friction``: ``"none"``, ``"viscous"`` (as in the paper) or
+            ``"full"``, which adds the Coulomb level in the direction of motion.
+        start: the first path parameter: ``"s0"`` of the task, or that of the ``"nearest"`` point of the path.
+    """
+
+    def __init__(
+        self, robot: RobotModel, task: PathTask, friction: FrictionCompensation = "viscous", start: Start = "s0"
+    ) -> None:
+        _check_choice("friction", friction, get_args(FrictionCompensation))
+        _check_choice("start", start, get_args(Start))
+        check_task(task, robot.n)
+        self.robot, self.task, self.friction, self.start_at = robot, task, friction, start
+        self._viscous = robot.friction.viscous
+
+    @abstractmethod
+    def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
+        """Torques for the joint positions q [rad] and velocities q̇ [rad/s], (*batch, n), at time t [s]."""
+
+    def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """State z, (*batch, 1), for an arm that starts at (q, q̇)."""
+        q = joint_array("q", q, self.robot.n)
+        joint_array("qd", qd, self.robot.n)
+        s = np.full(q.shape[:-1], self.task.s0) if self.start_at == "s0" else self.task.sigma_bar(q)
+        return np.asarray(s)[..., None]
+
+    def advance(self, z: Array, out: ControlOutput, period: float) -> Array:
+        """State one control ``period`` [s] after z.
+
+        With q held, ṡ = f(s) is taken by the exponential Rosenbrock–Euler step s + h φ₁(h f') f, φ₁(x) = (eˣ − 1)/x:
+        second order, exact for linear f, and stable for any gain of the extended motion plan, where k → ∞ makes it
+        Newton's method for (29). (Hochbruck and Ostermann, Acta Numerica 19, 2010.)
+        """
+        x = np.minimum(period * out.slope, 1.0)
+        growth = np.divide(np.expm1(x), x, out=np.ones_like(x), where=np.abs(x) > 1e-12)
+        s = out.s + period * growth * out.sdot
+        return (s if self.task.closed else np.clip(s, self.task.s0, self.task.s_end))[..., None]
+
+    def describe(self) -> dict[str, Any]:
+        """Name, gains and choices, for the record of a run."""
+        gains = {key: np.asarray(value).tolist() for key, value in vars(self).items() if key in self.gains}
+        name = {"controller": type(self).__name__, "friction": self.friction, "start": self.start_at}
+        return name | gains | {"robot": self.robot.name, "task": self.task.describe()}
+
+    #: names of the attributes that hold gains
+    gains: tuple[str, ...] = ()
+
+    # --- for laws -------------------------------------------------------------------------------------------
+
+    def point(self, s: Array) -> PathPoint:
+        """The task at s. Past the ends of an open path: its end point, and beyond the last one at rest."""
+        if self.task.closed:
+            return self.task.at(s)
+        point = self.task.at(np.clip(s, self.task.s0, self.task.s_end))
+        moving = s < self.task.s_end
+        return point._replace(theta=point.theta * moving, dtheta=point.dtheta * moving)
+
+    def inside(self, s: Array, sdot: Array) -> Array:
+        """ṡ without the part that would leave an open path."""
+        if self.task.closed:
+            return sdot
+        sdot = np.where(s >= self.task.s_end, np.minimum(sdot, 0.0), sdot)
+        return np.where(s <= self.task.s0, np.maximum(sdot, 0.0), sdot)
+
+    def friction_torque(self, qd: Array) -> Array | float:
+        """f̂(q̇) [N m], the friction that the law compensates."""
+        if self.friction == "viscous":
+            return self._viscous * qd
+        return self.robot.friction.torque(qd) if self.friction == "full" else 0.0
+
+
+def diagonal_gain(name: str, value: ArrayLike, n: int) -> Array:
+    """Diagonal of a positive definite gain matrix: a scalar for all joints, or (*batch, n)."""
+    array = finite(name, as_array(name, value))
+    if array.ndim and array.shape[-1] not in (1, n):
+        raise InputError(f"{name} has shape {array.shape}, expected a scalar or its diagonal, ({n},)")
+    return _positive(name, array)
+
+
+def scalar_gain(name: str, value: ArrayLike) -> Array:
+    """A gain that must be the same for all joints: a scalar, or (*batch, 1) with one for each rollout."""
+    array = finite(name, as_array(name, value))
+    if array.ndim and array.shape[-1] != 1:
+        raise InputError(
+            f"{name} = {np.asarray(value).tolist()}, expected a scalar: with different gains per joint {name} e_p is no "
+            "longer orthogonal to the path, and the stability proof of (39) fails"
+        )
+    return _positive(name, array)
+
+
+def _positive(name: str, array: Array) -> Array:
+    if (array <= 0).any():
+        raise InputError(f"{name} = {array.tolist()}, expected gains greater than 0")
+    return readonly(array)
+
+
+def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise UnknownNameError(f"{name} = {value!r}, expected one of {', '.join(map(repr, choices))}")

@@ -1,0 +1,56 @@
+"""The first path controller: the path parameter's rate listens to the arm."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
+from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.tasks.base import PathTask
+
+
+class ExtendedMotionPlan(Controller):
+    """Path control with the extended motion plan, eqs. (22) and (25), for any path.
+
+        σ̇ = ϑ(σ) − k e_pᵀq_d'(σ)
+        τ = M(q)[r'(σ)σ̇ + K_v e_v + K_p e_p] + C(q,q̇)q̇ + g(q) + f̂(q̇),   r = q_d'ϑ
+
+    with e_p = q_d(σ) − q and e_v = r(σ) − q̇. V = ½e_pᵀe_p + ½e_vᵀK_p⁻¹e_v falls along the closed loop,
+    V̇ = −e_vᵀK_p⁻¹K_v e_v − k(e_pᵀq_d')². k = 0 is computed torque on the timed trajectory, k → ∞ the projection law.
+
+    Args:
+        robot: the model the law uses.
+        task: path and velocity profile.
+        K_p: position gain [1/s²], scalar or diagonal (n,).
+        K_v: velocity gain [1/s], scalar or diagonal (n,).
+        k: gain of the extended motion plan [1/(rad² s)], ≥ 0; a scalar or (*batch,).
+        options: ``friction`` and ``start`` of :class:`Controller`.
+    """
+
+    gains = ("K_p", "K_v", "k")
+
+    def __init__(
+        self, robot: RobotModel, task: PathTask, K_p: ArrayLike, K_v: ArrayLike, k: ArrayLike, **options: Any
+    ) -> None:
+        super().__init__(robot, task, **options)
+        self.K_p, self.K_v = diagonal_gain("K_p", K_p, robot.n), diagonal_gain("K_v", K_v, robot.n)
+        self.k = readonly(finite("k", as_array("k", k)))
+        if (self.k < 0).any():
+            raise InputError(f"k = {self.k.tolist()}, expected k ≥ 0: a negative gain drives the path away from the arm")
+
+    def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
+        s = z[..., 0]
+        point = self.point(s)
+        e_p, e_v = point.q_d - q, point.velocity - qd
+        sdot = self.inside(s, point.theta - self.k * (e_p * point.dq_d).sum(-1))
+        curvature = (point.dq_d * point.dq_d).sum(-1) + (e_p * point.ddq_d).sum(-1)
+        qdd = point.velocity_slope * sdot[..., None] + self.K_v * e_v + self.K_p * e_p
+        tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd)
+        slope = point.dtheta - self.k * curvature
+        regular = np.ones(s.shape, dtype=bool)
+        return ControlOutput(tau, sdot[..., None], s, sdot, slope, e_p, e_v, regular)

@@ -1,0 +1,112 @@
+"""Motion control: the task as the timed trajectory q_r(t) = q_d(s(t)) of its motion plan ṡ = ϑ(s), eqs. (6) and (14)."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array
+from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.tasks.base import PathTask
+
+
+class Tracking(NamedTuple):
+    """The timed reference and the tracking errors q̃ = q_r − q, all (*batch, n)."""
+
+    acceleration: Array  # q̈_r
+    velocity: Array  # q̇_r
+    position_error: Array  # q̃
+    velocity_error: Array  # dq̃/dt
+
+
+class MotionController(Controller):
+    """A tracking law on the timed trajectory of the task. Its state is the plan's s; nothing of the arm slows it."""
+
+    @abstractmethod
+    def torque(self, q: Array, qd: Array, ref: Tracking) -> Array:
+        """Torque [N m], (*batch, n), without the compensation of friction."""
+
+    def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
+        s = z[..., 0]
+        point = self.point(s)
+        velocity = point.velocity
+        e_p, e_v = point.q_d - q, velocity - qd
+        tracking = Tracking(point.velocity_slope * point.theta[..., None], velocity, e_p, e_v)
+        tau = self.torque(q, qd, tracking) + self.friction_torque(qd)
+        regular = np.ones(s.shape, dtype=bool)
+        return ControlOutput(tau, point.theta[..., None], s, point.theta, point.dtheta, e_p, e_v, regular)
+
+
+class ComputedTorque(MotionController):
+    """Computed torque, eq. (16): τ = M(q)[q̈_r + K_v dq̃/dt + K_p q̃] + C(q,q̇)q̇ + g(q) + f̂(q̇).
+
+    Without unmodelled friction the error obeys (17), d²q̃/dt² + K_v dq̃/dt + K_p q̃ = 0.
+
+    Args:
+        robot: the model the law uses.
+        task: path and velocity profile.
+        K_p: position gain [1/s²], scalar or diagonal (n,).
+        K_v: velocity gain [1/s], scalar or diagonal (n,).
+        options: ``friction`` and ``start`` of :class:`Controller`.
+    """
+
+    gains = ("K_p", "K_v")
+
+    def __init__(self, robot: RobotModel, task: PathTask, K_p: ArrayLike, K_v: ArrayLike, **options: Any) -> None:
+        super().__init__(robot, task, **options)
+        self.K_p, self.K_v = diagonal_gain("K_p", K_p, robot.n), diagonal_gain("K_v", K_v, robot.n)
+
+    def torque(self, q: Array, qd: Array, ref: Tracking) -> Array:
+        qdd = ref.acceleration + self.K_v * ref.velocity_error + self.K_p * ref.position_error
+        return self.robot.inverse_dynamics(q, qd, qdd)
+
+
+class PDPlus(MotionController):
+    """PD+ (Paden and Panja, Int. J. Control 47, 1988): τ = M(q)q̈_r + C(q,q̇)q̇_r + g(q) + K_v dq̃/dt + K_p q̃ + f̂(q̇).
+
+    Args:
+        robot: the model the law uses.
+        task: path and velocity profile.
+        K_p: position gain [N m/rad], scalar or diagonal (n,).
+        K_v: velocity gain [N m s/rad], scalar or diagonal (n,).
+        options: ``friction`` and ``start`` of :class:`Controller`.
+    """
+
+    gains = ("K_p", "K_v")
+
+    def __init__(self, robot: RobotModel, task: PathTask, K_p: ArrayLike, K_v: ArrayLike, **options: Any) -> None:
+        super().__init__(robot, task, **options)
+        self.K_p, self.K_v = diagonal_gain("K_p", K_p, robot.n), diagonal_gain("K_v", K_v, robot.n)
+
+    def torque(self, q: Array, qd: Array, ref: Tracking) -> Array:
+        feedforward = self.robot.inverse_dynamics(q, qd, ref.acceleration, velocity=ref.velocity)
+        return feedforward + self.K_v * ref.velocity_error + self.K_p * ref.position_error
+
+
+class SlotineLi(MotionController):
+    """Slotine and Li's law with known parameters (Int. J. Robotics Research 6, 1987).
+
+    τ = M(q)q̈_s + C(q,q̇)q̇_s + g(q) + K_d (q̇_s − q̇) + f̂(q̇),  q̇_s = q̇_r + Λq̃,  q̈_s = q̈_r + Λ dq̃/dt.
+
+    Args:
+        robot: the model the law uses.
+        task: path and velocity profile.
+        Lambda: Λ [1/s], scalar or diagonal (n,).
+        K_d: gain on the sliding variable [N m s/rad], scalar or diagonal (n,).
+        options: ``friction`` and ``start`` of :class:`Controller`.
+    """
+
+    gains = ("Lambda", "K_d")
+
+    def __init__(self, robot: RobotModel, task: PathTask, Lambda: ArrayLike, K_d: ArrayLike, **options: Any) -> None:
+        super().__init__(robot, task, **options)
+        self.Lambda, self.K_d = diagonal_gain("Lambda", Lambda, robot.n), diagonal_gain("K_d", K_d, robot.n)
+
+    def torque(self, q: Array, qd: Array, ref: Tracking) -> Array:
+        velocity = ref.velocity + self.Lambda * ref.position_error
+        acceleration = ref.acceleration + self.Lambda * ref.velocity_error
+        return self.robot.inverse_dynamics(q, qd, acceleration, velocity=velocity) + self.K_d * (velocity - qd)

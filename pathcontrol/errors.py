@@ -1,0 +1,44 @@
+"""The errors this package raises: one root, leaves that are also the builtin a caller would expect.
+
+Every message names the value, what was expected and what to try.
+"""
+
+from __future__ import annotations
+
+
+class PathControlError(Exception):
+    """Root of all errors raised on purpose by :mod:`pathcontrol`."""
+
+
+class InputError(PathControlError, ValueError):
+    """An argument has the wrong shape, sign or value."""
+
+
+class UrdfError(PathControlError, ValueError):
+    """A robot description cannot be used; the message lists what is wrong in it."""
+
+
+class UnknownNameError(PathControlError, LookupError):
+    """A robot, joint, frame or choice does not exist; the message lists those that do."""
+
+
+class MissingExtraError(PathControlError, ImportError):
+    """An optional dependency is not installed; the message says which extra brings it."""
+
+    def __init__(self, package: str, extra: str, purpose: str) -> None:
+        super().__init__(
+            f"{purpose} needs the package {package!r}, which is not installed; "
+            f"try: pip install 'pathcontrol[{extra}]'"
+        )
+
+
+class TaskError(PathControlError, ValueError):
+    """A path task returns something it must not: a wrong shape, a NaN, a velocity profile that is not positive."""
+
+
+class ExperimentError(PathControlError, ValueError):
+    """An experiment file is invalid; the message names the key and the choices."""
+
+
+class SimulationError(PathControlError, RuntimeError):
+    """A simulation cannot go on; the message says at which time and why."""

@@ -1,0 +1,191 @@
+"""Joint friction laws as small immutable values.
+
+Every law is a viscous part and a dry part: at joint velocity q̇ the friction torque is
+
+    f(q̇) = b q̇ + F(q̇),    F_i ∈ {F⁺_i} if q̇_i > 0,  {−F⁻_i} if q̇_i < 0,  [−F⁻_i, F⁺_i] if q̇_i = 0,
+
+with the levels F⁺, F⁻ ≥ 0 [N m], which may themselves depend on q̇ (Stribeck). The set at zero velocity is stiction:
+the joint holds as long as it can. Laws add up with ``+``.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol.errors import InputError
+
+
+def _coefficients(name: str, value: ArrayLike) -> Array:
+    """Non-negative coefficients, one for each joint."""
+    array = finite(name, np.atleast_1d(as_array(name, value)))
+    if (array < 0).any():
+        raise InputError(f"{name} = {array.tolist()}, expected no negative value: friction takes energy out")
+    return readonly(array)
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionLaw(ABC):
+    """Friction torque of the joints as a function of their velocities."""
+
+    @property
+    @abstractmethod
+    def n(self) -> int:
+        """Number of joints."""
+
+    @property
+    def viscous(self) -> Array:
+        """Viscous coefficients b [N m s/rad], shape (n,)."""
+        return np.zeros(self.n)
+
+    def levels(self, qd: Array) -> tuple[Array, Array]:
+        """Dry friction levels (F⁺, F⁻) ≥ 0 [N m] at joint velocities ``qd`` (*batch, n) [rad/s].
+
+        The levels broadcast against ``qd``: a law whose levels are constant returns shape (n,).
+        """
+        return np.zeros(self.n), np.zeros(self.n)
+
+    def torque(self, qd: Array) -> Array:
+        """Friction torque f(q̇) [N m], (*batch, n); where q̇ = 0 the dry part is given as 0."""
+        plus, minus = self.levels(qd)
+        return self.viscous * qd + np.where(qd > 0, plus, 0.0) - np.where(qd < 0, minus, 0.0)
+
+    def smoothed(self, qd: Array, width: float) -> Array:
+        """Friction torque [N m] with the step at zero replaced by tanh(q̇/width); ``width`` in rad/s."""
+        plus, minus = self.levels(qd)
+        blend = np.tanh(qd / width)
+        return self.viscous * qd + 0.5 * ((plus + minus) * blend + (plus - minus) * blend**2)
+
+    def select(self, joints: Sequence[int]) -> Self:
+        """The same law for some of the joints."""
+        index = list(joints)
+        return type(self)(*(getattr(self, f.name)[..., index] for f in fields(self)))
+
+    def __add__(self, other: FrictionLaw) -> FrictionSum:
+        return FrictionSum((self, other))
+
+    def describe(self) -> dict[str, object]:
+        """The law and its coefficients, for the record of a run."""
+        return {"law": type(self).__name__} | {f.name: getattr(self, f.name).tolist() for f in fields(self)}
+
+
+@dataclass(frozen=True, eq=False)
+class Viscous(FrictionLaw):
+    """Viscous friction f = b q̇ with ``coefficients`` b [N m s/rad], shape (n,)."""
+
+    coefficients: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coefficients", _coefficients("viscous coefficients", self.coefficients))
+
+    @property
+    def n(self) -> int:
+        return self.coefficients.shape[-1]
+
+    @property
+    def viscous(self) -> Array:
+        return self.coefficients
+
+
+@dataclass(frozen=True, eq=False)
+class Coulomb(FrictionLaw):
+    """Coulomb friction with stiction: level ``plus`` [N m] for q̇ > 0 and ``minus`` for q̇ < 0 (default: the same)."""
+
+    plus: Array
+    minus: Array | None = None
+
+    def __post_init__(self) -> None:
+        plus = _coefficients("Coulomb friction for positive velocity", self.plus)
+        minus = (
+            plus
+            if self.minus is None
+            else _coefficients("Coulomb friction for negative velocity", self.minus)
+        )
+        if plus.shape[-1] != minus.shape[-1]:
+            raise InputError(
+                f"Coulomb levels for {plus.shape[-1]} joints forward and {minus.shape[-1]} backward; give both for all"
+            )
+        object.__setattr__(self, "plus", plus)
+        object.__setattr__(self, "minus", minus)
+
+    @property
+    def n(self) -> int:
+        return self.plus.shape[-1]
+
+    def levels(self, qd: Array) -> tuple[Array, Array]:
+        assert self.minus is not None
+        return self.plus, self.minus
+
+
+@dataclass(frozen=True, eq=False)
+class Stribeck(FrictionLaw):
+    """Dry friction that falls from ``static`` to ``coulomb`` [N m] as the joint starts to move.
+
+    F(q̇) = F_c + (F_s − F_c) exp(−(q̇/v_s)²) with the Stribeck velocity ``velocity`` v_s [rad/s], all of shape (n,)
+    (Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30, 1994).
+    """
+
+    coulomb: Array
+    static: Array
+    velocity: Array
+
+    def __post_init__(self) -> None:
+        for name in ("coulomb", "static", "velocity"):
+            object.__setattr__(self, name, _coefficients(f"Stribeck {name}", getattr(self, name)))
+        if (self.static < self.coulomb).any() or (self.velocity == 0).any():
+            raise InputError(
+                f"Stribeck friction with static {self.static.tolist()}, Coulomb {self.coulomb.tolist()} and velocity "
+                f"{self.velocity.tolist()}; expected static ≥ Coulomb and velocity > 0 at each joint"
+            )
+
+    @property
+    def n(self) -> int:
+        return self.coulomb.shape[-1]
+
+    def levels(self, qd: Array) -> tuple[Array, Array]:
+        level = self.coulomb + (self.static - self.coulomb) * np.exp(-((qd / self.velocity) ** 2))
+        return level, level
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionSum(FrictionLaw):
+    """The sum of several laws, as ``Viscous(b) + Coulomb(plus, minus)``."""
+
+    terms: tuple[FrictionLaw, ...]
+
+    def __post_init__(self) -> None:
+        sizes = sorted({term.n for term in self.terms})
+        if len(sizes) != 1:
+            raise InputError(
+                f"friction laws for {sizes} joints cannot be added; give each law one value per joint"
+            )
+
+    @property
+    def n(self) -> int:
+        return self.terms[0].n
+
+    @property
+    def viscous(self) -> Array:
+        return sum((term.viscous for term in self.terms), np.zeros(self.n))
+
+    def levels(self, qd: Array) -> tuple[Array, Array]:
+        levels = [term.levels(qd) for term in self.terms]
+        zero = np.zeros(self.n)
+        return sum((p for p, _ in levels), zero), sum((m for _, m in levels), zero)
+
+    def select(self, joints: Sequence[int]) -> Self:
+        return type(self)(tuple(term.select(joints) for term in self.terms))
+
+    def describe(self) -> dict[str, object]:
+        return {"law": "FrictionSum", "terms": [term.describe() for term in self.terms]}
+
+
+def no_friction(n: int) -> FrictionLaw:
+    """The law of ``n`` joints without any friction."""
+    return Viscous(np.zeros(n))

@@ -1,0 +1,335 @@
+"""The rigid-body model of an arm. The only module that imports Pinocchio.
+
+Arrays have leading batch axes: q, q̇, τ are ``(*batch, n)`` in the order of ``joint_names``. The transpose of a
+C-ordered ``(N, n)`` array is the ``(n, N)`` array Pinocchio's batched calls want, so nothing is copied on the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly, scalar
+from pathcontrol.errors import InputError, UnknownNameError, UrdfError
+from pathcontrol.robot.friction import FrictionLaw, no_friction
+
+
+@dataclass(frozen=True)
+class UrdfSource:
+    """Where a model came from: the URDF's text, and the folders its mesh files are looked up in."""
+
+    text: str
+    base_dir: Path | None = None
+    package_dirs: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Joint limits, each of shape (n,): position [rad or m], velocity [rad/s], effort [N m]; ±inf where there is none."""
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    effort: Array
+
+    def select(self, joints: Sequence[int]) -> Limits:
+        """The limits of some of the joints."""
+        return Limits(
+            *(readonly(a[list(joints)]) for a in (self.lower, self.upper, self.velocity, self.effort))
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Actuation:
+    """What the joints are driven and measured with: limits, friction, encoder resolution [counts/rev] or None."""
+
+    limits: Limits
+    friction: FrictionLaw
+    encoder_counts: Array | None = None
+
+    def select(self, joints: Sequence[int]) -> Actuation:
+        """The actuation of some of the joints."""
+        counts = None if self.encoder_counts is None else readonly(self.encoder_counts[list(joints)])
+        return Actuation(self.limits.select(joints), self.friction.select(joints), counts)
+
+
+@dataclass(frozen=True, eq=False)
+class RobotModel:
+    """M(q)q̈ + C(q,q̇)q̇ + g(q) = τ of a fixed-base arm, for one configuration or a batch; see :func:`load_robot`.
+
+    Instances are values: :meth:`with_payload`, :meth:`with_friction` and :meth:`reduced` return new ones. Friction is
+    kept beside the rigid-body terms and enters none of them; the simulated plant and the controllers ask for it.
+
+    Attributes:
+        pinocchio_model: the underlying ``pin.Model``; do not change it.
+        actuation: limits, friction law and encoders of the joints.
+        source: the URDF it came from.
+        threads: threads used by batched calls; results do not depend on it.
+    """
+
+    pinocchio_model: Any
+    actuation: Actuation
+    source: UrdfSource
+    threads: int = 1
+    _data: Any = field(init=False, repr=False)
+    _pool: Any = field(init=False, repr=False)
+    _weightless_pool: Any = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        model = self.pinocchio_model
+        weightless = pin.Model(model)
+        weightless.gravity = pin.Motion.Zero()
+        object.__setattr__(self, "_data", model.createData())
+        object.__setattr__(self, "_pool", pin.ModelPool(model, self.threads))
+        object.__setattr__(self, "_weightless_pool", pin.ModelPool(weightless, self.threads))
+
+    # --- what it is -----------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """The robot's name in its URDF."""
+        return self.pinocchio_model.name
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.pinocchio_model.nv
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in the order of every ``(*batch, n)`` array."""
+        return tuple(self.pinocchio_model.names)[1:]
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names of all frames: links, fixed and moving joints."""
+        return tuple(frame.name for frame in self.pinocchio_model.frames)
+
+    @property
+    def limits(self) -> Limits:
+        """Position, velocity and effort limits of the joints."""
+        return self.actuation.limits
+
+    @property
+    def friction(self) -> FrictionLaw:
+        """The friction law of the joints."""
+        return self.actuation.friction
+
+    def limit(self, joint: str) -> dict[str, float]:
+        """The limits of one joint by its name: lower, upper [rad], velocity [rad/s], effort [N m]."""
+        i = self.joint_index(joint)
+        return {key: float(getattr(self.limits, key)[i]) for key in ("lower", "upper", "velocity", "effort")}
+
+    def joint_index(self, joint: str) -> int:
+        """The position of a joint in ``joint_names``."""
+        if joint not in self.joint_names:
+            raise UnknownNameError(
+                f"{self.name} has no movable joint {joint!r}; it has {', '.join(self.joint_names)}"
+            )
+        return self.joint_names.index(joint)
+
+    # --- dynamics -------------------------------------------------------------------------------------------
+
+    def inverse_dynamics(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, velocity: ArrayLike | None = None
+    ) -> Array:
+        """τ = M(q)q̈ + C(q,q̇)q̇ + g(q) [N m], (*batch, n), by the recursive Newton–Euler algorithm.
+
+        With ``velocity`` v the Coriolis term is C(q,q̇)v, as passivity-based laws want it; see :meth:`coriolis`.
+        """
+        if velocity is None:
+            return self._batched(pin.rneaInParallel, self._pool, q=q, qd=qd, qdd=qdd)
+        qd, v = joint_array("qd", qd, self.n), joint_array("velocity", velocity, self.n)
+        surplus = self._centripetal(q, 0.5 * (qd - v))
+        return self._batched(pin.rneaInParallel, self._pool, q=q, qd=0.5 * (qd + v), qdd=qdd) - surplus
+
+    def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
+        """q̈ = M(q)⁻¹(τ − C(q,q̇)q̇ − g(q)) [rad/s²], (*batch, n), by the articulated-body algorithm."""
+        return self._batched(pin.abaInParallel, self._pool, q=q, qd=qd, tau=tau)
+
+    def nonlinear_effects(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """C(q,q̇)q̇ + g(q) [N m], (*batch, n)."""
+        return self.inverse_dynamics(q, qd, np.zeros(self.n))
+
+    def gravity(self, q: ArrayLike) -> Array:
+        """g(q) [N m], (*batch, n)."""
+        zero = np.zeros(self.n)
+        return self.inverse_dynamics(q, zero, zero)
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """M(q) [kg m²], (*batch, n, n): column i is the torque of a unit acceleration of joint i, without gravity."""
+        q = joint_array("q", q, self.n)[..., None, :]
+        columns = self._batched(
+            pin.rneaInParallel, self._weightless_pool, q=q, qd=np.zeros(self.n), qdd=np.eye(self.n)
+        )
+        return 0.5 * (columns + columns.swapaxes(-1, -2))
+
+    def coriolis(self, q: ArrayLike, qd: ArrayLike, v: ArrayLike) -> Array:
+        """C(q,q̇)v [N m], (*batch, n), with the C of Christoffel symbols, for which Ṁ − 2C is skew-symmetric.
+
+        That C is symmetric in its two velocities, C(q,x)y = C(q,y)x, so with c(q,x) = C(q,x)x polarisation gives
+        C(q,q̇)v = c(q,(q̇+v)/2) − c(q,(q̇−v)/2).
+        """
+        qd, v = joint_array("qd", qd, self.n), joint_array("v", v, self.n)
+        return self._centripetal(q, 0.5 * (qd + v)) - self._centripetal(q, 0.5 * (qd - v))
+
+    def coriolis_matrix(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """C(q,q̇) [N m s], (*batch, n, n), of Christoffel symbols: Ṁ − 2C is skew-symmetric."""
+        q, qd = joint_array("q", q, self.n)[..., None, :], joint_array("qd", qd, self.n)[..., None, :]
+        return self.coriolis(q, qd, np.eye(self.n)).swapaxes(-1, -2)
+
+    def kinetic_energy(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """½ q̇ᵀM(q)q̇ [J], (*batch,)."""
+        momentum = self._batched(pin.rneaInParallel, self._weightless_pool, q=q, qd=np.zeros(self.n), qdd=qd)
+        return 0.5 * np.asarray((momentum * as_array("qd", qd)).sum(-1))
+
+    def potential_energy(self, q: ArrayLike) -> Array:
+        """Energy in the field of gravity [J], (*batch,), zero where all mass is at the height of the base frame."""
+        return self._each(q, (), lambda qi: pin.computePotentialEnergy(self.pinocchio_model, self._data, qi))
+
+    # --- kinematics -----------------------------------------------------------------------------------------
+
+    def frame_pose(self, q: ArrayLike, frame: str) -> Array:
+        """Pose of ``frame`` in the base frame [m], (*batch, 4, 4) homogeneous."""
+        return self.frame_poses(q, [frame])[..., 0, :, :]
+
+    def frame_poses(self, q: ArrayLike, frames: Sequence[str]) -> Array:
+        """Poses of several frames in the base frame [m], (*batch, len(frames), 4, 4) homogeneous."""
+        ids = [self._frame_id(frame) for frame in frames]
+
+        def poses(qi: Array) -> list[Array]:
+            pin.framesForwardKinematics(self.pinocchio_model, self._data, qi)
+            return [self._data.oMf[i].homogeneous for i in ids]
+
+        return self._each(q, (len(ids), 4, 4), poses)
+
+    def frame_jacobian(self, q: ArrayLike, frame: str) -> Array:
+        """Jacobian of ``frame``, (*batch, 6, n): linear [m] then angular velocity, in axes parallel to the base frame."""
+        i, axes = self._frame_id(frame), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        return self._each(
+            q, (6, self.n), lambda qi: pin.computeFrameJacobian(self.pinocchio_model, self._data, qi, i, axes)
+        )
+
+    # --- variations -----------------------------------------------------------------------------------------
+
+    def with_friction(self, friction: FrictionLaw | None) -> RobotModel:
+        """The same arm with another friction law; ``None`` for no friction at all."""
+        law = no_friction(self.n) if friction is None else friction
+        if law.n != self.n:
+            raise InputError(f"the friction law is for {law.n} joints, {self.name} has {self.n}")
+        actuation = Actuation(self.limits, law, self.actuation.encoder_counts)
+        return RobotModel(self.pinocchio_model, actuation, self.source, self.threads)
+
+    def with_payload(
+        self, mass: float, frame: str, com: ArrayLike = (0.0, 0.0, 0.0), inertia: ArrayLike | None = None
+    ) -> RobotModel:
+        """The same arm carrying a rigid body.
+
+        Args:
+            mass: mass [kg].
+            frame: the frame that carries it.
+            com: centre of mass in that frame [m], shape (3,).
+            inertia: inertia about the centre of mass, axes of that frame [kg m²], shape (3, 3); default a point mass.
+        """
+        mass, lever = scalar("mass", mass, least=0.0), finite("com", as_array("com", com))
+        tensor = np.zeros((3, 3)) if inertia is None else finite("inertia", as_array("inertia", inertia))
+        if lever.shape != (3,) or tensor.shape != (3, 3):
+            raise InputError(
+                f"com has shape {lever.shape} and inertia {tensor.shape}, expected (3,) and (3, 3)"
+            )
+        if not np.allclose(tensor, tensor.T) or np.linalg.eigvalsh(tensor).min() < -1e-12:
+            raise InputError("the payload's inertia is not symmetric positive semi-definite")
+        model = pin.Model(self.pinocchio_model)
+        support = model.frames[self._frame_id(frame)]
+        model.appendBodyToJoint(support.parentJoint, pin.Inertia(mass, lever, tensor), support.placement)
+        return RobotModel(model, self.actuation, self.source, self.threads)
+
+    def with_armature(self, armature: ArrayLike) -> RobotModel:
+        """The same arm with rotor inertia [kg m²], shape (n,), added to the diagonal of M."""
+        added = joint_array("armature", armature, self.n)
+        if added.shape != (self.n,) or (added < 0).any():
+            raise InputError(f"armature = {added.tolist()}, expected {self.n} values not below 0")
+        model = pin.Model(self.pinocchio_model)
+        model.armature = np.asarray(model.armature) + added
+        return RobotModel(model, self.actuation, self.source, self.threads)
+
+    def with_threads(self, threads: int) -> RobotModel:
+        """The same arm whose batched calls use ``threads`` threads."""
+        if threads < 1:
+            raise InputError(f"threads = {threads}, expected 1 or more")
+        return RobotModel(self.pinocchio_model, self.actuation, self.source, threads)
+
+    def reduced(self, lock: Mapping[str, float]) -> RobotModel:
+        """The arm with some joints locked: ``{"joint name": angle [rad]}``; the others keep their order."""
+        indices = {
+            self.joint_index(joint): scalar(f"angle of {joint}", angle) for joint, angle in lock.items()
+        }
+        if len(indices) == self.n:
+            raise InputError(
+                f"locking all {self.n} joints of {self.name} leaves nothing to control; leave one free"
+            )
+        q = np.zeros(self.n)
+        q[list(indices)] = list(indices.values())
+        model = pin.buildReducedModel(self.pinocchio_model, [i + 1 for i in indices], q)
+        free = [i for i in range(self.n) if i not in indices]
+        return RobotModel(model, self.actuation.select(free), self.source, self.threads)
+
+    # --- inside ---------------------------------------------------------------------------------------------
+
+    def _centripetal(self, q: ArrayLike, x: ArrayLike) -> Array:
+        """c(q,x) = C(q,x)x [N m], (*batch, n)."""
+        return self._batched(pin.rneaInParallel, self._weightless_pool, q=q, qd=x, qdd=np.zeros(self.n))
+
+    def _batched(self, call: Callable[..., Any], pool: Any, **arguments: ArrayLike) -> Array:
+        """One of Pinocchio's batched calls on three (*batch, n) arguments that broadcast."""
+        arrays = [joint_array(name, value, self.n) for name, value in arguments.items()]
+        shape = arrays[0].shape
+        if not shape == arrays[1].shape == arrays[2].shape:
+            shape = _broadcast_shape(arguments, arrays)
+            arrays = [np.broadcast_to(a, shape) for a in arrays]
+        out = np.empty(shape)
+        flat = [a.reshape(-1, self.n).T for a in arrays]
+        if out.size:
+            call(self.threads, pool, *flat, out.reshape(-1, self.n).T)
+        return out
+
+    def _each(self, q: ArrayLike, shape: tuple[int, ...], function: Callable[[Array], Any]) -> Array:
+        """``function`` of each configuration, for what Pinocchio has no batched call for."""
+        array = joint_array("q", q, self.n)
+        values = [function(qi) for qi in array.reshape(-1, self.n)]
+        return np.array(values, dtype=np.float64).reshape(array.shape[:-1] + shape)
+
+    def _frame_id(self, frame: str) -> int:
+        # getFrameId answers nframes for a frame that does not exist, so ask first
+        if not self.pinocchio_model.existFrame(frame):
+            raise UnknownNameError(
+                f"{self.name} has no frame {frame!r}; it has {', '.join(self.frame_names)}"
+            )
+        return self.pinocchio_model.getFrameId(frame)
+
+
+def _broadcast_shape(arguments: Mapping[str, ArrayLike], arrays: Sequence[Array]) -> tuple[int, ...]:
+    try:
+        return np.broadcast_shapes(*(a.shape for a in arrays))
+    except ValueError as error:
+        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(arguments, arrays, strict=True))
+        raise InputError(f"the batch axes do not fit together: {shapes}") from error
+
+
+def build_model(text: str) -> Any:
+    """The ``pin.Model`` of a URDF that has passed the checks of :mod:`pathcontrol.robot.urdf_check`."""
+    try:
+        model = pin.buildModelFromXML(text)
+    except ValueError as error:  # the checks should have found it; say at least what Pinocchio says
+        raise UrdfError(f"Pinocchio cannot build a model from this URDF: {error}") from error
+    if model.nq != model.nv:
+        raise UrdfError(
+            f"{model.name} has joints that are not one angle or one length each; use a fixed-base arm"
+        )
+    return model

@@ -1,0 +1,121 @@
+"""The two ways to close the loop: sampled, as on hardware, or in continuous time, as in the theory."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_array, finite, scalar
+from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.sensors import Sensors
+
+
+@dataclass(frozen=True, eq=False)
+class SampledLoop:
+    """A control computer: torques held over a period, and what else of reality is switched on.
+
+    Attributes:
+        period: control period [s].
+        substeps: steps of the plant in a period; one is accurate, see :class:`Plant`.
+        encoders: False for exact positions, True for the resolution of the robot, or counts per revolution (n,).
+        velocity: ``"exact"``, or ``"difference"`` of two measured positions over the period.
+        filter_hz: corner frequency of a first-order low-pass filter on the velocity [Hz], or None.
+        torque_limits: False for none, True for the effort limits of the robot, or limits [N m], (n,).
+        delay: time from measuring to applying the torque [s]; no torque acts before the first one.
+    """
+
+    period: float = 2.5e-3
+    substeps: int = 1
+    encoders: bool | ArrayLike = False
+    velocity: Literal["exact", "difference"] = "exact"
+    filter_hz: float | None = None
+    torque_limits: bool | ArrayLike = False
+    delay: float = 0.0
+
+    def __post_init__(self) -> None:
+        scalar("period", self.period, positive=True)
+        scalar("delay", self.delay, least=0.0)
+        if not isinstance(self.substeps, int | np.integer) or self.substeps < 1:
+            raise InputError(f"substeps = {self.substeps!r}, expected a whole number from 1")
+        if self.velocity not in ("exact", "difference"):
+            raise InputError(f"velocity = {self.velocity!r}, expected 'exact' or 'difference'")
+        if self.filter_hz is not None:
+            scalar("filter_hz", self.filter_hz, positive=True)
+
+    def sensors(self, robot: RobotModel) -> Sensors:
+        """The measuring chain for ``robot``."""
+        return Sensors(self.period, self._resolution(robot), self.velocity == "difference", self.filter_hz)
+
+    def _resolution(self, robot: RobotModel) -> Array | None:
+        counts = _per_joint("encoders", self.encoders, robot.actuation.encoder_counts, robot)
+        if counts is None:
+            return None
+        if (counts <= 0).any():
+            raise InputError(f"encoders = {counts.tolist()}, expected counts per revolution greater than 0")
+        return 2 * np.pi / counts
+
+    def describe(self) -> dict[str, Any]:
+        """All settings, for the record of a run."""
+        return {"loop": "sampled"} | _plain(asdict(self))
+
+
+@dataclass(frozen=True, eq=False)
+class ContinuousTime:
+    """The closed loop as a differential equation, integrated with error control; dry friction is smoothed.
+
+    Attributes:
+        output_period: time between recorded samples [s].
+        rtol: relative tolerance of the integrator.
+        atol: absolute tolerance of the integrator.
+        friction_width: velocity w [rad/s] over which dry friction changes sign, as tanh(q̇/w).
+        torque_limits: as for :class:`SampledLoop`.
+    """
+
+    output_period: float = 2.5e-3
+    rtol: float = 1e-8
+    atol: float = 1e-10
+    friction_width: float = 1e-3
+    torque_limits: bool | ArrayLike = False
+
+    def __post_init__(self) -> None:
+        for name in ("output_period", "rtol", "atol", "friction_width"):
+            scalar(name, getattr(self, name), positive=True)
+
+    def describe(self) -> dict[str, Any]:
+        """All settings, for the record of a run."""
+        return {"loop": "continuous"} | _plain(asdict(self))
+
+
+def torque_limits(mode: SampledLoop | ContinuousTime, robot: RobotModel) -> Array | None:
+    """The limits [N m], (n,), that ``mode`` clamps torques to, or None."""
+    limits = _per_joint("torque_limits", mode.torque_limits, robot.limits.effort, robot, infinite=True)
+    if limits is not None and (limits <= 0).any():
+        dead = [name for name, limit in zip(robot.joint_names, limits, strict=True) if limit <= 0]
+        raise InputError(
+            f"the torque limit of {', '.join(dead)} is 0, which would kill all torque; give torque_limits = [...] in N m"
+        )
+    return limits
+
+
+def _per_joint(
+    name: str, value: bool | ArrayLike, own: Array | None, robot: RobotModel, infinite: bool = False
+) -> Array | None:
+    """False: None; True: the robot's own values; else one value for each joint."""
+    if value is False or value is None:
+        return None
+    if value is True:
+        if own is None:
+            raise InputError(f"{name} = True, but {robot.name} says nothing about them; give one value per joint")
+        return own
+    array = as_array(name, value)
+    if array.shape != (robot.n,):
+        raise InputError(f"{name} has shape {array.shape}, expected ({robot.n},): one value for each joint")
+    return array if infinite else finite(name, array)
+
+
+def _plain(settings: dict[str, Any]) -> dict[str, Any]:
+    return {k: np.asarray(v).tolist() if isinstance(v, np.ndarray | list | tuple) else v for k, v in settings.items()}

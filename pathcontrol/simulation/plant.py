@@ -1,0 +1,55 @@
+"""The simulated arm: rigid-body dynamics with friction that really sticks, at a fixed step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.dry_friction import stick_slip
+
+
+class Plant:
+    """M(q)q̈ + C(q,q̇)q̇ + g(q) + b q̇ + F(q̇) ∋ τ over steps of ``step`` seconds, F the set-valued dry friction.
+
+    With a(q, v) the acceleration without dry friction and P_h(v) the velocity that dry friction of duration h makes of
+    v (:func:`stick_slip`), one step is
+
+        v_m = P_{h/2}(v + h/2 a(q, v)),  q_m = q + h/4 (v + v_m),  v⁺ = P_h(v + h a(q_m, v_m)),  q⁺ = q + h/2 (v + v⁺):
+
+    second order where no joint changes between sticking and slipping, nothing stiff, and no creep at all while stuck.
+    Viscous friction enters by the trapezoidal rule, which adds h/2 b to the diagonal of M and is stable for any b.
+
+    Args:
+        robot: the arm; its ``friction`` is the friction of the plant.
+        step: h [s].
+    """
+
+    def __init__(self, robot: RobotModel, step: float) -> None:
+        self.robot, self.step = robot, step
+        self._damping = robot.friction.viscous
+        self._inertia = robot.with_armature(0.5 * step * self._damping)
+
+    def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
+        """(q, q̇) one step later under the constant torque ``tau``; all (N, n)."""
+        h, drive = self.step, tau - self._damping * qd
+        middle_qd = self._push(q, qd, qd, drive, 0.5 * h)
+        middle_q = q + 0.25 * h * (qd + middle_qd)
+        next_qd = self._push(middle_q, middle_qd, qd, drive, h)
+        return q + 0.5 * h * (qd + next_qd), next_qd
+
+    def _push(self, q: Array, qd: Array, start: Array, drive: Array, duration: float) -> Array:
+        """P(start + duration a(q, q̇)): dry friction keeps the direction of q̇, unless that proves wrong."""
+        plus, minus = self.robot.friction.levels(qd)
+        friction = np.where(qd > 0, plus, np.where(qd < 0, -minus, 0.0))
+        v = start + duration * self._inertia.forward_dynamics(q, qd, drive - friction)
+        settled = (v * qd > 0) | (plus + minus == 0)
+        if settled.all():
+            return v
+        rows = ~settled.all(-1)
+        M = self._inertia.mass_matrix(q[rows])
+        momentum = np.einsum("kij,kj->ki", M, v[rows]) + duration * friction[rows]
+        low = -duration * np.broadcast_to(minus, q.shape)[rows]
+        high = duration * np.broadcast_to(plus, q.shape)[rows]
+        v[rows] = stick_slip(M, momentum, low, high)
+        return v

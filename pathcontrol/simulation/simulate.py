@@ -1,0 +1,81 @@
+"""One call from a controller and an initial state to a :class:`Run`."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, finite, joint_array, scalar
+from pathcontrol.control.base import Controller
+from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.continuous import run_continuous
+from pathcontrol.simulation.modes import ContinuousTime, SampledLoop
+from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.sampled import run_sampled
+
+
+def simulate(
+    controller: Controller,
+    q: ArrayLike,
+    qd: ArrayLike | None = None,
+    *,
+    duration: float,
+    plant: RobotModel | None = None,
+    loop: SampledLoop | ContinuousTime | None = None,
+    progress: bool = True,
+) -> Run:
+    """Simulate a control law on an arm.
+
+    Args:
+        controller: the law, with its own model of the arm.
+        q: initial joint positions [rad], (n,) or a batch (*batch, n); the run counts batches as rollouts.
+        qd: initial joint velocities [rad/s], broadcast against ``q``; default at rest.
+        duration: simulated time [s].
+        plant: the arm that is really there, with its friction; default the controller's own model.
+        loop: how the loop is closed; default ``SampledLoop()``, a 2.5 ms hold and nothing else.
+        progress: show a bar on standard error when it takes longer than two seconds.
+
+    Raises:
+        InputError: an argument has the wrong shape or value.
+        SimulationError: a rollout diverged, or the integrator gave up.
+    """
+    duration = scalar("duration", duration, positive=True)
+    robot = controller.robot if plant is None else plant
+    if robot.joint_names != controller.robot.joint_names:
+        raise InputError(
+            f"the plant has the joints {robot.joint_names}, the controller's model {controller.robot.joint_names}"
+        )
+    loop = SampledLoop() if loop is None else loop
+    q0, qd0 = _initial_state(q, qd, robot.n)
+    run = run_sampled if isinstance(loop, SampledLoop) else run_continuous
+    time, arrays = run(controller, robot, loop, q0, qd0, duration, progress)  # type: ignore[operator]
+    return Run.from_arrays(time, robot.joint_names, arrays, _config(controller, robot, loop, duration))
+
+
+def _initial_state(q: ArrayLike, qd: ArrayLike | None, n: int) -> tuple[Array, Array]:
+    position = finite("q", joint_array("q", q, n))
+    velocity = np.zeros(n) if qd is None else finite("qd", joint_array("qd", qd, n))
+    try:
+        pair = np.broadcast_arrays(position, velocity)
+    except ValueError as error:
+        raise InputError(f"q has shape {position.shape} and qd {velocity.shape}, which do not fit together") from error
+    q0, qd0 = (np.array(a).reshape(-1, n) for a in pair)
+    return q0, qd0
+
+
+def _config(
+    controller: Controller, robot: RobotModel, loop: SampledLoop | ContinuousTime, duration: float
+) -> dict[str, Any]:
+    packages = ("pathcontrol", "pin", "numpy", "scipy")
+    return {
+        "controller": controller.describe(),
+        "plant": {"robot": robot.name, "friction": robot.friction.describe()},
+        "loop": loop.describe(),
+        "duration": duration,
+        "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
+    }

@@ -1,0 +1,184 @@
+"""What a task is: a desired path and a desired velocity profile."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import TaskError
+from pathcontrol.tasks.closest_point import ClosestPoint, Curve
+from pathcontrol.tasks.differentiation import Differentiator, best_width
+from pathcontrol.tasks.profile import VelocityProfile
+
+
+class PathPoint(NamedTuple):
+    """A task at path parameter s: all that a controller asks of it."""
+
+    q_d: Array
+    dq_d: Array
+    ddq_d: Array
+    theta: Array
+    dtheta: Array
+
+    @property
+    def velocity(self) -> Array:
+        """Desired joint velocity r = q_d'ϑ, (*batch, n)."""
+        return self.dq_d * self.theta[..., None]
+
+    @property
+    def velocity_slope(self) -> Array:
+        """r' = dr/ds = q_d''ϑ + q_d'ϑ', (*batch, n); the desired acceleration is r'ṡ."""
+        return self.ddq_d * self.theta[..., None] + self.dq_d * self.dtheta[..., None]
+
+
+class PathTask(ABC):
+    """A robotic task: *where* (a path q_d(s)) and *how fast along it* (a velocity profile ϑ(s)), never *when*.
+
+    Subclasses define :meth:`q_d` and :meth:`theta`, on arrays: s has shape ``(*batch,)``, q_d(s) ``(*batch, n)``.
+    What they leave out is computed: derivatives to about 1e-10, the projection as the global closest point. The curve
+
+        Γ = { (q, q̇) : q = q_d(s), q̇ = q_d'(s) ϑ(s) }
+
+    in state space (Moreno and Kelly, eqs. 2, 3 and 5) is what the task asks for.
+
+    Attributes:
+        s0: first path parameter.
+        s_end: last path parameter; ``inf`` for a path that does not end.
+        period: for a closed path, the period of q_d and ϑ in s; else ``None``.
+    """
+
+    s0: float = 0.0
+    s_end: float = np.inf
+    period: float | None = None
+
+    @abstractmethod
+    def q_d(self, s: Array) -> Array:
+        """Desired path q_d(s) [rad], (*batch, n), twice continuously differentiable."""
+
+    @abstractmethod
+    def theta(self, s: Array) -> Array:
+        """Desired velocity profile ϑ(s) > 0 [1/s], (*batch,): the rate of the path parameter."""
+
+    def dq_d(self, s: Array) -> Array:
+        """q_d'(s) = dq_d/ds [rad], (*batch, n)."""
+        return self._path_derivative(s, 1)
+
+    def ddq_d(self, s: Array) -> Array:
+        """q_d''(s) = d²q_d/ds² [rad], (*batch, n)."""
+        return self._path_derivative(s, 2)
+
+    def dtheta(self, s: Array) -> Array:
+        """ϑ'(s) = dϑ/ds [1/s], (*batch,)."""
+        return self._profile_derivative(s, 1)
+
+    def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
+        """Projection σ̄(q) [-], (*batch,): the path parameter of the point of the path nearest to q (*batch, n).
+
+        It solves (q_d(σ̄) − q)ᵀ q_d'(σ̄) = 0, eq. (29). Without ``near`` it is the global minimum, in [s0, s0 + period)
+        for closed paths. With ``near`` (*batch,), the parameter of a moment ago, the branch is followed by
+        continuity where that is possible, and laps are counted.
+        """
+        return self._closest_point(q, near)
+
+    def at(self, s: Array) -> PathPoint:
+        """q_d, q_d', q_d'', ϑ and ϑ' at s (*batch,). Override where they share work."""
+        return PathPoint(self.q_d(s), self.dq_d(s), self.ddq_d(s), self.theta(s), self.dtheta(s))
+
+    @cached_property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(np.asarray(self.q_d(np.float64(self.s0))).shape[-1])
+
+    @property
+    def closed(self) -> bool:
+        """Whether the path closes on itself."""
+        return self.period is not None
+
+    @property
+    def one_traverse(self) -> tuple[float, float]:
+        """The parameters [rad or -] between which every point of the path is passed once.
+
+        Raises:
+            TaskError: the path goes on for ever without repeating.
+        """
+        end = self.s_end if self.period is None else self.s0 + self.period
+        if not np.isfinite(end):
+            raise TaskError(
+                f"{type(self).__name__} neither ends nor repeats, so its nearest point cannot be searched; give it a "
+                "finite s_end or a period, or override sigma_bar"
+            )
+        return self.s0, end
+
+    def with_profile(self, profile: VelocityProfile) -> PathTask:
+        """The same path with another velocity profile."""
+        return _Reprofiled(self, profile)
+
+    def describe(self) -> dict[str, Any]:
+        """Name and public parameters, for the record of a run."""
+        public = {key: value for key, value in vars(self).items() if not key.startswith("_") and key != "n"}
+        plain = {key: np.asarray(value).tolist() for key, value in public.items() if _is_plain(value)}
+        return {"task": type(self).__name__} | plain
+
+    # --- inside ---------------------------------------------------------------------------------------------
+
+    @cached_property
+    def sampled_interval(self) -> tuple[float, float]:
+        """A finite part of the domain that stands for the whole."""
+        end = self.s_end if self.period is None else self.s0 + self.period
+        return self.s0, end if np.isfinite(end) else self.s0 + 2 * np.pi
+
+    def _differentiator(self, function: Any) -> Differentiator:
+        lower, upper = self.sampled_interval
+        width = best_width(function, lower, upper)
+        return Differentiator(function, self.s0 if self.period is None else -np.inf, self.s_end, width)
+
+    @cached_property
+    def _path_derivative(self) -> Differentiator:
+        return self._differentiator(self.q_d)
+
+    @cached_property
+    def _profile_derivative(self) -> Differentiator:
+        return self._differentiator(lambda s: self.theta(s) + np.zeros_like(s))
+
+    @cached_property
+    def _closest_point(self) -> ClosestPoint:
+        lower, upper = self.one_traverse
+        return ClosestPoint(Curve(self.q_d, self.dq_d, self.ddq_d), lower, upper, closed=self.closed)
+
+
+class _Reprofiled(PathTask):
+    """A path with a velocity profile that is not its own; made by :meth:`PathTask.with_profile`."""
+
+    def __init__(self, path: PathTask, profile: VelocityProfile) -> None:
+        self.path, self.profile = path, profile
+        self.s0, self.s_end, self.period = path.s0, path.s_end, path.period
+
+    def q_d(self, s: Array) -> Array:
+        return self.path.q_d(s)
+
+    def dq_d(self, s: Array) -> Array:
+        return self.path.dq_d(s)
+
+    def ddq_d(self, s: Array) -> Array:
+        return self.path.ddq_d(s)
+
+    def theta(self, s: Array) -> Array:
+        return self.profile.theta(self.path, s)
+
+    def dtheta(self, s: Array) -> Array:
+        return self.profile.dtheta(self.path, s)
+
+    def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
+        return self.path.sigma_bar(q, near)
+
+    def describe(self) -> dict[str, Any]:
+        return self.path.describe() | self.profile.describe()
+
+
+def _is_plain(value: Any) -> bool:
+    return np.asarray(value).dtype.kind in "biufU"

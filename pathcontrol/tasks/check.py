@@ -1,0 +1,69 @@
+"""A task checked once, before a run is spent on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import TaskError
+from pathcontrol.tasks.base import PathTask
+
+_SAMPLES = 129
+
+
+def check_task(task: PathTask, n: int) -> None:
+    """Check shapes and values of a task for an arm of ``n`` joints on samples of its domain.
+
+    Raises:
+        TaskError: it is not a path for ``n`` joints, returns a wrong shape or NaN, or ϑ is not positive somewhere.
+    """
+    name = type(task).__name__
+    if not isinstance(task, PathTask):
+        raise TaskError(f"the task is {task!r}, expected an instance of a PathTask subclass")
+    _check_domain(task, name)
+    lower, upper = task.sampled_interval
+    s = np.linspace(lower, upper, _SAMPLES)
+    _check_values(f"{name}.q_d", task.q_d, s, n)
+    theta = _check_values(f"{name}.theta", task.theta, s, None)
+    if not (theta > 0).all():
+        i = int(np.argmax(~(theta > 0)))
+        raise TaskError(
+            f"{name}.theta(s={s[i]:g}) = {theta[i]:g}, expected ϑ > 0 everywhere: where it is not, the motion plan "
+            "ṡ = ϑ(s) stops for ever"
+        )
+    for method in ("dq_d", "ddq_d", "dtheta"):
+        _check_values(f"{name}.{method}", getattr(task, method), s, None if method == "dtheta" else n)
+
+
+def _check_domain(task: PathTask, name: str) -> None:
+    if not np.isfinite(task.s0) or not task.s_end > task.s0:
+        raise TaskError(f"{name} has s0 = {task.s0} and s_end = {task.s_end}, expected a finite s0 < s_end")
+    if task.period is not None and not (0 < task.period < np.inf and task.s_end == np.inf):
+        raise TaskError(
+            f"{name} has period = {task.period} and s_end = {task.s_end}; a closed path has a period > 0 and no s_end"
+        )
+
+
+def _check_values(label: str, function: Callable[[Any], Any], s: Array, n: int | None) -> Array:
+    """Values at s and at one s alone, with the shapes that the batch convention asks for."""
+    for argument in (s, s[0]):
+        expected = np.shape(argument) + (() if n is None else (n,))
+        value = np.asarray(function(argument))
+        # ϑ may be a constant that broadcasts
+        if value.shape != expected and not (n is None and value.shape == ()):
+            raise TaskError(_shape_message(label, np.shape(argument), value.shape, expected, n))
+    values = np.asarray(function(s), dtype=np.float64) + (np.zeros_like(s) if n is None else 0.0)
+    if not np.isfinite(values).all():
+        i = int(np.argwhere(~np.isfinite(values))[0][0])
+        raise TaskError(f"{label}(s={s[i]:g}) = {values[i].tolist()}, expected finite numbers on the whole domain")
+    return values
+
+
+def _shape_message(label: str, given: Any, got: Any, expected: Any, n: int | None) -> str:
+    message = f"{label} of s with shape {given} has shape {got}, expected {expected}"
+    if n is not None and len(got) == len(expected) and got[:-1] == expected[:-1]:
+        return message + f": the path is for {got[-1]} joints, the arm has {n}"
+    return message + "; work on arrays and put the joints last, as in np.stack([...], axis=-1)"

@@ -1,0 +1,178 @@
+"""The point of a curve nearest to a given point: all over the curve, or along the branch one is on.
+
+The squared distance ½‖p(s) − x‖² has the derivative g(s) = (p(s) − x)ᵀp'(s), whose sign changes are bracketed on a
+grid fine enough to follow the curve's turns, and refined by a bracketing root finder. A bound on the distance within
+a cell of the grid tells which brackets can hold the global minimum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize.elementwise import find_root
+
+from pathcontrol._arrays import Array, as_array
+
+_MAX_TURN = 0.15  # rad between neighbouring tangents of the grid
+_MAX_CELLS = 1 << 16
+_CHUNK = 1 << 22  # distances held at once
+_NEWTON_STEPS = 12
+
+
+class Curve(NamedTuple):
+    """A curve p(s) in R^m with its first two derivatives; each maps (*batch,) to (*batch, m)."""
+
+    p: Callable[[Array], Array]
+    dp: Callable[[Array], Array]
+    ddp: Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class ClosestPoint:
+    """Nearest points of ``curve`` for s in [lower, upper]; a closed curve repeats with the period upper − lower."""
+
+    curve: Curve
+    lower: float
+    upper: float
+    closed: bool
+
+    def __call__(self, x: ArrayLike, near: ArrayLike | None = None) -> Array:
+        """Parameter (*batch,) of the point nearest to x (*batch, m); see :meth:`PathTask.sigma_bar`."""
+        x = as_array("x", x)
+        flat = x.reshape(-1, x.shape[-1])
+        if near is None:
+            return self.anywhere(flat).reshape(x.shape[:-1])
+        start = np.broadcast_to(as_array("near", near), x.shape[:-1]).reshape(-1)
+        return self.along(flat, start).reshape(x.shape[:-1])
+
+    def anywhere(self, x: Array) -> Array:
+        """Global minimum for each row of x (N, m), in [lower, upper], or [lower, upper) when closed."""
+        rows = max(1, _CHUNK // len(self._grid.s))
+        parts = [self._search(x[i : i + rows]) for i in range(0, len(x), rows)]
+        s = np.concatenate(parts) if parts else np.empty(0)
+        return np.where(s >= self.upper, self.lower, s) if self.closed else s
+
+    def along(self, x: Array, near: Array) -> Array:
+        """Local minimum reached from ``near`` (N,) by Newton's method; the global one where there is none close by."""
+        s, trusted = self._descend(x, near)
+        if not trusted.all():
+            lost = ~trusted
+            found = self.anywhere(x[lost])
+            s[lost] = self.unwrap(found, near[lost])
+        return s
+
+    def unwrap(self, s: Array, near: Array) -> Array:
+        """``s`` shifted by whole periods to lie nearest to ``near``."""
+        if not self.closed:
+            return s
+        period = self.upper - self.lower
+        return s + period * np.round((near - s) / period)
+
+    # --- the local search -----------------------------------------------------------------------------------
+
+    def _descend(self, x: Array, near: Array) -> tuple[Array, Array]:
+        """Newton's method on g from ``near``; also says which results are local minima within reach of ``near``."""
+        reach = 4 * self._grid.cell
+        s = near.copy()
+        for _ in range(_NEWTON_STEPS):
+            slope, curvature, gradient = self._slope(s, x)
+            step = -slope / np.where(curvature > 0.1 * gradient, curvature, gradient)
+            s, previous = self._inside(s + np.clip(step, -reach, reach)), s
+            if (np.abs(s - previous) <= 1e-14 * (1 + np.abs(s))).all():
+                break
+        slope, curvature, gradient = self._slope(s, x)
+        at_end = ~np.array(self.closed) & ((s <= self.lower) & (slope > 0) | (s >= self.upper) & (slope < 0))
+        stationary = np.abs(slope) <= 1e-9 * gradient * (1 + np.abs(s))
+        return s, (stationary & (curvature > 0) | at_end) & (np.abs(s - near) <= reach)
+
+    def _slope(self, s: Array, x: Array) -> tuple[Array, Array, Array]:
+        """g = (p − x)ᵀp', its derivative ‖p'‖² + (p − x)ᵀp'', and ‖p'‖²."""
+        difference, dp = self.curve.p(s) - x, self.curve.dp(s)
+        gradient = (dp * dp).sum(-1)
+        return (difference * dp).sum(-1), gradient + (difference * self.curve.ddp(s)).sum(-1), gradient
+
+    def _inside(self, s: Array) -> Array:
+        return s if self.closed else np.clip(s, self.lower, self.upper)
+
+    # --- the global search ----------------------------------------------------------------------------------
+
+    @cached_property
+    def _grid(self) -> _Grid:
+        cells = 64
+        while True:
+            grid = _Grid.sample(self.curve, np.linspace(self.lower, self.upper, cells + 1))
+            if grid.turn <= _MAX_TURN or cells >= _MAX_CELLS:
+                return grid
+            cells *= 2
+
+    def _search(self, x: Array) -> Array:
+        grid = self._grid
+        distance = np.sqrt(np.maximum(_squared_distances(x, grid.p), 0.0))
+        row, node = np.nonzero(self._candidates(distance))
+        refined = self._refine(x, row, node)
+        exact = np.linalg.norm(self.curve.p(refined) - x[row], axis=-1)
+        # rows are sorted: the best of each row's candidates comes first after this
+        order = np.lexsort((exact, row))
+        _, first = np.unique(row[order], return_index=True)
+        return refined[order[first]]
+
+    def _candidates(self, distance: Array) -> Array:
+        """Grid points that are nearer than their neighbours and may be next to the global minimum."""
+        before, after = np.roll(distance, 1, axis=1), np.roll(distance, -1, axis=1)
+        if self.closed:  # first and last grid point are the same point
+            before[:, 0], after[:, -1] = distance[:, -2], np.inf
+        else:
+            before[:, 0], after[:, -1] = np.inf, np.inf
+        slack = self._grid.longest * (1 + 1e-6) + 1e-7 * (1 + distance.min(1, keepdims=True))
+        near_enough = distance <= distance.min(1, keepdims=True) + slack
+        return (distance <= before) & (distance <= after) & near_enough
+
+    def _refine(self, x: Array, row: Array, node: Array) -> Array:
+        """Root of g beside each candidate grid point; the grid point itself where g does not change sign."""
+        s = self._grid.s
+        step = s[1] - s[0]
+        here = self._gradient(s[node], x[row])
+        lower = np.where(here > 0, s[node] - step, s[node])
+        upper = np.where(here > 0, s[node], s[node] + step)
+        lower, upper = self._inside(lower), self._inside(upper)
+        bracketed = self._gradient(lower, x[row]) * self._gradient(upper, x[row]) < 0
+        refined = s[node].copy()
+        if bracketed.any():
+            keep = row[bracketed]
+            found = find_root(lambda t, r: self._gradient(t, x[r]), (lower[bracketed], upper[bracketed]), args=(keep,))
+            refined[bracketed] = found.x
+        return refined
+
+    def _gradient(self, s: Array, x: Array) -> Array:
+        return ((self.curve.p(s) - x) * self.curve.dp(s)).sum(-1)
+
+
+class _Grid(NamedTuple):
+    """Samples of a curve, with what is needed to bound distances between them."""
+
+    s: Array
+    p: Array
+    longest: float  # the longest cell [same unit as p]
+    turn: float  # the largest angle between neighbouring tangents [rad]
+    cell: float  # the spacing in s
+
+    @classmethod
+    def sample(cls, curve: Curve, s: Array) -> _Grid:
+        p, dp = curve.p(s), curve.dp(s)
+        speed = np.linalg.norm(dp, axis=-1, keepdims=True)
+        tangent = dp / np.maximum(speed, np.finfo(float).tiny)
+        chord = np.linalg.norm(np.diff(tangent, axis=0), axis=-1)
+        turn = float(2 * np.arcsin(np.minimum(chord / 2, 1.0)).max())
+        cell = float(s[1] - s[0])
+        longest = max(float(np.linalg.norm(np.diff(p, axis=0), axis=-1).max()), float(speed.max()) * cell)
+        return cls(s, p, longest, turn, cell)
+
+
+def _squared_distances(x: Array, p: Array) -> Array:
+    """‖x_i − p_j‖², (N, K), by one matrix product; accurate enough to choose brackets."""
+    return (x * x).sum(-1)[:, None] - 2 * x @ p.T + (p * p).sum(-1)

@@ -1,0 +1,234 @@
+"""Curves in joint space, taken at a constant path speed ‖q̇‖ unless given another profile."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol.errors import InputError
+from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.profile import ConstantSpeed
+
+
+class JointCurve(PathTask):
+    """A curve given by closed forms of q_d, q_d' and q_d'', at the path speed ``speed`` = ‖q_d'‖ϑ [rad/s]."""
+
+    def __init__(self, speed: float) -> None:
+        self.speed = scalar("speed", speed, positive=True)
+
+    @abstractmethod
+    def dq_d(self, s: Array) -> Array:
+        """q_d'(s), (*batch, n)."""
+
+    @abstractmethod
+    def ddq_d(self, s: Array) -> Array:
+        """q_d''(s), (*batch, n)."""
+
+    def theta(self, s: Array) -> Array:
+        return ConstantSpeed(self.speed).theta(self, s)
+
+    def dtheta(self, s: Array) -> Array:
+        return ConstantSpeed(self.speed).dtheta(self, s)
+
+    def at(self, s: Array) -> PathPoint:
+        dq_d, ddq_d = self.dq_d(s), self.ddq_d(s)
+        theta = self.speed / np.sqrt((dq_d * dq_d).sum(-1))
+        dtheta = -theta * (theta / self.speed) ** 2 * (dq_d * ddq_d).sum(-1)
+        return PathPoint(self.q_d(s), dq_d, ddq_d, theta, dtheta)
+
+
+class Ellipse(JointCurve):
+    """An ellipse drawn by two joints, the others holding still.
+
+    q_d(s) = c + (a cos s) e_i ± (b sin s) e_j,  s ∈ [s0, ∞), period 2π.
+
+    Args:
+        semi_axes: (a, b) [rad] along the two joints.
+        speed: path speed ‖q̇‖ [rad/s].
+        center: posture c [rad], shape (n,); by default the origin of a 2-joint arm.
+        joints: indices (i, j) of the two joints.
+        clockwise: the sense of rotation in the plane of (q_i, q_j).
+    """
+
+    period = 2 * np.pi
+
+    def __init__(
+        self,
+        semi_axes: Sequence[float],
+        speed: float,
+        center: ArrayLike = (0.0, 0.0),
+        joints: Sequence[int] = (0, 1),
+        clockwise: bool = False,
+    ) -> None:
+        super().__init__(speed)
+        axes = finite("semi_axes", as_array("semi_axes", semi_axes))
+        if axes.shape != (2,) or (axes <= 0).any():
+            raise InputError(f"semi_axes = {semi_axes!r}, expected two lengths greater than 0")
+        self.semi_axes = readonly(axes)
+        self.center = readonly(finite("center", np.atleast_1d(as_array("center", center))))
+        self.joints = _two_joints(joints, len(self.center))
+        self.clockwise = bool(clockwise)
+        self._cosine, self._sine = np.zeros((2, len(self.center)))
+        self._cosine[self.joints[0]] = axes[0]
+        self._sine[self.joints[1]] = -axes[1] if clockwise else axes[1]
+
+    def q_d(self, s: Array) -> Array:
+        return self.center - self.ddq_d(s)
+
+    def dq_d(self, s: Array) -> Array:
+        s = np.asarray(s)[..., None]
+        return self._sine * np.cos(s) - self._cosine * np.sin(s)
+
+    def ddq_d(self, s: Array) -> Array:
+        s = np.asarray(s)[..., None]
+        return -self._cosine * np.cos(s) - self._sine * np.sin(s)
+
+
+class Circle(Ellipse):
+    """The paper's task, eqs. (9) and (10): a circle of radius r₀ [rad] at the path speed v₀ [rad/s].
+
+    q_d(s) = c + r₀ (cos s e_i ± sin s e_j),  ϑ = v₀/r₀,  σ̄(q) = atan2(±(q_j − c_j), q_i − c_i).
+
+    The projection is (30) with the two-argument arctangent, defined everywhere but at the centre.
+
+    Args:
+        radius: r₀ [rad].
+        speed: v₀ [rad/s].
+        center: posture c [rad], shape (n,); by default the origin of a 2-joint arm.
+        joints: indices (i, j) of the joints that draw it.
+        clockwise: the sense of rotation in the plane of (q_i, q_j).
+    """
+
+    def __init__(
+        self,
+        radius: float,
+        speed: float,
+        center: ArrayLike = (0.0, 0.0),
+        joints: Sequence[int] = (0, 1),
+        clockwise: bool = False,
+    ) -> None:
+        self.radius = scalar("radius", radius, positive=True)
+        super().__init__((self.radius, self.radius), speed, center, joints, clockwise)
+
+    def theta(self, s: Array) -> Array:
+        return np.full_like(s, self.speed / self.radius, dtype=np.float64)
+
+    def dtheta(self, s: Array) -> Array:
+        return np.zeros_like(s, dtype=np.float64)
+
+    def at(self, s: Array) -> PathPoint:
+        s = np.asarray(s)
+        cos, sin = np.cos(s)[..., None], np.sin(s)[..., None]
+        outward = self._cosine * cos + self._sine * sin
+        dq_d = self._sine * cos - self._cosine * sin
+        return PathPoint(self.center + outward, dq_d, -outward, self.theta(s), self.dtheta(s))
+
+    def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
+        i, j = self.joints
+        x = as_array("q", q) - self.center
+        angle = np.arctan2(-x[..., j] if self.clockwise else x[..., j], x[..., i])
+        reference = self.s0 + np.pi if near is None else near
+        return angle + self.period * np.round((reference - angle) / self.period)
+
+
+class Lissajous(JointCurve):
+    """Each joint swings at its own frequency: q_{d,i}(s) = c_i + a_i sin(f_i s + φ_i).
+
+    With whole frequencies the path closes after 2π; frequencies (1, 2) draw a figure of eight.
+
+    Args:
+        amplitudes: a [rad], shape (n,).
+        frequencies: f, whole numbers ≥ 0, shape (n,).
+        speed: path speed ‖q̇‖ [rad/s].
+        phases: φ [rad], shape (n,); default 0.
+        center: c [rad], shape (n,); default 0.
+    """
+
+    def __init__(
+        self,
+        amplitudes: ArrayLike,
+        frequencies: ArrayLike,
+        speed: float,
+        phases: ArrayLike = 0.0,
+        center: ArrayLike = 0.0,
+    ) -> None:
+        super().__init__(speed)
+        given = {"amplitudes": amplitudes, "frequencies": frequencies, "phases": phases, "center": center}
+        arrays = [finite(name, np.atleast_1d(as_array(name, value))) for name, value in given.items()]
+        try:
+            arrays = [readonly(a) for a in np.broadcast_arrays(*arrays)]
+        except ValueError as error:
+            shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
+            raise InputError(f"one value per joint is needed of each; got {shapes}") from error
+        self.amplitudes, self.frequencies, self.phases, self.center = arrays
+        whole = self.frequencies == np.round(self.frequencies)
+        if not whole.all() or (self.frequencies < 0).any() or not self.frequencies.any():
+            raise InputError(f"frequencies = {self.frequencies.tolist()}, expected whole numbers ≥ 0, not all 0")
+        self.period = 2 * np.pi / float(np.gcd.reduce(self.frequencies.astype(int)))
+        slowest = np.linalg.norm(self.dq_d(np.linspace(0, self.period, 4097)), axis=-1).min()
+        if slowest < 1e-6 * np.abs(self.amplitudes * self.frequencies).max():
+            raise InputError(
+                f"this Lissajous figure turns back on itself (‖q_d'‖ falls to {slowest:.1e}), so a constant speed is "
+                f"impossible; change phases = {self.phases.tolist()}"
+            )
+
+    def q_d(self, s: Array) -> Array:
+        return self.center + self.amplitudes * np.sin(self._angle(s))
+
+    def dq_d(self, s: Array) -> Array:
+        return self.amplitudes * self.frequencies * np.cos(self._angle(s))
+
+    def ddq_d(self, s: Array) -> Array:
+        return -self.amplitudes * self.frequencies**2 * np.sin(self._angle(s))
+
+    def _angle(self, s: Array) -> Array:
+        return self.frequencies * np.asarray(s)[..., None] + self.phases
+
+
+class Line(JointCurve):
+    """The straight line from ``start`` to ``end`` in joint space, its parameter the arc length.
+
+    q_d(s) = start + s u,  u = (end − start)/‖end − start‖,  s ∈ [0, ‖end − start‖],  ϑ = ``speed``.
+
+    Args:
+        start: first posture [rad], shape (n,).
+        end: last posture [rad], shape (n,).
+        speed: path speed ‖q̇‖ [rad/s].
+    """
+
+    def __init__(self, start: ArrayLike, end: ArrayLike, speed: float) -> None:
+        super().__init__(speed)
+        self.start = readonly(finite("start", np.atleast_1d(as_array("start", start))))
+        self.end = readonly(finite("end", np.atleast_1d(as_array("end", end))))
+        if self.start.shape != self.end.shape or self.start.ndim != 1:
+            raise InputError(f"start has shape {self.start.shape} and end {self.end.shape}, expected the same (n,)")
+        self.s_end = float(np.linalg.norm(self.end - self.start))
+        if self.s_end == 0:
+            raise InputError(f"start and end are the same posture {self.start.tolist()}; a line needs a length")
+        self._direction = (self.end - self.start) / self.s_end
+
+    def q_d(self, s: Array) -> Array:
+        return self.start + np.asarray(s)[..., None] * self._direction
+
+    def dq_d(self, s: Array) -> Array:
+        return np.zeros_like(s, dtype=np.float64)[..., None] + self._direction
+
+    def ddq_d(self, s: Array) -> Array:
+        return np.zeros_like(self.dq_d(s))
+
+    def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
+        return np.clip((as_array("q", q) - self.start) @ self._direction, 0.0, self.s_end)
+
+
+def _two_joints(joints: Sequence[int], n: int) -> tuple[int, int]:
+    try:
+        i, j = (int(k) for k in joints)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"joints = {joints!r}, expected two joint indices such as (0, 1)") from error
+    if i == j or not (0 <= i < n and 0 <= j < n):
+        raise InputError(f"joints = ({i}, {j}), expected two different indices from 0 to {n - 1}: center has {n} joints")
+    return i, j

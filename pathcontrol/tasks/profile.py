@@ -1,0 +1,63 @@
+"""Velocity profiles ϑ(s): how fast a path is taken, kept apart from where it goes."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array, scalar
+
+if TYPE_CHECKING:
+    from pathcontrol.tasks.base import PathTask
+
+
+class VelocityProfile(ABC):
+    """ϑ(s) > 0 for any path; the motion plan (6) is ṡ = ϑ(s)."""
+
+    @abstractmethod
+    def theta(self, path: PathTask, s: Array) -> Array:
+        """ϑ(s) [1/s], (*batch,)."""
+
+    @abstractmethod
+    def dtheta(self, path: PathTask, s: Array) -> Array:
+        """ϑ'(s) [1/s], (*batch,)."""
+
+    def describe(self) -> dict[str, Any]:
+        """Name and parameters, for the record of a run."""
+        return {"profile": type(self).__name__} | asdict(self)  # type: ignore[call-overload]
+
+
+@dataclass(frozen=True)
+class ConstantRate(VelocityProfile):
+    """ϑ(s) = ``rate`` [1/s]: the path parameter grows steadily."""
+
+    rate: float
+
+    def __post_init__(self) -> None:
+        scalar("rate", self.rate, positive=True)
+
+    def theta(self, path: PathTask, s: Array) -> Array:
+        return np.full_like(s, self.rate)
+
+    def dtheta(self, path: PathTask, s: Array) -> Array:
+        return np.zeros_like(s)
+
+
+@dataclass(frozen=True)
+class ConstantSpeed(VelocityProfile):
+    """ϑ(s) = v₀/‖q_d'(s)‖: the joints move at the path speed ‖q̇‖ = ``speed`` [rad/s]."""
+
+    speed: float
+
+    def __post_init__(self) -> None:
+        scalar("speed", self.speed, positive=True)
+
+    def theta(self, path: PathTask, s: Array) -> Array:
+        return self.speed / np.linalg.norm(path.dq_d(s), axis=-1)
+
+    def dtheta(self, path: PathTask, s: Array) -> Array:
+        dq_d = path.dq_d(s)
+        return -self.speed * (dq_d * path.ddq_d(s)).sum(-1) / np.linalg.norm(dq_d, axis=-1) ** 3
