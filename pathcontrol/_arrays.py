@@ -17,7 +17,7 @@ def as_array(name: str, value: ArrayLike) -> Array:
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{name} = {value!r} is not an array of numbers") from error
+        raise InputError(f"{name} = {value!r}, expected numbers") from error
 
 
 def joint_array(name: str, value: ArrayLike, n: int) -> Array:

@@ -80,8 +80,8 @@ class Controller(ABC):
         """State one control ``period`` [s] after z.
 
         With q held, ṡ = f(s) is taken by the exponential Rosenbrock–Euler step s + h φ₁(h f') f, φ₁(x) = (eˣ − 1)/x:
-        second order, exact for linear f, and stable for any gain of the extended motion plan, where k → ∞ makes it
-        Newton's method for (29). (Hochbruck and Ostermann, Acta Numerica 19, 2010.)
+        second order, exact for linear f, and with the arm at rest stable for any gain of the extended motion plan,
+        where k → ∞ makes it Newton's method for (29). (Hochbruck and Ostermann, Acta Numerica 19, 2010.)
         """
         x = np.minimum(period * out.slope, 1.0)
         growth = np.divide(np.expm1(x), x, out=np.ones_like(x), where=np.abs(x) > 1e-12)

@@ -28,7 +28,9 @@ class ExtendedMotionPlan(Controller):
         task: path and velocity profile.
         K_p: position gain [1/s²], scalar or diagonal (n,).
         K_v: velocity gain [1/s], scalar or diagonal (n,).
-        k: gain of the extended motion plan [1/(rad² s)], ≥ 0; a scalar or (*batch,).
+        k: gain of the extended motion plan [1/(rad² s)], ≥ 0; a scalar or (*batch,). In a sampled loop keep
+            k‖q_d'‖² times the period well below 1: σ lags the arm by a period, and r'σ̇ magnifies that by k. For
+            more, take its limit, :class:`Projection`.
         options: ``friction`` and ``start`` of :class:`Controller`.
     """
 

@@ -43,7 +43,7 @@ class Plant:
         plus, minus = self.robot.friction.levels(qd)
         friction = np.where(qd > 0, plus, np.where(qd < 0, -minus, 0.0))
         v = start + duration * self._inertia.forward_dynamics(q, qd, drive - friction)
-        settled = (v * qd > 0) | (plus + minus == 0)
+        settled = (v > 0) & (qd > 0) | (v < 0) & (qd < 0) | (plus + minus == 0)
         if settled.all():
             return v
         rows = ~settled.all(-1)

@@ -74,7 +74,8 @@ def run_sampled(
     sensors, actuator, recorder = loop.sensors(plant_robot), Actuator(loop, plant_robot, q.shape), Recorder(ticks + 1)
     plants = [Plant(plant_robot, part / loop.substeps) for part in actuator.parts]
     reading, z = sensors.start(q, qd), controller.start(q, qd)
-    with progress_bar("simulating", ticks, progress) as update:
+    # a rollout that diverges overflows first; that is looked for below
+    with progress_bar("simulating", ticks, progress) as update, np.errstate(over="ignore", invalid="ignore"):
         for tick in range(ticks + 1):
             reading = sensors.read(q, qd, reading)
             out = controller.law(tick * loop.period, reading.q, reading.qd, z)

@@ -25,11 +25,11 @@ _NEWTON_STEPS = 12
 
 
 class Curve(NamedTuple):
-    """A curve p(s) in R^m with its first two derivatives; each maps (*batch,) to (*batch, m)."""
+    """A curve p(s) in R^m with its derivatives; each maps (*batch,) to (*batch, m). p'' serves the local search."""
 
     p: Callable[[Array], Array]
     dp: Callable[[Array], Array]
-    ddp: Callable[[Array], Array]
+    ddp: Callable[[Array], Array] | None = None
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class ClosestPoint:
         rows = max(1, _CHUNK // len(self._grid.s))
         parts = [self._search(x[i : i + rows]) for i in range(0, len(x), rows)]
         s = np.concatenate(parts) if parts else np.empty(0)
-        return np.where(s >= self.upper, self.lower, s) if self.closed else s
+        return self.lower + np.mod(s - self.lower, self.upper - self.lower) if self.closed else s
 
     def along(self, x: Array, near: Array) -> Array:
         """Local minimum reached from ``near`` (N,) by Newton's method; the global one where there is none close by."""
@@ -94,7 +94,9 @@ class ClosestPoint:
         """g = (p − x)ᵀp', its derivative ‖p'‖² + (p − x)ᵀp'', and ‖p'‖²."""
         difference, dp = self.curve.p(s) - x, self.curve.dp(s)
         gradient = (dp * dp).sum(-1)
-        return (difference * dp).sum(-1), gradient + (difference * self.curve.ddp(s)).sum(-1), gradient
+        # without p'' this is the Gauss–Newton method
+        bend = 0.0 if self.curve.ddp is None else (difference * self.curve.ddp(s)).sum(-1)
+        return (difference * dp).sum(-1), gradient + bend, gradient
 
     def _inside(self, s: Array) -> Array:
         return s if self.closed else np.clip(s, self.lower, self.upper)

@@ -50,7 +50,8 @@ class Differentiator:
 def _weights(u: Array, order: int) -> Array:
     """Weights of the samples for the derivative at u in [-1, 1]."""
     derivative = _DERIVATIVES[order]
-    return chebyshev.chebvander(u, len(derivative) - 1) @ derivative @ _TO_COEFFICIENTS
+    basis = chebyshev.chebvander(u, len(derivative) - 1).reshape(*np.shape(u), -1)
+    return basis @ (derivative @ _TO_COEFFICIENTS)
 
 
 def best_width(function: Callable[[Array], Array], lower: float, upper: float, samples: int = 33) -> float:

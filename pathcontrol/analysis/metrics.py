@@ -1,0 +1,74 @@
+"""Numbers that sum up a run: errors in steady state, along and across the path, and when they settled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array, scalar
+from pathcontrol.analysis.gamma import distance_to_gamma
+from pathcontrol.errors import InputError, TaskError
+from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.base import PathTask
+
+
+def steady_state(run: Run, fraction: float = 0.5) -> Run:
+    """The last ``fraction`` of a run; the paper's peaks are those of the second half."""
+    fraction = scalar("fraction", fraction, positive=True)
+    if fraction > 1:
+        raise InputError(f"fraction = {fraction:g}, expected a number from 0 to 1")
+    return Run(run.data.sel(time=run.time >= (1 - fraction) * run.time[-1]), run.config)
+
+
+def peak(values: Array) -> Array:
+    """The largest value over time, (rollout,) of (rollout, time)."""
+    return values.max(-1)
+
+
+def rms(values: Array) -> Array:
+    """The root mean square over time, (rollout,) of (rollout, time)."""
+    return np.sqrt((values**2).mean(-1))
+
+
+def contour_error(run: Run, task: PathTask) -> Array:
+    """‖q_d(σ̄(q)) − q‖ [rad], (rollout, time): distance from the path itself, whatever s the controller was at."""
+    q = run.array("q")
+    return np.linalg.norm(task.q_d(task.sigma_bar(q)) - q, axis=-1)
+
+
+def lag_error(run: Run, task: PathTask) -> Array:
+    """Component of q_d(s) − q along the path [rad], (rollout, time): positive where the arm is behind s."""
+    s = run.array("s")
+    tangent = task.dq_d(s)
+    along = ((task.q_d(s) - run.array("q")) * tangent).sum(-1)
+    return along / np.linalg.norm(tangent, axis=-1)
+
+
+def settling_time(values: Array, time: Array, band: float) -> Array:
+    """The time [s] from which ``values`` (rollout, time) stay within ``band``, (rollout,); inf where they never do."""
+    outside = np.abs(values) > scalar("band", band, positive=True)
+    last = values.shape[-1] - 1 - np.argmax(outside[:, ::-1], axis=-1)
+    after = np.append(time, np.inf)[last + 1]
+    return np.where(outside.any(-1), after, time[0])
+
+
+def metrics(run: Run, task: PathTask, fraction: float = 0.5, band: float = np.deg2rad(2.0)) -> dict[str, Any]:
+    """The usual numbers of a run, each a list with one entry for each rollout.
+
+    Peaks and RMS of ‖e_p‖ [rad], ‖e_v‖ [rad/s], contour and lag error [rad] and distance to Γ over the last
+    ``fraction`` of the time; settling time [s] of ‖e_p‖ into ``band`` [rad]; largest torque demand [N m].
+    Contour error and distance to Γ are left out for paths that neither end nor repeat.
+    """
+    late = steady_state(run, fraction)
+    signals = {"e_p": late.norm("e_p"), "e_v": late.norm("e_v"), "lag_error": np.abs(lag_error(late, task))}
+    try:
+        signals["contour_error"] = contour_error(late, task)
+        signals["gamma_distance"] = np.asarray(distance_to_gamma(task, late.array("q"), late.array("qd")))
+    except TaskError:
+        pass  # no nearest point on an endless path
+    values = {f"{name}_peak": peak(v) for name, v in signals.items()}
+    values |= {f"{name}_rms": rms(v) for name, v in signals.items()}
+    values["settling_time"] = settling_time(run.norm("e_p"), run.time, band)
+    values["tau_demand_peak"] = np.abs(run.array("tau_demand")).max((1, 2))
+    return {name: value.tolist() for name, value in values.items()}

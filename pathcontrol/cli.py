@@ -1,0 +1,119 @@
+"""The command line: a thin layer over the library. Heavy imports wait until a command needs them."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from pathcontrol.errors import PathControlError
+
+
+class _Group(click.Group):
+    """Turns the library's errors into one message and exit code 2, and Ctrl-C into exit code 130."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except PathControlError as error:
+            click.echo(f"error: {error}", err=True)
+            sys.exit(2)
+        except KeyboardInterrupt:
+            click.echo("interrupted; no half-written file is left behind", err=True)
+            sys.exit(130)
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, nothing else.")
+
+
+@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="pathcontrol")
+def main() -> None:
+    """Path control of robot arms: tasks as a path and a velocity profile, not as a schedule."""
+
+
+@main.command()
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=Path("results"), show_default=True)
+@json_option
+def reproduce(out: Path, as_json: bool) -> None:
+    """Run the paper's two experiments on the bundled arm."""
+    from pathcontrol.experiments.reproduce import reproduce as run_both
+
+    summary = run_both(out)
+    if as_json:
+        click.echo(json.dumps(summary))
+        return
+    from rich.console import Console
+
+    console = Console()
+    console.print(_peaks_table(summary))
+    console.print(f"Figures 7 to 10, data, animations and summary.json are in {out}/ ({summary['seconds']} s).")
+
+
+@main.command()
+@click.argument("file", type=click.Path(exists=False, path_type=Path), required=False)
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=Path("results"), show_default=True)
+@click.option("--example", is_flag=True, help="Print a commented experiment file and stop.")
+@json_option
+def run(file: Path | None, out: Path, example: bool, as_json: bool) -> None:
+    """Run the experiment that FILE.toml describes."""
+    if example:
+        from pathcontrol.experiments.template import example_text
+
+        click.echo(example_text(), nl=False)
+        return
+    if file is None:
+        raise click.UsageError("give an experiment file; --example prints one to start from")
+    from pathcontrol.experiments.runner import run_experiment
+
+    result, written = run_experiment(file, out)
+    report = {
+        "run": repr(result),
+        "written": {name: str(path) for name, path in written.items()},
+    }
+    if as_json:
+        click.echo(json.dumps(report))
+        return
+    click.echo(report["run"])
+    for name, path in written.items():
+        click.echo(f"  {name}: {path}")
+
+
+@main.command()
+@click.argument("file")
+@json_option
+def check(file: str, as_json: bool) -> None:
+    """Report what is wrong or odd in a URDF: a FILE.urdf, or the name of a known robot. Exits with 1 on errors."""
+    from pathcontrol.robot.loading import find_urdf
+    from pathcontrol.robot.urdf_check import check_urdf
+
+    urdf = find_urdf(file)
+    report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs)
+    if as_json:
+        click.echo(json.dumps(report.as_dict()))
+    else:
+        click.echo(f"{report.name or file}: {len(report.links)} links, {len(report.joints)} movable joints")
+        for finding in report.findings:
+            click.echo(f"  {finding}")
+        click.echo("usable" if report.ok else "not usable")
+    sys.exit(0 if report.ok else 1)
+
+
+
+def _peaks_table(summary: dict[str, Any]) -> Any:
+    """Steady-state peaks, measured beside the paper's."""
+    from rich.table import Table
+
+    table = Table(title="Steady-state peaks: measured here, and in the paper")
+    for column in ("experiment", "‖e_p‖ [deg]", "paper", "", "‖e_v‖ [deg/s]", "paper", ""):
+        table.add_column(column, justify="left" if column == "experiment" else "right")
+    for name in ("extended_motion_plan", "projection"):
+        measured, paper = summary[name], summary[name]["paper"]
+        row = [name.replace("_", " ")]
+        for key in ("e_p_peak_deg", "e_v_peak_deg_s"):
+            row += [f"{measured[key]:.2f}", f"{paper[key]:.1f}", f"{100 * (measured[key] / paper[key] - 1):+.1f} %"]
+        table.add_row(*row)
+    return table

@@ -1,0 +1,117 @@
+"""The paper's two experiments on the bundled arm, section 5, with the published parameters and nothing tuned."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._files import whole_file
+from pathcontrol._progress import progress_bar
+from pathcontrol.analysis.metrics import peak, steady_state
+from pathcontrol.control.base import Controller
+from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
+from pathcontrol.control.projection import Projection
+from pathcontrol.robot.loading import load_robot
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.modes import SampledLoop
+from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.simulate import simulate
+from pathcontrol.tasks.curves import Circle
+
+RADIUS_DEG, SPEED_DEG_S = 57.3, 114.59
+K_P, K_V, K = 800.0, (45.0, 100.0), 20.0
+START_DEG = (40.0, 70.0)
+PERIOD, DURATION = 2.5e-3, 10.0
+
+#: the paper's steady-state peaks and the numbers of its figures
+PAPER: dict[str, dict[str, float]] = {
+    "extended_motion_plan": {"e_p_peak_deg": 1.5, "e_v_peak_deg_s": 14.5},
+    "projection": {"e_p_peak_deg": 1.4, "e_v_peak_deg_s": 17.2},
+}
+FIGURES = {"extended_motion_plan": ("figure_07", "figure_08"), "projection": ("figure_09", "figure_10")}
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One of the two experiments: its run, and the steady-state peaks as the paper gives them."""
+
+    name: str
+    controller: Controller
+    run: Run
+
+    @property
+    def peaks(self) -> dict[str, float]:
+        """Peaks of ‖e_p‖ [deg] and ‖e_v‖ [deg/s] over the second half, from what the controller measures."""
+        late = steady_state(self.run)
+        return {
+            "e_p_peak_deg": float(np.rad2deg(peak(late.norm("e_p"))[0])),
+            "e_v_peak_deg_s": float(np.rad2deg(peak(late.norm("e_v"))[0])),
+        }
+
+
+def paper_task() -> Circle:
+    """The circle of (9) and (10): r₀ = 57.3 deg, v₀ = 114.59 deg/s, about the origin of joint space."""
+    return Circle(np.deg2rad(RADIUS_DEG), np.deg2rad(SPEED_DEG_S))
+
+
+def paper_loop() -> SampledLoop:
+    """The control computer of the arm: 2.5 ms, encoders, velocity by differentiation, torque limits."""
+    return SampledLoop(period=PERIOD, encoders=True, velocity="difference", torque_limits=True)
+
+
+def paper_controllers(robot: RobotModel) -> dict[str, Controller]:
+    """Both path controllers with the published gains; viscous friction compensated, Coulomb friction not."""
+    task = paper_task()
+    return {
+        "extended_motion_plan": ExtendedMotionPlan(robot, task, K_P, K_V, K),
+        "projection": Projection(robot, task, K_P, K_V),
+    }
+
+
+def run_experiments(robot: RobotModel | None = None) -> dict[str, Experiment]:
+    """Run both experiments."""
+    robot = load_robot("cicese_2dof") if robot is None else robot
+    start = np.deg2rad(START_DEG)
+    return {
+        name: Experiment(name, controller, simulate(controller, start, duration=DURATION, loop=paper_loop()))
+        for name, controller in paper_controllers(robot).items()
+    }
+
+
+def reproduce(out: str | Path) -> dict[str, Any]:
+    """Run both experiments and write data, figures, animations and ``summary.json`` to the folder ``out``.
+
+    Returns:
+        What ``summary.json`` holds.
+    """
+    from pathcontrol.view.figures import error_figure, path_figure, save_figure
+    from pathcontrol.view.recorder import record
+
+    began, out, robot = time.perf_counter(), Path(out), load_robot("cicese_2dof")
+    with progress_bar("reproducing", 8) as update:
+        experiments = run_experiments(robot)
+        for i, (name, experiment) in enumerate(experiments.items()):
+            update(2 + 3 * i)
+            run, task = experiment.run, experiment.controller.task
+            run.save(out / f"{name}.nc")
+            path_name, error_name = FIGURES[name]
+            save_figure(path_figure(run, task), out / path_name)
+            save_figure(error_figure(run), out / error_name)
+            record(run, robot, task=task).save(out / f"{name}.html")
+    summary = summarise(experiments) | {"seconds": round(time.perf_counter() - began, 2)}
+    with whole_file(out / "summary.json") as temporary:
+        temporary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    return summary
+
+
+def summarise(experiments: dict[str, Experiment]) -> dict[str, Any]:
+    """Measured peaks beside the paper's, the versions and the settings."""
+    peaks = {name: experiment.peaks | {"paper": PAPER[name]} for name, experiment in experiments.items()}
+    configs = {name: dict(experiment.run.config) for name, experiment in experiments.items()}
+    versions = [config.pop("versions") for config in configs.values()][0]
+    return peaks | {"versions": versions, "settings": configs}

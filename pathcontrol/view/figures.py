@@ -1,0 +1,149 @@
+"""The paper's figures for any run: the path in joint space, and the error norms over time.
+
+Degrees here only, where a person reads. One style for all; SVG and PNG, written whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pathcontrol._files import whole_file
+from pathcontrol.errors import TaskError
+from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.base import PathTask
+
+# Okabe and Ito's colours, told apart with any colour vision
+BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#8A8A8A"
+
+_STYLE = {
+    "font.size": 9.0,
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "grid.color": "#E3E3E3",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.1,
+    "legend.frameon": False,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "pathcontrol",
+    "savefig.dpi": 300,
+}
+
+
+def path_figure(
+    run: Run, task: PathTask | None = None, joints: tuple[int, int] = (0, 1), rollout: int = 0
+) -> Figure:
+    """q_j over q_i [deg], as in the paper's figures 7 and 9, over the desired path."""
+    i, j = joints
+    names = [str(name) for name in run["joint"].to_numpy()]
+    with _style():
+        figure = Figure(figsize=(3.5, 3.5), layout="constrained")
+        axes = figure.add_subplot(aspect="equal")
+        desired = _desired_path(task)
+        if desired is not None:
+            axes.plot(desired[:, i], desired[:, j], color=GREY, linewidth=2.4, label="desired path")
+        q = np.rad2deg(run.array("q")[rollout])
+        axes.plot(q[:, i], q[:, j], color=BLUE, label="arm")
+        axes.plot(q[0, i], q[0, j], "o", color=ORANGE, markersize=5, label="start")
+        axes.set(xlabel=f"{_symbol(i, names)} [deg]", ylabel=f"{_symbol(j, names)} [deg]")
+        axes.legend(
+            loc="upper center", bbox_to_anchor=(0.5, 1.14), ncols=3, handlelength=1.4, columnspacing=1.2
+        )
+    return figure
+
+
+def error_figure(run: Run, rollout: int = 0) -> Figure:
+    """‖e_p‖ [deg] and ‖e_v‖ [deg/s] over time, as in the paper's figures 8 and 10, with the steady-state peaks."""
+    with _style():
+        figure = Figure(figsize=(3.5, 4.2), layout="constrained")
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        _norm(upper, run, "e_p", rollout, r"$\|\mathbf{e}_p\|$ [deg]", "deg")
+        _norm(lower, run, "e_v", rollout, r"$\|\mathbf{e}_v\|$ [deg/s]", "deg/s")
+        lower.set(xlabel="time [s]", xlim=(0, run.time[-1]))
+    return figure
+
+
+def torque_figure(run: Run, limits: np.ndarray | None = None, rollout: int = 0) -> Figure:
+    """Applied torques [N m] over time, one panel for each joint, beside their limits (n,) where given."""
+    names = [str(name) for name in run["joint"].to_numpy()]
+    tau = run.array("tau")[rollout]
+    with _style():
+        figure = Figure(figsize=(3.5, 1.2 + 1.1 * len(names)), layout="constrained")
+        panels = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
+        for k, axes in enumerate(panels):
+            axes.plot(run.time, tau[:, k], color=BLUE)
+            axes.set_ylabel(rf"$\tau_{{{k + 1}}}$ [N m]")
+            if limits is not None and np.isfinite(limits[k]):
+                axes.axhline(limits[k], color=ORANGE, linewidth=0.8)
+                axes.axhline(-limits[k], color=ORANGE, linewidth=0.8)
+        panels[-1].set(xlabel="time [s]", xlim=(0, run.time[-1]))
+    return figure
+
+
+def save_figure(figure: Figure, path: str | Path) -> list[Path]:
+    """Write ``path`` with the suffixes .svg and .png; returns both paths."""
+    stem = Path(path)
+    stem = stem.with_suffix("") if stem.suffix in (".svg", ".png") else stem
+    written = []
+    with _style():
+        for suffix in (".svg", ".png"):
+            target = stem.with_name(stem.name + suffix)
+            with whole_file(target) as temporary:
+                # no date inside, so that the same run gives the same file
+                figure.savefig(temporary, metadata={"Date": None} if suffix == ".svg" else None)
+            written.append(target)
+    return written
+
+
+def run_figure(run: Run, path: str | Path, task: PathTask | None = None) -> list[Path]:
+    """The path and the error norms of a run, as ``<path>-path`` and ``<path>-errors``."""
+    stem = Path(path).with_suffix("") if Path(path).suffix in (".svg", ".png") else Path(path)
+    figures = {"errors": error_figure(run)}
+    if run.data.sizes["joint"] > 1:
+        figures["path"] = path_figure(run, task)
+    return [p for name, f in figures.items() for p in save_figure(f, stem.with_name(f"{stem.name}-{name}"))]
+
+
+def _norm(axes: Axes, run: Run, name: str, rollout: int, label: str, unit: str) -> None:
+    """One norm over all the time, and magnified in an inset over the second half, with its peak there."""
+    values = np.rad2deg(run.norm(name)[rollout])
+    late = run.time >= 0.5 * run.time[-1]
+    peak = values[late].max()
+    axes.plot(run.time, values, color=BLUE)
+    axes.set(ylabel=label, ylim=(0, 1.05 * values.max()))
+    inset = axes.inset_axes((0.42, 0.36, 0.58, 0.5))
+    inset.plot(run.time[late], values[late], color=BLUE, linewidth=0.9)
+    inset.axhline(peak, color=ORANGE, linewidth=0.9, linestyle=(0, (4, 2)))
+    inset.set_title(f"steady state, peak {peak:.3g} {unit}", fontsize=8, color=ORANGE, loc="right", pad=3)
+    inset.set(ylim=(0, 1.15 * peak), xlim=(run.time[late][0], run.time[-1]))
+    inset.tick_params(labelsize=7)
+
+
+def _desired_path(task: PathTask | None) -> np.ndarray | None:
+    """Samples of the path [deg], (K, n)."""
+    if task is None:
+        return None
+    try:
+        lower, upper = task.one_traverse
+    except TaskError:
+        return None  # an endless path has no whole to draw
+    return np.rad2deg(task.q_d(np.linspace(lower, upper, 721)))
+
+
+def _symbol(index: int, names: list[str]) -> str:
+    return rf"$q_{{{index + 1}}}$" if len(names) <= 2 else rf"$q_{{{index + 1}}}$ ({names[index]})"
+
+
+@contextmanager
+def _style() -> Iterator[None]:
+    with mpl.rc_context(_STYLE):
+        yield

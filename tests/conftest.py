@@ -1,0 +1,34 @@
+"""Shared by all tests: the paper's arm and task, and how hypothesis searches."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, settings
+
+from pathcontrol import Circle, RobotModel, Viscous, load_robot
+
+settings.register_profile(
+    "default", deadline=None, max_examples=50, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("default")
+
+START = np.deg2rad([40.0, 70.0])
+
+
+@pytest.fixture(scope="session")
+def arm() -> RobotModel:
+    """The CICESE arm with all its friction."""
+    return load_robot("cicese_2dof")
+
+
+@pytest.fixture(scope="session")
+def ideal_arm(arm: RobotModel) -> RobotModel:
+    """The same arm with viscous friction only, which the controllers compensate exactly."""
+    return arm.with_friction(Viscous(arm.friction.viscous))
+
+
+@pytest.fixture(scope="session")
+def circle() -> Circle:
+    """The paper's task."""
+    return Circle(np.deg2rad(57.3), np.deg2rad(114.59))

@@ -1,0 +1,273 @@
+"""The sampled loop part by part, the paper's peaks converged in the step, and how fast Γ is reached."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from pathcontrol import (
+    Circle,
+    ComputedTorque,
+    ContinuousTime,
+    ExtendedMotionPlan,
+    InputError,
+    Line,
+    Lissajous,
+    Projection,
+    Run,
+    SampledLoop,
+    SimulationError,
+    distance_to_gamma,
+    simulate,
+)
+from pathcontrol.experiments.reproduce import paper_controllers
+from pathcontrol.simulation.sensors import Sensors
+
+START = np.deg2rad([40.0, 70.0])
+
+
+def paper_law(arm, circle, **options):
+    return ExtendedMotionPlan(arm, circle, 800.0, [45.0, 100.0], 20.0, **options)
+
+
+# --- accuracy -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["extended_motion_plan", "projection"])
+def test_one_step_per_tick_gives_the_converged_peaks(arm, name):
+    law = paper_controllers(arm)[name]
+    peaks = []
+    for substeps in (1, 8):
+        loop = SampledLoop(torque_limits=True, substeps=substeps)
+        run = simulate(law, START, duration=10.0, loop=loop, progress=False)
+        late = run.time >= 5
+        peaks.append([run.norm(error)[0, late].max() for error in ("e_p", "e_v")])
+    assert peaks[0] == pytest.approx(peaks[1], rel=1e-3)
+
+
+@pytest.mark.parametrize("clockwise", [False, True])
+@pytest.mark.parametrize("kind", [ExtendedMotionPlan, Projection])
+def test_gamma_is_reached_exponentially_from_anywhere(ideal_arm, kind, clockwise):
+    """200 random states, turning either way; without Coulomb friction the distance falls like e^{−αt}."""
+    rng = np.random.default_rng(7)
+    task = Circle(1.0, 2.0, clockwise=clockwise)
+    angle, radius = rng.uniform(-np.pi, np.pi, 200), rng.uniform(0.4, 2.0, 200)
+    q = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], -1)
+    qd = rng.uniform(-3, 3, (200, 2))
+    gain = {"k": 20.0} if kind is ExtendedMotionPlan else {}
+    law = kind(ideal_arm, task, 800.0, [45.0, 100.0], **gain)
+    loop = ContinuousTime(output_period=0.05, rtol=1e-11, atol=1e-13)
+    run = simulate(law, q, qd, duration=2.0, loop=loop, progress=False)
+    distance = distance_to_gamma(task, run.array("q"), run.array("qd"))
+    assert (distance[:, -1] < 1e-5 * distance[:, 0]).all()
+    # the slowest pole of s² + 100 s + 800, joint 2 alone, is −8.8; each rollout's log distance falls at half that or faster
+    steady = (run.time >= 0.5) & (run.time <= 1.5)
+    slopes = np.polyfit(run.time[steady], np.log(distance[:, steady]).T, 1)[0]
+    assert (slopes < -4.4).all()
+
+
+def test_rollouts_do_not_know_of_each_other(arm, circle):
+    rng = np.random.default_rng(3)
+    q = rng.normal(size=(5, 2))
+    loop = SampledLoop(encoders=True, velocity="difference", torque_limits=True)
+    law = paper_law(arm, circle)
+    together = simulate(law, q, duration=0.5, loop=loop, progress=False)
+    for i in range(5):
+        alone = simulate(law, q[i], duration=0.5, loop=loop, progress=False)
+        for name in together.data.data_vars:
+            assert np.array_equal(alone.array(name)[0], together.array(name)[i]), name
+
+
+# --- the parts of the loop ----------------------------------------------------------------------------------------
+
+
+def test_torques_stay_within_their_limits(arm, circle):
+    law = paper_law(arm, circle)
+    free = simulate(law, START, duration=0.3, progress=False)
+    for limits in (True, [100.0, 9.0]):
+        run = simulate(law, START, duration=0.3, loop=SampledLoop(torque_limits=limits), progress=False)
+        bound = arm.limits.effort if limits is True else np.array(limits)
+        assert (np.abs(run.array("tau")) <= bound).all()
+        assert (np.abs(run.array("tau")).max((0, 1)) == bound).all()
+        assert (np.abs(run.array("tau_demand")) > bound).any()
+    assert np.array_equal(free.array("tau"), free.array("tau_demand"))
+
+
+def test_encoders_read_whole_counts(arm, circle):
+    counts = np.array([1000.0, 360.0])
+    run = simulate(paper_law(arm, circle), START, duration=0.3, loop=SampledLoop(encoders=counts), progress=False)
+    resolution = 2 * np.pi / counts
+    read = run.array("q_measured") / resolution
+    assert np.allclose(read, np.round(read), atol=1e-9)
+    assert (np.abs(run.array("q_measured") - run.array("q")) <= resolution / 2 * (1 + 1e-9)).all()
+
+
+def test_velocity_by_differentiation(arm, circle):
+    loop = SampledLoop(velocity="difference")
+    run = simulate(paper_law(arm, circle), START, [0.5, -0.2], duration=0.3, loop=loop, progress=False)
+    q, measured = run.array("q")[0], run.array("qd_measured")[0]
+    assert np.allclose(measured[1:], np.diff(q, axis=0) / loop.period, rtol=1e-9, atol=1e-12)
+    assert np.allclose(measured[0], [0.5, -0.2])
+
+
+def test_the_velocity_filter_is_a_first_order_lag():
+    """A step of velocity comes through as 1 − e^{−ωt}, at any sampling period."""
+    for period in (1e-3, 1e-2):
+        sensors = Sensors(period, None, False, 5.0)
+        reading = sensors.start(np.zeros((1, 1)), np.zeros((1, 1)))
+        for tick in range(1, 30):
+            reading = sensors.read(np.zeros((1, 1)), np.ones((1, 1)), reading)
+            assert reading.qd[0, 0] == pytest.approx(1 - np.exp(-2 * np.pi * 5.0 * tick * period))
+
+
+@pytest.mark.parametrize("delay", [1e-3, 2.5e-3, 6e-3])
+def test_the_delay_moves_the_torque_in_time(arm, delay):
+    """The arm hangs at rest: nothing acts before the delay is over, and then what was computed at t = 0."""
+    task = Line([0.0, 0.0], [1.0, 1.0], 1.0)
+    law = ComputedTorque(arm.with_friction(None), task, 50.0, 20.0)
+    loop, late = SampledLoop(), SampledLoop(delay=delay)
+    prompt = simulate(law, [0.0, 0.0], duration=0.05, loop=loop, progress=False)
+    run = simulate(law, [0.0, 0.0], duration=0.05, loop=late, progress=False)
+    still = run.time <= delay
+    assert not run.array("q")[0, still].any()
+    assert run.array("q")[0, ~still].all(-1).any()
+    # while nothing has moved the demand is the same, so the first motion is the prompt one, later
+    whole, part = divmod(delay, loop.period)
+    first = int(whole) + 1
+    expected = prompt.array("qd")[0, 1] * (1 - part / loop.period)
+    assert np.allclose(run.array("qd")[0, first], expected, rtol=2e-3)
+
+
+def test_a_delay_too_long_destabilises_and_the_error_says_when(arm, circle):
+    law = paper_law(arm.with_friction(None), circle)
+    with pytest.raises(SimulationError, match=r"rollout 0 diverged before t = .* s"):
+        simulate(law, START, duration=20.0, loop=SampledLoop(delay=0.05), progress=False)
+
+
+def test_an_open_path_ends_at_rest_on_its_last_point(ideal_arm):
+    task = Line([0.2, -0.3], [0.9, 0.6], 1.0)
+    for law in (
+        ComputedTorque(ideal_arm, task, 400.0, 40.0),
+        ExtendedMotionPlan(ideal_arm, task, 400.0, 40.0, 20.0),
+        Projection(ideal_arm, task, 400.0, 40.0),
+    ):
+        run = simulate(law, [0.0, -0.5], duration=4.0, progress=False)
+        assert np.abs(run.array("q")[0, -1] - task.end).max() < 1e-3
+        assert np.abs(run.array("qd")[0, -1]).max() < 1e-3
+        s = run.array("s")[0]
+        assert task.s0 <= s.min() <= s.max() <= task.s_end
+
+
+def test_a_figure_of_eight_is_followed_branch_by_branch(arm):
+    task = Lissajous([0.8, 0.8], [1, 2], 1.0)
+    law = Projection(arm, task, 800.0, [45.0, 100.0])
+    run = simulate(law, task.q_d(0.3), duration=12.0, loop=SampledLoop(velocity="difference"), progress=False)
+    s = run.array("s")[0]
+    assert s[-1] > s[0] + task.period
+    assert np.abs(np.diff(s)).max() < 0.05  # never jumps at the crossing
+    assert run.norm("e_p")[0, run.time > 2].max() < np.deg2rad(4)
+
+
+# --- what comes out -----------------------------------------------------------------------------------------------
+
+
+def test_a_run_is_labelled(arm, circle):
+    run = simulate(paper_law(arm, circle), [START, START + 0.1, START - 0.1], duration=0.1, progress=False)
+    assert dict(run.data.sizes) == {"rollout": 3, "time": 41, "joint": 2}
+    assert run["q"].dims == ("rollout", "time", "joint")
+    assert list(run["joint"].to_numpy()) == ["joint_1", "joint_2"]
+    assert run["tau"].attrs["units"] == "N m"
+    assert run["time"].attrs["units"] == "s"
+    assert run.time[-1] == pytest.approx(0.1)
+    assert run.config["controller"]["k"] == 20.0
+    assert run.config["controller"]["task"]["radius"] == circle.radius
+    assert run.config["plant"]["friction"]["law"] == "FrictionSum"
+    assert np.array_equal(run.rollout(1).array("q")[0], run.array("q")[1])
+
+
+def test_a_run_survives_the_disk(arm, circle, tmp_path):
+    run = simulate(paper_law(arm, circle), START, duration=0.1, progress=False)
+    path = run.save(tmp_path / "deep" / "run.nc")
+    again = Run.load(path)
+    assert again.data.identical(run.data)
+    assert again.config == json.loads(json.dumps(run.config))
+    assert path.read_bytes()[:8] == b"\x89HDF\r\n\x1a\n"  # plain netCDF-4, nothing pickled
+    assert [p.name for p in path.parent.iterdir()] == ["run.nc"]
+
+
+def test_a_file_is_whole_or_not_there(arm, circle, tmp_path, monkeypatch):
+    run = simulate(paper_law(arm, circle), START, duration=0.1, progress=False)
+    path = run.save(tmp_path / "run.nc")
+    before = path.read_bytes()
+
+    def interrupted(self, target, **options):
+        target.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(type(run.data), "to_netcdf", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run.save(path)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["run.nc"]
+
+
+def test_loading_something_else(tmp_path):
+    with pytest.raises(InputError, match="there is no file"):
+        Run.load(tmp_path / "none.nc")
+    (tmp_path / "text.nc").write_text("not a run")
+    with pytest.raises(InputError, match="not a run saved by"):
+        Run.load(tmp_path / "text.nc")
+
+
+# --- bad input ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"q": [0.0, 0.0, 0.0]}, ["q has shape (3,)", "2 joints"]),
+        ({"q": [0.0, np.nan]}, ["q[1] is nan"]),
+        ({"qd": [[1.0, 2.0, 3.0]]}, ["qd has shape (1, 3)"]),
+        ({"q": np.zeros((3, 2)), "qd": np.zeros((4, 2))}, ["(3, 2)", "(4, 2)"]),
+        ({"duration": 0.0}, ["duration = 0"]),
+        ({"duration": np.inf}, ["duration = inf"]),
+    ],
+)
+def test_bad_calls(arm, circle, change, words):
+    arguments = {"q": START, "duration": 1.0} | change
+    with pytest.raises(InputError) as error:
+        simulate(paper_law(arm, circle), **arguments)
+    assert all(word in str(error.value) for word in words), str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ({"period": 0.0}, "period = 0"),
+        ({"period": float("nan")}, "period"),
+        ({"substeps": 0}, "substeps = 0"),
+        ({"velocity": "guess"}, "'exact' or 'difference'"),
+        ({"filter_hz": -1.0}, "filter_hz = -1"),
+        ({"delay": -1.0}, "delay = -1"),
+    ],
+)
+def test_bad_loops(options, word):
+    with pytest.raises(InputError) as error:
+        SampledLoop(**options)
+    assert word in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ({"encoders": [100.0, 0.0]}, "counts per revolution greater than 0"),
+        ({"encoders": [100.0]}, "one value for each joint"),
+        ({"torque_limits": [10.0, 0.0]}, "torque limit of joint_2 is 0"),
+    ],
+)
+def test_bad_hardware(arm, circle, options, word):
+    with pytest.raises(InputError, match=word):
+        simulate(paper_law(arm, circle), START, duration=0.1, loop=SampledLoop(**options))

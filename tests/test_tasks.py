@@ -1,0 +1,182 @@
+"""Paths, profiles, derivatives that a subclass leaves out, and the check of a task."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pathcontrol import (
+    Circle,
+    ConstantRate,
+    ConstantSpeed,
+    Ellipse,
+    InputError,
+    Line,
+    Lissajous,
+    PathTask,
+    TaskError,
+    check_task,
+)
+from strategies import floats, tasks, vectors, wobbles
+
+S = np.linspace(-4.0, 15.0, 301)
+
+
+@given(wobbles())
+def test_default_derivatives_are_accurate_to_1e8_relative(task):
+    for got, exact in (
+        (task.dq_d(S), task.exact_dq_d(S)),
+        (task.ddq_d(S), task.exact_ddq_d(S)),
+        (task.dtheta(S), task.exact_dtheta(S)),
+    ):
+        assert np.abs(got - exact).max() <= 1e-8 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("frequency", [0.3, 1.0, 12.0])
+def test_default_derivatives_near_the_ends_look_only_inside_the_domain(frequency):
+    seen = []
+
+    class Open(PathTask):
+        s0, s_end = 1.0, 3.0
+
+        def q_d(self, s):
+            seen.append((np.min(s), np.max(s)))
+            return np.stack([np.sin(frequency * s), np.sqrt(s - 0.5)], axis=-1)
+
+        def theta(self, s):
+            return 1 + s
+
+    task, s = Open(), np.linspace(1.0, 3.0, 101)
+    first = np.stack([frequency * np.cos(frequency * s), 0.5 / np.sqrt(s - 0.5)], -1)
+    second = np.stack([-(frequency**2) * np.sin(frequency * s), -0.25 * (s - 0.5) ** -1.5], -1)
+    assert np.abs(task.dq_d(s) - first).max() <= 1e-8 * np.abs(first).max()
+    assert np.abs(task.ddq_d(s) - second).max() <= 1e-8 * np.abs(second).max()
+    assert min(low for low, _ in seen) >= 1.0
+    assert max(high for _, high in seen) <= 3.0
+
+
+@given(tasks())
+def test_derivatives_agree_with_differences(task):
+    s, h = np.linspace(0, 6, 41), 1e-5
+    for f, df in ((task.q_d, task.dq_d), (task.dq_d, task.ddq_d), (task.theta, task.dtheta)):
+        difference = (f(s + h) - f(s - h)) / (2 * h)
+        # second-order differences: the error is h²/6 of a third derivative plus rounding of about 1e-11
+        assert np.allclose(df(s), difference, rtol=1e-6, atol=1e-6 * (1 + np.abs(difference).max()))
+
+
+@given(tasks())
+def test_at_is_what_the_methods_say(task):
+    point = task.at(S)
+    for got, want in zip(point, (task.q_d, task.dq_d, task.ddq_d, task.theta, task.dtheta), strict=True):
+        assert np.allclose(got, want(S), rtol=1e-12, atol=1e-12)
+    assert np.allclose(point.velocity, point.dq_d * point.theta[:, None])
+    assert np.allclose(point.velocity_slope, task.ddq_d(S) * task.theta(S)[:, None] + task.dq_d(S) * task.dtheta(S)[:, None])
+
+
+@given(tasks(), st.sampled_from([(), (3,), (2, 4), (0,)]))
+def test_every_batch_shape(task, shape):
+    s = np.linspace(0, 5, int(np.prod(shape))).reshape(shape)
+    assert task.q_d(s).shape == (*shape, 2)
+    assert all(a.shape == (*shape, 2) for a in task.at(s)[:3])
+    assert all(np.shape(a) == shape for a in task.at(s)[3:])
+    assert task.sigma_bar(task.q_d(s)).shape == shape
+    assert np.allclose(task.q_d(s).reshape(-1, 2), [task.q_d(x) for x in s.ravel()] or np.empty((0, 2)))
+
+
+@given(tasks())
+def test_closed_paths_close(task):
+    s = np.linspace(0, task.period, 17)
+    assert np.allclose(task.q_d(s), task.q_d(s + task.period), atol=1e-12)
+    assert np.allclose(task.theta(s), task.theta(s + task.period), rtol=1e-10)
+
+
+@given(floats(0.2, 2), floats(0.1, 3), st.booleans(), vectors(5, 1.0))
+def test_circle_is_the_papers_and_fits_any_two_joints(radius, speed, clockwise, center):
+    task = Circle(radius, speed, center=center, joints=(3, 1), clockwise=clockwise)
+    sign = -1 if clockwise else 1
+    expected = np.tile(center, (len(S), 1))
+    expected[:, 3] += radius * np.cos(S)
+    expected[:, 1] += sign * radius * np.sin(S)
+    assert np.allclose(task.q_d(S), expected, atol=1e-14)
+    assert np.allclose(task.theta(S), speed / radius)
+    assert np.allclose(np.linalg.norm(task.at(S).velocity, axis=-1), speed)
+
+
+@given(tasks(), floats(0.1, 5.0))
+def test_profiles(task, speed):
+    steady = task.with_profile(ConstantSpeed(speed))
+    assert np.allclose(np.linalg.norm(steady.at(S).velocity, axis=-1), speed, rtol=1e-9)
+    rate = task.with_profile(ConstantRate(speed))
+    assert np.allclose(rate.theta(S), speed)
+    assert not rate.dtheta(S).any()
+    assert np.array_equal(rate.q_d(S), task.q_d(S))
+    assert rate.describe()["profile"] == "ConstantRate"
+
+
+def test_line():
+    task = Line([0.0, 1.0, 2.0], [1.0, 1.0, 0.0], 0.5)
+    s = np.linspace(0, task.s_end, 7)
+    assert np.allclose(task.q_d(task.s_end), [1, 1, 0])
+    assert np.allclose(np.linalg.norm(task.dq_d(s), axis=-1), 1)
+    assert np.allclose(task.theta(s), 0.5)
+    assert task.sigma_bar([-9.0, 0, 9.0]) == 0
+    assert task.sigma_bar([9.0, 0, -9.0]) == task.s_end
+
+
+# --- the check of a task ------------------------------------------------------------------------------------------
+
+
+def broken(**methods):
+    """A circle of which some methods are replaced."""
+    return type("Broken", (Circle,), {"at": PathTask.at} | methods)(1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("task", "words"),
+    [
+        (broken(q_d=lambda self, s: np.array([np.cos(s), np.sin(s)])), ["Broken.q_d", "(2, 129)", "axis=-1"]),
+        (broken(q_d=lambda self, s: np.stack([s, s, s], -1)), ["3 joints", "has 2"]),
+        (broken(q_d=lambda self, s: np.stack([s, s * np.nan], -1)), ["q_d", "nan", "finite"]),
+        (broken(theta=lambda self, s: np.cos(s)), ["theta", "ϑ > 0"]),
+        (broken(theta=lambda self, s: 0.0 * s), ["theta(s=0) = 0", "ϑ > 0"]),
+        (broken(dq_d=lambda self, s: s), ["Broken.dq_d", "shape"]),
+        (broken(period=-1.0), ["period = -1"]),
+        (broken(s0=np.nan), ["s0 = nan"]),
+        (Circle, ["PathTask"]),
+    ],
+)
+def test_a_bad_task_is_found_before_the_run(task, words):
+    with pytest.raises(TaskError) as error:
+        check_task(task, 2)
+    assert all(word in str(error.value) for word in words), str(error.value)
+
+
+def test_a_constant_profile_may_be_a_number():
+    check_task(broken(theta=lambda self, s: 2.0), 2)
+
+
+@pytest.mark.parametrize(
+    ("make", "word"),
+    [
+        (lambda: Circle(-1.0, 1.0), "radius = -1"),
+        (lambda: Circle(1.0, 0.0), "speed = 0"),
+        (lambda: Circle("wide", 1.0), "radius"),
+        (lambda: Circle(1.0, 1.0, joints=(0, 0)), "two different"),
+        (lambda: Circle(1.0, 1.0, joints=(0, 2)), "from 0 to 1"),
+        (lambda: Circle(1.0, 1.0, center=[0.0, np.nan]), "center[1] is nan"),
+        (lambda: Ellipse((1.0, 0.0), 1.0), "semi_axes"),
+        (lambda: Lissajous([1, 1], [1, 1.5], 1.0), "whole numbers"),
+        (lambda: Lissajous([1, 1], [1, 1], 1.0), "turns back"),
+        (lambda: Lissajous([1, 1], [1, 2, 3], 1.0), "one value per joint"),
+        (lambda: Line([0, 0], [0, 0], 1.0), "needs a length"),
+        (lambda: Line([0, 0], [0, 0, 1], 1.0), "same (n,)"),
+        (lambda: ConstantRate(-2.0), "rate = -2"),
+    ],
+)
+def test_bad_arguments(make, word):
+    with pytest.raises(InputError, match="expected|need|turns") as error:
+        make()
+    assert word in str(error.value)
+    assert "\n" not in str(error.value)
