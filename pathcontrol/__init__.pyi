@@ -30,7 +30,7 @@ from .robot.friction import no_friction as no_friction
 from .robot.loading import known_robots as known_robots
 from .robot.loading import load_robot as load_robot
 from .robot.model import RobotModel as RobotModel
-from .robot.urdf_check import check_urdf as check_urdf
+from .robot.urdf import check_urdf as check_urdf
 from .simulation.modes import ContinuousTime as ContinuousTime
 from .simulation.modes import SampledLoop as SampledLoop
 from .simulation.plant import Plant as Plant

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol.errors import InputError
 
-Array = NDArray[np.float64]
+#: an array of floats; shapes are said in docstrings
+Array = NDArray[Any]
 
 
 def as_array(name: str, value: ArrayLike) -> Array:
@@ -22,7 +23,7 @@ def as_array(name: str, value: ArrayLike) -> Array:
 
 def joint_array(name: str, value: ArrayLike, n: int) -> Array:
     """``value`` as an array of shape (*batch, n)."""
-    array = as_array(name, value)
+    array = value if type(value) is np.ndarray and value.dtype == np.float64 else as_array(name, value)
     if array.ndim == 0 or array.shape[-1] != n:
         raise InputError(
             f"{name} has shape {array.shape}, expected (*batch, {n}): one value for each of the {n} joints last"

@@ -88,7 +88,7 @@ def run(file: Path | None, out: Path, example: bool, as_json: bool) -> None:
 def check(file: str, as_json: bool) -> None:
     """Report what is wrong or odd in a URDF: a FILE.urdf, or the name of a known robot. Exits with 1 on errors."""
     from pathcontrol.robot.loading import find_urdf
-    from pathcontrol.robot.urdf_check import check_urdf
+    from pathcontrol.robot.urdf import check_urdf
 
     urdf = find_urdf(file)
     report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs)
@@ -102,7 +102,6 @@ def check(file: str, as_json: bool) -> None:
     sys.exit(0 if report.ok else 1)
 
 
-
 def _peaks_table(summary: dict[str, Any]) -> Any:
     """Steady-state peaks, measured beside the paper's."""
     from rich.table import Table
@@ -114,6 +113,10 @@ def _peaks_table(summary: dict[str, Any]) -> Any:
         measured, paper = summary[name], summary[name]["paper"]
         row = [name.replace("_", " ")]
         for key in ("e_p_peak_deg", "e_v_peak_deg_s"):
-            row += [f"{measured[key]:.2f}", f"{paper[key]:.1f}", f"{100 * (measured[key] / paper[key] - 1):+.1f} %"]
+            row += [
+                f"{measured[key]:.2f}",
+                f"{paper[key]:.1f}",
+                f"{100 * (measured[key] / paper[key] - 1):+.1f} %",
+            ]
         table.add_row(*row)
     return table

@@ -27,8 +27,7 @@ class MissingExtraError(PathControlError, ImportError):
 
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         super().__init__(
-            f"{purpose} needs the package {package!r}, which is not installed; "
-            f"try: pip install 'pathcontrol[{extra}]'"
+            f"{purpose} needs the package {package!r}, which is not installed; try: pip install 'pathcontrol[{extra}]'"
         )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import floats, tasks, vectors
 
 from pathcontrol import (
     Circle,
@@ -24,7 +25,6 @@ from pathcontrol import (
     simulate,
     steady_state,
 )
-from strategies import floats, tasks, vectors
 
 START = np.deg2rad([40.0, 70.0])
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given
+from strategies import floats, tasks, vectors, wobbles
 
 from pathcontrol import Circle, Line, Lissajous, PathTask, TaskError
-from strategies import floats, tasks, vectors, wobbles
 
 
 def stationarity(task, s, q):
@@ -75,7 +75,10 @@ def test_many_are_as_one(task):
     # the path itself is a matrix product, whose rounding depends on the shape
     assert np.allclose(s, [[task.sigma_bar(x) for x in row] for row in q], rtol=0, atol=1e-12)
     near = s + 0.05
-    assert np.allclose(task.sigma_bar(q, near), [[task.sigma_bar(x, n) for x, n in zip(*rows, strict=True)] for rows in zip(q, near, strict=True)])
+    assert np.allclose(
+        task.sigma_bar(q, near),
+        [[task.sigma_bar(x, n) for x, n in zip(*rows, strict=True)] for rows in zip(q, near, strict=True)],
+    )
 
 
 def test_open_paths_end():

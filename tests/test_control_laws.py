@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from strategies import floats, gains, tasks, vectors
 
 from pathcontrol import (
     Circle,
@@ -20,7 +21,6 @@ from pathcontrol import (
     simulate,
 )
 from pathcontrol.analysis.lyapunov import extended_motion_plan_lyapunov, projection_lyapunov
-from strategies import floats, gains, tasks, vectors
 
 START = np.deg2rad([40.0, 70.0])
 states = st.tuples(vectors(2, 2.0), vectors(2, 4.0), floats(0, 6))

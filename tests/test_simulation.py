@@ -62,7 +62,7 @@ def test_gamma_is_reached_exponentially_from_anywhere(ideal_arm, kind, clockwise
     run = simulate(law, q, qd, duration=2.0, loop=loop, progress=False)
     distance = distance_to_gamma(task, run.array("q"), run.array("qd"))
     assert (distance[:, -1] < 1e-5 * distance[:, 0]).all()
-    # the slowest pole of s² + 100 s + 800, joint 2 alone, is −8.8; each rollout's log distance falls at half that or faster
+    # the slowest pole of s² + 100 s + 800, joint 2 alone, is −8.8; every log distance falls at half that or faster
     steady = (run.time >= 0.5) & (run.time <= 1.5)
     slopes = np.polyfit(run.time[steady], np.log(distance[:, steady]).T, 1)[0]
     assert (slopes < -4.4).all()

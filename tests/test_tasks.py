@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import floats, tasks, vectors, wobbles
 
 from pathcontrol import (
     Circle,
@@ -19,7 +20,6 @@ from pathcontrol import (
     TaskError,
     check_task,
 )
-from strategies import floats, tasks, vectors, wobbles
 
 S = np.linspace(-4.0, 15.0, 301)
 
@@ -72,7 +72,9 @@ def test_at_is_what_the_methods_say(task):
     for got, want in zip(point, (task.q_d, task.dq_d, task.ddq_d, task.theta, task.dtheta), strict=True):
         assert np.allclose(got, want(S), rtol=1e-12, atol=1e-12)
     assert np.allclose(point.velocity, point.dq_d * point.theta[:, None])
-    assert np.allclose(point.velocity_slope, task.ddq_d(S) * task.theta(S)[:, None] + task.dq_d(S) * task.dtheta(S)[:, None])
+    assert np.allclose(
+        point.velocity_slope, task.ddq_d(S) * task.theta(S)[:, None] + task.dq_d(S) * task.dtheta(S)[:, None]
+    )
 
 
 @given(tasks(), st.sampled_from([(), (3,), (2, 4), (0,)]))
@@ -176,7 +178,7 @@ def test_a_constant_profile_may_be_a_number():
     ],
 )
 def test_bad_arguments(make, word):
-    with pytest.raises(InputError, match="expected|need|turns") as error:
+    with pytest.raises(InputError, match=r"expected|need|turns") as error:
         make()
     assert word in str(error.value)
     assert "\n" not in str(error.value)

@@ -1,0 +1,1 @@
+"""What runs and states say: distances, errors, Lyapunov functions."""

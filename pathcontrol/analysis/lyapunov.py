@@ -63,4 +63,3 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
         f"no Lyapunov function is given for {type(controller).__name__}; use ExtendedMotionPlan or Projection, "
         "or ExtendedMotionPlan with k = 0 for computed torque"
     )
-

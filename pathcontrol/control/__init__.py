@@ -1,0 +1,1 @@
+"""Control laws: motion control and path control."""

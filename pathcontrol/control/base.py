@@ -57,7 +57,11 @@ class Controller(ABC):
     """
 
     def __init__(
-        self, robot: RobotModel, task: PathTask, friction: FrictionCompensation = "viscous", start: Start = "s0"
+        self,
+        robot: RobotModel,
+        task: PathTask,
+        friction: FrictionCompensation = "viscous",
+        start: Start = "s0",
     ) -> None:
         _check_choice("friction", friction, get_args(FrictionCompensation))
         _check_choice("start", start, get_args(Start))
@@ -134,8 +138,8 @@ def scalar_gain(name: str, value: ArrayLike) -> Array:
     array = finite(name, as_array(name, value))
     if array.ndim and array.shape[-1] != 1:
         raise InputError(
-            f"{name} = {np.asarray(value).tolist()}, expected a scalar: with different gains per joint {name} e_p is no "
-            "longer orthogonal to the path, and the stability proof of (39) fails"
+            f"{name} = {np.asarray(value).tolist()}, expected a scalar: with different gains per joint {name} e_p is "
+            "no longer orthogonal to the path, and the stability proof of (39) fails"
         )
     return _positive(name, array)
 

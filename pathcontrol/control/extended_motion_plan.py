@@ -43,7 +43,9 @@ class ExtendedMotionPlan(Controller):
         self.K_p, self.K_v = diagonal_gain("K_p", K_p, robot.n), diagonal_gain("K_v", K_v, robot.n)
         self.k = readonly(finite("k", as_array("k", k)))
         if (self.k < 0).any():
-            raise InputError(f"k = {self.k.tolist()}, expected k ≥ 0: a negative gain drives the path away from the arm")
+            raise InputError(
+                f"k = {self.k.tolist()}, expected k ≥ 0: a negative gain drives the path away from the arm"
+            )
 
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         s = z[..., 0]

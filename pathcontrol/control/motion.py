@@ -1,4 +1,4 @@
-"""Motion control: the task as the timed trajectory q_r(t) = q_d(s(t)) of its motion plan ṡ = ϑ(s), eqs. (6) and (14)."""
+"""Motion control: the task as the timed trajectory q_r(t) = q_d(s(t)) of its motion plan, eqs. (6) and (14)."""
 
 from __future__ import annotations
 

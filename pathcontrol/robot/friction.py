@@ -13,7 +13,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,6 +33,9 @@ def _coefficients(name: str, value: ArrayLike) -> Array:
 @dataclass(frozen=True, eq=False)
 class FrictionLaw(ABC):
     """Friction torque of the joints as a function of their velocities."""
+
+    #: whether the levels change with velocity
+    varies: ClassVar[bool] = False
 
     @property
     @abstractmethod
@@ -102,11 +105,7 @@ class Coulomb(FrictionLaw):
 
     def __post_init__(self) -> None:
         plus = _coefficients("Coulomb friction for positive velocity", self.plus)
-        minus = (
-            plus
-            if self.minus is None
-            else _coefficients("Coulomb friction for negative velocity", self.minus)
-        )
+        minus = plus if self.minus is None else _coefficients("Coulomb friction for negative velocity", self.minus)
         if plus.shape[-1] != minus.shape[-1]:
             raise InputError(
                 f"Coulomb levels for {plus.shape[-1]} joints forward and {minus.shape[-1]} backward; give both for all"
@@ -134,6 +133,7 @@ class Stribeck(FrictionLaw):
     coulomb: Array
     static: Array
     velocity: Array
+    varies = True
 
     def __post_init__(self) -> None:
         for name in ("coulomb", "static", "velocity"):
@@ -162,13 +162,15 @@ class FrictionSum(FrictionLaw):
     def __post_init__(self) -> None:
         sizes = sorted({term.n for term in self.terms})
         if len(sizes) != 1:
-            raise InputError(
-                f"friction laws for {sizes} joints cannot be added; give each law one value per joint"
-            )
+            raise InputError(f"friction laws for {sizes} joints cannot be added; give each law one value per joint")
 
     @property
     def n(self) -> int:
         return self.terms[0].n
+
+    @property
+    def varies(self) -> bool:  # type: ignore[override]
+        return any(term.varies for term in self.terms)
 
     @property
     def viscous(self) -> Array:

@@ -14,7 +14,7 @@ from pathcontrol._arrays import Array, readonly
 from pathcontrol.errors import MissingExtraError, UnknownNameError, UrdfError
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Viscous
 from pathcontrol.robot.model import Actuation, Limits, RobotModel, UrdfSource, build_model
-from pathcontrol.robot.urdf_check import check_urdf, parse_urdf
+from pathcontrol.robot.urdf import check_urdf, parse_urdf
 
 _UNLIMITED = 1e30  # some URDFs write 1.8e308 for "no limit"
 
@@ -41,14 +41,10 @@ def load_robot(
     """
     urdf = find_urdf(source, tuple(Path(d) for d in package_dirs))
     lock = dict(lock or {})
-    report = check_urdf(
-        urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=tuple(lock)
-    )
+    report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=tuple(lock))
     if not report.ok:
         label = "this URDF" if str(source).lstrip().startswith("<") else repr(str(source))
-        raise UrdfError(
-            "\n".join([f"{label} cannot be used:", *(f"  {finding}" for finding in report.errors)])
-        )
+        raise UrdfError("\n".join([f"{label} cannot be used:", *(f"  {finding}" for finding in report.errors)]))
     robot = _build(urdf, threads)
     return robot.reduced(lock) if lock else robot
 
@@ -60,9 +56,7 @@ def known_robots() -> dict[str, str]:
         catalogue = _example_robots()
     except MissingExtraError:
         return bundled
-    arms = {
-        name: "example-robot-data" for name, c in catalogue.items() if c.urdf_filename and not c.free_flyer
-    }
+    arms = {name: "example-robot-data" for name, c in catalogue.items() if c.urdf_filename and not c.free_flyer}
     return bundled | arms
 
 
@@ -74,9 +68,7 @@ def find_urdf(source: str | Path, package_dirs: tuple[Path, ...] = ()) -> UrdfSo
     if isinstance(source, str) and not path.suffix and path.name == source and not path.exists():
         return _named(source, package_dirs)
     if not path.is_file():
-        raise UrdfError(
-            f"there is no URDF file {str(path)!r}; give a file, a URDF string or one of: {_names()}"
-        )
+        raise UrdfError(f"there is no URDF file {str(path)!r}; give a file, a URDF string or one of: {_names()}")
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
@@ -105,18 +97,14 @@ def _example_urdf(loader: Any, package_dirs: tuple[Path, ...]) -> UrdfSource:
     relative = Path(loader.path, loader.urdf_subpath, loader.urdf_filename)
     root = Path(getModelPath(str(relative))).resolve()
     path = root / relative
-    return UrdfSource(
-        path.read_text(encoding="utf-8"), path.parent, (*package_dirs, root, root.parent.parent)
-    )
+    return UrdfSource(path.read_text(encoding="utf-8"), path.parent, (*package_dirs, root, root.parent.parent))
 
 
 def _example_robots() -> dict[str, Any]:
     try:
         from example_robot_data.robots_loader import ROBOTS
     except ImportError as error:
-        raise MissingExtraError(
-            "example-robot-data-loaders", "robots", "loading other robots by name"
-        ) from error
+        raise MissingExtraError("example-robot-data-loaders", "robots", "loading other robots by name") from error
     return ROBOTS
 
 

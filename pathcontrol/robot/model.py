@@ -31,7 +31,7 @@ class UrdfSource:
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Joint limits, each of shape (n,): position [rad or m], velocity [rad/s], effort [N m]; ±inf where there is none."""
+    """Joint limits, each (n,): position [rad or m], velocity [rad/s], effort [N m]; ±inf where there is none."""
 
     lower: Array
     upper: Array
@@ -40,9 +40,7 @@ class Limits:
 
     def select(self, joints: Sequence[int]) -> Limits:
         """The limits of some of the joints."""
-        return Limits(
-            *(readonly(a[list(joints)]) for a in (self.lower, self.upper, self.velocity, self.effort))
-        )
+        return Limits(*(readonly(a[list(joints)]) for a in (self.lower, self.upper, self.velocity, self.effort)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +69,14 @@ class RobotModel:
         actuation: limits, friction law and encoders of the joints.
         source: the URDF it came from.
         threads: threads used by batched calls; results do not depend on it.
+        n: number of joints.
     """
 
     pinocchio_model: Any
     actuation: Actuation
     source: UrdfSource
     threads: int = 1
+    n: int = field(init=False)
     _data: Any = field(init=False, repr=False)
     _pool: Any = field(init=False, repr=False)
     _weightless_pool: Any = field(init=False, repr=False)
@@ -85,6 +85,7 @@ class RobotModel:
         model = self.pinocchio_model
         weightless = pin.Model(model)
         weightless.gravity = pin.Motion.Zero()
+        object.__setattr__(self, "n", model.nv)
         object.__setattr__(self, "_data", model.createData())
         object.__setattr__(self, "_pool", pin.ModelPool(model, self.threads))
         object.__setattr__(self, "_weightless_pool", pin.ModelPool(weightless, self.threads))
@@ -95,11 +96,6 @@ class RobotModel:
     def name(self) -> str:
         """The robot's name in its URDF."""
         return self.pinocchio_model.name
-
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        return self.pinocchio_model.nv
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -129,16 +125,12 @@ class RobotModel:
     def joint_index(self, joint: str) -> int:
         """The position of a joint in ``joint_names``."""
         if joint not in self.joint_names:
-            raise UnknownNameError(
-                f"{self.name} has no movable joint {joint!r}; it has {', '.join(self.joint_names)}"
-            )
+            raise UnknownNameError(f"{self.name} has no movable joint {joint!r}; it has {', '.join(self.joint_names)}")
         return self.joint_names.index(joint)
 
     # --- dynamics -------------------------------------------------------------------------------------------
 
-    def inverse_dynamics(
-        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, velocity: ArrayLike | None = None
-    ) -> Array:
+    def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, velocity: ArrayLike | None = None) -> Array:
         """τ = M(q)q̈ + C(q,q̇)q̇ + g(q) [N m], (*batch, n), by the recursive Newton–Euler algorithm.
 
         With ``velocity`` v the Coriolis term is C(q,q̇)v, as passivity-based laws want it; see :meth:`coriolis`.
@@ -165,9 +157,7 @@ class RobotModel:
     def mass_matrix(self, q: ArrayLike) -> Array:
         """M(q) [kg m²], (*batch, n, n): column i is the torque of a unit acceleration of joint i, without gravity."""
         q = joint_array("q", q, self.n)[..., None, :]
-        columns = self._batched(
-            pin.rneaInParallel, self._weightless_pool, q=q, qd=np.zeros(self.n), qdd=np.eye(self.n)
-        )
+        columns = self._batched(pin.rneaInParallel, self._weightless_pool, q=q, qd=np.zeros(self.n), qdd=np.eye(self.n))
         return 0.5 * (columns + columns.swapaxes(-1, -2))
 
     def coriolis(self, q: ArrayLike, qd: ArrayLike, v: ArrayLike) -> Array:
@@ -210,7 +200,7 @@ class RobotModel:
         return self._each(q, (len(ids), 4, 4), poses)
 
     def frame_jacobian(self, q: ArrayLike, frame: str) -> Array:
-        """Jacobian of ``frame``, (*batch, 6, n): linear [m] then angular velocity, in axes parallel to the base frame."""
+        """Jacobian of ``frame``, (*batch, 6, n): linear [m], then angular velocity, in axes parallel to the base's."""
         i, axes = self._frame_id(frame), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         return self._each(
             q, (6, self.n), lambda qi: pin.computeFrameJacobian(self.pinocchio_model, self._data, qi, i, axes)
@@ -240,9 +230,7 @@ class RobotModel:
         mass, lever = scalar("mass", mass, least=0.0), finite("com", as_array("com", com))
         tensor = np.zeros((3, 3)) if inertia is None else finite("inertia", as_array("inertia", inertia))
         if lever.shape != (3,) or tensor.shape != (3, 3):
-            raise InputError(
-                f"com has shape {lever.shape} and inertia {tensor.shape}, expected (3,) and (3, 3)"
-            )
+            raise InputError(f"com has shape {lever.shape} and inertia {tensor.shape}, expected (3,) and (3, 3)")
         if not np.allclose(tensor, tensor.T) or np.linalg.eigvalsh(tensor).min() < -1e-12:
             raise InputError("the payload's inertia is not symmetric positive semi-definite")
         model = pin.Model(self.pinocchio_model)
@@ -267,13 +255,9 @@ class RobotModel:
 
     def reduced(self, lock: Mapping[str, float]) -> RobotModel:
         """The arm with some joints locked: ``{"joint name": angle [rad]}``; the others keep their order."""
-        indices = {
-            self.joint_index(joint): scalar(f"angle of {joint}", angle) for joint, angle in lock.items()
-        }
+        indices = {self.joint_index(joint): scalar(f"angle of {joint}", angle) for joint, angle in lock.items()}
         if len(indices) == self.n:
-            raise InputError(
-                f"locking all {self.n} joints of {self.name} leaves nothing to control; leave one free"
-            )
+            raise InputError(f"locking all {self.n} joints of {self.name} leaves nothing to control; leave one free")
         q = np.zeros(self.n)
         q[list(indices)] = list(indices.values())
         model = pin.buildReducedModel(self.pinocchio_model, [i + 1 for i in indices], q)
@@ -293,10 +277,13 @@ class RobotModel:
         if not shape == arrays[1].shape == arrays[2].shape:
             shape = _broadcast_shape(arguments, arrays)
             arrays = [np.broadcast_to(a, shape) for a in arrays]
-        out = np.empty(shape)
-        flat = [a.reshape(-1, self.n).T for a in arrays]
+        out: Array = np.empty(shape)
+        if len(shape) == 2:
+            x, y, z, result = *arrays, out
+        else:
+            x, y, z, result = (a.reshape(-1, self.n) for a in (*arrays, out))
         if out.size:
-            call(self.threads, pool, *flat, out.reshape(-1, self.n).T)
+            call(self.threads, pool, x.T, y.T, z.T, result.T)
         return out
 
     def _each(self, q: ArrayLike, shape: tuple[int, ...], function: Callable[[Array], Any]) -> Array:
@@ -308,9 +295,7 @@ class RobotModel:
     def _frame_id(self, frame: str) -> int:
         # getFrameId answers nframes for a frame that does not exist, so ask first
         if not self.pinocchio_model.existFrame(frame):
-            raise UnknownNameError(
-                f"{self.name} has no frame {frame!r}; it has {', '.join(self.frame_names)}"
-            )
+            raise UnknownNameError(f"{self.name} has no frame {frame!r}; it has {', '.join(self.frame_names)}")
         return self.pinocchio_model.getFrameId(frame)
 
 
@@ -323,13 +308,11 @@ def _broadcast_shape(arguments: Mapping[str, ArrayLike], arrays: Sequence[Array]
 
 
 def build_model(text: str) -> Any:
-    """The ``pin.Model`` of a URDF that has passed the checks of :mod:`pathcontrol.robot.urdf_check`."""
+    """The ``pin.Model`` of a URDF that has passed the checks of :mod:`pathcontrol.robot.urdf`."""
     try:
         model = pin.buildModelFromXML(text)
     except ValueError as error:  # the checks should have found it; say at least what Pinocchio says
         raise UrdfError(f"Pinocchio cannot build a model from this URDF: {error}") from error
     if model.nq != model.nv:
-        raise UrdfError(
-            f"{model.name} has joints that are not one angle or one length each; use a fixed-base arm"
-        )
+        raise UrdfError(f"{model.name} has joints that are not one angle or one length each; use a fixed-base arm")
     return model

@@ -1,0 +1,1 @@
+"""The simulated arm, the loop around it, and what comes out."""

@@ -39,7 +39,13 @@ class ClosedLoop:
 
 
 def run_continuous(
-    controller: Controller, plant_robot: RobotModel, mode: ContinuousTime, q: Array, qd: Array, duration: float, progress: bool
+    controller: Controller,
+    plant_robot: RobotModel,
+    mode: ContinuousTime,
+    q: Array,
+    qd: Array,
+    duration: float,
+    progress: bool,
 ) -> tuple[Array, dict[str, Array]]:
     """Times (T,) and arrays (rollout, T, …) of the continuous closed loop from (q, q̇), both (N, n)."""
     loop = ClosedLoop(controller, plant_robot, mode)

@@ -69,7 +69,9 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array) -> Array:
         active = active[count > 0]
         if not active.size:
             return v
-    raise SimulationError(f"the friction of {active.size} rollouts did not settle; is the mass matrix positive definite?")
+    raise SimulationError(
+        f"the friction of {active.size} rollouts did not settle; is the mass matrix positive definite?"
+    )
 
 
 def _solve(problem: _Problem, states: _States) -> tuple[Array, _States]:

@@ -96,7 +96,7 @@ def torque_limits(mode: SampledLoop | ContinuousTime, robot: RobotModel) -> Arra
     if limits is not None and (limits <= 0).any():
         dead = [name for name, limit in zip(robot.joint_names, limits, strict=True) if limit <= 0]
         raise InputError(
-            f"the torque limit of {', '.join(dead)} is 0, which would kill all torque; give torque_limits = [...] in N m"
+            f"the torque limit of {', '.join(dead)} is 0, which kills all torque; give torque_limits = [...] in N m"
         )
     return limits
 

@@ -28,6 +28,9 @@ class Plant:
     def __init__(self, robot: RobotModel, step: float) -> None:
         self.robot, self.step = robot, step
         self._damping = robot.friction.viscous
+        levels = robot.friction.levels
+        steady = levels(np.zeros(robot.n))
+        self._levels = levels if robot.friction.varies else lambda qd: steady
         self._inertia = robot.with_armature(0.5 * step * self._damping)
 
     def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
@@ -40,7 +43,7 @@ class Plant:
 
     def _push(self, q: Array, qd: Array, start: Array, drive: Array, duration: float) -> Array:
         """P(start + duration a(q, q̇)): dry friction keeps the direction of q̇, unless that proves wrong."""
-        plus, minus = self.robot.friction.levels(qd)
+        plus, minus = self._levels(qd)
         friction = np.where(qd > 0, plus, np.where(qd < 0, -minus, 0.0))
         v = start + duration * self._inertia.forward_dynamics(q, qd, drive - friction)
         settled = (v > 0) & (qd > 0) | (v < 0) & (qd < 0) | (plus + minus == 0)

@@ -25,7 +25,11 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "s": (("rollout", "time"), "1", "path parameter"),
     "sdot": (("rollout", "time"), "1/s", "rate of the path parameter"),
     "e_p": (("rollout", "time", "joint"), "rad", "position error q_d(s) - q as the controller sees it"),
-    "e_v": (("rollout", "time", "joint"), "rad/s", "velocity error q_d'(s) theta(s) - qd as the controller sees it"),
+    "e_v": (
+        ("rollout", "time", "joint"),
+        "rad/s",
+        "velocity error q_d'(s) theta(s) - qd as the controller sees it",
+    ),
     "regular": (("rollout", "time"), "1", "0 where the path parameter was undefined and the last one kept"),
 }
 _CONFIG = "pathcontrol_config"

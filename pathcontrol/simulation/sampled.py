@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 
 import numpy as np
 
@@ -67,11 +66,21 @@ class Actuator:
 
 
 def run_sampled(
-    controller: Controller, plant_robot: RobotModel, loop: SampledLoop, q: Array, qd: Array, duration: float, progress: bool
+    controller: Controller,
+    plant_robot: RobotModel,
+    loop: SampledLoop,
+    q: Array,
+    qd: Array,
+    duration: float,
+    progress: bool,
 ) -> tuple[Array, dict[str, Array]]:
     """Times (T,) and recorded arrays (rollout, T, …) of the sampled loop from (q, q̇), both (N, n)."""
     ticks = max(1, round(duration / loop.period))
-    sensors, actuator, recorder = loop.sensors(plant_robot), Actuator(loop, plant_robot, q.shape), Recorder(ticks + 1)
+    sensors, actuator, recorder = (
+        loop.sensors(plant_robot),
+        Actuator(loop, plant_robot, q.shape),
+        Recorder(ticks + 1),
+    )
     plants = [Plant(plant_robot, part / loop.substeps) for part in actuator.parts]
     reading, z = sensors.start(q, qd), controller.start(q, qd)
     # a rollout that diverges overflows first; that is looked for below

@@ -52,8 +52,10 @@ def simulate(
         )
     loop = SampledLoop() if loop is None else loop
     q0, qd0 = _initial_state(q, qd, robot.n)
-    run = run_sampled if isinstance(loop, SampledLoop) else run_continuous
-    time, arrays = run(controller, robot, loop, q0, qd0, duration, progress)  # type: ignore[operator]
+    if isinstance(loop, SampledLoop):
+        time, arrays = run_sampled(controller, robot, loop, q0, qd0, duration, progress)
+    else:
+        time, arrays = run_continuous(controller, robot, loop, q0, qd0, duration, progress)
     return Run.from_arrays(time, robot.joint_names, arrays, _config(controller, robot, loop, duration))
 
 

@@ -32,7 +32,7 @@ class PathPoint(NamedTuple):
 
     @property
     def velocity_slope(self) -> Array:
-        """r' = dr/ds = q_d''ϑ + q_d'ϑ', (*batch, n); the desired acceleration is r'ṡ."""
+        """R' = dr/ds = q_d''ϑ + q_d'ϑ', (*batch, n); the desired acceleration is r'ṡ."""
         return self.ddq_d * self.theta[..., None] + self.dq_d * self.dtheta[..., None]
 
 
@@ -58,22 +58,22 @@ class PathTask(ABC):
 
     @abstractmethod
     def q_d(self, s: Array) -> Array:
-        """Desired path q_d(s) [rad], (*batch, n), twice continuously differentiable."""
+        """Desired path [rad], (*batch, n), at s (*batch,); twice continuously differentiable."""
 
     @abstractmethod
     def theta(self, s: Array) -> Array:
         """Desired velocity profile ϑ(s) > 0 [1/s], (*batch,): the rate of the path parameter."""
 
     def dq_d(self, s: Array) -> Array:
-        """q_d'(s) = dq_d/ds [rad], (*batch, n)."""
+        """First derivative q_d'(s) = dq_d/ds [rad], (*batch, n)."""
         return self._path_derivative(s, 1)
 
     def ddq_d(self, s: Array) -> Array:
-        """q_d''(s) = d²q_d/ds² [rad], (*batch, n)."""
+        """Second derivative q_d''(s) = d²q_d/ds² [rad], (*batch, n)."""
         return self._path_derivative(s, 2)
 
     def dtheta(self, s: Array) -> Array:
-        """ϑ'(s) = dϑ/ds [1/s], (*batch,)."""
+        """Derivative of the profile, ϑ'(s) = dϑ/ds [1/s], (*batch,)."""
         return self._profile_derivative(s, 1)
 
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
@@ -92,7 +92,7 @@ class PathTask(ABC):
     @cached_property
     def n(self) -> int:
         """Number of joints."""
-        return int(np.asarray(self.q_d(np.float64(self.s0))).shape[-1])
+        return int(np.asarray(self.q_d(np.asarray(self.s0, dtype=np.float64))).shape[-1])
 
     @property
     def closed(self) -> bool:

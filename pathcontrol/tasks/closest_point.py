@@ -91,7 +91,7 @@ class ClosestPoint:
         return s, (stationary & (curvature > 0) | at_end) & (np.abs(s - near) <= reach)
 
     def _slope(self, s: Array, x: Array) -> tuple[Array, Array, Array]:
-        """g = (p − x)ᵀp', its derivative ‖p'‖² + (p − x)ᵀp'', and ‖p'‖²."""
+        """G = (p − x)ᵀp', its derivative ‖p'‖² + (p − x)ᵀp'', and ‖p'‖²."""
         difference, dp = self.curve.p(s) - x, self.curve.dp(s)
         gradient = (dp * dp).sum(-1)
         # without p'' this is the Gauss–Newton method

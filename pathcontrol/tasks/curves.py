@@ -230,5 +230,7 @@ def _two_joints(joints: Sequence[int], n: int) -> tuple[int, int]:
     except (TypeError, ValueError) as error:
         raise InputError(f"joints = {joints!r}, expected two joint indices such as (0, 1)") from error
     if i == j or not (0 <= i < n and 0 <= j < n):
-        raise InputError(f"joints = ({i}, {j}), expected two different indices from 0 to {n - 1}: center has {n} joints")
+        raise InputError(
+            f"joints = ({i}, {j}), expected two different indices from 0 to {n - 1}: center has {n} joints"
+        )
     return i, j

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -63,6 +64,6 @@ def best_width(function: Callable[[Array], Array], lower: float, upper: float, s
     s = np.linspace(lower, upper, samples)
     widths = 0.5 * (upper - lower) * 2.0 ** -np.arange(12)
     derivatives = [Differentiator(function, lower, upper, w)(s, 2) for w in widths]
-    disagreement = [np.abs(a - b).max() for a, b in zip(derivatives, derivatives[1:], strict=False)]
+    disagreement = [np.abs(a - b).max() for a, b in pairwise(derivatives)]
     # the narrower of the two that agree best
     return float(widths[int(np.argmin(disagreement)) + 1])

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -22,7 +23,7 @@ from pathcontrol.tasks.base import PathTask
 # Okabe and Ito's colours, told apart with any colour vision
 BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#8A8A8A"
 
-_STYLE = {
+_STYLE: Any = {
     "font.size": 9.0,
     "axes.linewidth": 0.7,
     "axes.grid": True,
@@ -39,9 +40,7 @@ _STYLE = {
 }
 
 
-def path_figure(
-    run: Run, task: PathTask | None = None, joints: tuple[int, int] = (0, 1), rollout: int = 0
-) -> Figure:
+def path_figure(run: Run, task: PathTask | None = None, joints: tuple[int, int] = (0, 1), rollout: int = 0) -> Figure:
     """q_j over q_i [deg], as in the paper's figures 7 and 9, over the desired path."""
     i, j = joints
     names = [str(name) for name in run["joint"].to_numpy()]
@@ -55,9 +54,7 @@ def path_figure(
         axes.plot(q[:, i], q[:, j], color=BLUE, label="arm")
         axes.plot(q[0, i], q[0, j], "o", color=ORANGE, markersize=5, label="start")
         axes.set(xlabel=f"{_symbol(i, names)} [deg]", ylabel=f"{_symbol(j, names)} [deg]")
-        axes.legend(
-            loc="upper center", bbox_to_anchor=(0.5, 1.14), ncols=3, handlelength=1.4, columnspacing=1.2
-        )
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.14), ncols=3, handlelength=1.4, columnspacing=1.2)
     return figure
 
 

@@ -1,0 +1,75 @@
+"""What is wrong, doubtful or worth knowing in a URDF, found before Pinocchio reads it.
+
+A check of values is a function from an arm to findings; to add one, write it and list it in `VALUE_CHECKS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pathcontrol.errors import UrdfError
+from pathcontrol.robot.urdf.arm import read_arm
+from pathcontrol.robot.urdf.elements import MOVABLE_TYPES, names_of
+from pathcontrol.robot.urdf.finding import Finding, Level, UrdfReport
+from pathcontrol.robot.urdf.form import check_form
+from pathcontrol.robot.urdf.inertia import check_inertials, check_inertias, check_mass_matrix, check_masses
+from pathcontrol.robot.urdf.parse import parse_urdf
+from pathcontrol.robot.urdf.shapes import check_meshes, check_shapes
+from pathcontrol.robot.urdf.values import (
+    check_axes,
+    check_dynamics,
+    check_joint_types,
+    check_limits,
+    check_mimics,
+)
+
+_ORDER: tuple[Level, ...] = ("error", "warning", "note")
+
+VALUE_CHECKS = (
+    check_joint_types,
+    check_mimics,
+    check_axes,
+    check_limits,
+    check_masses,
+    check_inertias,
+    check_inertials,
+    check_mass_matrix,
+    check_dynamics,
+)
+
+
+def check_urdf(
+    text: str,
+    *,
+    base_dir: Path | None = None,
+    package_dirs: Sequence[Path] = (),
+    allow_mimic: Sequence[str] = (),
+) -> UrdfReport:
+    """Check a URDF and report everything a user should know; a bad URDF is a finding, never an exception.
+
+    A robot without errors is read by Pinocchio from ``etree.tostring(parse_urdf(text), encoding="unicode")``.
+    Values are looked at once the form is sound, so a second run may find more than the first.
+
+    Args:
+        text: The XML of the robot.
+        base_dir: Folder of the URDF file. Relative meshes are looked for there, and packages there and above.
+        package_dirs: Folders that hold packages, for ``package://`` meshes.
+        allow_mimic: Joints that the caller is going to lock: taken as fixed here, and free to mimic another.
+
+    Returns:
+        The names in the robot and the findings.
+    """
+    try:
+        root = parse_urdf(text)
+    except UrdfError as error:
+        return UrdfReport("", (), (), (Finding("error", "unreadable", "file", str(error)),))
+    findings = list(check_form(root))
+    if not any(finding.level == "error" for finding in findings):
+        arm = read_arm(root, allow_mimic)
+        findings += [finding for check in VALUE_CHECKS for finding in check(arm)]
+    findings += [*check_shapes(root), *check_meshes(root, base_dir, package_dirs)]
+    findings.sort(key=lambda finding: _ORDER.index(finding.level))
+    links = names_of(root.iterfind("link"))
+    joints = names_of(joint for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES)
+    return UrdfReport(root.get("name", ""), links, joints, tuple(findings))

@@ -1,0 +1,81 @@
+"""Checks of masses and inertias: could they be those of rigid bodies, and can every joint be moved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pathcontrol.robot.urdf.arm import Arm, axis_inertia, has_direction, moving_bodies
+from pathcontrol.robot.urdf.finding import Finding, Level, place
+
+if TYPE_CHECKING:
+    from yourdfpy.urdf import Link
+
+INERTIA_TOLERANCE = 1e-6  # of the largest principal moment: what rounding in a file may cost
+NO_INERTIA = 1e-15  # kg m^2, far below any finger joint
+NO_MASS = 1e-15  # kg
+
+
+def check_masses(arm: Arm) -> Iterator[Finding]:
+    """No mass is negative; what has inertia has mass."""
+    moving = arm.moving
+    for name, inertial in arm.inertials.items():
+        if inertial.mass < 0:
+            message = f"the mass is {inertial.mass:g} kg; expected zero or more, correct it"
+            yield Finding("error", "mass-negative", place("link", name), message)
+        elif inertial.mass == 0 and name in moving and np.any(inertial.inertia):
+            message = "the mass is 0 kg although it has inertia and moves; expected a mass, give one"
+            yield Finding("warning", "mass-zero", place("link", name), message)
+
+
+def check_inertias(arm: Arm) -> Iterator[Finding]:
+    """Every inertia could be that of a rigid body: no moment negative or above the sum of the two others."""
+    moving = arm.moving
+    for name, inertial in arm.inertials.items():
+        moments = np.linalg.eigvalsh(inertial.inertia)
+        slack = max(NO_INERTIA, INERTIA_TOLERANCE * np.abs(moments).max())
+        given = f"the principal moments are {', '.join(f'{moment:g}' for moment in moments)} kg m^2"
+        if moments[0] < -slack:
+            level: Level = "error" if name in moving else "warning"
+            message = f"{given}; expected none below zero, check signs and products of inertia"
+            yield Finding(level, "inertia-negative", place("link", name), message)
+        elif moments[2] - moments[0] - moments[1] > slack:
+            message = f"{given}; expected none above the sum of the two others, check units and axes"
+            yield Finding("warning", "inertia-triangle", place("link", name), message)
+
+
+def check_inertials(arm: Arm) -> Iterator[Finding]:
+    """Every moving body has an inertial, and so has every moving link with a shape."""
+    for body in moving_bodies(arm):
+        bare = [name for name in body.poses if arm.links[name].inertial is None]
+        if len(bare) < len(body.poses):
+            bare = [name for name in bare if name in arm.shaped]
+        for name in bare:
+            message = "it moves but has no <inertial> and so no mass; expected one, give mass and inertia"
+            yield Finding("warning", "inertial-missing", place("link", name), message)
+
+
+def check_mass_matrix(arm: Arm) -> Iterator[Finding]:
+    """Every joint has something to move; otherwise the mass matrix is singular in every configuration."""
+    weight: dict[str, np.ndarray] = {}
+    for body in reversed(moving_bodies(arm)):
+        parts = [_weight(arm.links[name]) for name in body.poses]
+        parts += [weight[outer.joint.name] for outer in body.outer]
+        mass, inertia = weight[body.joint.name] = np.sum(parts, axis=0)
+        slides = body.joint.type == "prismatic"
+        singular = mass < NO_MASS and (slides or inertia < NO_INERTIA)
+        if not slides and not body.outer and has_direction(body.joint):
+            singular = abs(axis_inertia(arm, body)) < NO_INERTIA
+        if singular:
+            what = f"mass is {mass:g} kg" if slides else "inertia about its axis is 0 kg m^2"
+            message = f"the {what} for all it moves: the mass matrix is singular; give <inertial>, or lock it"
+            yield Finding("error", "mass-matrix-singular", place("joint", body.joint.name), message)
+
+
+def _weight(link: Link) -> np.ndarray:
+    """Return the mass of a link [kg] and the size of its inertia [kg m^2]."""
+    if link.inertial is None:
+        return np.zeros(2)
+    return np.array([abs(link.inertial.mass), np.abs(link.inertial.inertia).sum()])

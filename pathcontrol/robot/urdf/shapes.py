@@ -1,0 +1,79 @@
+"""Checks of what a robot looks like: shapes that can be read, meshes that can be found."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from lxml import etree
+
+from pathcontrol.robot.urdf.elements import place_of
+from pathcontrol.robot.urdf.finding import Finding, shown
+from pathcontrol.robot.urdf.numbers import POSE, read_numbers
+
+_SHAPES: dict[str, dict[str, int]] = {
+    "box": {"size": 3},
+    "cylinder": {"radius": 1, "length": 1},
+    "sphere": {"radius": 1},
+    "mesh": {"scale": 3},
+}
+
+
+def check_shapes(root: etree._Element) -> Iterator[Finding]:
+    """Every shape can be read; readers leave out one that cannot, and all after it in its link."""
+    for link in root.iterfind("link"):
+        for holder in link.iterchildren("visual", "collision"):
+            for problem in _shape_problems(holder):
+                message = f"{problem}; it and every <{holder.tag}> after it are left out, correct it"
+                yield Finding("warning", "shape-unreadable", place_of(link), message)
+
+
+def check_meshes(
+    root: etree._Element, base_dir: Path | None, package_dirs: Sequence[Path]
+) -> Iterator[Finding]:
+    """Every mesh is a file that can be found; nothing is fetched."""
+    for link in root.iterfind("link"):
+        for name in dict.fromkeys(mesh.get("filename", "") for mesh in link.iterfind("*/geometry/mesh")):
+            scheme = name.rpartition("://")[0]
+            paths = _mesh_paths(name, base_dir, package_dirs)
+            if scheme not in ("", "file", "package"):
+                message = (
+                    f"mesh {shown(name)} is not fetched; expected package://, file:// or a relative path"
+                )
+                yield Finding("warning", "mesh-remote", place_of(link), message)
+            elif name and paths and not any(map(os.path.isfile, paths)):
+                message = f"mesh {shown(name)} is not found; expected a file, add the folder of its package"
+                yield Finding("warning", "mesh-missing", place_of(link), message)
+
+
+def _shape_problems(holder: etree._Element) -> Iterator[str]:
+    for origin in holder.findall("origin")[:1]:
+        yield from _bad_numbers(origin, POSE)
+    shape = next(holder.iterfind("geometry/*"), None)
+    if shape is None or shape.tag not in _SHAPES:
+        tag = "nothing" if shape is None else f"<{shape.tag}>"
+        yield f"<geometry> holds {tag}, expected one of {', '.join(_SHAPES)}"
+        return
+    required = ("filename",) if shape.tag == "mesh" else tuple(_SHAPES[shape.tag])
+    yield from (f"<{shape.tag}> lacks {name}" for name in required if not shape.get(name))
+    yield from _bad_numbers(shape, _SHAPES[shape.tag])
+
+
+def _bad_numbers(element: etree._Element, lengths: dict[str, int]) -> Iterator[str]:
+    for name, length in lengths.items():
+        text = element.get(name)
+        if text and read_numbers(text, length) is None:
+            yield f"{name} of <{element.tag}> is {shown(text)}, expected {length} finite number(s)"
+
+
+def _mesh_paths(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> list[Path]:
+    """Return where a mesh may be, nothing if there is no folder to look in."""
+    scheme, _, path = name.rpartition("://")
+    if scheme == "file" or os.path.isabs(name):
+        return [Path(path)]
+    folders = list(package_dirs)
+    if base_dir is not None:
+        folder = base_dir.absolute()
+        folders += [folder, *folder.parents] if scheme else [folder]
+    return [folder / path.lstrip("/") for folder in folders]

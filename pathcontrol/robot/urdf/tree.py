@@ -1,0 +1,70 @@
+"""Checks that the joints join the links of a robot to one tree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from lxml import etree
+
+from pathcontrol.robot.urdf.elements import place_of
+from pathcontrol.robot.urdf.finding import Finding, place, shown
+
+
+def check_ends(root: etree._Element) -> Iterator[Finding]:
+    """Every joint joins two links that exist."""
+    links = {link.get("name") for link in root.findall("link")}
+    for joint in root.findall("joint"):
+        for end in ("parent", "child"):
+            name = _end(joint, end)
+            if name is not None and name not in links:
+                message = f"the {end} link {shown(name)} does not exist; add that <link> or correct the name"
+                yield Finding("error", f"{end}-unknown", place_of(joint), message)
+
+
+def check_tree(root: etree._Element) -> Iterator[Finding]:
+    """The links form one tree: one root, one parent for every other link, no loop."""
+    parents: dict[str, str] = {}
+    holders: dict[str, list[str]] = {}
+    for joint in root.findall("joint"):
+        if (child := _end(joint, "child")) is not None:
+            parents[child] = _end(joint, "parent") or ""
+            holders.setdefault(child, []).append(joint.get("name", ""))
+    links = dict.fromkeys(link.get("name", "") for link in root.findall("link"))
+    roots = [name for name in links if name not in parents]
+    if len(roots) > 1:
+        message = f"{len(roots)} root links ({_listed(roots)}); expected one, join the others to it"
+        yield Finding("error", "several-roots", "robot", message)
+    for name, joints in holders.items():
+        if len(joints) > 1:
+            message = f"it is the child of the joints {_listed(joints)}; expected one, remove the others"
+            yield Finding("error", "two-parents", place("link", name), message)
+    if loop := _loop(parents):
+        chain = " -> ".join(map(shown, loop))
+        message = f"the links {chain} form a loop; expected a tree, remove one of the joints"
+        yield Finding("error", "loop", place("link", loop[0]), message)
+
+
+def _end(joint: etree._Element, end: str) -> str | None:
+    element = joint.find(end)
+    return None if element is None else element.get("link")
+
+
+def _loop(parents: dict[str, str]) -> list[str]:
+    """Return one loop in a map from child to parent, its first link repeated at the end, or nothing."""
+    settled: set[str] = set()
+    for start in parents:
+        path: dict[str, None] = {}
+        name = start
+        while name in parents and name not in settled and name not in path:
+            path[name] = None
+            name = parents[name]
+        if name in path:
+            names = list(path)
+            return [*names[names.index(name) :], name]
+        settled.update(path)
+    return []
+
+
+def _listed(names: Sequence[str], most: int = 5) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(map(shown, names[:most])) + more

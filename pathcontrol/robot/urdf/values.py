@@ -1,0 +1,115 @@
+"""Checks of the joints: their kinds, axes, limits and friction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pathcontrol.robot.urdf.arm import Arm, has_direction
+from pathcontrol.robot.urdf.elements import MOVABLE_TYPES
+from pathcontrol.robot.urdf.finding import Finding, place, shown
+from pathcontrol.robot.urdf.numbers import ABSURD
+
+if TYPE_CHECKING:
+    from yourdfpy.urdf import Joint
+
+UNIT_TOLERANCE = 1e-3
+
+
+def check_joint_types(arm: Arm) -> Iterator[Finding]:
+    """The base is fixed and something moves."""
+    for joint in arm.joints:
+        if joint.type in ("floating", "planar"):
+            message = f"type '{joint.type}' is refused: fixed-base arms only; make the joint fixed"
+            yield Finding("error", f"joint-{joint.type}", place("joint", joint.name), message)
+    if not arm.free:
+        message = f"0 of {len(arm.joints)} joints can move; expected one that is {' or '.join(MOVABLE_TYPES)}"
+        yield Finding("error", "no-movable-joint", "robot", message)
+
+
+def check_mimics(arm: Arm) -> Iterator[Finding]:
+    """No joint follows another, for Pinocchio would take it as independent."""
+    for joint in arm.movable:
+        if joint.name in arm.mimics and joint.name not in arm.locked:
+            followed = shown(arm.mimics[joint.name])
+            message = (
+                f"it mimics joint {followed}, which is refused; make it fixed or independent, or lock it"
+            )
+            yield Finding("error", "joint-mimic", place("joint", joint.name), message)
+
+
+def check_axes(arm: Arm) -> Iterator[Finding]:
+    """Every axis has a direction and unit length."""
+    for joint in arm.movable:
+        length = float(np.linalg.norm(joint.axis))
+        axis = " ".join(f"{value:g}" for value in joint.axis)
+        if not has_direction(joint):
+            message = f"the axis '{axis}' has no direction; expected a unit vector such as '0 0 1'"
+            yield Finding("error", "axis-zero", place("joint", joint.name), message)
+        elif abs(length - 1) > UNIT_TOLERANCE:
+            message = f"the axis '{axis}' has length {length:g} and is normalised; expected length 1"
+            yield Finding("warning", "axis-not-unit", place("joint", joint.name), message)
+
+
+def check_limits(arm: Arm) -> Iterator[Finding]:
+    """Limits are there, in order, and neither zero nor absurd."""
+    for joint in arm.movable:
+        if joint.limit is None:
+            yield _no_limit(joint)
+            continue
+        yield from _wrong_limits(joint)
+        if joint.name not in arm.locked:
+            yield from _doubtful_limits(joint)
+
+
+def check_dynamics(arm: Arm) -> Iterator[Finding]:
+    """No friction drives the arm; friction that is there is pointed out, and so are continuous joints."""
+    for joint in arm.free:
+        given = {name: float(getattr(joint.dynamics, name, None) or 0) for name in ("damping", "friction")}
+        for name, value in given.items():
+            if value < 0:
+                message = f"{name} is {value:g}, which would drive the joint; expected zero or more"
+                yield Finding("error", f"{name}-negative", place("joint", joint.name), message)
+        if max(given.values()) > 0:
+            values = " and ".join(f"{name} {value:g}" for name, value in given.items())
+            message = f"it has {values}; Pinocchio's own dynamics contain neither"
+            yield Finding("note", "friction-present", place("joint", joint.name), message)
+        if joint.type == "continuous":
+            message = "it turns without end and is treated as one angle; lower and upper are ignored"
+            yield Finding("note", "joint-continuous", place("joint", joint.name), message)
+
+
+def _no_limit(joint: Joint) -> Finding:
+    if joint.type == "continuous":
+        message = "there is no <limit>, so effort and velocity are infinite; expected both, give them"
+        return Finding("warning", "joint-no-limit", place("joint", joint.name), message)
+    message = f"a {joint.type} joint must have a <limit>; give lower, upper, effort and velocity"
+    return Finding("error", "joint-no-limit", place("joint", joint.name), message)
+
+
+def _wrong_limits(joint: Joint) -> Iterator[Finding]:
+    lower, upper = joint.limit.lower or 0.0, joint.limit.upper or 0.0
+    if joint.type != "continuous" and lower > upper:
+        message = f"lower {lower:g} is above upper {upper:g} (a missing one is 0); expected lower below upper"
+        yield Finding("error", "limit-inverted", place("joint", joint.name), message)
+    for name in ("effort", "velocity"):
+        if (value := getattr(joint.limit, name)) < 0:
+            message = f"the limit of {name} is {value:g}; expected a positive number"
+            yield Finding("error", f"{name}-negative", place("joint", joint.name), message)
+
+
+def _doubtful_limits(joint: Joint) -> Iterator[Finding]:
+    lower, upper = joint.limit.lower or 0.0, joint.limit.upper or 0.0
+    if joint.type != "continuous" and lower == upper:
+        message = f"lower and upper are both {lower:g} (a missing one is 0); expected a range, give one"
+        yield Finding("warning", "limit-no-range", place("joint", joint.name), message)
+    for name in ("effort", "velocity"):
+        if getattr(joint.limit, name) == 0:
+            message = f"the limit of {name} is 0, and clamping to it stops the joint; give a positive number"
+            yield Finding("warning", f"{name}-zero", place("joint", joint.name), message)
+    for name in ("lower", "upper", "effort", "velocity"):
+        if abs(value := getattr(joint.limit, name) or 0.0) >= ABSURD:
+            message = f"the limit {name} is {value:g}, which limits nothing; expected what the joint can do"
+            yield Finding("warning", "limit-absurd", place("joint", joint.name), message)

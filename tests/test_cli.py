@@ -1,0 +1,134 @@
+"""The command line as a user meets it: in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from pathcontrol.cli import main
+
+COMMAND = [sys.executable, "-m", "pathcontrol"]
+
+
+def call(*arguments, **options):
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=120, **options)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """The paper's experiments, run once."""
+    out = tmp_path_factory.mktemp("reproduce")
+    done = call("reproduce", "--out", out, "--json")
+    assert done.returncode == 0, done.stderr
+    return out, json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["reproduce", "--help"], ["run", "--help"], ["check", "--help"]])
+def test_help_imports_nothing_heavy(arguments):
+    """What takes the time is the imports; a clock would only measure how busy the machine is."""
+    code = (
+        "import sys\nfrom pathcontrol.cli import main\n"
+        f"main({arguments!r}, standalone_mode=False)\n"
+        "heavy = {'numpy', 'scipy', 'pinocchio', 'xarray', 'matplotlib', 'meshcat', 'yourdfpy', 'pydantic', 'rich'}\n"
+        "print(sorted(heavy & set(sys.modules)), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert "Usage:" in done.stdout
+    assert done.stderr.strip() == "[]"
+
+
+def test_importing_the_package_is_light():
+    code = (
+        "import sys, pathcontrol\n"
+        "assert 'Circle' in dir(pathcontrol)\n"
+        "print(sorted({'matplotlib', 'meshcat', 'dask', 'pinocchio', 'xarray'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout.strip() == "[]"
+
+
+def test_reproduce_writes_everything(results):
+    out, summary = results
+    figures = {f"figure_{number}.{suffix}" for number in ("07", "08", "09", "10") for suffix in ("svg", "png")}
+    pages = {f"{name}{suffix}" for name in ("extended_motion_plan", "projection") for suffix in (".html", ".nc")}
+    assert {p.name for p in out.iterdir()} == figures | pages | {"summary.json"}
+    assert json.loads((out / "summary.json").read_text()) == summary
+    assert set(summary["versions"]) >= {"pathcontrol", "pin", "numpy", "python"}
+    assert summary["settings"]["projection"]["controller"]["k_p"] == 800.0
+    assert summary["seconds"] < 60
+
+
+@pytest.mark.parametrize("name", ["extended_motion_plan", "projection"])
+def test_the_papers_peaks_come_out_within_ten_percent(results, name):
+    measured = results[1][name]
+    for key, paper in measured["paper"].items():
+        assert measured[key] == pytest.approx(paper, rel=0.10)
+        assert measured[key] != paper  # a measurement, not a copy
+
+
+def test_reproduce_prints_a_table(monkeypatch, capsys, results):
+    from rich.console import Console
+
+    from pathcontrol.cli import _peaks_table
+
+    console = Console(width=120, record=True)
+    console.print(_peaks_table(results[1]))
+    text = console.export_text()
+    assert "extended motion plan" in text
+    assert "14.5" in text
+
+
+def test_check_reports_and_exits_with_a_code(tmp_path):
+    assert call("check", "cicese_2dof").returncode == 0
+    bad = tmp_path / "bad.urdf"
+    bad.write_text("<robot name='x'><link name='a'/></robot>")
+    done = call("check", bad, "--json")
+    assert done.returncode == 1
+    report = json.loads(done.stdout)
+    assert not report["ok"]
+    assert any(finding["level"] == "error" for finding in report["findings"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["check", "none.urdf"], ["none.urdf"]),
+        (["check", "no_such_robot"], ["no_such_robot", "cicese_2dof"]),
+        (["run", "none.toml"], ["none.toml"]),
+        (["run"], ["--example"]),
+    ],
+)
+def test_errors_are_one_message_without_a_traceback(arguments, words):
+    done = call(*arguments)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert all(word in done.stderr for word in words), done.stderr
+    assert done.stdout == ""
+
+
+def test_ctrl_c_leaves_no_half_written_file(tmp_path):
+    process = subprocess.Popen(
+        [*COMMAND, "reproduce", "--out", str(tmp_path / "out")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    deadline = time.monotonic() + 60
+    while not list(tmp_path.glob("out/*")) and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)  # until the first file begins to appear
+    os.kill(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert b"Traceback" not in err
+    assert not [p.name for p in (tmp_path / "out").iterdir() if p.name.startswith(".")]
+    assert not (tmp_path / "out" / "summary.json").exists()
+
+
+def test_the_console_script_is_the_same_command():
+    assert main.name == "main"
+    assert set(main.commands) == {"reproduce", "run", "check"}

@@ -1,0 +1,70 @@
+"""Every example runs as a user would run it, and writes what it says."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+EXAMPLES = {
+    "paper_experiments": 10,
+    "motion_control": 10,
+    "custom_task": 3,
+    "six_joints": 3,
+}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_example(name, tmp_path):
+    if name == "six_joints":
+        pytest.importorskip("example_robot_data")
+    script = ROOT / "examples" / f"{name}.py"
+    done = subprocess.run([sys.executable, script, tmp_path], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    written = list(tmp_path.iterdir())
+    assert len(written) == EXAMPLES[name]
+    assert all(path.stat().st_size > 1000 for path in written)
+
+
+def test_every_example_is_tested():
+    assert {p.stem for p in (ROOT / "examples").glob("*.py")} == set(EXAMPLES)
+
+
+def test_path_control_keeps_nearer_to_the_path_than_motion_control(tmp_path):
+    done = subprocess.run(
+        [sys.executable, ROOT / "examples" / "motion_control.py", tmp_path],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    errors = {m[1].strip(): float(m[2]) for m in re.finditer(r"^(\S.*?)\s{2,}([\d.]+)$", done.stdout, re.MULTILINE)}
+    assert len(errors) == 5
+    assert max(errors["extended motion plan"], errors["projection"]) < min(errors["computed torque"], errors["PD+"])
+
+
+def test_the_readmes_example_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)[1]
+    exec(compile(code, "README.md", "exec"), {"__name__": "readme"})
+    assert {p.name for p in tmp_path.iterdir()} == {
+        "triangle.svg",
+        "triangle.png",
+        "triangle.html",
+        "triangle.nc",
+    }
+
+
+def test_the_custom_task_is_ten_lines():
+    source = (ROOT / "examples" / "custom_task.py").read_text()
+    body = re.search(r"class RoundedTriangle.*?(?=\n\n\nif )", source, re.DOTALL)[0]
+    lines = [line for line in body.splitlines() if line.strip() and not line.strip().startswith('"""')]
+    assert len(lines) <= 10
+    spec = importlib.util.spec_from_file_location("custom_task", ROOT / "examples" / "custom_task.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.RoundedTriangle(0.9, 1.5).n == 2

@@ -1,0 +1,613 @@
+"""The checks of a robot description: each finding, the refusal of hostile XML, and laws for any text."""
+
+import json
+import time
+from os.path import join
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from lxml import etree
+
+from pathcontrol.errors import UrdfError
+from pathcontrol.robot.urdf import Finding, check_urdf, parse_urdf
+from pathcontrol.robot.urdf.arm import axis_inertia, moving_bodies, read_arm
+
+MOMENTS = 'ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"'
+INERTIAL = f'<inertial><origin xyz="0 0 0.1"/><mass value="2"/><inertia {MOMENTS}/></inertial>'
+AXIS = '<axis xyz="0 1 0"/>'
+LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="2"/>'
+NO_MOMENTS = 'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"'
+
+FUZZ = settings(max_examples=150, deadline=2000, suppress_health_check=[HealthCheck.too_slow])
+
+
+def link(name, inside=INERTIAL):
+    return f'<link name="{name}">{inside}</link>'
+
+
+def joint(name, parent, child, kind="revolute", inside=AXIS + LIMIT):
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}{inside}</joint>'
+
+
+def robot(*parts, attributes='name="two"'):
+    return f"<robot {attributes}>\n" + "\n".join(parts) + "\n</robot>\n"
+
+
+BASE, UPPER, LOWER = link("base", ""), link("upper"), link("lower")
+SHOULDER, ELBOW = joint("shoulder", "base", "upper"), joint("elbow", "upper", "lower")
+ARM = robot(BASE, UPPER, LOWER, SHOULDER, ELBOW)
+
+
+def elbow(inside=AXIS + LIMIT, kind="revolute"):
+    """The arm with another elbow."""
+    return robot(BASE, UPPER, LOWER, SHOULDER, joint("elbow", "upper", "lower", kind, inside))
+
+
+def hand(inside):
+    """The arm with another last link."""
+    return robot(BASE, UPPER, link("lower", inside), SHOULDER, ELBOW)
+
+
+def inertial(mass="2", moments=MOMENTS, origin=""):
+    return f'<inertial>{origin}<mass value="{mass}"/><inertia {moments}/></inertial>'
+
+
+def find(report, code):
+    return [finding for finding in report.findings if finding.code == code]
+
+
+def read_by_pinocchio(text):
+    return pin.buildModelFromXML(etree.tostring(parse_urdf(text), encoding="unicode"))
+
+
+def test_a_sound_arm_has_nothing_to_report():
+    report = check_urdf(ARM)
+    assert report.findings == ()
+    assert report.ok
+    assert (report.name, report.links) == ("two", ("base", "upper", "lower"))
+    assert report.joints == ("shoulder", "elbow")
+
+
+ERRORS = {
+    "no name": (robot(*ARM.splitlines()[1:-1], attributes=""), "name-missing", "name"),
+    "version": (ARM.replace("<robot", '<robot version="7.0"'), "version-unknown", "7.0"),
+    "no links": ('<robot name="empty"/>', "no-links", "<link>"),
+    "too many links": (robot(*(link(f"l{i}", "") for i in range(1001))), "too-many-links", "1001"),
+    "no joint": (robot(BASE), "no-movable-joint", "0 joints"),
+    "nothing moves": (
+        robot(BASE, UPPER, joint("j", "base", "upper", "fixed")),
+        "no-movable-joint",
+        "1 joints",
+    ),
+    "unnamed link": (robot(BASE, UPPER, LOWER, SHOULDER, ELBOW, "<link/>"), "name-missing", "1 <link>"),
+    "unnamed joint": (ARM.replace('name="elbow" ', ""), "name-missing", "1 <joint>"),
+    "same links": (robot(BASE, UPPER, LOWER, UPPER, SHOULDER, ELBOW), "duplicate-link", "2 <link>"),
+    "same joints": (ARM.replace('"elbow"', '"shoulder"'), "duplicate-joint", "2 <joint>"),
+    "same materials": (robot(*['<material name="m"/>'] * 2, BASE), "duplicate-material", "2 <material>"),
+    "parent": (ARM.replace('<parent link="upper"', '<parent link="uper"'), "parent-unknown", "'uper'"),
+    "child": (ARM.replace('<child link="lower"', '<child link="lover"'), "child-unknown", "'lover'"),
+    "no parent": (ARM.replace('<parent link="upper"/>', ""), "part-missing", "<parent>"),
+    "no child": (ARM.replace('<child link="lower"/>', ""), "part-missing", "<child>"),
+    "parent without link": (
+        ARM.replace('<parent link="upper"/>', "<parent/>"),
+        "part-missing",
+        "link of <parent>",
+    ),
+    "no type": (ARM.replace(' type="revolute"', "", 1), "type-missing", "revolute"),
+    "type": (elbow(kind="Revolute"), "type-unknown", "'Revolute'"),
+    "roots": (robot(BASE, UPPER, LOWER, SHOULDER), "several-roots", "'lower'"),
+    "two parents": (
+        robot(BASE, UPPER, LOWER, SHOULDER, ELBOW, joint("j", "base", "lower")),
+        "two-parents",
+        "'j'",
+    ),
+    "loop": (robot(BASE, UPPER, LOWER, ELBOW, joint("j", "lower", "upper")), "loop", "'upper' -> 'lower'"),
+    "self loop": (robot(BASE, UPPER, SHOULDER, joint("j", "base", "base")), "loop", "'base' -> 'base'"),
+    "floating": (elbow(kind="floating"), "joint-floating", "fixed-base arms only"),
+    "planar": (elbow(kind="planar"), "joint-planar", "fixed-base arms only"),
+    "mimic": (elbow(AXIS + LIMIT + '<mimic joint="shoulder"/>'), "joint-mimic", "'shoulder'"),
+    "mimic of nothing": (elbow(AXIS + LIMIT + "<mimic/>"), "part-missing", "joint of <mimic>"),
+    "axis zero": (elbow('<axis xyz="0 0 0"/>' + LIMIT), "axis-zero", "'0 0 0'"),
+    "axis nearly zero": (elbow('<axis xyz="0 1e-200 0"/>' + LIMIT), "axis-zero", "1e-200"),
+    "axis nan": (elbow('<axis xyz="0 nan 0"/>' + LIMIT), "not-a-number", "'0 nan 0'"),
+    "axis of two": (elbow('<axis xyz="0 1"/>' + LIMIT), "not-a-number", "'0 1'"),
+    "axis without xyz": (elbow("<axis/>" + LIMIT), "part-missing", "xyz of <axis>"),
+    "decimal comma": (elbow('<origin xyz="0 0,45 0"/>' + AXIS + LIMIT), "not-a-number", "'0 0,45 0'"),
+    "rpy": (elbow('<origin rpy="0 0 pi"/>' + AXIS + LIMIT), "not-a-number", "'0 0 pi'"),
+    "quaternion": (elbow('<origin quat_xyzw="0 0 0 1"/>' + LIMIT), "origin-quaternion", "'0 0 0 1'"),
+    "no limit": (elbow(AXIS), "joint-no-limit", "revolute"),
+    "no effort": (elbow('<limit lower="0" upper="1" velocity="1"/>'), "part-missing", "effort of <limit>"),
+    "no velocity": (elbow('<limit lower="0" upper="1" effort="1"/>'), "part-missing", "velocity of <limit>"),
+    "effort inf": (elbow('<limit effort="inf" velocity="1"/>'), "not-a-number", "'inf'"),
+    "effort huge": (elbow('<limit effort="1e400" velocity="1"/>'), "not-a-number", "'1e400'"),
+    "effort in words": (elbow('<limit effort="10 Nm" velocity="1"/>'), "not-a-number", "'10 Nm'"),
+    "effort with space": (elbow('<limit effort="10 " velocity="1"/>'), "not-a-number", "'10 '"),
+    "effort negative": (elbow('<limit lower="-1" effort="-10" velocity="1"/>'), "effort-negative", "-10"),
+    "velocity negative": (elbow('<limit lower="-1" effort="10" velocity="-3"/>'), "velocity-negative", "-3"),
+    "limits exchanged": (
+        elbow('<limit lower="2" upper="1" effort="1" velocity="1"/>'),
+        "limit-inverted",
+        "2 is",
+    ),
+    "upper missing": (elbow('<limit lower="2" effort="1" velocity="1"/>'), "limit-inverted", "upper 0"),
+    "damping negative": (elbow(AXIS + LIMIT + '<dynamics damping="-0.5"/>'), "damping-negative", "-0.5"),
+    "friction negative": (elbow(AXIS + LIMIT + '<dynamics friction="-7"/>'), "friction-negative", "-7"),
+    "damping not a number": (elbow(AXIS + LIMIT + '<dynamics damping="x"/>'), "not-a-number", "'x'"),
+    "dynamics empty": (elbow(AXIS + LIMIT + "<dynamics/>"), "part-missing", "<dynamics>"),
+    "mass negative": (hand(inertial(mass="-2")), "mass-negative", "-2 kg"),
+    "mass nan": (hand(inertial(mass="nan")), "not-a-number", "'nan'"),
+    "mass in grams": (hand(inertial(mass="2kg")), "not-a-number", "'2kg'"),
+    "mass absurd": (hand(inertial(mass="1e200")), "number-absurd", "'1e200'"),
+    "no mass": (hand(f"<inertial><inertia {MOMENTS}/></inertial>"), "part-missing", "<mass>"),
+    "no inertia": (hand('<inertial><mass value="1"/></inertial>'), "part-missing", "<inertia>"),
+    "no izz": (hand(inertial(moments=MOMENTS.replace("izz", "zz"))), "part-missing", "izz of <inertia>"),
+    "inertia not a number": (hand(inertial(moments=MOMENTS.replace("0.01", "1/2"))), "not-a-number", "'1/2'"),
+    "inertia negative": (
+        hand(inertial(moments=MOMENTS.replace("0.01", "-0.01"))),
+        "inertia-negative",
+        "-0.01",
+    ),
+    "inertia indefinite": (
+        hand(inertial(moments=MOMENTS.replace('iyz="0"', 'iyz="9"'))),
+        "inertia-negative",
+        "9.0",
+    ),
+    "inertial origin": (hand(inertial(origin='<origin xyz="0 0"/>')), "not-a-number", "'0 0'"),
+    "no inertia at all": (hand(""), "mass-matrix-singular", "0 kg m^2"),
+    "slider without mass": (hand("").replace("revolute", "prismatic"), "mass-matrix-singular", "0 kg"),
+    "slider of tiny mass": (
+        hand(inertial("1e-320")).replace("revolute", "prismatic"),
+        "mass-matrix-singular",
+        "e-321 kg",
+    ),
+    "point mass on axis": (hand(inertial(moments=NO_MOMENTS)), "mass-matrix-singular", "0 kg m^2"),
+}
+
+
+@pytest.mark.parametrize(("text", "code", "shown"), ERRORS.values(), ids=ERRORS.keys())
+def test_what_makes_a_robot_unusable_is_an_error_that_shows_the_value(text, code, shown):
+    report = check_urdf(text)
+    assert not report.ok
+    (finding, *_) = find(report, code)
+    assert finding.level == "error"
+    assert finding in report.errors
+    assert shown in finding.message
+
+
+WARNINGS = {
+    "continuous without limit": (elbow(AXIS, "continuous"), "joint-no-limit", "infinite"),
+    "effort 0": (elbow(AXIS + LIMIT.replace('"10"', '"0"')), "effort-zero", "effort is 0"),
+    "velocity 0": (elbow(AXIS + LIMIT.replace('"2"', '"0"')), "velocity-zero", "velocity is 0"),
+    "absurd": (elbow(AXIS + LIMIT.replace('"10"', '"1.797e308"')), "limit-absurd", "1.797e+308"),
+    "no range": (elbow('<limit effort="1" velocity="1"/>'), "limit-no-range", "both 0"),
+    "a point": (elbow('<limit lower="1" upper="1" effort="1" velocity="1"/>'), "limit-no-range", "both 1"),
+    "slider without range": (
+        elbow('<limit effort="1" velocity="1"/>', "prismatic"),
+        "limit-no-range",
+        "both 0",
+    ),
+    "long axis": (elbow('<axis xyz="0 3 4"/>' + LIMIT), "axis-not-unit", "length 5"),
+    "triangle": (hand(inertial(moments=MOMENTS.replace("0.01", "0.05"))), "inertia-triangle", "0.05"),
+    "mass 0": (hand(inertial(mass="0")), "mass-zero", "0 kg"),
+    "two limits": (elbow(AXIS + LIMIT * 2), "repeated-element", "2 times"),
+    "http mesh": (
+        hand(INERTIAL + '<visual><geometry><mesh filename="http://h/m.stl"/></geometry></visual>'),
+        "mesh-remote",
+        "http://h/m.stl",
+    ),
+    "no shape": (hand(INERTIAL + "<visual><geometry/></visual>"), "shape-unreadable", "nothing"),
+    "no radius": (
+        hand(INERTIAL + "<visual><geometry><sphere/></geometry></visual>"),
+        "shape-unreadable",
+        "radius",
+    ),
+    "bad size": (
+        hand(INERTIAL + '<collision><geometry><box size="1 1"/></geometry></collision>'),
+        "shape-unreadable",
+        "'1 1'",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "code", "shown"), WARNINGS.values(), ids=WARNINGS.keys())
+def test_what_was_probably_not_meant_is_a_warning_and_pinocchio_reads_the_robot(text, code, shown):
+    report = check_urdf(text)
+    (finding,) = find(report, code)
+    assert finding.level == "warning"
+    assert finding in report.warnings
+    assert shown in finding.message
+    assert report.ok
+    read_by_pinocchio(text)
+
+
+def test_continuous_joints_and_friction_are_notes():
+    text = elbow(AXIS + LIMIT + '<dynamics damping="2.288" friction="7.17"/>', "continuous")
+    report = check_urdf(text)
+    assert {finding.code: finding.level for finding in report.findings} == {
+        "joint-continuous": "note",
+        "friction-present": "note",
+    }
+    (friction,) = find(report, "friction-present")
+    assert "2.288" in friction.message
+    assert "7.17" in friction.message
+
+
+UNREADABLE = {
+    "empty": ("", "empty"),
+    "blank": ("\ufeff \n\t", "empty"),
+    "not XML": ("lower: 1", "line 1"),
+    "cut off": (ARM[: len(ARM) // 2], "not XML"),
+    "wrong root": ("<sdf/>", "sdf"),
+    "namespace": (ARM.replace("<robot", '<robot xmlns="http://example.org"'), "http://example.org"),
+    "namespace inside": (ARM.replace("<link", '<link xmlns="urn:x"', 1), "urn:x"),
+    "xacro macro": (
+        robot('<xacro:macro name="m"/>', attributes='xmlns:xacro="http://ros.org/xacro"'),
+        "xacro first",
+    ),
+    "xacro undeclared": (robot('<xacro:macro name="m"/>'), "xacro first"),
+    "xacro property": (elbow('<axis xyz="${axis}"/>' + LIMIT), "xacro first"),
+    "surrogate": (ARM.replace("two", "\ud800"), "Unicode"),
+    "null": (ARM.replace("two", "\0"), "not XML"),
+    "unknown entity": (ARM.replace("two", "&two;"), "two"),
+}
+
+
+@pytest.mark.parametrize(("text", "reason"), UNREADABLE.values(), ids=UNREADABLE.keys())
+def test_what_is_no_urdf_is_one_error_with_the_reason(text, reason):
+    with pytest.raises(UrdfError, match=reason):
+        parse_urdf(text)
+    report = check_urdf(text)
+    (finding,) = report.findings
+    assert (finding.level, finding.code) == ("error", "unreadable")
+    assert reason in finding.message
+    assert "\n" not in str(finding)
+
+
+def test_the_line_of_a_syntax_error_is_given():
+    lines = ARM.splitlines()
+    lines[3] = lines[3].replace('"lower"', "lower")
+    with pytest.raises(UrdfError, match="line 4"):
+        parse_urdf("\n".join(lines))
+
+
+LAUGHS = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 12))
+HOSTILE = {
+    "billion laughs": f'<!DOCTYPE robot [<!ENTITY l0 "ha">{LAUGHS}]><robot name="&l11;"/>',
+    "in an element": f'<!DOCTYPE robot [<!ENTITY l0 "ha">{LAUGHS}]><robot name="r">&l11;</robot>',
+    "external entity": '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///secret.txt">]><robot>&x;</robot>',
+    "external file": '<!DOCTYPE robot SYSTEM "http://localhost:9/r.dtd"><robot name="r"/>',
+    "behind comments": '<?xml version="1.0"?>\n<!-- a --><?p?>\n<!-- b --><!DOCTYPE robot><robot/>',
+    "bare": "\ufeff<!DOCTYPE robot>" + ARM,
+}
+
+
+@pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
+def test_doctypes_and_entities_are_refused_at_once(text):
+    start = time.perf_counter()
+    with pytest.raises(UrdfError, match="DOCTYPE"):
+        parse_urdf(text)
+    assert time.perf_counter() - start < 0.5
+
+
+def test_a_doctype_in_a_comment_is_harmless():
+    assert check_urdf(f"<!-- <!DOCTYPE robot> -->{ARM}").findings == ()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        elbow(AXIS + LIMIT.replace('"10"', f'"{"1" * 200_000}x"')),
+        "<!--" * 200_000,
+        "<robot" + " " * 200_000,
+        robot("<a>" * 100_000),
+        robot(*(link(f"l{i}", "") for i in range(5000)), *(joint(f"j{i}", "l0", "l1") for i in range(5000))),
+    ],
+    ids=["digits", "comments", "blanks", "depth", "joints"],
+)
+def test_large_nonsense_is_refused_fast(text):
+    start = time.perf_counter()
+    assert not check_urdf(text).ok
+    assert time.perf_counter() - start < 2.0
+
+
+def test_a_text_over_the_size_limit_is_refused(monkeypatch):
+    monkeypatch.setattr("pathcontrol.robot.urdf.parse.MAX_BYTES", len(ARM) - 1)
+    with pytest.raises(UrdfError, match=f"{len(ARM)} bytes"):
+        parse_urdf(ARM)
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8", "utf-16", "nonsense"])
+def test_an_encoding_declaration_does_not_matter_for_text(encoding):
+    text = f'<?xml version="1.0" encoding="{encoding}"?>\n' + ARM.replace("two", "Größe")
+    assert check_urdf(text).findings == ()
+    assert check_urdf(text).name == "Größe"
+
+
+def test_names_outside_ascii_are_read(caplog):
+    text = robot(BASE, UPPER, link("größe"), SHOULDER, joint("ellenbögen", "upper", "größe"), "<ä ö='1'/>")
+    text = text.replace('<link name="upper"', '<link name="upper" größe="1"')
+    assert check_urdf(text).findings == ()
+    assert caplog.records == []
+
+
+def test_tabs_and_line_breaks_in_vectors_are_read_once_normalised():
+    text = elbow('<axis xyz="0\t1\n0"/>' + LIMIT)
+    assert check_urdf(text).findings == ()
+    assert read_by_pinocchio(text).nv == 2
+
+
+def test_extensions_are_silent():
+    extensions = (
+        '<gazebo reference="upper"><mu1>${mu}</mu1><sdf xmlns="urn:sdf"><link/></sdf></gazebo>',
+        '<transmission name="t"><joint name="elbow"/></transmission>',
+        '<ros2_control name="c"><joint name="elbow"/></ros2_control>',
+        "<mujoco><compiler/></mujoco>",
+        '<pathcontrol><joint name="elbow"/></pathcontrol>',
+    )
+    assert check_urdf(robot(BASE, UPPER, LOWER, SHOULDER, ELBOW, *extensions)).findings == ()
+
+
+def test_the_zero_axis_that_exporters_give_fixed_joints_is_silent():
+    tool = joint("flange", "lower", "tool", "fixed", '<axis xyz="0 0 0"/>')
+    assert check_urdf(robot(BASE, UPPER, LOWER, link("tool", ""), SHOULDER, ELBOW, tool)).findings == ()
+
+
+def test_a_locked_mimic_joint_is_taken_as_fixed():
+    mimic = '<limit effort="0" velocity="0"/><mimic joint="shoulder" multiplier="-1"/>'
+    text = elbow(AXIS + mimic)
+    assert [finding.code for finding in check_urdf(text).errors] == ["joint-mimic"]
+    report = check_urdf(text, allow_mimic=["elbow"])
+    assert report.findings == ()
+    assert report.joints == ("shoulder", "elbow")
+
+
+def test_locking_a_joint_without_inertia_makes_the_robot_usable():
+    assert check_urdf(hand(""), allow_mimic=["elbow"]).ok
+    (finding,) = check_urdf(ARM, allow_mimic=["shoulder", "elbow"]).errors
+    assert finding.code == "no-movable-joint"
+
+
+def test_a_wrong_inertia_only_matters_where_it_moves():
+    bad = link("base", inertial(moments=MOMENTS.replace("0.01", "-0.01")))
+    report = check_urdf(robot(bad, UPPER, LOWER, SHOULDER, ELBOW))
+    assert [(finding.level, finding.code) for finding in report.findings] == [("warning", "inertia-negative")]
+
+
+def test_an_inertial_is_missed_on_shapes_and_bodies_but_not_on_frames():
+    shape = '<visual><geometry><sphere radius="1"/></geometry></visual>'
+    parts = (BASE, UPPER, LOWER, SHOULDER, ELBOW, joint("flange", "lower", "tool", "fixed", ""))
+    assert check_urdf(robot(*parts, link("tool", ""))).findings == ()
+    (finding,) = check_urdf(robot(*parts, link("tool", shape))).findings
+    assert (finding.code, finding.where) == ("inertial-missing", "link 'tool'")
+    (finding,) = check_urdf(robot(BASE, link("upper", ""), LOWER, SHOULDER, ELBOW)).findings
+    assert (finding.code, finding.where) == ("inertial-missing", "link 'upper'")
+
+
+@pytest.mark.parametrize("scheme", ["", "package://", "file://"])
+def test_meshes_are_looked_for_in_the_folders_given(tmp_path, scheme):
+    (tmp_path / "pack" / "urdf").mkdir(parents=True)
+    (tmp_path / "pack" / "upper.stl").touch()
+    name = f"file://{tmp_path}/pack/upper.stl" if scheme == "file://" else f"{scheme}pack/upper.stl"
+    shape = f'<visual><geometry><mesh filename="{name}"/></geometry></visual>'
+    assert check_urdf(hand(INERTIAL + shape), package_dirs=[tmp_path]).findings == ()
+    if scheme == "package://":
+        assert check_urdf(hand(INERTIAL + shape), base_dir=tmp_path / "pack" / "urdf").findings == ()
+    (tmp_path / "pack" / "upper.stl").unlink()
+    (finding,) = check_urdf(hand(INERTIAL + shape), base_dir=tmp_path).findings
+    assert (finding.level, finding.code) == ("warning", "mesh-missing")
+    assert "upper.stl" in finding.message
+
+
+def test_a_relative_mesh_is_not_missed_without_a_folder():
+    shape = '<visual><geometry><mesh filename="meshes/upper.stl"/></geometry></visual>'
+    assert check_urdf(hand(INERTIAL + shape)).findings == ()
+
+
+def test_the_report_is_plain_json():
+    report = check_urdf(elbow(AXIS))
+    data = json.loads(json.dumps(report.as_dict()))
+    assert data["ok"] is False
+    assert data["joints"] == ["shoulder", "elbow"]
+    assert Finding(**data["findings"][0]) == report.findings[0]
+    assert str(report.findings[0]).startswith("error: joint 'elbow': ")
+
+
+def test_findings_come_errors_first_and_stay_on_one_line():
+    text = elbow('<axis xyz="0 2 0"/><limit effort="0" velocity="-1" upper="-1"/><dynamics damping="1"/>')
+    report = check_urdf(text)
+    order = [("error", "warning", "note").index(finding.level) for finding in report.findings]
+    assert order == sorted(order)
+    assert set(order) == {0, 1, 2}
+    assert all("\n" not in str(finding) for finding in report.findings)
+
+
+VALUES = st.sampled_from(["0", "0.1", "2"])
+
+
+@given(
+    kinds=st.lists(st.sampled_from(["revolute", "prismatic", "fixed"]), min_size=3, max_size=3),
+    masses=st.lists(VALUES, min_size=3, max_size=3),
+    arms=st.lists(VALUES, min_size=3, max_size=3),
+    moments=st.lists(VALUES, min_size=3, max_size=3),
+)
+@FUZZ
+def test_a_mass_matrix_called_singular_is_singular(kinds, masses, arms, moments):
+    parts = [BASE]
+    for i, (kind, mass, arm, moment) in enumerate(zip(kinds, masses, arms, moments, strict=True)):
+        inertia = f'ixx="{moment}" iyy="{moment}" izz="{moment}" ixy="0" ixz="0" iyz="0"'
+        parts.append(link(f"l{i}", inertial(mass, inertia, f'<origin xyz="0 0 {arm}"/>')))
+        where = f'<origin xyz="0 {arm} 0" rpy="{arm} 0 0"/>'
+        parts.append(joint(f"j{i}", f"l{i - 1}" if i else "base", f"l{i}", kind, where + AXIS + LIMIT))
+    report = check_urdf(robot(*parts))
+    model = read_by_pinocchio(robot(*parts))
+    diagonals = [
+        np.diag(pin.crba(model, model.createData(), q * np.ones(model.nq))) for q in (0.0, 0.7, -2.0)
+    ]
+    for finding in find(report, "mass-matrix-singular"):
+        index = model.joints[model.getJointId(finding.where.split("'")[1])].idx_v
+        assert all(abs(diagonal[index]) < 1e-12 for diagonal in diagonals)
+    for i, kind in enumerate(kinds):
+        if kind == "prismatic" and all(
+            diagonal[model.joints[model.getJointId(f"j{i}")].idx_v] == 0 for diagonal in diagonals
+        ):
+            assert f"joint 'j{i}'" in [finding.where for finding in find(report, "mass-matrix-singular")]
+
+
+@given(st.text(max_size=300) | st.text(alphabet='<>/="!-?[]& robtlinkje\n', max_size=300))
+@FUZZ
+def test_any_text_is_answered_by_a_report(text):
+    assert not check_urdf(text).ok
+
+
+RICH = robot(
+    BASE,
+    link(
+        "upper", INERTIAL + '<visual><origin xyz="0 0 1"/><geometry><sphere radius="1"/></geometry></visual>'
+    ),
+    LOWER,
+    joint("shoulder", "base", "upper", "continuous", AXIS + LIMIT),
+    joint("elbow", "upper", "lower", "prismatic", '<origin xyz="0 0 0.45" rpy="0 0.1 0"/>' + AXIS + LIMIT),
+).replace("><", ">\n<")
+
+
+@st.composite
+def mutated_urdfs(draw):
+    """The rich arm with lines deleted, repeated or moved, attributes exchanged, and bytes replaced."""
+    lines = RICH.splitlines()
+    for _ in range(draw(st.integers(1, 3))):
+        i, k = (draw(st.integers(0, len(lines) - 1)) for _ in range(2))
+        kind = draw(st.sampled_from(["delete", "repeat", "move", "swap", "number", "noise"]))
+        if kind == "delete" and len(lines) > 1:
+            del lines[i]
+        elif kind == "repeat":
+            lines.insert(k, lines[i])
+        elif kind == "move":
+            lines.insert(k, lines.pop(i))
+        elif kind == "swap":
+            lines[i], lines[k] = swapped(lines[i], lines[k])
+        elif kind == "number":
+            lines[i] = replaced_number(lines[i], draw(st.sampled_from(NUMBERS) | st.floats().map(repr)))
+        else:
+            at = draw(st.integers(0, len(lines[i])))
+            noise = draw(st.binary(max_size=4)).decode("latin-1")
+            lines[i] = lines[i][:at] + noise + lines[i][at + draw(st.integers(0, 4)) :]
+    return "\n".join(lines)
+
+
+NUMBERS = (
+    "",
+    "0",
+    "-1",
+    "nan",
+    "-inf",
+    "1e999",
+    "1e300",
+    "1e-320",
+    " 1",
+    "1 ",
+    "0x1",
+    "1_0",
+    "1 2 3",
+    "one",
+    "٣",
+)
+
+
+def swapped(one, other):
+    """Exchange the last attribute values of two lines."""
+    a, b = one.split('"'), other.split('"')
+    if len(a) > 1 and len(b) > 1:
+        a[-2], b[-2] = b[-2], a[-2]
+    return '"'.join(a), '"'.join(b)
+
+
+def replaced_number(line, number):
+    """Replace the first attribute value of a line."""
+    parts = line.split('"')
+    if len(parts) > 1:
+        parts[1] = number
+    return '"'.join(parts)
+
+
+@given(mutated_urdfs())
+@settings(FUZZ, max_examples=600)
+def test_what_is_accepted_is_read_by_pinocchio(text):
+    report = check_urdf(text)
+    if report.ok:
+        model = read_by_pinocchio(text)
+        assert set(model.names[1:]) == set(report.joints)
+        angles = pin.neutral(model)
+        assert np.isfinite(pin.crba(model, model.createData(), angles)).all()
+
+
+ROBOTS = {
+    "ur3": (),
+    "ur5": (),
+    "ur10": (),
+    "ur5_gripper": (),
+    "kinova": (),
+    "z1": (),
+    "xarm7": (),
+    "talos_arm": (),
+    "so100": (),
+    "so101": (),
+    "asr_twodof": (),
+    "double_pendulum": (),
+    "double_pendulum_continuous": (),
+    "double_pendulum_simple": (),
+    "finger_edu": (),
+    "tiago": (),
+    "tiago_dual": (),
+    "allegro_left_hand": (),
+    "alex_nub_hands": (),
+    "bravo7_no_ee": (),
+    "bravo7_gripper": ("bravo_finger1_joint", "bravo_finger2_joint"),
+    "panda": ("panda_finger_joint2",),
+    "baxter": ("l_gripper_r_finger_joint", "r_gripper_r_finger_joint"),
+}
+
+
+def urdf_path(name):
+    loaders = pytest.importorskip("example_robot_data.robots_loader")
+    loader = loaders.ROBOTS[name]
+    parts = (loader.path, loader.urdf_subpath, loader.urdf_filename)
+    return Path(loaders.getModelPath(join(*parts)), *parts)
+
+
+@pytest.mark.parametrize(("name", "locked"), ROBOTS.items())
+def test_known_robots_have_no_errors_and_all_their_meshes(name, locked):
+    path = urdf_path(name)
+    report = check_urdf(path.read_text(encoding="utf-8"), base_dir=path.parent, allow_mimic=locked)
+    assert report.errors == ()
+    assert find(report, "mesh-missing") == []
+
+
+def test_the_mimic_finger_of_the_panda_is_refused_by_name():
+    (finding,) = check_urdf(urdf_path("panda").read_text(encoding="utf-8")).errors
+    assert (finding.code, finding.where) == ("joint-mimic", "joint 'panda_finger_joint2'")
+    assert "'panda_finger_joint1'" in finding.message
+
+
+@pytest.mark.parametrize("name", ["ur5", "kinova", "talos_arm"])
+def test_common_arms_have_no_warnings(name):
+    path = urdf_path(name)
+    assert check_urdf(path.read_text(encoding="utf-8"), base_dir=path.parent).warnings == ()
+
+
+@given(st.tuples(*[st.floats(-3, 3)] * 6), st.floats(0, 5), st.sampled_from(["1 0 0", "0 0.6 0.8"]))
+@FUZZ
+def test_inertia_about_the_axis_is_that_of_pinocchio(pose, mass, axis):
+    origin = f'<origin xyz="{pose[0]} {pose[1]} {pose[2]}" rpy="{pose[3]} {pose[4]} {pose[5]}"/>'
+    tool = link("tool", inertial(f"{mass}", MOMENTS, origin))
+    flange = joint("flange", "lower", "tool", "fixed", origin)
+    turning = joint("elbow", "upper", "lower", "revolute", f'<axis xyz="{axis}"/>' + LIMIT)
+    text = robot(BASE, UPPER, LOWER, tool, SHOULDER, turning, flange)
+    model = read_by_pinocchio(text)
+    arm = read_arm(parse_urdf(text))
+    expected = pin.crba(model, model.createData(), np.array([0.4, -0.8]))[1, 1]
+    assert axis_inertia(arm, moving_bodies(arm)[1]) == pytest.approx(expected, rel=1e-9)
