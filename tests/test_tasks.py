@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import floats, tasks, vectors, wobbles
+from strategies import Wobble, floats, tasks, vectors, wobbles
 
 from pathcontrol import (
     Circle,
@@ -79,6 +79,15 @@ def test_at_is_what_the_methods_say(task):
 
 @given(tasks(), st.sampled_from([(), (3,), (2, 4), (0,)]))
 def test_every_batch_shape(task, shape):
+    check_batch(task, shape)
+
+
+@pytest.mark.parametrize("shape", [(), (3,), (2, 4), (0,)])
+def test_every_batch_shape_of_default_derivatives(shape):
+    check_batch(Wobble(np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]])), shape)
+
+
+def check_batch(task, shape):
     s = np.linspace(0, 5, int(np.prod(shape))).reshape(shape)
     assert task.q_d(s).shape == (*shape, 2)
     assert all(a.shape == (*shape, 2) for a in task.at(s)[:3])

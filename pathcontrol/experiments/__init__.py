@@ -1,1 +1,1 @@
-"""Experiment files: a robot, a task, a controller, a plant and a loop in one TOML file, and what to write of the run."""
+"""Experiment files: robot, task, controller, plant, loop and outputs of one run in a TOML file."""

@@ -51,7 +51,7 @@ class Differentiator:
 def _weights(u: Array, order: int) -> Array:
     """Weights of the samples for the derivative at u in [-1, 1]."""
     derivative = _DERIVATIVES[order]
-    basis = chebyshev.chebvander(u, len(derivative) - 1).reshape(*np.shape(u), -1)
+    basis = chebyshev.chebvander(u, len(derivative) - 1).reshape(*np.shape(u), len(derivative))
     return basis @ (derivative @ _TO_COEFFICIENTS)
 
 
