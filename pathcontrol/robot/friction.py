@@ -138,6 +138,11 @@ class Stribeck(FrictionLaw):
     def __post_init__(self) -> None:
         for name in ("coulomb", "static", "velocity"):
             object.__setattr__(self, name, _coefficients(f"Stribeck {name}", getattr(self, name)))
+        sizes = {name: getattr(self, name).shape[-1] for name in ("coulomb", "static", "velocity")}
+        if len(set(sizes.values())) != 1:
+            raise InputError(
+                f"Stribeck coefficients for different numbers of joints, {sizes}; expected one each per joint"
+            )
         if (self.static < self.coulomb).any() or (self.velocity == 0).any():
             raise InputError(
                 f"Stribeck friction with static {self.static.tolist()}, Coulomb {self.coulomb.tolist()} and velocity "

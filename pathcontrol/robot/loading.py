@@ -64,21 +64,23 @@ def find_urdf(source: str | Path, package_dirs: tuple[Path, ...] = ()) -> UrdfSo
     """The text of a URDF given as a name, a path or a string, without looking at what it says."""
     if isinstance(source, str) and source.lstrip().startswith("<"):
         return UrdfSource(source, None, package_dirs)
-    path = Path(source)
-    if isinstance(source, str) and not path.suffix and path.name == source and not path.exists():
+    if isinstance(source, str) and source.isidentifier():  # a file of that name would have a suffix
         return _named(source, package_dirs)
-    if not path.is_file():
-        raise UrdfError(f"there is no URDF file {str(path)!r}; give a file, a URDF string or one of: {_names()}")
+    path = Path(source)
     try:
         text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise UrdfError(
+            f"cannot read the URDF file {str(path)!r} ({error.strerror}); give a file, a URDF string or one of: {_names()}"
+        ) from error
     except UnicodeDecodeError as error:
         raise UrdfError(f"{str(path)!r} is not a text file in UTF-8: {error}") from error
     return UrdfSource(text, path.resolve().parent, package_dirs)
 
 
 def _named(name: str, package_dirs: tuple[Path, ...]) -> UrdfSource:
-    bundled = _bundled_dir() / f"{name}.urdf"
-    if bundled.is_file():
+    bundled = {path.stem: path for path in _bundled_dir().glob("*.urdf")}.get(name)
+    if bundled is not None:
         return UrdfSource(bundled.read_text(encoding="utf-8"), bundled.parent, package_dirs)
     try:
         loader = _example_robots().get(name)

@@ -29,18 +29,14 @@ def check_shapes(root: etree._Element) -> Iterator[Finding]:
                 yield Finding("warning", "shape-unreadable", place_of(link), message)
 
 
-def check_meshes(
-    root: etree._Element, base_dir: Path | None, package_dirs: Sequence[Path]
-) -> Iterator[Finding]:
+def check_meshes(root: etree._Element, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Finding]:
     """Every mesh is a file that can be found; nothing is fetched."""
     for link in root.iterfind("link"):
         for name in dict.fromkeys(mesh.get("filename", "") for mesh in link.iterfind("*/geometry/mesh")):
             scheme = name.rpartition("://")[0]
             paths = _mesh_paths(name, base_dir, package_dirs)
             if scheme not in ("", "file", "package"):
-                message = (
-                    f"mesh {shown(name)} is not fetched; expected package://, file:// or a relative path"
-                )
+                message = f"mesh {shown(name)} is not fetched; expected package://, file:// or a relative path"
                 yield Finding("warning", "mesh-remote", place_of(link), message)
             elif name and paths and not any(map(os.path.isfile, paths)):
                 message = f"mesh {shown(name)} is not found; expected a file, add the folder of its package"

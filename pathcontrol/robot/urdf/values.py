@@ -34,9 +34,7 @@ def check_mimics(arm: Arm) -> Iterator[Finding]:
     for joint in arm.movable:
         if joint.name in arm.mimics and joint.name not in arm.locked:
             followed = shown(arm.mimics[joint.name])
-            message = (
-                f"it mimics joint {followed}, which is refused; make it fixed or independent, or lock it"
-            )
+            message = f"it mimics joint {followed}, which is refused; make it fixed or independent, or lock it"
             yield Finding("error", "joint-mimic", place("joint", joint.name), message)
 
 

@@ -1,0 +1,82 @@
+"""``[robot]`` and ``[plant]``: the controller's model of the arm, and the arm that is simulated."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import PlainValidator, model_validator
+
+from pathcontrol.experiments.section import Section
+from pathcontrol.experiments.values import Number, Numbers, Text, expected
+
+
+class Payload(Section):
+    """A point mass [kg] carried by ``frame``, at ``com`` [m] in it."""
+
+    mass: Number
+    frame: Text
+    com: Numbers | None = None
+
+
+class Robot(Section):
+    """The arm as the controller knows it. ``lock`` is in ``angle_unit``, and in metres for sliding joints."""
+
+    source: Text
+    lock: dict[str, Number] | None = None
+    package_dirs: list[Text] | None = None
+    payload: Payload | None = None
+
+
+class Directions(Section):
+    """Coulomb levels [N m] by the direction of motion, one for each joint."""
+
+    positive: Numbers
+    negative: Numbers
+
+
+class StribeckFriction(Section):
+    """Dry friction that falls from ``static`` to ``coulomb`` [N m] at ``velocity``, one for each joint."""
+
+    angles = ("velocity",)
+    coulomb: Numbers
+    static: Numbers
+    velocity: Numbers
+
+
+def _levels(value: Any) -> Any:
+    if isinstance(value, dict | Directions):
+        return Directions.model_validate(value)
+    if not isinstance(value, list) or not value:
+        raise expected("a list with one number for each joint, or a table of 'positive' and 'negative' lists")
+    return value
+
+
+class FrictionTable(Section):
+    """The sum of the friction laws given."""
+
+    viscous: Numbers | None = None
+    coulomb: Annotated[list[float] | Directions, PlainValidator(_levels)] | None = None
+    stribeck: StribeckFriction | None = None
+
+    @model_validator(mode="after")
+    def _one_dry_law(self) -> Self:
+        if self.coulomb is not None and self.stribeck is not None:
+            raise expected("either 'coulomb' or 'stribeck', which has a Coulomb level of its own")
+        if self.viscous is None and self.coulomb is None and self.stribeck is None:
+            raise expected("'viscous', 'coulomb' or 'stribeck' in it, or \"none\" in its place")
+        return self
+
+
+def _friction(value: Any) -> Any:
+    if isinstance(value, dict | FrictionTable):
+        return FrictionTable.model_validate(value)
+    if value not in ("urdf", "none"):
+        raise expected("'urdf', 'none' or a table of 'viscous', 'coulomb' and 'stribeck'")
+    return value
+
+
+class Plant(Section):
+    """The arm that is simulated: the controller's model, but for what is said here."""
+
+    friction: Annotated[Literal["urdf", "none"] | FrictionTable, PlainValidator(_friction)] = "urdf"
+    payload: Payload | None = None

@@ -1,0 +1,113 @@
+"""From a validated experiment to the objects it names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from pathcontrol._arrays import Array, finite, joint_array
+from pathcontrol.control.base import Controller
+from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
+from pathcontrol.control.motion import ComputedTorque, PDPlus, SlotineLi
+from pathcontrol.control.projection import Projection
+from pathcontrol.errors import ExperimentError
+from pathcontrol.experiments.build_arms import build_arms
+from pathcontrol.experiments.build_task import build_task
+from pathcontrol.experiments.controller_sections import ContinuousSection
+from pathcontrol.experiments.keyed import keyed, users_code
+from pathcontrol.experiments.schema import Experiment, Output
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.modes import ContinuousTime, SampledLoop, torque_limits
+
+_LAWS: dict[str, type[Controller]] = {
+    "extended_motion_plan": ExtendedMotionPlan,
+    "projection": Projection,
+    "computed_torque": ComputedTorque,
+    "pd_plus": PDPlus,
+    "slotine_li": SlotineLi,
+}
+_MOST_SAMPLES = 10_000_000
+
+
+class Setup(NamedTuple):
+    """All that :func:`pathcontrol.simulate` needs, checked, and the files to write.
+
+    Attributes:
+        controller: the law, with its model of the arm and its task.
+        plant: the simulated arm.
+        loop: how the loop is closed.
+        q: initial joint positions [rad], (n,).
+        qd: initial joint velocities [rad/s], (n,).
+        duration: simulated time [s].
+        output: the files to write.
+    """
+
+    controller: Controller
+    plant: RobotModel
+    loop: SampledLoop | ContinuousTime
+    q: Array
+    qd: Array
+    duration: float
+    output: Output
+
+
+def build(experiment: Experiment, base_dir: str | Path = ".") -> Setup:
+    """Build and check everything an experiment names; nothing is simulated.
+
+    Args:
+        experiment: a validated experiment.
+        base_dir: the folder that the paths in it are relative to.
+
+    Raises:
+        ExperimentError: something does not exist, does not fit together or is out of range.
+    """
+    base_dir = Path(base_dir)
+    with np.errstate(all="ignore"):  # absurd numbers overflow in the checks, which find that themselves
+        model, plant = build_arms(experiment, base_dir)
+        task = build_task(experiment.task, model.n, base_dir, experiment.to_radians)
+        law = experiment.controller.arguments(float)
+        with keyed("controller", law):
+            controller = _LAWS[experiment.controller.type](model, task, **law)
+        loop = _loop(experiment, plant)
+        q, qd = _state(experiment, controller)
+    return Setup(controller, plant, loop, q, qd, float(experiment.duration), experiment.output)
+
+
+def _loop(experiment: Experiment, plant: RobotModel) -> SampledLoop | ContinuousTime:
+    """The loop, with encoders and torque limits that fit the simulated arm."""
+    section, arguments = experiment.loop, experiment.loop.arguments(experiment.to_radians)
+    with keyed("loop", arguments):
+        if isinstance(section, ContinuousSection):
+            continuous = ContinuousTime(**arguments)
+            torque_limits(continuous, plant)
+            _refuse_too_long(experiment, "output_period", continuous.output_period)
+            return continuous
+        sampled = SampledLoop(**arguments)
+        sampled.sensors(plant)
+        torque_limits(sampled, plant)
+        _refuse_too_long(experiment, "period", sampled.period, sampled.delay)
+    return sampled
+
+
+def _refuse_too_long(experiment: Experiment, name: str, period: float, delay: float = 0.0) -> None:
+    samples = experiment.duration / period
+    if samples > _MOST_SAMPLES:
+        raise ExperimentError(
+            f"duration = {experiment.duration:g} and loop.{name} = {period:g} make {samples:.3g} samples, "
+            f"expected at most {_MOST_SAMPLES:.0e}: shorten the one or lengthen the other"
+        )
+    if delay > experiment.duration:
+        raise ExperimentError(f"loop.delay = {delay:g}, expected at most duration = {experiment.duration:g}")
+
+
+def _state(experiment: Experiment, controller: Controller) -> tuple[Array, Array]:
+    """(q, q̇) at the start, for which the law has been tried once."""
+    n, given = controller.robot.n, experiment.start.arguments(experiment.to_radians)
+    with keyed("start", ("q", "qd")):
+        q = finite("q", joint_array("q", given["q"], n))
+        qd = finite("qd", joint_array("qd", given.get("qd", np.zeros(n)), n))
+    with users_code("controller", f"{type(controller).__name__} at the start"):
+        controller.law(0.0, q, qd, controller.start(q, qd))
+    return q, qd

@@ -1,0 +1,72 @@
+"""From ``[robot]`` and ``[plant]`` to the controller's model and the simulated arm."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pathcontrol.errors import ExperimentError
+from pathcontrol.experiments.arm_sections import Payload
+from pathcontrol.experiments.build_friction import with_friction
+from pathcontrol.experiments.keyed import keyed
+from pathcontrol.experiments.schema import Experiment
+from pathcontrol.robot.loading import find_urdf, load_robot
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.robot.urdf import parse_urdf
+
+
+def build_arms(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, RobotModel]:
+    """The controller's model and the simulated arm.
+
+    Raises:
+        ExperimentError: a robot, joint or frame does not exist, or a value is out of range.
+    """
+    bare = _load(experiment, base_dir)
+    robot, plant = experiment.robot, experiment.plant
+    model = _carrying("robot.payload", bare, robot.payload)
+    carrier = model if plant.payload is None else _carrying("plant.payload", bare, plant.payload)
+    return model, with_friction(carrier, plant.friction, experiment.to_radians)
+
+
+def _load(experiment: Experiment, base_dir: Path) -> RobotModel:
+    section = experiment.robot
+    package_dirs = [base_dir / folder for folder in section.package_dirs or ()]
+    with keyed("robot.source"):
+        source = _source(section.source, base_dir)
+        urdf = find_urdf(source, tuple(package_dirs))
+        sliding = _sliding_joints(urdf.text) if experiment.angle_unit == "deg" else set()
+    lock = {
+        joint: value if joint in sliding else experiment.to_radians(value)
+        for joint, value in (section.lock or {}).items()
+    }
+    with keyed("robot", ("lock",)):
+        robot = load_robot(source, lock=lock, package_dirs=package_dirs)
+    _refuse_degrees(robot, sliding)
+    return robot
+
+
+def _source(source: str, base_dir: Path) -> str | Path:
+    """A URDF as text or the name of a robot, as it is; else a path relative to the experiment file."""
+    if source.lstrip().startswith("<"):
+        return source
+    path = base_dir / source
+    return path if Path(source).suffix or Path(source).name != source or path.is_file() else source
+
+
+def _sliding_joints(urdf: str) -> set[str]:
+    return {str(joint.get("name")) for joint in parse_urdf(urdf).iterfind("joint[@type='prismatic']")}
+
+
+def _refuse_degrees(robot: RobotModel, sliding: set[str]) -> None:
+    free = [name for name in robot.joint_names if name in sliding]
+    if free:
+        raise ExperimentError(
+            f"angle_unit = 'deg', but {', '.join(free)} of {robot.name} slides, and a length is no angle; "
+            "write the file in 'rad' and metres, or lock the joint"
+        )
+
+
+def _carrying(key: str, robot: RobotModel, payload: Payload | None) -> RobotModel:
+    if payload is None:
+        return robot
+    with keyed(key, ("mass", "com")):
+        return robot.with_payload(**payload.arguments(float))

@@ -1,0 +1,43 @@
+"""Errors of the library told as errors of an experiment file."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Iterable, Iterator
+
+from pathcontrol.errors import ExperimentError, PathControlError
+
+
+@contextlib.contextmanager
+def keyed(key: str, fields: Iterable[str] = ()) -> Iterator[None]:
+    """Errors inside the block become ExperimentErrors whose message begins with the key path.
+
+    A message that begins with one of the ``fields`` of the section ``key``, as ``K_v = -1.0, expected …``, is
+    told as ``controller.K_v = …``.
+    """
+    try:
+        yield
+    except ExperimentError:
+        raise
+    except (PathControlError, OSError) as error:
+        word = re.match(r"\w*", str(error))
+        joint = "." if word and word[0] in set(fields) else ": "
+        raise ExperimentError(f"{key}{joint}{error}") from error
+
+
+@contextlib.contextmanager
+def users_code(key: str, doing: str, fields: Iterable[str] = ()) -> Iterator[None]:
+    """As :func:`keyed`, for code of the user: whatever it raises becomes an ExperimentError."""
+    try:
+        with keyed(key, fields):
+            yield
+    except PathControlError:
+        raise
+    except Exception as error:
+        raise ExperimentError(f"{key}: {doing} raised {told(error)}") from error
+
+
+def told(error: BaseException) -> str:
+    """Kind and message of an exception of the user's code."""
+    return f"{type(error).__name__}: {error}"

@@ -1,0 +1,85 @@
+"""The files an experiment asks for, each written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+from pathcontrol._files import whole_file
+from pathcontrol.errors import InputError
+from pathcontrol.experiments.build import Setup
+from pathcontrol.experiments.schema import Output
+from pathcontrol.simulation.run import Run
+
+
+def check_folder(out_dir: Path, output: Output) -> None:
+    """Make the output folder and see that every file can be written, before time is spent on a simulation.
+
+    Raises:
+        InputError: the folder cannot be made or written to, or a folder is where a file should go.
+    """
+    for name in output.model_dump(exclude_none=True).values():
+        target = out_dir / name
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"the output folder {str(target.parent)!r} cannot be made: {error}") from error
+        if not os.access(target.parent, os.W_OK):
+            raise InputError(f"the output folder {str(target.parent)!r} cannot be written to")
+        if target.is_dir():
+            raise InputError(f"there is a folder where the file {str(target)!r} should go; remove or rename it")
+
+
+def write_outputs(run: Run, setup: Setup, out_dir: Path) -> dict[str, Path]:
+    """Write the files that ``setup.output`` names.
+
+    Returns:
+        The files by what they are: ``data``, ``summary``, ``html``, and ``figure-…`` for each figure.
+    """
+    output = setup.output
+    written = {"data": run.save(out_dir / output.data)}
+    if output.summary:
+        written["summary"] = _write_summary(run, setup, out_dir / output.summary)
+    if output.figure:
+        written |= _write_figures(run, setup, out_dir / output.figure)
+    if output.html:
+        written["html"] = _write_html(run, setup, out_dir / output.html)
+    return written
+
+
+def _write_summary(run: Run, setup: Setup, path: Path) -> Path:
+    from pathcontrol.analysis.metrics import metrics
+
+    text = json.dumps(_plain(metrics(run, setup.controller.task)), indent=2, allow_nan=False)
+    with whole_file(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+    return path
+
+
+def _write_figures(run: Run, setup: Setup, path: Path) -> dict[str, Path]:
+    from pathcontrol.view.figures import run_figure
+
+    stem = path.with_suffix("").name
+    figures = run_figure(run, path, setup.controller.task)
+    return {f"figure{figure.name.removeprefix(stem)}": figure for figure in figures}
+
+
+def _write_html(run: Run, setup: Setup, path: Path) -> Path:
+    from pathcontrol.view.recorder import record
+
+    record(run, setup.plant, task=setup.controller.task).save(path)
+    return path
+
+
+def _plain(value: Any) -> Any:
+    """``value`` as JSON can hold it: not finite, as the settling time of what never settles, is null."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value

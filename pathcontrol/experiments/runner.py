@@ -1,0 +1,55 @@
+"""One call from an experiment file to its run and the files it asks for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pathcontrol.errors import ExperimentError
+from pathcontrol.experiments.build import Setup, build
+from pathcontrol.experiments.load import invalid, load_experiment
+from pathcontrol.experiments.outputs import check_folder, write_outputs
+from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.simulate import simulate
+
+
+def run_experiment(path: str | Path, out_dir: str | Path, progress: bool = True) -> tuple[Run, dict[str, Path]]:
+    """Run the experiment of a file; everything it says is checked before anything is computed.
+
+    Args:
+        path: the experiment file; paths in it are relative to its folder.
+        out_dir: the folder to write to, made if need be.
+        progress: show a bar on standard error when it takes longer than two seconds.
+
+    Returns:
+        The run, and the files written, by what they are; see :func:`write_outputs`.
+
+    Raises:
+        ExperimentError: the file is invalid.
+        InputError: ``out_dir`` cannot be written to.
+        SimulationError: the simulation diverged.
+    """
+    setup, out_dir = load_setup(path), Path(out_dir)
+    check_folder(out_dir, setup.output)
+    run = simulate(
+        setup.controller,
+        setup.q,
+        setup.qd,
+        duration=setup.duration,
+        plant=setup.plant,
+        loop=setup.loop,
+        progress=progress,
+    )
+    return run, write_outputs(run, setup, out_dir)
+
+
+def load_setup(path: str | Path) -> Setup:
+    """The objects that an experiment file names, built and checked.
+
+    Raises:
+        ExperimentError: the file is invalid.
+    """
+    experiment = load_experiment(path)
+    try:
+        return build(experiment, Path(path).parent)
+    except ExperimentError as error:
+        raise invalid(path, [str(error)]) from error

@@ -1,0 +1,79 @@
+"""What an experiment file may say. Importing this loads nothing heavy; :mod:`.build` makes objects of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import PurePath
+from typing import Annotated, Any, Literal
+
+from pydantic import PlainValidator
+
+from pathcontrol.experiments.arm_sections import Plant, Robot
+from pathcontrol.experiments.controller_sections import Law, Loop, SampledSection
+from pathcontrol.experiments.section import Section
+from pathcontrol.experiments.task_sections import Task
+from pathcontrol.experiments.values import Numbers, Positive, expected
+
+
+class Start(Section):
+    """``[start]``: the initial state, in ``angle_unit``; at rest unless told."""
+
+    angles = ("q", "qd")
+    q: Numbers
+    qd: Numbers | None = None
+
+
+def _file(*suffixes: str) -> PlainValidator:
+    """Names of files below the output folder that end as the format asks."""
+    wanted = " or ".join(suffix or "no suffix" for suffix in suffixes)
+
+    def check(value: Any) -> str:
+        path = PurePath(value) if isinstance(value, str) else PurePath()
+        inside = path.name and not path.is_absolute() and ".." not in path.parts and "\0" not in str(path)
+        if not inside or path.suffix not in suffixes:
+            raise expected(f"a file name relative to the output folder, with {wanted}")
+        return value
+
+    return PlainValidator(check)
+
+
+class Output(Section):
+    """``[output]``: the files to write, relative to the output folder; the data always, the rest on request.
+
+    Attributes:
+        data: the run, as netCDF; :meth:`pathcontrol.Run.load` reads it.
+        html: the animation, one file for any browser.
+        figure: the beginning of the names of the figures, SVG and PNG.
+        summary: the metrics, as JSON.
+    """
+
+    data: Annotated[str, _file(".nc")] = "run.nc"
+    html: Annotated[str, _file(".html")] | None = None
+    figure: Annotated[str, _file("", ".svg", ".png")] | None = None
+    summary: Annotated[str, _file(".json")] | None = None
+
+
+class Experiment(Section):
+    """An experiment file: robot, task, controller, plant, loop, initial state, duration [s] and outputs.
+
+    Attributes:
+        angle_unit: of all angles and angular rates: ``lock``, the task's lengths, speeds and phases,
+            ``start``, the Stribeck velocity and ``friction_width``. All else is in SI units, as gains are, or
+            taken as it is, as ``task.parameters`` are.
+    """
+
+    angle_unit: Literal["rad", "deg"] = "rad"
+    duration: Positive
+    robot: Robot
+    task: Task
+    controller: Law
+    start: Start
+    plant: Plant = Plant()
+    loop: Loop = SampledSection()
+    output: Output = Output()
+
+    @property
+    def to_radians(self) -> Callable[[float], float]:
+        """Converts from ``angle_unit``."""
+        return math.radians if self.angle_unit == "deg" else float

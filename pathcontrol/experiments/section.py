@@ -1,0 +1,113 @@
+"""A section of an experiment file, and the choice between sections of several kinds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Self
+
+from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from pathcontrol.experiments.values import did_you_mean, expected, shown
+
+_EXPLAINED = "explained"
+
+
+class Section(BaseModel):
+    """A table of an experiment file. Its fields are named as the arguments of what is built from it.
+
+    Attributes:
+        angles: names of the fields that the file's ``angle_unit`` applies to.
+        not_arguments: names of the fields that are no arguments.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    angles: ClassVar[tuple[str, ...]] = ()
+    not_arguments: ClassVar[tuple[str, ...]] = ("type", "mode")
+
+    def arguments(self, to_radians: Callable[[float], float]) -> dict[str, Any]:
+        """Keyword arguments in SI units; what the file leaves out is left to the defaults."""
+        names = [name for name in type(self).model_fields if name not in self.not_arguments]
+        given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        return {k: converted(v, to_radians) if k in self.angles else v for k, v in given.items()}
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _explain(cls, value: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Say in every error what to write instead; here the valid keys are known."""
+        try:
+            return handler(value)
+        except ValidationError as error:
+            raise ValidationError.from_exception_data(
+                cls.__name__, [_detail(cls, e) for e in error.errors(include_url=False)]
+            ) from None
+
+
+def chooser(
+    key: str, sections: Mapping[str, type[Section]], default: str | None = None, also: str = ""
+) -> Callable[[Any], Any]:
+    """A validator that takes the section named by the value of ``key``; errors list names and ``also``."""
+
+    def choose(value: Any) -> Any:
+        if isinstance(value, tuple(sections.values())):
+            return value
+        if not isinstance(value, dict):
+            raise expected(f"a table with the key {key!r}")
+        kind = value.get(key, default)
+        section = sections.get(kind) if isinstance(kind, str) else None
+        if section is None:
+            raise _wrong_choice(key, kind, sections, also)
+        return section.model_validate(value)
+
+    return choose
+
+
+def converted(value: Any, function: Callable[[float], float]) -> Any:
+    """``value`` with ``function`` applied to each number in it."""
+    if isinstance(value, dict):
+        return {key: converted(item, function) for key, item in value.items()}
+    return [converted(item, function) for item in value] if isinstance(value, list) else function(value)
+
+
+def _wrong_choice(key: str, kind: Any, sections: Mapping[str, Any], also: str) -> ValidationError:
+    choices = ", ".join(map(repr, sections)) + also
+    text = f": missing; choose one of {choices}"
+    if kind is not None:
+        text = f" = {shown(kind)}, expected one of {choices}{did_you_mean(kind, sections)}"
+    return ValidationError.from_exception_data("choice", [_explained((key,), kind, text)])
+
+
+def _detail(section: type[Section], error: Any) -> InitErrorDetails:
+    """A line of a validation error, as what follows the key path in the message."""
+    return _explained(error["loc"], error["input"], _text(section, error))
+
+
+def _explained(loc: tuple[int | str, ...], value: Any, text: str) -> InitErrorDetails:
+    error = PydanticCustomError(_EXPLAINED, "{text}", {"text": text})
+    return InitErrorDetails(type=error, loc=loc, input=value)
+
+
+def _text(section: type[Section], error: Any) -> str:
+    kind, value = error["type"], error["input"]
+    if kind == _EXPLAINED:
+        return error["ctx"]["text"]
+    if kind == "missing":
+        needed = [name for name, field in section.model_fields.items() if field.is_required()]
+        return f": missing; needed here: {', '.join(needed)}"
+    if kind == "extra_forbidden":
+        keys = sorted(section.model_fields, key=lambda name: name not in section.not_arguments)
+        return f": unknown key{did_you_mean(error['loc'][-1], keys) or ';'} valid keys: {', '.join(keys)}"
+    return f" = {shown(value)}, expected {_wanted(error)}{_closest_literal(error)}"
+
+
+def _wanted(error: Any) -> str:
+    if error["type"] in ("model_type", "model_attributes_type", "dict_type"):
+        return "a table"
+    return error["msg"].removeprefix("Input should be ").replace("a valid ", "a ")
+
+
+def _closest_literal(error: Any) -> str:
+    if error["type"] != "literal_error":
+        return ""
+    return did_you_mean(error["input"], re.findall("'(.*?)'", error["ctx"]["expected"]))
