@@ -4,25 +4,32 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
 
-if TYPE_CHECKING:
-    from pathcontrol.tasks.base import PathTask
+
+class Path(Protocol):
+    """What a profile may ask of a path; every :class:`PathTask` is one."""
+
+    def dq_d(self, s: Array) -> Array:
+        """First derivative q_d'(s), (*batch, n)."""
+
+    def ddq_d(self, s: Array) -> Array:
+        """Second derivative q_d''(s), (*batch, n)."""
 
 
 class VelocityProfile(ABC):
     """ϑ(s) > 0 for any path; the motion plan (6) is ṡ = ϑ(s)."""
 
     @abstractmethod
-    def theta(self, path: PathTask, s: Array) -> Array:
+    def theta(self, path: Path, s: Array) -> Array:
         """ϑ(s) [1/s], (*batch,)."""
 
     @abstractmethod
-    def dtheta(self, path: PathTask, s: Array) -> Array:
+    def dtheta(self, path: Path, s: Array) -> Array:
         """ϑ'(s) [1/s], (*batch,)."""
 
     def describe(self) -> dict[str, Any]:
@@ -39,10 +46,10 @@ class ConstantRate(VelocityProfile):
     def __post_init__(self) -> None:
         scalar("rate", self.rate, positive=True)
 
-    def theta(self, path: PathTask, s: Array) -> Array:
+    def theta(self, path: Path, s: Array) -> Array:
         return np.full_like(s, self.rate)
 
-    def dtheta(self, path: PathTask, s: Array) -> Array:
+    def dtheta(self, path: Path, s: Array) -> Array:
         return np.zeros_like(s)
 
 
@@ -55,9 +62,9 @@ class ConstantSpeed(VelocityProfile):
     def __post_init__(self) -> None:
         scalar("speed", self.speed, positive=True)
 
-    def theta(self, path: PathTask, s: Array) -> Array:
+    def theta(self, path: Path, s: Array) -> Array:
         return self.speed / np.linalg.norm(path.dq_d(s), axis=-1)
 
-    def dtheta(self, path: PathTask, s: Array) -> Array:
+    def dtheta(self, path: Path, s: Array) -> Array:
         dq_d = path.dq_d(s)
         return -self.speed * (dq_d * path.ddq_d(s)).sum(-1) / np.linalg.norm(dq_d, axis=-1) ** 3
