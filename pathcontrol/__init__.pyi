@@ -7,8 +7,8 @@ from .analysis.metrics import peak as peak
 from .analysis.metrics import rms as rms
 from .analysis.metrics import settling_time as settling_time
 from .analysis.metrics import steady_state as steady_state
-from .control.base import ControlOutput as ControlOutput
 from .control.base import Controller as Controller
+from .control.base import ControlOutput as ControlOutput
 from .control.extended_motion_plan import ExtendedMotionPlan as ExtendedMotionPlan
 from .control.motion import ComputedTorque as ComputedTorque
 from .control.motion import PDPlus as PDPlus

@@ -107,7 +107,7 @@ def _peaks_table(summary: dict[str, Any]) -> Any:
     from rich.table import Table
 
     table = Table(title="Steady-state peaks: measured here, and in the paper")
-    for column in ("experiment", "‖e_p‖ [deg]", "paper", "", "‖e_v‖ [deg/s]", "paper", ""):
+    for column in ("experiment", r"‖e_p‖ \[deg]", "paper", "", r"‖e_v‖ \[deg/s]", "paper", ""):
         table.add_column(column, justify="left" if column == "experiment" else "right")
     for name in ("extended_motion_plan", "projection"):
         measured, paper = summary[name], summary[name]["paper"]

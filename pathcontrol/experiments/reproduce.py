@@ -113,5 +113,5 @@ def summarise(experiments: dict[str, Experiment]) -> dict[str, Any]:
     """Measured peaks beside the paper's, the versions and the settings."""
     peaks = {name: experiment.peaks | {"paper": PAPER[name]} for name, experiment in experiments.items()}
     configs = {name: dict(experiment.run.config) for name, experiment in experiments.items()}
-    versions = [config.pop("versions") for config in configs.values()][0]
-    return peaks | {"versions": versions, "settings": configs}
+    versions = [config.pop("versions") for config in configs.values()]  # the same for both
+    return peaks | {"versions": versions[0], "settings": configs}

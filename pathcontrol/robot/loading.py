@@ -71,7 +71,8 @@ def find_urdf(source: str | Path, package_dirs: tuple[Path, ...] = ()) -> UrdfSo
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise UrdfError(
-            f"cannot read the URDF file {str(path)!r} ({error.strerror}); give a file, a URDF string or one of: {_names()}"
+            f"cannot read the URDF file {str(path)!r} ({error.strerror}); "
+            f"give a file, a URDF string or one of: {_names()}"
         ) from error
     except UnicodeDecodeError as error:
         raise UrdfError(f"{str(path)!r} is not a text file in UTF-8: {error}") from error

@@ -294,9 +294,12 @@ class RobotModel:
 
     def _frame_id(self, frame: str) -> int:
         # getFrameId answers nframes for a frame that does not exist, so ask first
-        if not self.pinocchio_model.existFrame(frame):
+        model = self.pinocchio_model
+        if not model.existFrame(frame):
             raise UnknownNameError(f"{self.name} has no frame {frame!r}; it has {', '.join(self.frame_names)}")
-        return self.pinocchio_model.getFrameId(frame)
+        if model.existFrame(frame, pin.FrameType.BODY):  # a link and a joint may share a name
+            return model.getFrameId(frame, pin.FrameType.BODY)
+        return model.getFrameId(frame)
 
 
 def _broadcast_shape(arguments: Mapping[str, ArrayLike], arrays: Sequence[Array]) -> tuple[int, ...]:

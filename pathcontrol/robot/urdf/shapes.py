@@ -10,6 +10,7 @@ from lxml import etree
 
 from pathcontrol.robot.urdf.elements import place_of
 from pathcontrol.robot.urdf.finding import Finding, shown
+from pathcontrol.robot.urdf.mesh_files import LOCAL_SCHEMES, mesh_candidates
 from pathcontrol.robot.urdf.numbers import POSE, read_numbers
 
 _SHAPES: dict[str, dict[str, int]] = {
@@ -34,8 +35,8 @@ def check_meshes(root: etree._Element, base_dir: Path | None, package_dirs: Sequ
     for link in root.iterfind("link"):
         for name in dict.fromkeys(mesh.get("filename", "") for mesh in link.iterfind("*/geometry/mesh")):
             scheme = name.rpartition("://")[0]
-            paths = _mesh_paths(name, base_dir, package_dirs)
-            if scheme not in ("", "file", "package"):
+            paths = mesh_candidates(name, base_dir, package_dirs)
+            if scheme not in LOCAL_SCHEMES:
                 message = f"mesh {shown(name)} is not fetched; expected package://, file:// or a relative path"
                 yield Finding("warning", "mesh-remote", place_of(link), message)
             elif name and paths and not any(map(os.path.isfile, paths)):
@@ -61,15 +62,3 @@ def _bad_numbers(element: etree._Element, lengths: dict[str, int]) -> Iterator[s
         text = element.get(name)
         if text and read_numbers(text, length) is None:
             yield f"{name} of <{element.tag}> is {shown(text)}, expected {length} finite number(s)"
-
-
-def _mesh_paths(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> list[Path]:
-    """Return where a mesh may be, nothing if there is no folder to look in."""
-    scheme, _, path = name.rpartition("://")
-    if scheme == "file" or os.path.isabs(name):
-        return [Path(path)]
-    folders = list(package_dirs)
-    if base_dir is not None:
-        folder = base_dir.absolute()
-        folders += [folder, *folder.parents] if scheme else [folder]
-    return [folder / path.lstrip("/") for folder in folders]

@@ -1,0 +1,84 @@
+"""From where to look: at the plane in which the tool moves, from its free side, a little from above."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+
+LOWEST, HIGHEST = np.deg2rad([22.0, 60.0])
+ASIDE = np.deg2rad(20.0)
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A view that shows a scene whole, at whatever shape the window has.
+
+    Attributes:
+        target: middle of the picture in the base frame [m], (3,).
+        direction: unit vector from the target to the eye, (3,).
+        outline: the outermost of what is to be seen, from the target, in the axes of the picture [m], (k, 3).
+    """
+
+    target: Array
+    direction: Array
+    outline: Array
+
+    @classmethod
+    def framing(cls, points: Array, direction: Array) -> Camera:
+        """The view from ``direction`` that shows all points [m], (k, 3)."""
+        axes = picture_axes(direction)
+        seen = points @ axes.T
+        middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+        outermost = np.unique((seen @ _directions(200).T).argmax(axis=0))
+        return cls(middle @ axes, axes[2], seen[outermost] - middle)
+
+
+def picture_axes(direction: Array) -> Array:
+    """Rows: right, up and towards the eye, unit vectors in the base frame, (3, 3); z is up in the picture."""
+    right = np.cross(_UP, direction)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(direction, right), direction])
+
+
+def view_direction(path: Array, scene: Array) -> Array:
+    """Unit vector towards an eye that sees the tool's path well, (3,).
+
+    It is normal to the plane that fits the path best (the least principal axis), on the side of the path that
+    the arm is not, then raised to an elevation from 22° to 60° and turned aside by 20°, which shows depth.
+
+    Args:
+        path: points of the tool's path [m], (k, 3).
+        scene: points of the arm [m], (k, 3).
+    """
+    normal = _normal(path - path.mean(axis=0))
+    free_side = path.mean(axis=0) - (scene.min(axis=0) + scene.max(axis=0)) / 2
+    if normal @ free_side < 0:
+        normal = -normal
+    if np.hypot(*normal[:2]) < 0.3:  # a path in a horizontal plane is seen from outside
+        outwards = free_side if np.hypot(*free_side[:2]) > 1e-6 else np.array([1.0, -1.0, 0.0])
+        normal = np.array([*outwards[:2] / np.hypot(*outwards[:2]) * 0.3, 1.0])
+    azimuth = np.arctan2(normal[1], normal[0]) + ASIDE
+    elevation = np.clip(np.arctan2(normal[2], np.hypot(*normal[:2])), LOWEST, HIGHEST)
+    return np.array([*(np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])), np.sin(elevation)])
+
+
+def _directions(count: int) -> Array:
+    """Unit vectors spread evenly, (count, 3), on a golden spiral."""
+    height = 1 - (2 * np.arange(count) + 1) / count
+    turn = np.pi * (1 + np.sqrt(5)) * np.arange(count)
+    circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1) * np.sqrt(1 - height**2)[:, None]
+    return np.column_stack([circle, height])
+
+
+def _normal(centred: Array) -> Array:
+    """The least principal axis of a cloud; for a straight line the horizontal direction across it."""
+    _, spread, axes = np.linalg.svd(centred, full_matrices=False) if len(centred) >= 3 else (0, np.zeros(3), np.eye(3))
+    if spread[1] > 1e-3 * spread[0]:
+        return axes[2]
+    across = np.cross(_UP, axes[0])
+    length = np.linalg.norm(across)
+    return across / length if length > 1e-3 else np.array([0.0, -1.0, 0.0])

@@ -1,0 +1,134 @@
+"""What the links of a robot look like, from the ``<visual>`` elements of its URDF."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import dataclass
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import yourdfpy
+from lxml import etree
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import UrdfError
+from pathcontrol.robot.urdf import parse_urdf
+from pathcontrol.view.meshes import find_mesh, read_mesh
+from pathcontrol.view.shapes import Box, Color, Cylinder, Shape, Sphere
+
+if TYPE_CHECKING:
+    from pathcontrol.robot.model import UrdfSource
+
+UNPAINTED: Color = (0.72, 0.74, 0.77, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class LinkVisual:
+    """One shape of one colour that moves with a link.
+
+    Attributes:
+        link: name of the link, which is also the name of its frame.
+        name: name of the visual, empty if it has none.
+        origin: pose of the shape in the frame of the link [m], (4, 4) homogeneous.
+        shape: what it looks like.
+        color: red, green, blue and opacity.
+    """
+
+    link: str
+    name: str
+    origin: Array
+    shape: Shape
+    color: Color
+
+    @property
+    def corners(self) -> Array:
+        """The corners of its bounding box in the frame of the link [m], (8, 3)."""
+        bounds = self.shape.bounds
+        grid = np.stack(np.meshgrid(*bounds.T), axis=-1).reshape(8, 3)
+        return grid @ self.origin[:3, :3].T + self.origin[:3, 3]
+
+
+def link_visuals(source: UrdfSource) -> list[LinkVisual]:
+    """The visuals of every link, in the order of the URDF; collision shapes are left out.
+
+    A visual that cannot be read, or whose mesh file cannot, is left out with a warning that names it. The
+    colours inside a mesh file win over the URDF's, as in RViz.
+    """
+    root = parse_urdf(source.text)
+    palette = _palette(root)
+    visuals: list[LinkVisual] = []
+    for link in root.iterchildren("link"):
+        for element in link.iterchildren("visual"):
+            visuals += _visuals(link.get("name", ""), element, palette, source)
+    return visuals
+
+
+def leaf_links(source: UrdfSource) -> set[str]:
+    """Names of the links that carry no other link: tools, fingers, marker frames."""
+    root = parse_urdf(source.text)
+    parents = {parent.get("link") for parent in root.iterfind("joint/parent")}
+    return {link.get("name", "") for link in root.iterchildren("link")} - parents
+
+
+def _visuals(link: str, element: Any, palette: dict[str, Color], source: UrdfSource) -> Iterator[LinkVisual]:
+    try:
+        visual = _read(element)
+        origin = np.eye(4) if visual.origin is None else np.asarray(visual.origin, dtype=np.float64)
+        shapes = _shapes(visual.geometry, source)
+    except (UrdfError, LookupError, TypeError, ValueError) as error:
+        mesh = element.find("geometry/mesh")
+        what = "a visual" if mesh is None else f"mesh {mesh.get('filename')!r}"
+        warnings.warn(f"{what} of link {link!r} is left out of the picture: {error}", stacklevel=4)
+        return
+    color = _color(visual.material, palette)
+    for shape, own_color in shapes:
+        yield LinkVisual(link, visual.name or "", origin, shape, own_color or color)
+
+
+def _read(element: Any) -> yourdfpy.urdf.Visual:
+    """One ``<visual>`` as yourdfpy reads it, alone, so that a broken one costs no other."""
+    robot = etree.Element("robot", name="one")
+    link = etree.SubElement(robot, "link", name="one")
+    link.append(deepcopy(element))
+    file = BytesIO(etree.tostring(robot))
+    return yourdfpy.URDF.load(file, build_scene_graph=False, load_meshes=False).robot.links[0].visuals[0]
+
+
+def _shapes(geometry: yourdfpy.urdf.Geometry, source: UrdfSource) -> list[tuple[Shape, Color | None]]:
+    if (mesh := geometry.mesh) is not None:
+        path = find_mesh(mesh.filename or "", source.base_dir, source.package_dirs)
+        return [*read_mesh(path, 1.0 if mesh.scale is None else mesh.scale)]
+    if (box := geometry.box) is not None:
+        return [(Box(np.broadcast_to(box.size, 3)), None)]
+    if (cylinder := geometry.cylinder) is not None:
+        return [(Cylinder(cylinder.radius, cylinder.length), None)]
+    return [(Sphere(geometry.sphere.radius), None)]
+
+
+def _palette(root: Any) -> dict[str, Color]:
+    """Colours by the name of their material; the first definition of a name counts."""
+    found: dict[str, Color] = {}
+    for material in [*root.iterchildren("material"), *root.iterfind("link/visual/material")]:
+        rgba = material.find("color")
+        if rgba is not None and material.get("name"):
+            found.setdefault(material.get("name"), _rgba(rgba.get("rgba", "").split()))
+    return found
+
+
+def _color(material: yourdfpy.urdf.Material | None, palette: dict[str, Color]) -> Color:
+    if material is None:
+        return UNPAINTED
+    if material.color is not None:
+        return _rgba(material.color.rgba)
+    return palette.get(material.name or "", UNPAINTED)
+
+
+def _rgba(values: Any) -> Color:
+    try:
+        red, green, blue, opacity = np.clip(np.asarray(values, dtype=np.float64), 0.0, 1.0).tolist()
+    except ValueError:
+        return UNPAINTED
+    return red, green, blue, opacity
