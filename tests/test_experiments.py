@@ -397,7 +397,7 @@ BAD = {
         "controller.k_p = [1.0, 2.0], expected a scalar",
     ),
     "unknown robot": ({"robot.source": "cicese_3dof"}, "robot.source: "),
-    "no such URDF": ({"robot.source": "none.urdf"}, "robot.source: there is no URDF file"),
+    "no such URDF": ({"robot.source": "none.urdf"}, "robot.source: cannot read the URDF file"),
     "endless name": ({"robot.source": "x" * 300}, "robot.source: "),
     "unknown joint": ({"robot.lock": {"joint_3": 0.0}}, "no movable joint 'joint_3'; it has joint_1"),
     "unknown frame": ({"robot.payload": {"mass": 1.0, "frame": "tol"}}, "robot.payload: cicese_2dof has no"),

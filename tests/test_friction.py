@@ -1,0 +1,397 @@
+"""Friction laws, and the exact solver of set-valued dry friction."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import lsq_linear
+
+from pathcontrol.errors import InputError
+from pathcontrol.robot.friction import Coulomb, FrictionSum, Stribeck, Viscous, no_friction
+from pathcontrol.simulation.dry_friction import stick_slip
+
+EPS = np.finfo(float).eps
+
+examples = settings(deadline=None)
+
+VISCOUS = Viscous([2.288, 0.175, 0.0])
+COULOMB = Coulomb([7.17, 1.734, 0.5], [8.049, 1.734, 0.0])
+STRIBECK = Stribeck([2.0, 0.0, 1.0], [3.0, 0.5, 1.0], [0.1, 0.2, 0.3])
+LAWS = {
+    "none": no_friction(3),
+    "viscous": VISCOUS,
+    "coulomb": COULOMB,
+    "stribeck": STRIBECK,
+    "sum": VISCOUS + COULOMB,
+    "three": VISCOUS + COULOMB + STRIBECK,
+}
+every_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+velocities = st.lists(st.floats(-20, 20), min_size=3, max_size=3).map(np.array)
+
+
+# --- laws ---------------------------------------------------------------------------------------------------
+
+
+@every_law
+@examples
+@given(qd=velocities)
+def test_friction_takes_energy_out_at_every_joint(law, qd):
+    assert (qd * law.torque(qd) >= 0).all()
+    # smoothing with a width must not turn it into a motor either; tanh(x)(a + b tanh x) with |b| ≤ a
+    assert (qd * law.smoothed(qd, 0.3) >= 0).all()
+
+
+@every_law
+@examples
+@given(qd=velocities)
+def test_torque_is_the_viscous_and_the_dry_part_of_the_definition(law, qd):
+    plus, minus = (np.broadcast_to(level, 3) for level in law.levels(qd))
+    assert (plus >= 0).all()
+    assert (minus >= 0).all()
+    for i, v in enumerate(qd):
+        dry = plus[i] if v > 0 else -minus[i] if v < 0 else 0.0
+        assert law.torque(qd)[i] == pytest.approx(law.viscous[i] * v + dry, rel=1e-15)
+
+
+def test_coulomb_friction_keeps_its_direction_apart():
+    assert_array_equal(COULOMB.torque(np.array([1e-9, 1.0, 20.0])), [7.17, 1.734, 0.5])
+    assert_array_equal(COULOMB.torque(-np.array([1e-9, 1.0, 20.0])), [-8.049, -1.734, 0.0])
+    assert_array_equal(COULOMB.torque(np.zeros(3)), np.zeros(3))
+
+
+def test_coulomb_friction_is_symmetric_unless_told_otherwise():
+    qd = np.array([0.3, -2.0])
+    assert_array_equal(Coulomb([1.0, 2.0]).torque(qd), -Coulomb([1.0, 2.0]).torque(-qd))
+
+
+def test_stribeck_friction_falls_from_static_to_coulomb():
+    at_rest, _ = STRIBECK.levels(np.zeros(3))
+    assert_array_equal(at_rest, STRIBECK.static)
+    fast, _ = STRIBECK.levels(np.full(3, 100.0))
+    assert_array_equal(fast, STRIBECK.coulomb)
+    at_v_s, backward = STRIBECK.levels(STRIBECK.velocity)
+    assert_allclose(at_v_s, STRIBECK.coulomb + (STRIBECK.static - STRIBECK.coulomb) / np.e, rtol=1e-14)
+    assert_array_equal(at_v_s, backward)
+    speeds = np.linspace(0, 1, 50)[:, None] * np.ones(3)
+    levels, _ = STRIBECK.levels(speeds)
+    assert (np.diff(levels, axis=0) <= 0).all()
+
+
+@examples
+@given(qd=velocities)
+def test_a_sum_is_the_sum_of_its_terms(qd):
+    more = Viscous([0.0, 1.0, 0.5])
+    total = VISCOUS + COULOMB + STRIBECK + more
+    expected = VISCOUS.torque(qd) + COULOMB.torque(qd) + STRIBECK.torque(qd) + more.torque(qd)
+    assert isinstance(total, FrictionSum)
+    assert_allclose(total.torque(qd), expected, rtol=1e-13)
+    smooth = sum(law.smoothed(qd, 0.1) for law in (VISCOUS, COULOMB, STRIBECK, more))
+    assert_allclose(total.smoothed(qd, 0.1), smooth, rtol=1e-13, atol=1e-300)
+
+
+@every_law
+@pytest.mark.parametrize("joints", [[0], [2, 0], [1, 2], [0, 1, 2]])
+def test_selecting_joints_selects_their_torques(law, joints):
+    qd = np.array([[0.2, -0.5, 0.7], [-3.0, 0.05, 0.0]])
+    few = law.select(joints)
+    assert few.n == len(joints)
+    assert type(few) is type(law)
+    assert_array_equal(few.torque(qd[:, joints]), law.torque(qd)[:, joints])
+
+
+@every_law
+def test_a_batch_is_a_loop(law):
+    qd = np.random.default_rng(0).normal(size=(2, 4, 3))
+    qd[0, 1] = 0.0
+    for function in (law.torque, lambda v: law.smoothed(v, 0.1)):
+        assert_array_equal(function(qd), [[function(v) for v in row] for row in qd])
+
+
+@every_law
+def test_smoothed_friction_tends_to_the_torque(law):
+    qd = np.array([[0.3, -0.3, 0.5], [-0.4, 0.6, -0.2], [-0.3, 0.0, 0.0]])
+    plus, minus = law.levels(qd)
+    for width in (0.1, 0.03, 0.01):
+        # |tanh x − sign x| and |tanh² x − 1| are at most 2 e^{−2|x|} and 4 e^{−2|x|}
+        gap = 4 * (plus + minus) * np.exp(-2 * np.abs(qd) / width)
+        gap = np.where(qd == 0, 0.0, gap) + 4 * EPS * (plus + minus + law.viscous)
+        assert (np.abs(law.smoothed(qd, width) - law.torque(qd)) <= gap).all()
+
+
+@every_law
+def test_smoothed_friction_is_continuous_at_rest(law):
+    tiny = np.full(3, 1e-9)
+    plus, minus = law.levels(np.zeros(3))
+    bound = (law.viscous + (plus + minus) / 0.1) * tiny  # the slope at zero is b + (F⁺ + F⁻)/2w
+    assert (np.abs(law.smoothed(tiny, 0.1)) <= bound).all()
+    assert_array_equal(law.smoothed(np.zeros(3), 0.1), np.zeros(3))
+
+
+@every_law
+def test_a_law_describes_itself_in_plain_values(law):
+    import json
+
+    assert json.loads(json.dumps(law.describe()))["law"] == type(law).__name__
+
+
+def test_no_friction_is_none():
+    qd = np.array([[-1.0, 2.0]])
+    assert_array_equal(no_friction(2).torque(qd), np.zeros((1, 2)))
+
+
+@pytest.mark.parametrize(
+    ("build", "said"),
+    [
+        (lambda: Viscous([1.0, -2.0]), r"viscous.*-2\.0"),
+        (lambda: Viscous([np.nan]), r"viscous.*\[0\] is nan"),
+        (lambda: Viscous(["soap"]), "viscous.*soap"),
+        (lambda: Coulomb([1.0], [-1.0]), r"negative velocity.*-1\.0"),
+        (lambda: Coulomb([1.0, 2.0], [1.0]), "2 joints forward and 1 backward"),
+        (lambda: Stribeck([2.0], [1.0], [0.1]), "expected static ≥ Coulomb"),
+        (lambda: Stribeck([1.0], [2.0], [0.0]), "velocity > 0"),
+        (lambda: Viscous([1.0, 2.0]) + Coulomb([1.0]), r"\[1, 2\] joints"),
+    ],
+)
+def test_bad_coefficients_are_refused_by_value(build, said):
+    with pytest.raises(InputError, match=said):
+        build()
+
+
+def test_coefficients_cannot_be_changed_afterwards():
+    given_values = np.array([1.0, 2.0])
+    law = Viscous(given_values)
+    given_values[0] = 99.0
+    assert_array_equal(law.viscous, [1.0, 2.0])
+    with pytest.raises(ValueError, match="read-only"):
+        law.viscous[0] = 99.0
+
+
+# --- set-valued dry friction over a step --------------------------------------------------------------------
+
+
+def inertia(rng, n, condition):
+    """A random symmetric positive definite matrix of the given condition number."""
+    axes, _ = np.linalg.qr(rng.normal(size=(n, n)))
+    moments = condition ** -rng.uniform(size=n)
+    moments[0], moments[-1] = 1.0, 1.0 / condition
+    M = (axes * moments) @ axes.T
+    return 0.5 * (M + M.T)
+
+
+@st.composite
+def problems(draw, max_n=8, max_condition=1e6):
+    """M, p, low, high of mechanisms of the same size; a fifth of the bounds are zero, on one side or both."""
+    n, rng = draw(st.integers(1, max_n)), np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    condition = 10 ** draw(st.floats(0, np.log10(max_condition)))
+    count = 16
+    M = np.array([inertia(rng, n, condition) for _ in range(count)])
+    plus, minus = rng.exponential(size=(2, count, n)) * (rng.random((2, count, n)) < 0.8)
+    p = draw(st.sampled_from([0.3, 1.0, 3.0])) * rng.normal(size=(count, n))
+    return M, p, -minus, plus
+
+
+def assert_optimal(M, p, low, high, v):
+    """The conditions M v + λ = p, λ in the set of sign v, to rounding.
+
+    λ is taken from the first of them. Linear solves are backward stable: their residual is of the order
+    n ε ‖M‖‖v‖, and a joint that close to slipping, or within 1e-12 max|p|, may stick.
+    """
+    n = p.shape[-1]
+    impulse = p - (M @ v[..., None])[..., 0]
+    size = np.abs(M).sum((-1, -2)) * np.abs(v).max(-1) + np.abs(p).max(-1)
+    slack = (16 * n * EPS * size + 1e-12 * np.abs(p).max(-1))[:, None]
+    assert (impulse <= high + slack).all()
+    assert (impulse >= low - slack).all()
+    assert (np.abs(impulse - high) <= slack)[v > 0].all()
+    assert (np.abs(impulse - low) <= slack)[v < 0].all()
+
+
+def by_enumeration(M, p, low, high):
+    """v⁺ of one mechanism: of all 3^n ways to stick and slip, the one that contradicts itself least."""
+    n, best, least = len(p), None, np.inf
+    for states in product((-1, 0, 1), repeat=n):
+        state = np.array(states)
+        slip = state != 0
+        impulse = np.where(state > 0, high, low)
+        v = np.zeros(n)
+        v[slip] = np.linalg.solve(M[np.ix_(slip, slip)], (p - impulse)[slip])
+        needed = p - M @ v
+        wrong_way = np.maximum(-v * state, 0)
+        beyond = np.where(slip, 0.0, np.maximum(needed - high, low - needed))
+        contradiction = max(wrong_way.max(), beyond.max())
+        if contradiction < least:
+            best, least = v, contradiction
+    return best
+
+
+def by_least_squares(M, p, low, high):
+    """v⁺ of one mechanism from the dual, min ½(p − λ)ᵀM⁻¹(p − λ) over low ≤ λ ≤ high."""
+    L = cholesky(M, lower=True)
+    dry = low < high
+    columns = solve_triangular(L, np.eye(len(p))[:, dry], lower=True)
+    target = solve_triangular(L, p, lower=True)
+    impulse = np.zeros(len(p))
+    if dry.any():
+        fit = lsq_linear(columns, target, (low[dry], high[dry]), method="bvls", tol=1e-15, max_iter=500)
+        impulse[dry] = fit.x
+    return np.linalg.solve(M, p - impulse)
+
+
+@settings(examples, max_examples=60)
+@given(problem=problems())
+def test_the_velocity_satisfies_the_optimality_conditions(problem):
+    M, p, low, high = problem
+    v = stick_slip(M, p, low, high)
+    assert v.shape == p.shape
+    assert_optimal(M, p, low, high, v)
+
+
+@settings(examples, max_examples=60)
+@given(problem=problems())
+def test_a_joint_well_inside_its_bounds_does_not_move_at_all(problem):
+    M, p, low, high = problem
+    v = stick_slip(M, p, low, high)
+    impulse = p - (M @ v[..., None])[..., 0]
+    # 1e-6 is far above the rounding error of the impulse, 1e6 · 1e-16 at most
+    inside = (impulse < high - 1e-6) & (impulse > low + 1e-6)
+    assert_array_equal(v[inside], 0.0)
+
+
+def test_the_problems_above_stick_and_slip_both_ways():
+    rng = np.random.default_rng(3)
+    M = np.array([inertia(rng, 8, 1e6) for _ in range(50)])
+    p, bound = rng.normal(size=(50, 8)), rng.exponential(size=(50, 8))
+    v = stick_slip(M, p, -bound, bound)
+    assert (v > 0).mean() > 0.1
+    assert (v < 0).mean() > 0.1
+    assert (v == 0).mean() > 0.1
+
+
+@settings(examples, max_examples=20)
+@given(problem=problems(max_n=4, max_condition=1e3))
+def test_it_is_the_best_of_all_partitions(problem):
+    v = stick_slip(*problem)
+    for k, row in enumerate(zip(*problem, strict=True)):
+        # v is determined to ε times the condition number of M, at most 1e3 here, and its own size
+        assert_allclose(v[k], by_enumeration(*row), rtol=1e-11, atol=1e-11 * (1 + np.abs(v[k]).max()))
+
+
+@settings(examples, max_examples=20)
+@given(problem=problems(max_condition=1e3))
+def test_it_solves_the_box_constrained_dual(problem):
+    v = stick_slip(*problem)
+    for k, row in enumerate(zip(*problem, strict=True)):
+        # BVLS stops at a relative optimality of 1e-15 or at rounding, which M⁻¹ magnifies up to 1e3 times
+        assert_allclose(v[k], by_least_squares(*row), rtol=1e-9, atol=1e-9 * (1 + np.abs(v[k]).max()))
+
+
+@settings(examples, max_examples=40)
+@given(problem=problems())
+def test_the_step_loses_kinetic_energy(problem):
+    M, p, low, high = problem
+    v = stick_slip(M, p, low, high)
+    # λᵀv ≥ 0 at every joint: friction opposes motion
+    impulse = p - (M @ v[..., None])[..., 0]
+    size = np.abs(M).sum((-1, -2)) * np.abs(v).max(-1) + np.abs(p).max(-1)
+    assert (impulse * v >= -(32 * EPS * size * np.abs(v).max(-1))[:, None]).all()
+
+
+@settings(examples, max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), condition=st.sampled_from([1e1, 1e6]))
+def test_momentum_exactly_at_the_bound(seed, condition):
+    """Built from a known answer in which joints at rest sit at the very edge of slipping."""
+    rng = np.random.default_rng(seed)
+    n, count = int(rng.integers(1, 9)), 16
+    M = np.array([inertia(rng, n, condition) for _ in range(count)])
+    plus, minus = rng.exponential(size=(2, count, n))
+    # at rest, just about to move, or well under way
+    answer = rng.normal(size=(count, n)) * rng.choice([0.0, 1e-9, 1.0], size=(count, n))
+    edge = np.where(rng.random((count, n)) < 0.5, plus, -minus)
+    impulse = np.where(answer > 0, plus, np.where(answer < 0, -minus, edge))
+    p = (M @ answer[..., None])[..., 0] + impulse
+    v = stick_slip(M, p, -minus, plus)
+    assert_optimal(M, p, -minus, plus, v)
+    # the margin of 1e-12 max|p| in the impulse is worth that many times ‖M⁻¹‖ = condition in the velocity
+    assert_allclose(v, answer, rtol=0, atol=20 * n * 1e-12 * condition * np.abs(p).max())
+
+
+def test_momentum_exactly_at_the_bound_of_a_soft_mechanism():
+    """The same where the slipping joints move fast along a direction of hardly any inertia.
+
+    Their momentum is a small difference of large terms, so that rounding alone may call for sticking and for
+    slipping in turn.
+    """
+    rng = np.random.default_rng(7)
+    n, count, condition = 3, 2000, 1e6
+    M = np.array([inertia(rng, n, condition) for _ in range(count)])
+    plus, minus = rng.exponential(size=(2, count, n))
+    answer = np.zeros((count, n))
+    for k in range(count):
+        slip = rng.permutation(n)[:2]
+        moments, axes = np.linalg.eigh(M[k][np.ix_(slip, slip)])
+        answer[k, slip] = axes[:, 0] / moments[0]
+    edge = np.where(rng.random((count, n)) < 0.5, plus, -minus)
+    impulse = np.where(answer > 0, plus, np.where(answer < 0, -minus, edge))
+    p = (M @ answer[..., None])[..., 0] + impulse
+    assert_optimal(M, p, -minus, plus, stick_slip(M, p, -minus, plus))
+
+
+def test_integers_exactly_at_the_bound_stick():
+    M = np.array([[[2.0, 1.0], [1.0, 2.0]]])
+    bound = np.array([[1.0, 1.0]])
+    for signs in product((-1.0, 1.0), repeat=2):
+        assert_array_equal(stick_slip(M, np.array([signs]), -bound, bound), [[0.0, 0.0]])
+
+
+def test_no_momentum_no_motion():
+    rng = np.random.default_rng(4)
+    M = np.array([inertia(rng, 5, 1e6) for _ in range(10)])
+    plus, minus = rng.exponential(size=(2, 10, 5)) * (rng.random((2, 10, 5)) < 0.7)
+    assert_array_equal(stick_slip(M, np.zeros((10, 5)), -minus, plus), np.zeros((10, 5)))
+
+
+def test_without_friction_it_is_the_plain_velocity():
+    rng = np.random.default_rng(5)
+    M, p = np.array([inertia(rng, 6, 1e3) for _ in range(10)]), rng.normal(size=(10, 6))
+    zero = np.zeros((10, 6))
+    assert_allclose(stick_slip(M, p, zero, zero), np.linalg.solve(M, p[..., None])[..., 0], rtol=1e-12)
+
+
+def test_a_frictionless_joint_without_momentum_of_its_own_is_carried_along():
+    M, p = np.array([[[2.0, 1.0], [1.0, 2.0]]]), np.array([[3.0, 0.0]])
+    bound = np.array([[1.0, 0.0]])
+    # joint 1 slips, p − λ = (2, 0), v = M⁻¹ (2, 0)
+    assert_allclose(stick_slip(M, p, -bound, bound), [[4 / 3, -2 / 3]], rtol=1e-15)
+
+
+def test_joints_that_do_not_feel_each_other_are_shrunk_one_by_one():
+    rng = np.random.default_rng(6)
+    moments, p = rng.uniform(0.1, 5, (20, 4)), 2 * rng.normal(size=(20, 4))
+    plus, minus = rng.exponential(size=(2, 20, 4))
+    M = moments[:, :, None] * np.eye(4)
+    expected = (np.maximum(p - plus, 0) + np.minimum(p + minus, 0)) / moments
+    assert_allclose(stick_slip(M, p, -minus, plus), expected, rtol=1e-14)
+
+
+def test_one_way_friction_holds_one_way_only():
+    M, p = np.full((2, 1, 1), 2.0), np.array([[1.0], [-1.0]])
+    v = stick_slip(M, p, np.zeros((2, 1)), np.full((2, 1), 3.0))
+    assert_array_equal(v, [[0.0], [-0.5]])
+
+
+@settings(examples, max_examples=20)
+@given(problem=problems())
+def test_a_batch_of_mechanisms_is_a_loop(problem):
+    v = stick_slip(*problem)
+    for k in range(len(v)):
+        alone = stick_slip(*(a[k : k + 1] for a in problem))[0]
+        assert_allclose(v[k], alone, rtol=1e-9, atol=1e-9 * (1 + np.abs(alone).max()))
+
+
+def test_an_empty_batch_is_empty():
+    empty = np.zeros((0, 3))
+    assert stick_slip(np.zeros((0, 3, 3)), empty, empty, empty).shape == (0, 3)

@@ -1,0 +1,623 @@
+"""Laws of rigid-body dynamics and kinematics that any arm must keep, on several arms."""
+
+from functools import cache, partial
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from pathcontrol.errors import InputError, UnknownNameError, UrdfError
+from pathcontrol.robot.friction import Coulomb, Viscous
+from pathcontrol.robot.loading import known_robots, load_robot
+
+EPS = np.finfo(float).eps
+G = 9.81
+
+#: name: (joints, joints to lock, the frame that carries tools)
+ROBOTS = {
+    "cicese_2dof": (2, {}, "tool"),
+    "double_pendulum": (2, {}, "link2"),
+    "ur5": (6, {}, "tool0"),
+    "kinova": (6, {}, "j2s6s200_end_effector"),
+    "panda": (7, {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}, "panda_hand_tcp"),
+    "baxter": (
+        15,
+        {f"{side}_gripper_{finger}_finger_joint": 0.0 for side in "lr" for finger in "lr"},
+        "left_gripper",
+    ),
+}
+every_robot = pytest.mark.parametrize("name", ROBOTS)
+few = settings(max_examples=8, deadline=None)
+seeds = st.integers(0, 2**32 - 1)
+
+
+@cache
+def load(name):
+    if name != "cicese_2dof":
+        pytest.importorskip("example_robot_data")
+    return load_robot(name, lock=ROBOTS[name][1])
+
+
+def frame_of(name):
+    return ROBOTS[name][2]
+
+
+def states(robot, seed, batch=(), count=2):
+    """``count`` random arrays: angles within one turn, then velocities, accelerations, … of a few units."""
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-np.pi, np.pi, (*batch, robot.n))
+    return (q, *(rng.normal(0, 2, (*batch, robot.n)) for _ in range(count - 1)))
+
+
+def times(M, v):
+    """M v for batches."""
+    return (M @ v[..., None])[..., 0]
+
+
+def close(value, expected, relative=1e-12):
+    """Equal to ``relative`` of the largest entry: a sum of terms of both signs is as good as its largest."""
+    scale = max(np.abs(expected).max(initial=0), np.abs(value).max(initial=0), 1e-3)
+    assert_allclose(value, expected, rtol=0, atol=relative * scale)
+
+
+# --- what it is ---------------------------------------------------------------------------------------------
+
+
+@every_robot
+def test_joints_are_as_many_as_expected_and_named(name):
+    robot = load(name)
+    assert robot.n == ROBOTS[name][0] == len(robot.joint_names) == len(set(robot.joint_names))
+    assert not set(ROBOTS[name][1]) & set(robot.joint_names)
+    for i, joint in enumerate(robot.joint_names):
+        assert robot.joint_index(joint) == i
+    assert frame_of(name) in robot.frame_names
+
+
+@every_robot
+def test_limits_by_name_are_those_by_index(name):
+    robot = load(name)
+    for i, joint in enumerate(robot.joint_names):
+        limit = robot.limit(joint)
+        assert set(limit) == {"lower", "upper", "velocity", "effort"}
+        assert all(limit[key] == getattr(robot.limits, key)[i] for key in limit)
+        assert limit["lower"] <= limit["upper"]  # equal in double_pendulum: its URDF has zeros
+
+
+def test_limits_are_those_of_the_data_sheet():
+    ur5 = load("ur5")
+    assert ur5.limit("wrist_3_joint")["effort"] == 28.0
+    assert ur5.limit("elbow_joint")["effort"] == 150.0
+    panda = load("panda")
+    assert panda.limit("panda_joint4")["upper"] == pytest.approx(-0.0698)
+    assert panda.limit("panda_joint4")["lower"] == pytest.approx(-3.0718)
+
+
+def test_limits_cannot_be_written_to():
+    with pytest.raises(ValueError, match="read-only"):
+        load("cicese_2dof").limits.effort[0] = 0.0
+
+
+# --- dynamics -----------------------------------------------------------------------------------------------
+
+
+@every_robot
+@few
+@given(seed=seeds)
+def test_mass_matrix_is_symmetric_and_positive_definite(name, seed):
+    robot = load(name)
+    (q,) = states(robot, seed, (4,), 1)
+    M = robot.mass_matrix(q)
+    assert_array_equal(M, M.swapaxes(-1, -2))
+    assert (np.linalg.eigvalsh(M) > 0).all()
+
+
+@every_robot
+@few
+@given(seed=seeds)
+def test_mass_matrix_is_that_of_the_composite_rigid_body_algorithm(name, seed):
+    robot = load(name)
+    (q,) = states(robot, seed, (), 1)
+    model = robot.pinocchio_model
+    close(robot.mass_matrix(q), pin.crba(model, model.createData(), q))
+
+
+@every_robot
+@few
+@given(seed=seeds)
+def test_mass_rate_minus_twice_coriolis_is_skew(name, seed):
+    robot = load(name)
+    q, qd = states(robot, seed)
+    h = 1e-5
+    rate = (robot.mass_matrix(q + h * qd) - robot.mass_matrix(q - h * qd)) / (2 * h)
+    S = rate - 2 * robot.coriolis_matrix(q, qd)
+    # the central difference costs h²‖q̇‖³ of truncation and ε/h of rounding, both near 1e-10 of M
+    scale = np.abs(robot.mass_matrix(q)).max() * max(1.0, np.linalg.norm(qd)) ** 3
+    assert_allclose(S, -S.T, rtol=0, atol=1e-9 * scale)
+
+
+@every_robot
+@few
+@given(seed=seeds)
+def test_coriolis_matrix_is_the_one_of_christoffel_symbols(name, seed):
+    robot = load(name)
+    q, qd = states(robot, seed)
+    model = robot.pinocchio_model
+    close(robot.coriolis_matrix(q, qd), pin.computeCoriolisMatrix(model, model.createData(), q, qd), 1e-11)
+
+
+@every_robot
+@few
+@given(seed=seeds)
+def test_coriolis_is_the_matrix_times_a_velocity_and_symmetric_in_both(name, seed):
+    robot = load(name)
+    q, x, y = states(robot, seed, (3,), 3)
+    close(robot.coriolis(q, x, y), times(robot.coriolis_matrix(q, x), y), 1e-11)
+    close(robot.coriolis(q, x, y), robot.coriolis(q, y, x), 1e-11)
+
+
+@every_robot
+@few
+@given(seed=seeds)
+def test_inverse_dynamics_is_the_sum_of_its_terms(name, seed):
+    robot = load(name)
+    q, qd, qdd, v = states(robot, seed, (3,), 4)
+    M, C, g = robot.mass_matrix(q), robot.coriolis_matrix(q, qd), robot.gravity(q)
+    close(robot.nonlinear_effects(q, qd), times(C, qd) + g, 1e-11)
+    close(robot.inverse_dynamics(q, qd, qdd), times(M, qdd) + times(C, qd) + g, 1e-11)
+    close(robot.inverse_dynamics(q, qd, qdd, velocity=v), times(M, qdd) + times(C, v) + g, 1e-11)
+    close(robot.inverse_dynamics(q, qd, qdd, velocity=qd), robot.inverse_dynamics(q, qd, qdd), 1e-11)
+
+
+@every_robot
+@few
+@given(seed=seeds)
+def test_forward_dynamics_inverts_inverse_dynamics(name, seed):
+    robot = load(name)
+    q, qd, qdd = states(robot, seed, (3,), 3)
+    tau = robot.inverse_dynamics(q, qd, qdd)
+    # rounding of τ is magnified by M⁻¹
+    worst = np.linalg.norm(np.linalg.inv(robot.mass_matrix(q)), axis=(-2, -1)).max()
+    tolerance = 100 * EPS * worst * np.abs(tau).max()
+    assert_allclose(robot.forward_dynamics(q, qd, tau), qdd, rtol=0, atol=tolerance)
+
+
+@every_robot
+@few
+@given(seed=seeds)
+def test_power_is_the_rate_of_energy(name, seed):
+    robot = load(name)
+    q, qd, qdd = states(robot, seed, (), 3)
+
+    def energy(t):
+        at, moving = q + t * qd + 0.5 * t * t * qdd, qd + t * qdd
+        return robot.kinetic_energy(at, moving) + robot.potential_energy(at)
+
+    h = 1e-4
+    # five points: truncation of order h⁴ ‖q̇‖⁵, rounding of order ε/h
+    rate = (8 * (energy(h) - energy(-h)) - (energy(2 * h) - energy(-2 * h))) / (12 * h)
+    scale = np.abs(energy(0.0)) + np.linalg.norm(qd) * np.abs(robot.inverse_dynamics(q, qd, qdd)).max()
+    assert rate == pytest.approx(qd @ robot.inverse_dynamics(q, qd, qdd), abs=1e-9 * scale)
+
+
+@every_robot
+@few
+@given(seed=seeds)
+def test_gravity_is_the_gradient_of_potential_energy(name, seed):
+    robot = load(name)
+    (q,) = states(robot, seed, (), 1)
+    h = 1e-3
+    steps = h * np.eye(robot.n)
+    energy = robot.potential_energy
+    gradient = 8 * (energy(q + steps) - energy(q - steps)) - (energy(q + 2 * steps) - energy(q - 2 * steps))
+    # weights at heights of a metre or so: ε/h of rounding and h⁴/30 of truncation, below 2e-12 of them
+    weight = G * pin.computeTotalMass(robot.pinocchio_model)
+    assert_allclose(robot.gravity(q), gradient / (12 * h), rtol=0, atol=2e-12 * weight)
+
+
+@every_robot
+def test_kinetic_energy_is_half_the_quadratic_form(name):
+    robot = load(name)
+    q, qd = states(robot, 1, (5,))
+    close(robot.kinetic_energy(q, qd), 0.5 * (qd * times(robot.mass_matrix(q), qd)).sum(-1))
+
+
+# --- kinematics ---------------------------------------------------------------------------------------------
+
+
+@every_robot
+@few
+@given(seed=seeds)
+def test_poses_are_rigid_motions(name, seed):
+    robot = load(name)
+    (q,) = states(robot, seed, (3,), 1)
+    poses = robot.frame_poses(q, robot.frame_names)
+    assert poses.shape == (3, len(robot.frame_names), 4, 4)
+    R = poses[..., :3, :3]
+    # URDFs give axes and angles with some six digits, but as rotations they are normalised
+    assert_allclose(R @ R.swapaxes(-1, -2), np.broadcast_to(np.eye(3), R.shape), rtol=0, atol=1e-13)
+    assert_allclose(np.linalg.det(R), 1.0, rtol=0, atol=1e-13)
+    assert_array_equal(poses[..., 3, :], np.broadcast_to([0.0, 0.0, 0.0, 1.0], poses.shape[:-1]))
+    last = robot.frame_names[-1]
+    assert_array_equal(poses[:, -1], robot.frame_pose(q, last))
+
+
+@every_robot
+@few
+@given(seed=seeds)
+def test_jacobian_is_the_derivative_of_the_pose(name, seed):
+    robot, frame = load(name), frame_of(name)
+    (q,) = states(robot, seed, (), 1)
+    h = 1e-5
+    steps = h * np.eye(robot.n)
+    rate = (robot.frame_pose(q + steps, frame) - robot.frame_pose(q - steps, frame)) / (2 * h)
+    R = robot.frame_pose(q, frame)[:3, :3]
+    linear = rate[:, :3, 3].T
+    spin = rate[:, :3, :3] @ R.T  # skew, of the angular velocity in axes of the base
+    angular = np.array([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]])
+    J = robot.frame_jacobian(q, frame)
+    # h²/6 of truncation and ε/h of rounding, each below 2e-11 per metre of arm
+    assert_allclose(J, np.concatenate([linear, angular]), rtol=0, atol=1e-9)
+
+
+# --- batches ------------------------------------------------------------------------------------------------
+
+#: method: how many joint arrays it takes
+BATCHED = {
+    "inverse_dynamics": 3,
+    "forward_dynamics": 3,
+    "nonlinear_effects": 2,
+    "gravity": 1,
+    "mass_matrix": 1,
+    "coriolis": 3,
+    "coriolis_matrix": 2,
+    "kinetic_energy": 2,
+    "potential_energy": 1,
+    "frame_pose": 1,
+    "frame_jacobian": 1,
+}
+every_method = pytest.mark.parametrize("method", BATCHED)
+
+
+def call(name, method):
+    """A bound method; those about frames get the frame."""
+    function = getattr(load(name), method)
+    return partial(function, frame=frame_of(name)) if method.startswith("frame") else function
+
+
+def shape_of_one(robot, method):
+    """Shape of the result for a single configuration."""
+    n = robot.n
+    special = {
+        "mass_matrix": (n, n),
+        "coriolis_matrix": (n, n),
+        "frame_pose": (4, 4),
+        "frame_jacobian": (6, n),
+        "kinetic_energy": (),
+        "potential_energy": (),
+    }
+    return special.get(method, (n,))
+
+
+@every_robot
+@every_method
+def test_a_batch_is_a_loop(name, method):
+    robot, function = load(name), call(name, method)
+    one = shape_of_one(robot, method)
+    arguments = states(robot, 2, (2, 3), BATCHED[method])
+    whole = np.asarray(function(*arguments))
+    assert whole.shape == (2, 3, *one)
+    for i in range(2):
+        assert_array_equal(function(*(a[i] for a in arguments)), whole[i])
+        for j in range(3):
+            single = function(*(a[i, j] for a in arguments))
+            assert np.shape(single) == one
+            assert_array_equal(single, whole[i, j])
+
+
+@every_robot
+@every_method
+def test_an_empty_batch_is_empty(name, method):
+    robot = load(name)
+    for batch in ((0,), (2, 0)):
+        arguments = [np.zeros((*batch, robot.n))] * BATCHED[method]
+        assert call(name, method)(*arguments).shape == (*batch, *shape_of_one(robot, method))
+
+
+@pytest.mark.parametrize("name", ["cicese_2dof", "panda"])
+@pytest.mark.parametrize("method", [m for m, count in BATCHED.items() if count > 1])
+def test_batch_axes_broadcast(name, method):
+    robot, function = load(name), call(name, method)
+    arguments = states(robot, 3, (2, 3), BATCHED[method])
+    for kept in range(len(arguments)):
+        mixed = [a if i == kept else a[0, 0] for i, a in enumerate(arguments)]
+        full = [np.array(np.broadcast_to(a, (2, 3, robot.n))) for a in mixed]
+        assert_array_equal(function(*mixed), function(*full))
+    outer = [a[:, :1] if i == 0 else a[:1] for i, a in enumerate(arguments)]
+    full = [np.array(np.broadcast_to(a, (2, 3, robot.n))) for a in outer]
+    assert_array_equal(function(*outer), function(*full))
+
+
+@pytest.mark.parametrize("name", ["cicese_2dof", "panda"])
+@every_method
+@pytest.mark.parametrize(
+    "scatter",
+    [
+        np.asfortranarray,
+        lambda a: np.repeat(a, 2, axis=0)[::2],
+        lambda a: np.repeat(a, 2, axis=-1)[..., ::2],
+        lambda a: a[::-1].copy()[::-1],
+        lambda a: a[..., ::-1].copy()[..., ::-1],
+        lambda a: np.ascontiguousarray(a.T).T,
+        lambda a: a.tolist(),
+    ],
+    ids=["fortran", "every second row", "every second column", "reversed", "mirrored", "transposed", "list"],
+)
+def test_memory_layout_does_not_matter(name, method, scatter):
+    function, arguments = call(name, method), states(load(name), 4, (5,), BATCHED[method])
+    assert_array_equal(function(*map(scatter, arguments)), function(*arguments))
+
+
+@pytest.mark.parametrize("method", [m for m in BATCHED if m != "frame_pose"])
+def test_arguments_are_left_alone(method):
+    arguments = states(load("ur5"), 5, (3,), BATCHED[method])
+    before = [a.copy() for a in arguments]
+    call("ur5", method)(*arguments)
+    for a, b in zip(arguments, before, strict=True):
+        assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("name", ["cicese_2dof", "panda"])
+@pytest.mark.parametrize("size", [1, 2, 3, 257])
+def test_threads_do_not_change_a_bit(name, size):
+    robot = load(name)
+    two = robot.with_threads(2)
+    arguments = states(robot, 6, (size,), 3)
+    for method, count in BATCHED.items():
+        if not method.startswith("frame"):
+            one_thread = getattr(robot, method)(*arguments[:count])
+            assert_array_equal(getattr(two, method)(*arguments[:count]), one_thread)
+
+
+# --- continuous joints --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["kinova", "cicese_2dof"])
+def test_a_continuous_joint_is_one_angle(name):
+    robot = load(name)
+    endless = np.isinf(robot.limits.lower)
+    assert endless.sum() >= 2
+    assert_array_equal(endless, np.isinf(robot.limits.upper))
+    q, qd = states(robot, 7, (10,))
+    turned = q + 2 * np.pi * endless
+    # a turn of 2π is rounded to ε · 2π, and each joint adds its own
+    close(robot.mass_matrix(turned), robot.mass_matrix(q), 1e-13)
+    close(robot.nonlinear_effects(turned, qd), robot.nonlinear_effects(q, qd), 1e-13)
+    close(robot.frame_pose(turned, frame_of(name)), robot.frame_pose(q, frame_of(name)), 1e-13)
+
+
+# --- variations ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "lock"),
+    [
+        ("cicese_2dof", {"joint_1": 0.4}),
+        ("cicese_2dof", {"joint_2": -1.1}),
+        ("ur5", {"elbow_joint": 0.7, "shoulder_pan_joint": -0.3, "wrist_3_joint": 2.0}),
+        ("kinova", {"j2s6s200_joint_1": 5.0, "j2s6s200_joint_4": -0.6}),
+        ("baxter", {"head_pan": 0.5, "left_e1": 0.3, "right_s0": -0.2}),
+    ],
+)
+def test_a_reduced_arm_is_the_whole_one_with_those_joints_held(name, lock):
+    robot = load(name)
+    reduced = robot.reduced(lock)
+    free = [i for i, joint in enumerate(robot.joint_names) if joint not in lock]
+    held = [robot.joint_index(joint) for joint in lock]
+    assert reduced.joint_names == tuple(robot.joint_names[i] for i in free)
+
+    small = states(reduced, 8, (4,), 3)
+    q, qd, qdd = (np.zeros((4, robot.n)) for _ in range(3))
+    for whole, part in zip((q, qd, qdd), small, strict=True):
+        whole[:, free] = part
+    q[:, held] = list(lock.values())
+
+    close(reduced.mass_matrix(small[0]), robot.mass_matrix(q)[:, free][:, :, free], 1e-12)
+    close(reduced.coriolis_matrix(*small[:2]), robot.coriolis_matrix(q, qd)[:, free][:, :, free], 1e-11)
+    close(reduced.gravity(small[0]), robot.gravity(q)[:, free], 1e-12)
+    close(reduced.inverse_dynamics(*small), robot.inverse_dynamics(q, qd, qdd)[:, free], 1e-12)
+    for frame in (frame_of(name), robot.frame_names[1]):
+        close(reduced.frame_pose(small[0], frame), robot.frame_pose(q, frame), 1e-13)
+        close(reduced.frame_jacobian(small[0], frame), robot.frame_jacobian(q, frame)[..., free], 1e-13)
+
+
+def test_a_reduced_arm_keeps_the_limits_friction_and_encoders_of_its_joints():
+    arm = load("cicese_2dof")
+    rest = arm.reduced({"joint_1": 0.0})
+    assert rest.limit("joint_2") == arm.limit("joint_2")
+    assert_array_equal(rest.friction.torque(np.array([-2.0])), arm.friction.torque(np.array([0.0, -2.0]))[1:])
+    assert_array_equal(rest.actuation.encoder_counts, arm.actuation.encoder_counts[1:])
+
+
+def test_locking_at_loading_is_reducing_afterwards():
+    pytest.importorskip("example_robot_data")
+    lock = {"elbow_joint": 0.7, "wrist_1_joint": -0.3}
+    early, late = load_robot("ur5", lock=lock), load("ur5").reduced(lock)
+    assert early.joint_names == late.joint_names
+    q, qd, qdd = states(early, 9, (3,), 3)
+    assert_array_equal(early.inverse_dynamics(q, qd, qdd), late.inverse_dynamics(q, qd, qdd))
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (4,), (2, 3)])
+def test_an_arm_of_one_joint_works_like_any_other(batch):
+    arm = load("cicese_2dof").reduced({"joint_1": 0.0})
+    q, qd, qdd = states(arm, 10, batch, 3)
+    inertia, moment = 0.093 + 3.880 * 0.048**2, 9.81 * 3.880 * 0.048
+    tau = inertia * qdd + moment * np.sin(q)
+    close(arm.inverse_dynamics(q, qd, qdd), tau)
+    close(arm.forward_dynamics(q, qd, tau), qdd)
+    close(arm.mass_matrix(q), np.full((*batch, 1, 1), inertia))
+    close(arm.coriolis_matrix(q, qd), np.zeros((*batch, 1, 1)))
+
+
+BAR = np.array([[0.02, 0.003, 0.001], [0.003, 0.03, -0.002], [0.001, -0.002, 0.025]])
+
+
+@every_robot
+@pytest.mark.parametrize("inertia", [None, BAR], ids=["point", "body"])
+@pytest.mark.parametrize("com", [(0.0, 0.0, 0.0), (0.05, -0.1, 0.2)], ids=["centred", "apart"])
+def test_a_payload_adds_its_own_inertia_and_weight(name, inertia, com):
+    robot, frame, mass = load(name), frame_of(name), 2.5
+    loaded = robot.with_payload(mass, frame, com, inertia)
+    (q,) = states(robot, 11, (4,), 1)
+    pose, J = robot.frame_pose(q, frame), robot.frame_jacobian(q, frame)
+    R, lever = pose[:, :3, :3], pose[:, :3, :3] @ np.array(com)
+    # velocity of the centre of mass: v + ω × lever, column by column
+    J_c = J[:, :3] + np.cross(J[:, 3:], lever[:, :, None], axis=1)
+    added = mass * J_c.swapaxes(-1, -2) @ J_c
+    if inertia is not None:
+        added += J[:, 3:].swapaxes(-1, -2) @ R @ inertia @ R.swapaxes(-1, -2) @ J[:, 3:]
+    close(loaded.mass_matrix(q), robot.mass_matrix(q) + added)
+    close(loaded.gravity(q), robot.gravity(q) + mass * G * J_c[:, 2])
+    height = pose[:, 2, 3] + lever[:, 2]
+    close(loaded.potential_energy(q), robot.potential_energy(q) + mass * G * height)
+
+
+def test_a_payload_leaves_the_arm_itself_as_it_was():
+    robot = load("ur5")
+    (q,) = states(robot, 12, (2,), 1)
+    before = robot.mass_matrix(q), robot.gravity(q)
+    loaded = robot.with_payload(5.0, "tool0")
+    assert not np.allclose(loaded.mass_matrix(q), before[0])
+    assert_array_equal(robot.mass_matrix(q), before[0])
+    assert_array_equal(robot.gravity(q), before[1])
+    assert loaded.limits is robot.limits
+    assert loaded.friction is robot.friction
+
+
+def test_payloads_add_up_and_none_is_none():
+    robot = load("panda")
+    (q,) = states(robot, 13, (3,), 1)
+    frame = frame_of("panda")
+    twice = robot.with_payload(1.0, frame).with_payload(1.5, frame)
+    close(twice.mass_matrix(q), robot.with_payload(2.5, frame).mass_matrix(q))
+    close(robot.with_payload(0.0, frame).mass_matrix(q), robot.mass_matrix(q))
+
+
+@every_robot
+def test_armature_adds_to_the_diagonal_only(name):
+    robot = load(name)
+    rotors = np.linspace(0.1, 2.0, robot.n)
+    geared = robot.with_armature(rotors)
+    q, qd, qdd = states(robot, 14, (3,), 3)
+    close(geared.mass_matrix(q), robot.mass_matrix(q) + np.diag(rotors))
+    close(geared.coriolis_matrix(q, qd), robot.coriolis_matrix(q, qd))
+    close(geared.gravity(q), robot.gravity(q))
+    close(geared.inverse_dynamics(q, qd, qdd), robot.inverse_dynamics(q, qd, qdd) + rotors * qdd)
+    close(geared.forward_dynamics(q, qd, geared.inverse_dynamics(q, qd, qdd)), qdd, 1e-11)
+    close(geared.with_armature(rotors).mass_matrix(q), robot.mass_matrix(q) + 2 * np.diag(rotors))
+
+
+def test_friction_is_beside_the_rigid_body_terms():
+    arm = load("cicese_2dof")
+    q, qd, qdd = states(arm, 15, (3,), 3)
+    other = arm.with_friction(Viscous([1.0, 2.0]) + Coulomb([3.0, 4.0]))
+    assert_array_equal(other.friction.viscous, [1.0, 2.0])
+    assert_array_equal(other.inverse_dynamics(q, qd, qdd), arm.inverse_dynamics(q, qd, qdd))
+    assert_array_equal(arm.with_friction(None).friction.torque(qd), np.zeros((3, 2)))
+    assert arm.friction.viscous[0] == 2.288
+
+
+def test_variations_keep_each_other():
+    arm = load("cicese_2dof").with_friction(Viscous([1.0, 2.0])).with_payload(1.0, "tool").with_threads(2)
+    assert arm.threads == 2
+    assert_array_equal(arm.friction.viscous, [1.0, 2.0])
+    few_joints = arm.with_armature([0.5, 0.5]).reduced({"joint_1": 0.0})
+    assert few_joints.threads == 2
+    assert_array_equal(few_joints.friction.viscous, [2.0])
+    assert_allclose(few_joints.mass_matrix([0.0]), 0.093 + 3.880 * 0.048**2 + 0.45**2 + 0.5, rtol=1e-12)
+
+
+# --- what is refused ----------------------------------------------------------------------------------------
+
+
+def test_an_unknown_robot_lists_the_known_ones():
+    with pytest.raises(UnknownNameError, match="cicese_2dof") as caught:
+        load_robot("cicese_3dof")
+    assert "'cicese_3dof'" in str(caught.value)
+    assert all(name in str(caught.value) for name in known_robots())
+    assert isinstance(caught.value, LookupError)
+
+
+@pytest.mark.parametrize("name", ["talos", "anymal"])
+def test_a_floating_base_is_refused(name):
+    pytest.importorskip("example_robot_data")
+    assert name not in known_robots()
+    with pytest.raises(UnknownNameError, match="floating base"):
+        load_robot(name)
+
+
+@pytest.mark.parametrize("source", ["nowhere/arm.urdf", "arm.urdf"])
+def test_a_missing_file_is_named(source, tmp_path):
+    with pytest.raises(UrdfError, match=r"cannot read the URDF file .*arm\.urdf"):
+        load_robot(tmp_path / source)
+    with pytest.raises(UrdfError, match=r"cannot read the URDF file .*arm\.urdf"):
+        load_robot(source)
+
+
+def test_a_file_and_its_text_are_the_same_arm(tmp_path):
+    arm = load("cicese_2dof")
+    path = tmp_path / "arm.urdf"
+    path.write_text(arm.source.text, encoding="utf-8")
+    q, qd, qdd = states(arm, 16, (3,), 3)
+    for source in (path, str(path), arm.source.text):
+        other = load_robot(source)
+        assert_array_equal(other.inverse_dynamics(q, qd, qdd), arm.inverse_dynamics(q, qd, qdd))
+
+
+@pytest.mark.parametrize(
+    ("refused", "error", "said"),
+    [
+        (lambda r: r.frame_pose([0, 0], "hand"), UnknownNameError, "'hand'.*tool"),
+        (lambda r: r.frame_jacobian([0, 0], "hand"), UnknownNameError, "'hand'.*tool"),
+        (lambda r: r.with_payload(1.0, "hand"), UnknownNameError, "'hand'.*tool"),
+        (lambda r: r.limit("elbow"), UnknownNameError, "'elbow'.*joint_1, joint_2"),
+        (lambda r: r.joint_index("elbow"), UnknownNameError, "'elbow'.*joint_1, joint_2"),
+        (lambda r: r.joint_index("tool_joint"), UnknownNameError, "'tool_joint'"),
+        (lambda r: r.reduced({"elbow": 0.0}), UnknownNameError, "'elbow'.*joint_1, joint_2"),
+        (lambda r: r.reduced({"joint_1": 0.0, "joint_2": 0.0}), InputError, "all 2 joints"),
+        (lambda r: r.reduced({"joint_1": np.nan}), InputError, "angle of joint_1"),
+        (lambda r: r.gravity(0.0), InputError, r"q has shape \(\).*2 joints"),
+        (lambda r: r.gravity([1.0, 2.0, 3.0]), InputError, r"q has shape \(3,\).*2 joints"),
+        (lambda r: r.potential_energy([[1.0]]), InputError, r"q has shape \(1, 1\)"),
+        (lambda r: r.gravity(["a", "b"]), InputError, "q = .*numbers"),
+        (lambda r: r.inverse_dynamics([0, 0], [0, 0, 0], [0, 0]), InputError, r"qd has shape \(3,\)"),
+        (lambda r: r.forward_dynamics([0, 0], [0, 0], [1]), InputError, r"tau has shape \(1,\)"),
+        (
+            lambda r: r.inverse_dynamics([0, 0], [0, 0], [0, 0], velocity=[0]),
+            InputError,
+            r"velocity has shape \(1,\)",
+        ),
+        (
+            lambda r: r.inverse_dynamics(np.zeros((3, 2)), np.zeros((4, 2)), np.zeros(2)),
+            InputError,
+            r"do not fit.*q \(3, 2\), qd \(4, 2\)",
+        ),
+        (lambda r: r.with_payload(-1.0, "tool"), InputError, "mass = -1"),
+        (lambda r: r.with_payload(np.inf, "tool"), InputError, "mass = inf"),
+        (lambda r: r.with_payload(1.0, "tool", com=[0, 0]), InputError, r"\(2,\).*expected \(3,\)"),
+        (lambda r: r.with_payload(1.0, "tool", com=[0, 0, np.nan]), InputError, "com"),
+        (lambda r: r.with_payload(1.0, "tool", inertia=[1, 1, 1]), InputError, r"\(3, 3\)"),
+        (lambda r: r.with_payload(1.0, "tool", inertia=-np.eye(3)), InputError, "semi-definite"),
+        (lambda r: r.with_payload(1.0, "tool", inertia=np.triu(np.ones((3, 3)))), InputError, "symmetric"),
+        (lambda r: r.with_armature([1.0]), InputError, r"armature has shape \(1,\)"),
+        (lambda r: r.with_armature([1.0, -1.0]), InputError, r"armature = .*-1\.0"),
+        (lambda r: r.with_friction(Viscous([1.0])), InputError, "for 1 joints, cicese_2dof has 2"),
+        (lambda r: r.with_threads(0), InputError, "threads = 0"),
+    ],
+)
+def test_bad_arguments_are_refused_by_value(refused, error, said):
+    with pytest.raises(error, match=said):
+        refused(load("cicese_2dof"))
