@@ -1,0 +1,76 @@
+"""Configuration of the documentation. Nothing is fetched while it is built."""
+
+import re
+from importlib import metadata
+
+project = "pathcontrol"
+author = project_copyright = "The pathcontrol contributors"
+release = version = metadata.version("pathcontrol")
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.viewcode",
+]
+myst_enable_extensions = ["amsmath", "colon_fence", "dollarmath"]
+myst_heading_anchors = 3
+exclude_patterns = ["_build"]
+
+html_theme = "furo"
+html_title = f"pathcontrol {release}"
+
+autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+autodoc_typehints_format = "short"
+autodoc_type_aliases = {"Array": "Array", "ArrayLike": "ArrayLike"}
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True  # as fields of the class; as attributes they would be listed twice
+
+
+def _docstring(app, what, name, obj, options, lines):
+    """Make reStructuredText of what the docstrings leave plain: equations and ``(*batch, n)``."""
+    for i, line in enumerate(lines):
+        parts = re.split(r"(``.*?``)", line)
+        lines[i] = "".join(p if p.startswith("``") else p.replace("(*batch", r"(\*batch") for p in parts)
+    _keep_equation_lines(lines)
+
+
+def _keep_equation_lines(lines):
+    """An indented block between blank lines is an equation or several, one a line."""
+    block = False
+    for i, line in enumerate(lines):
+        indented = line.startswith("    ") and bool(line.strip())
+        block = indented and (block or not lines[i - 1].strip())
+        if block:
+            lines[i] = "    | " + line.strip()
+
+
+def _colon_in_property(app, what, name, obj, options, lines):
+    """Napoleon takes what precedes a colon in the docstring of a property for its type."""
+    if what == "property" and lines:
+        lines.insert(0, "\\ ")
+
+
+def _signature(app, what, name, obj, options, signature, return_annotation):
+    """Names of type aliases, as they are written in the code."""
+
+    def plain(text):
+        return text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text)
+
+    return plain(signature), plain(return_annotation)
+
+
+def _skip_fields(app, what, name, obj, skip, options):
+    """The fields of a NamedTuple are told in its docstring, not as ``Alias for field number 0``."""
+    return True if type(obj).__name__ == "_tuplegetter" else skip
+
+
+def setup(app):
+    """Called by Sphinx."""
+    app.connect("autodoc-process-docstring", _colon_in_property, priority=100)
+    app.connect("autodoc-process-docstring", _docstring)
+    app.connect("autodoc-process-signature", _signature)
+    app.connect("autodoc-skip-member", _skip_fields)
