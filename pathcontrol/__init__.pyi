@@ -9,10 +9,13 @@ from .analysis.metrics import settling_time as settling_time
 from .analysis.metrics import steady_state as steady_state
 from .control.base import Controller as Controller
 from .control.base import ControlOutput as ControlOutput
+from .control.base import diagonal_gain as diagonal_gain
 from .control.extended_motion_plan import ExtendedMotionPlan as ExtendedMotionPlan
 from .control.motion import ComputedTorque as ComputedTorque
+from .control.motion import MotionController as MotionController
 from .control.motion import PDPlus as PDPlus
 from .control.motion import SlotineLi as SlotineLi
+from .control.motion import Tracking as Tracking
 from .control.projection import Projection as Projection
 from .errors import ExperimentError as ExperimentError
 from .errors import InputError as InputError

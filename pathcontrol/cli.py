@@ -84,14 +84,15 @@ def run(file: Path | None, out: Path, example: bool, as_json: bool) -> None:
 
 @main.command()
 @click.argument("file")
+@click.option("--lock", multiple=True, metavar="JOINT", help="A joint that will be locked; repeat for more.")
 @json_option
-def check(file: str, as_json: bool) -> None:
+def check(file: str, lock: tuple[str, ...], as_json: bool) -> None:
     """Report what is wrong or odd in a URDF: a FILE.urdf, or the name of a known robot. Exits with 1 on errors."""
     from pathcontrol.robot.loading import find_urdf
     from pathcontrol.robot.urdf import check_urdf
 
     urdf = find_urdf(file)
-    report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs)
+    report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=lock)
     if as_json:
         click.echo(json.dumps(report.as_dict()))
     else:

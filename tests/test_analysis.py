@@ -16,6 +16,7 @@ from pathcontrol import (
     InputError,
     PathTask,
     Projection,
+    SampledLoop,
     contour_error,
     distance_to_gamma,
     lag_error,
@@ -73,6 +74,19 @@ def test_v_and_vdot_belong_together_along_a_run(ideal_arm, circle, kind):
     # central differences: h²/6 of a third derivative
     assert np.abs(difference - Vdot[1:-1]).max() < 1e-3 * np.abs(Vdot).max()
     assert (np.diff(V) < 0).all()
+
+
+@pytest.mark.parametrize("loop", [SampledLoop(), ContinuousTime()])
+def test_v_of_rollouts_with_gains_of_their_own(ideal_arm, circle, loop):
+    K_p, k = np.array([[50.0, 60.0], [400.0, 500.0]]), np.array([1.0, 9.0])
+    both = ExtendedMotionPlan(ideal_arm, circle, K_p, 20.0, k)
+    together = lyapunov(both, simulate(both, [START, START], duration=0.1, loop=loop, progress=False))
+    for i in range(2):
+        law = ExtendedMotionPlan(ideal_arm, circle, K_p[i], 20.0, k[i])
+        alone = lyapunov(law, simulate(law, START, duration=0.1, loop=loop, progress=False))
+        # two rollouts share the steps of the integrator: equal within its tolerance
+        assert np.allclose(together.V[i], alone.V[0], rtol=1e-5, atol=1e-9)
+        assert np.allclose(together.Vdot[i], alone.Vdot[0], rtol=1e-5, atol=1e-7)
 
 
 def test_no_lyapunov_function_for_other_laws(ideal_arm, circle):

@@ -112,9 +112,7 @@ def test_the_first_experiment_has_the_same_peaks(arm):
     task = Circle(np.deg2rad(57.3), np.deg2rad(114.59))
     controller = ExtendedMotionPlan(arm, task, K_p=800.0, K_v=[45.0, 100.0], k=20.0)
     start = np.deg2rad([40.0, 70.0])
-    ours = simulate(
-        controller, start, duration=10.0, loop=SampledLoop(PERIOD, torque_limits=True), progress=False
-    )
+    ours = simulate(controller, start, duration=10.0, loop=SampledLoop(PERIOD, torque_limits=True), progress=False)
     theirs = run_in_mujoco(controller, start, 10.0, step=1e-4)
     # One plant step per period against 25 of MuJoCo's: they differ by 0.06 and 0.004 %. Friction that is the
     # same in both directions would move the first peak by 1.1 %, 2 % more of it at joint 2 both by 1.7 %.

@@ -221,6 +221,32 @@ def test_loading_something_else(tmp_path):
         Run.load(tmp_path / "text.nc")
 
 
+def test_a_law_that_knows_the_time_is_recorded_as_it_acted(ideal_arm, circle):
+    class Clock(ComputedTorque):
+        def law(self, t, q, qd, z):
+            return super().law(t, q, qd, z)._replace(tau=np.full(q.shape, t))
+
+    for loop in (SampledLoop(), ContinuousTime()):
+        run = simulate(Clock(ideal_arm, circle, 1.0, 1.0), START, duration=0.1, loop=loop, progress=False)
+        assert np.allclose(run.array("tau")[0, :, 0], run.time)
+
+
+def test_a_task_may_carry_anything(ideal_arm):
+    """What cannot be written into the record of a run is left out of it, and never costs the run."""
+
+    class Loaded(Circle):
+        def __init__(self):
+            super().__init__(1.0, 1.0)
+            self.ragged, self.function, self.label = [[1], [1, 2]], np.sin, "inner contour"
+
+    run = simulate(Projection(ideal_arm, Loaded(), 100.0, 20.0), START, duration=0.01, progress=False)
+    described = run.config["controller"]["task"]
+    assert described["label"] == "inner contour"
+    assert described["radius"] == 1.0
+    assert "ragged" not in described
+    json.dumps(run.config)
+
+
 # --- bad input ----------------------------------------------------------------------------------------------------
 
 
@@ -231,14 +257,17 @@ def test_loading_something_else(tmp_path):
         ({"q": [0.0, np.nan]}, ["q[1] is nan"]),
         ({"qd": [[1.0, 2.0, 3.0]]}, ["qd has shape (1, 3)"]),
         ({"q": np.zeros((3, 2)), "qd": np.zeros((4, 2))}, ["(3, 2)", "(4, 2)"]),
+        ({"q": np.zeros((4, 2)), "rows": 3}, ["shape (4, 2)"]),
+        ({"q": [0.0, 0.0], "rows": 3}, ["(1, 2)"]),
         ({"duration": 0.0}, ["duration = 0"]),
         ({"duration": np.inf}, ["duration = inf"]),
     ],
 )
 def test_bad_calls(arm, circle, change, words):
     arguments = {"q": START, "duration": 1.0} | change
+    gains = np.full((arguments.pop("rows"), 2), 50.0) if "rows" in change else 50.0
     with pytest.raises(InputError) as error:
-        simulate(paper_law(arm, circle), **arguments)
+        simulate(ExtendedMotionPlan(arm, circle, gains, 10.0, 1.0), **arguments)
     assert all(word in str(error.value) for word in words), str(error.value)
     assert "\n" not in str(error.value)
 

@@ -165,7 +165,9 @@ def test_a_bad_task_is_found_before_the_run(task, words):
 
 
 def test_a_constant_profile_may_be_a_number():
-    check_task(broken(theta=lambda self, s: 2.0), 2)
+    task = broken(theta=lambda self, s: 2.0)
+    check_task(task, 2)
+    assert np.array_equal(task.at(S).velocity, 2.0 * task.dq_d(S))
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The checks of a robot description: each finding, the refusal of hostile XML, and laws for any text."""
 
 import json
+import re
 import time
 from os.path import join
 from pathlib import Path
@@ -288,10 +289,10 @@ HOSTILE = {
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
 def test_doctypes_and_entities_are_refused_at_once(text):
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(UrdfError, match="DOCTYPE"):
         parse_urdf(text)
-    assert time.perf_counter() - start < 0.5
+    assert time.process_time() - start < 5.0  # an entity bomb that goes off takes hours
 
 
 def test_a_doctype_in_a_comment_is_harmless():
@@ -310,9 +311,10 @@ def test_a_doctype_in_a_comment_is_harmless():
     ids=["digits", "comments", "blanks", "depth", "joints"],
 )
 def test_large_nonsense_is_refused_fast(text):
-    start = time.perf_counter()
+    # bounded work, not a speed claim: quadratic time would take minutes
+    start = time.process_time()
     assert not check_urdf(text).ok
-    assert time.perf_counter() - start < 2.0
+    assert time.process_time() - start < 20.0
 
 
 def test_a_text_over_the_size_limit_is_refused(monkeypatch):
@@ -445,9 +447,7 @@ def test_a_mass_matrix_called_singular_is_singular(kinds, masses, arms, moments)
         parts.append(joint(f"j{i}", f"l{i - 1}" if i else "base", f"l{i}", kind, where + AXIS + LIMIT))
     report = check_urdf(robot(*parts))
     model = read_by_pinocchio(robot(*parts))
-    diagonals = [
-        np.diag(pin.crba(model, model.createData(), q * np.ones(model.nq))) for q in (0.0, 0.7, -2.0)
-    ]
+    diagonals = [np.diag(pin.crba(model, model.createData(), q * np.ones(model.nq))) for q in (0.0, 0.7, -2.0)]
     for finding in find(report, "mass-matrix-singular"):
         index = model.joints[model.getJointId(finding.where.split("'")[1])].idx_v
         assert all(abs(diagonal[index]) < 1e-12 for diagonal in diagonals)
@@ -466,9 +466,7 @@ def test_any_text_is_answered_by_a_report(text):
 
 RICH = robot(
     BASE,
-    link(
-        "upper", INERTIAL + '<visual><origin xyz="0 0 1"/><geometry><sphere radius="1"/></geometry></visual>'
-    ),
+    link("upper", INERTIAL + '<visual><origin xyz="0 0 1"/><geometry><sphere radius="1"/></geometry></visual>'),
     LOWER,
     joint("shoulder", "base", "upper", "continuous", AXIS + LIMIT),
     joint("elbow", "upper", "lower", "prismatic", '<origin xyz="0 0 0.45" rpy="0 0.1 0"/>' + AXIS + LIMIT),
@@ -611,3 +609,39 @@ def test_inertia_about_the_axis_is_that_of_pinocchio(pose, mass, axis):
     arm = read_arm(parse_urdf(text))
     expected = pin.crba(model, model.createData(), np.array([0.4, -0.8]))[1, 1]
     assert axis_inertia(arm, moving_bodies(arm)[1]) == pytest.approx(expected, rel=1e-9)
+
+
+# --- <pathcontrol> ------------------------------------------------------------------------------------------------
+
+
+def extended(extension: str) -> str:
+    return ARM.replace("</robot>", f"<pathcontrol>{extension}</pathcontrol></robot>")
+
+
+ELBOW = re.search(r'<joint name="(\w+)"', ARM)[1]
+
+
+@pytest.mark.parametrize(
+    ("extension", "code", "value"),
+    [
+        ("<joint name='nose'><coulomb positive='1' negative='1'/></joint>", "extension-joint", "nose"),
+        ("<motor/>", "extension-joint", "motor"),
+        (f"<joint name='{ELBOW}'><grease/></joint>", "extension-element", "grease"),
+        (f"<joint name='{ELBOW}'><coulomb positive='1'/></joint>", "extension-number", "negative"),
+        (f"<joint name='{ELBOW}'><coulomb positive='-1' negative='1'/></joint>", "extension-number", "-1"),
+        (f"<joint name='{ELBOW}'><coulomb positive='much' negative='1'/></joint>", "extension-number", "much"),
+        (f"<joint name='{ELBOW}'><encoder counts_per_revolution='0'/></joint>", "extension-number", "above 0"),
+        (f"<joint name='{ELBOW}'><encoder counts_per_revolution='nan'/></joint>", "extension-number", "nan"),
+    ],
+)
+def test_the_extension_is_checked(extension, code, value):
+    findings = check_urdf(extended(extension)).errors
+    assert [finding.code for finding in findings] == [code]
+    assert value in findings[0].message
+
+
+def test_the_extension_of_the_bundled_arm_is_sound():
+    text = (Path(__file__).parent.parent / "urdf" / "cicese_2dof.urdf").read_text()
+    assert check_urdf(text).ok
+    one_missing = re.sub(r'<encoder counts_per_revolution="655360"/>', "", text)
+    assert [f.code for f in check_urdf(one_missing).warnings] == ["extension-encoders"]

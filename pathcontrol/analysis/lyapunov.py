@@ -31,10 +31,7 @@ def extended_motion_plan_lyapunov(controller: ExtendedMotionPlan, s: Array, e_p:
         e_p: position error [rad], (*batch, n).
         e_v: velocity error [rad/s], (*batch, n).
     """
-    K_p, K_v = controller.K_p, controller.K_v
-    along = (e_p * controller.point(s).dq_d).sum(-1)
-    V = 0.5 * (e_p**2).sum(-1) + 0.5 * (e_v**2 / K_p).sum(-1)
-    return Lyapunov(V, -(e_v**2 * (K_v / K_p)).sum(-1) - controller.k * along**2)
+    return _extended(controller.K_p, controller.K_v, controller.k, e_p, e_v, controller.point(s).dq_d)
 
 
 def projection_lyapunov(controller: Projection, e_p: Array, e_v: Array) -> Lyapunov:
@@ -45,8 +42,7 @@ def projection_lyapunov(controller: Projection, e_p: Array, e_v: Array) -> Lyapu
         e_p: position error [rad], (*batch, n).
         e_v: velocity error [rad/s], (*batch, n).
     """
-    V = 0.5 * (e_v**2).sum(-1) + 0.5 * (controller.k_p * e_p**2).sum(-1)
-    return Lyapunov(V, -(controller.K_v * e_v**2).sum(-1))
+    return _projected(controller.k_p, controller.K_v, e_p, e_v)
 
 
 def lyapunov(controller: Controller, run: Run) -> Lyapunov:
@@ -56,10 +52,27 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     """
     e_p, e_v = run.array("e_p"), run.array("e_v")
     if isinstance(controller, ExtendedMotionPlan):
-        return extended_motion_plan_lyapunov(controller, run.array("s"), e_p, e_v)
+        K_p, K_v, k = _over_time(controller.K_p), _over_time(controller.K_v), controller.k[..., None]
+        return _extended(K_p, K_v, k, e_p, e_v, controller.point(run.array("s")).dq_d)
     if isinstance(controller, Projection):
-        return projection_lyapunov(controller, e_p, e_v)
+        return _projected(_over_time(controller.k_p), _over_time(controller.K_v), e_p, e_v)
     raise InputError(
         f"no Lyapunov function is given for {type(controller).__name__}; use ExtendedMotionPlan or Projection, "
         "or ExtendedMotionPlan with k = 0 for computed torque"
     )
+
+
+def _extended(K_p: Array, K_v: Array, k: Array, e_p: Array, e_v: Array, dq_d: Array) -> Lyapunov:
+    along = (e_p * dq_d).sum(-1)
+    V = 0.5 * (e_p**2).sum(-1) + 0.5 * (e_v**2 / K_p).sum(-1)
+    return Lyapunov(V, -(e_v**2 * (K_v / K_p)).sum(-1) - k * along**2)
+
+
+def _projected(k_p: Array, K_v: Array, e_p: Array, e_v: Array) -> Lyapunov:
+    V = 0.5 * (e_v**2).sum(-1) + 0.5 * (k_p * e_p**2).sum(-1)
+    return Lyapunov(V, -(K_v * e_v**2).sum(-1))
+
+
+def _over_time(gain: Array) -> Array:
+    """Gains (rollout, n) as (rollout, 1, n), to meet errors (rollout, time, n)."""
+    return gain[:, None, :] if gain.ndim == 2 else gain

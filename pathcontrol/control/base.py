@@ -138,8 +138,8 @@ def scalar_gain(name: str, value: ArrayLike) -> Array:
     array = finite(name, as_array(name, value))
     if array.ndim and array.shape[-1] != 1:
         raise InputError(
-            f"{name} = {np.asarray(value).tolist()}, expected a scalar: with different gains per joint {name} e_p is "
-            "no longer orthogonal to the path, and the stability proof of (39) fails"
+            f"{name} = {np.asarray(value).tolist()}, expected a scalar: the Lyapunov function (42) is for one "
+            f"gain; give one {name}, or weigh the joints with K_v"
         )
     return _positive(name, array)
 

@@ -15,6 +15,7 @@ from pathcontrol.errors import MissingExtraError, UnknownNameError, UrdfError
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Viscous
 from pathcontrol.robot.model import Actuation, Limits, RobotModel, UrdfSource, build_model
 from pathcontrol.robot.urdf import check_urdf, parse_urdf
+from pathcontrol.robot.urdf.extension import extension_values
 
 _UNLIMITED = 1e30  # some URDFs write 1.8e308 for "no limit"
 
@@ -157,38 +158,19 @@ def _limits(model: Any, names: Sequence[str], endless: set[str]) -> Limits:
 
 
 def _friction(root: Any, names: Sequence[str]) -> FrictionLaw:
-    """Viscous and Coulomb friction of ``<dynamics>``; ``<pathcontrol><joint><coulomb>`` gives it by direction."""
+    """Viscous and Coulomb friction of ``<dynamics>``; ``<pathcontrol>`` may give the latter by direction."""
     joints = {joint.get("name"): joint for joint in root.iterfind("joint")}
-    extension = _extension(root, "coulomb")
+    by_direction = extension_values(root, "coulomb")
     viscous, plus, minus = np.zeros((3, len(names)))
     for i, name in enumerate(names):
         dynamics = joints[name].find("dynamics")
         given: Mapping[str, str] = {} if dynamics is None else dynamics.attrib
-        viscous[i], plus[i] = float(given.get("damping", 0)), float(given.get("friction", 0))
-        minus[i] = plus[i]
-        if name in extension:
-            plus[i], minus[i] = _numbers(extension[name], name, "positive", "negative")
+        viscous[i], level = float(given.get("damping", 0)), float(given.get("friction", 0))
+        plus[i], minus[i] = by_direction.get(name, (level, level))
     return Viscous(viscous) + Coulomb(plus, minus)
 
 
 def _encoders(root: Any, names: Sequence[str]) -> Array | None:
-    """Encoder resolution [counts per revolution] of ``<pathcontrol><joint><encoder>``, if every joint has one."""
-    extension = _extension(root, "encoder")
-    if not set(names) <= set(extension):
-        return None
-    return readonly(np.array([_numbers(extension[name], name, "counts_per_revolution")[0] for name in names]))
-
-
-def _extension(root: Any, tag: str) -> dict[str, Any]:
-    found = {joint.get("name"): joint.find(tag) for joint in root.iterfind("pathcontrol/joint")}
-    return {name: element for name, element in found.items() if element is not None}
-
-
-def _numbers(element: Any, joint: str, *keys: str) -> list[float]:
-    try:
-        return [float(element.attrib[key]) for key in keys]
-    except (KeyError, ValueError) as error:
-        wanted = ", ".join(keys)
-        raise UrdfError(
-            f"<pathcontrol> joint {joint!r}: <{element.tag}> needs numbers for {wanted}: {error}"
-        ) from error
+    """Encoder resolution [counts per revolution] of ``<pathcontrol>``, if every joint has one."""
+    counts = extension_values(root, "encoder")
+    return readonly(np.array([counts[name][0] for name in names])) if set(names) <= set(counts) else None

@@ -11,6 +11,8 @@ from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.errors import SimulationError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.modes import ContinuousTime, torque_limits
+from pathcontrol.simulation.recorder import Recorder
+from pathcontrol.simulation.sensors import Reading
 
 
 class ClosedLoop:
@@ -72,24 +74,14 @@ def run_continuous(
         )
     if not solution.success or not np.isfinite(solution.y).all():
         raise SimulationError(f"the integrator gave up at t = {solution.t[-1]:.3g} s: {solution.message}")
-    states = solution.y.T.reshape(len(time), *start.shape).swapaxes(0, 1)
-    return time, _recorded(loop, states)
+    return time, _recorded(loop, time, solution.y.T.reshape(len(time), *start.shape))
 
 
-def _recorded(loop: ClosedLoop, states: Array) -> dict[str, Array]:
-    """What a run holds, from the states (rollout, time, 2n + m)."""
-    q, qd, _ = loop.split(states)
-    out, tau = loop.control(0.0, states)
-    return {
-        "q": q,
-        "qd": qd,
-        "q_measured": q,
-        "qd_measured": qd,
-        "tau_demand": out.tau,
-        "tau": tau,
-        "s": out.s,
-        "sdot": out.sdot,
-        "e_p": out.e_p,
-        "e_v": out.e_v,
-        "regular": out.regular,
-    }
+def _recorded(loop: ClosedLoop, time: Array, states: Array) -> dict[str, Array]:
+    """What a run holds, from the states (time, rollout, 2n + m)."""
+    recorder = Recorder(len(time))
+    for tick, (t, y) in enumerate(zip(time, states, strict=True)):
+        q, qd, _ = loop.split(y)
+        out, tau = loop.control(t, y)
+        recorder.write(tick, q, qd, Reading(q, qd), out, tau)
+    return recorder.arrays()

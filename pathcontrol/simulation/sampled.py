@@ -8,33 +8,14 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
-from pathcontrol.control.base import Controller, ControlOutput
+from pathcontrol.control.base import Controller
 from pathcontrol.errors import SimulationError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.modes import SampledLoop, torque_limits
 from pathcontrol.simulation.plant import Plant
-from pathcontrol.simulation.sensors import Reading
+from pathcontrol.simulation.recorder import Recorder
 
 _CHECK_EVERY = 64  # ticks between looks at whether everything is still finite
-
-
-class Recorder:
-    """Arrays (time, rollout, …) filled a tick at a time, handed out as (rollout, time, …)."""
-
-    def __init__(self, ticks: int) -> None:
-        self._ticks = ticks
-        self._arrays: dict[str, Array] = {}
-
-    def write(self, tick: int, **values: Array) -> None:
-        """Store the values of one tick."""
-        if not self._arrays:
-            self._arrays = {k: np.empty((self._ticks, *v.shape), dtype=v.dtype) for k, v in values.items()}
-        for name, value in values.items():
-            self._arrays[name][tick] = value
-
-    def arrays(self) -> dict[str, Array]:
-        """Everything stored, rollouts first."""
-        return {name: np.moveaxis(array, 0, 1) for name, array in self._arrays.items()}
 
 
 class Actuator:
@@ -89,7 +70,7 @@ def run_sampled(
             reading = sensors.read(q, qd, reading)
             out = controller.law(tick * loop.period, reading.q, reading.qd, z)
             torques = actuator.torques(actuator.limited(out.tau))
-            _record(recorder, tick, q, qd, reading, out, torques[0])
+            recorder.write(tick, q, qd, reading, out, torques[0])
             z = controller.advance(z, out, loop.period)
             q, qd = _hold(plants, torques, loop.substeps, q, qd)
             if tick % _CHECK_EVERY == 0:
@@ -104,25 +85,6 @@ def _hold(plants: list[Plant], torques: list[Array], substeps: int, q: Array, qd
         for _ in range(substeps):
             q, qd = plant.advance(q, qd, tau)
     return q, qd
-
-
-def _record(
-    recorder: Recorder, tick: int, q: Array, qd: Array, reading: Reading, out: ControlOutput, tau: Array
-) -> None:
-    recorder.write(
-        tick,
-        q=q,
-        qd=qd,
-        q_measured=reading.q,
-        qd_measured=reading.qd,
-        tau_demand=out.tau,
-        tau=tau,
-        s=out.s,
-        sdot=out.sdot,
-        e_p=out.e_p,
-        e_v=out.e_v,
-        regular=out.regular,
-    )
 
 
 def _check_finite(time: float, q: Array, qd: Array) -> None:

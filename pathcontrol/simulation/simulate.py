@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, finite, joint_array, scalar
 from pathcontrol.control.base import Controller
-from pathcontrol.errors import InputError
+from pathcontrol.errors import InputError, PathControlError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.continuous import run_continuous
 from pathcontrol.simulation.modes import ContinuousTime, SampledLoop
@@ -52,11 +52,13 @@ def simulate(
         )
     loop = SampledLoop() if loop is None else loop
     q0, qd0 = _initial_state(q, qd, robot.n)
+    _check_batch(controller, q0, qd0)
+    config = _config(controller, robot, loop, duration)
     if isinstance(loop, SampledLoop):
         time, arrays = run_sampled(controller, robot, loop, q0, qd0, duration, progress)
     else:
         time, arrays = run_continuous(controller, robot, loop, q0, qd0, duration, progress)
-    return Run.from_arrays(time, robot.joint_names, arrays, _config(controller, robot, loop, duration))
+    return Run.from_arrays(time, robot.joint_names, arrays, config)
 
 
 def _initial_state(q: ArrayLike, qd: ArrayLike | None, n: int) -> tuple[Array, Array]:
@@ -68,6 +70,21 @@ def _initial_state(q: ArrayLike, qd: ArrayLike | None, n: int) -> tuple[Array, A
         raise InputError(f"q has shape {position.shape} and qd {velocity.shape}, which do not fit together") from error
     q0, qd0 = (np.array(a).reshape(-1, n) for a in pair)
     return q0, qd0
+
+
+def _check_batch(controller: Controller, q: Array, qd: Array) -> None:
+    """The law gives one torque for each initial state: batches of gains have one row for each rollout."""
+    try:
+        shape = controller.law(0.0, q, qd, controller.start(q, qd)).tau.shape
+    except (ValueError, IndexError) as error:
+        if isinstance(error, PathControlError):
+            raise
+        raise InputError(f"the control law fails at the initial states, of shape {q.shape}: {error}") from error
+    if shape != q.shape:
+        raise InputError(
+            f"the control law gives torques of shape {shape} for initial states of shape {q.shape}; give gains that "
+            "differ between rollouts one row for each, and as many initial states"
+        )
 
 
 def _config(

@@ -13,7 +13,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 from pathcontrol.tasks.differentiation import Differentiator, best_width
-from pathcontrol.tasks.profile import VelocityProfile
+from pathcontrol.tasks.profile import VelocityProfile, plain_attributes
 
 
 class PathPoint(NamedTuple):
@@ -32,7 +32,7 @@ class PathPoint(NamedTuple):
 
     @property
     def velocity_slope(self) -> Array:
-        """R' = dr/ds = q_d''ϑ + q_d'ϑ', (*batch, n); the desired acceleration is r'ṡ."""
+        """Slope r' = dr/ds = q_d''ϑ + q_d'ϑ', (*batch, n); the desired acceleration is r'ṡ."""
         return self.ddq_d * self.theta[..., None] + self.dq_d * self.dtheta[..., None]
 
 
@@ -87,9 +87,10 @@ class PathTask(ABC):
 
     def at(self, s: Array) -> PathPoint:
         """q_d, q_d', q_d'', ϑ and ϑ' at s (*batch,). Override where they share work."""
-        return PathPoint(self.q_d(s), self.dq_d(s), self.ddq_d(s), self.theta(s), self.dtheta(s))
+        zero = np.zeros_like(s, dtype=np.float64)  # ϑ may be a plain number
+        return PathPoint(self.q_d(s), self.dq_d(s), self.ddq_d(s), self.theta(s) + zero, self.dtheta(s) + zero)
 
-    @cached_property
+    @property
     def n(self) -> int:
         """Number of joints."""
         return int(np.asarray(self.q_d(np.asarray(self.s0, dtype=np.float64))).shape[-1])
@@ -114,23 +115,21 @@ class PathTask(ABC):
             )
         return self.s0, end
 
+    @property
+    def sampled_interval(self) -> tuple[float, float]:
+        """A finite part of the domain that stands for the whole."""
+        end = self.s_end if self.period is None else self.s0 + self.period
+        return self.s0, end if np.isfinite(end) else self.s0 + 2 * np.pi
+
     def with_profile(self, profile: VelocityProfile) -> PathTask:
         """The same path with another velocity profile."""
         return _Reprofiled(self, profile)
 
     def describe(self) -> dict[str, Any]:
         """Name and public parameters, for the record of a run."""
-        public = {key: value for key, value in vars(self).items() if not key.startswith("_") and key != "n"}
-        plain = {key: np.asarray(value).tolist() for key, value in public.items() if _is_plain(value)}
-        return {"task": type(self).__name__} | plain
+        return {"task": type(self).__name__} | plain_attributes(self)
 
     # --- inside ---------------------------------------------------------------------------------------------
-
-    @cached_property
-    def sampled_interval(self) -> tuple[float, float]:
-        """A finite part of the domain that stands for the whole."""
-        end = self.s_end if self.period is None else self.s0 + self.period
-        return self.s0, end if np.isfinite(end) else self.s0 + 2 * np.pi
 
     def _differentiator(self, function: Any) -> Differentiator:
         lower, upper = self.sampled_interval
@@ -178,7 +177,3 @@ class _Reprofiled(PathTask):
 
     def describe(self) -> dict[str, Any]:
         return self.path.describe() | self.profile.describe()
-
-
-def _is_plain(value: Any) -> bool:
-    return np.asarray(value).dtype.kind in "biufU"

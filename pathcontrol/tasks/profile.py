@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 from abc import ABC, abstractmethod
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -34,7 +35,7 @@ class VelocityProfile(ABC):
 
     def describe(self) -> dict[str, Any]:
         """Name and parameters, for the record of a run."""
-        return {"profile": type(self).__name__} | asdict(self)  # type: ignore[call-overload]
+        return {"profile": type(self).__name__} | plain_attributes(self)
 
 
 @dataclass(frozen=True)
@@ -68,3 +69,14 @@ class ConstantSpeed(VelocityProfile):
     def dtheta(self, path: Path, s: Array) -> Array:
         dq_d = path.dq_d(s)
         return -self.speed * (dq_d * path.ddq_d(s)).sum(-1) / np.linalg.norm(dq_d, axis=-1) ** 3
+
+
+def plain_attributes(instance: Any) -> dict[str, Any]:
+    """The public attributes of an object that are numbers, texts or regular arrays of them, fit for JSON."""
+    plain = {}
+    for name, value in vars(instance).items():
+        with contextlib.suppress(ValueError):  # a ragged list is no array
+            array = np.asarray(value)
+            if not name.startswith("_") and array.dtype.kind in "biufU":
+                plain[name] = array.tolist()
+    return plain

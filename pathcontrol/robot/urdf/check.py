@@ -11,6 +11,7 @@ from pathlib import Path
 from pathcontrol.errors import UrdfError
 from pathcontrol.robot.urdf.arm import read_arm
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES, names_of
+from pathcontrol.robot.urdf.extension import check_extension
 from pathcontrol.robot.urdf.finding import Finding, Level, UrdfReport
 from pathcontrol.robot.urdf.form import check_form
 from pathcontrol.robot.urdf.inertia import check_inertials, check_inertias, check_mass_matrix, check_masses
@@ -68,6 +69,7 @@ def check_urdf(
     if not any(finding.level == "error" for finding in findings):
         arm = read_arm(root, allow_mimic)
         findings += [finding for check in VALUE_CHECKS for finding in check(arm)]
+        findings += check_extension(root)
     findings += [*check_shapes(root), *check_meshes(root, base_dir, package_dirs)]
     findings.sort(key=lambda finding: _ORDER.index(finding.level))
     links = names_of(root.iterfind("link"))
