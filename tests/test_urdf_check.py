@@ -618,20 +618,17 @@ def extended(extension: str) -> str:
     return ARM.replace("</robot>", f"<pathcontrol>{extension}</pathcontrol></robot>")
 
 
-ELBOW = re.search(r'<joint name="(\w+)"', ARM)[1]
-
-
 @pytest.mark.parametrize(
     ("extension", "code", "value"),
     [
         ("<joint name='nose'><coulomb positive='1' negative='1'/></joint>", "extension-joint", "nose"),
         ("<motor/>", "extension-joint", "motor"),
-        (f"<joint name='{ELBOW}'><grease/></joint>", "extension-element", "grease"),
-        (f"<joint name='{ELBOW}'><coulomb positive='1'/></joint>", "extension-number", "negative"),
-        (f"<joint name='{ELBOW}'><coulomb positive='-1' negative='1'/></joint>", "extension-number", "-1"),
-        (f"<joint name='{ELBOW}'><coulomb positive='much' negative='1'/></joint>", "extension-number", "much"),
-        (f"<joint name='{ELBOW}'><encoder counts_per_revolution='0'/></joint>", "extension-number", "above 0"),
-        (f"<joint name='{ELBOW}'><encoder counts_per_revolution='nan'/></joint>", "extension-number", "nan"),
+        ("<joint name='elbow'><grease/></joint>", "extension-element", "grease"),
+        ("<joint name='elbow'><coulomb positive='1'/></joint>", "extension-number", "negative"),
+        ("<joint name='elbow'><coulomb positive='-1' negative='1'/></joint>", "extension-number", "-1"),
+        ("<joint name='elbow'><coulomb positive='much' negative='1'/></joint>", "extension-number", "much"),
+        ("<joint name='elbow'><encoder counts_per_revolution='0'/></joint>", "extension-number", "above 0"),
+        ("<joint name='elbow'><encoder counts_per_revolution='nan'/></joint>", "extension-number", "nan"),
     ],
 )
 def test_the_extension_is_checked(extension, code, value):
