@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import tempfile
+import secrets
 from collections.abc import Iterator
 from pathlib import Path
+
+from pathcontrol.errors import InputError
 
 
 @contextlib.contextmanager
@@ -15,17 +16,14 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
     The suffix is kept, since some writers choose the format by it.
     """
-    target = Path(path)
+    target = Path(path).resolve()  # through a link, to the file that is meant
+    if target.is_dir():
+        raise InputError(f"{str(path)!r} is a folder, expected the name of a file to write")
     target.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
-    os.close(handle)
-    temporary = Path(name)
+    temporary = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
     try:
+        temporary.touch(exist_ok=False)
         yield temporary
-        # mkstemp makes private files; give this one the permissions an ordinary one would get
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
         temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)

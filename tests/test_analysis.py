@@ -126,6 +126,7 @@ def test_metrics_of_a_run(arm, circle):
     assert values["e_v_rms"] == pytest.approx(np.sqrt((run.norm("e_v")[:, late] ** 2).mean(-1)))
     assert all(len(v) == 2 for v in values.values())
     assert steady_state(run, 0.25).time[0] == pytest.approx(1.5)
+    assert steady_state(steady_state(run)).time[0] == pytest.approx(1.5)
     with pytest.raises(InputError, match="fraction = 2"):
         steady_state(run, 2.0)
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from strategies import floats, tasks, vectors, wobbles
 
-from pathcontrol import Circle, Line, Lissajous, PathTask, TaskError
+from pathcontrol import Circle, Ellipse, Line, Lissajous, PathTask, TaskError
 
 
 def stationarity(task, s, q):
@@ -79,6 +79,39 @@ def test_many_are_as_one(task):
         task.sigma_bar(q, near),
         [[task.sigma_bar(x, n) for x, n in zip(*rows, strict=True)] for rows in zip(q, near, strict=True)],
     )
+
+
+@pytest.mark.parametrize("teeth", [64, 128, 100])
+def test_details_that_repeat_with_the_grid_are_not_missed(teeth):
+    class Gear(PathTask):
+        period = 2 * np.pi
+
+        def q_d(self, s):
+            return (1 + 3 / teeth * np.sin(teeth * s))[..., None] * np.stack([np.cos(s), np.sin(s)], -1)
+
+        def theta(self, s):
+            return 1.0
+
+    task, s = Gear(), np.random.default_rng(0).uniform(0, 6, 60)
+    q = task.q_d(s)
+    assert np.abs(task.q_d(task.sigma_bar(q)) - q).max() < 1e-9
+
+
+def test_one_sharp_end_does_not_shorten_the_sight_of_the_warm_start():
+    """Inside a thin ellipse the other side is nearer, but continuity keeps the side one is on."""
+    for b in (0.1, 1e-2, 1e-3):
+        task = Ellipse((1.0, b), 1.0)
+        assert task.sigma_bar([5e-4, -0.3 * b], near=np.pi / 2) == pytest.approx(np.pi / 2, abs=1e-2)
+        assert task.sigma_bar([5e-4, -0.3 * b]) == pytest.approx(-np.pi / 2 % (2 * np.pi), abs=1e-2)
+
+
+def test_nan_stays_where_it_is():
+    task = Lissajous([1.0, 1.0], [1, 2], 1.0)
+    q = np.array([[np.nan, 0.0], [0.0, 1.0]])
+    for near in (None, [0.0, 0.0]):
+        s = task.sigma_bar(q, near)
+        assert np.isnan(s[0])
+        assert s[1] == task.sigma_bar(q[1], None if near is None else 0.0)
 
 
 def test_open_paths_end():

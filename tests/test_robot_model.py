@@ -1,5 +1,7 @@
 """Laws of rigid-body dynamics and kinematics that any arm must keep, on several arms."""
 
+import copy
+import pickle
 from functools import cache, partial
 
 import numpy as np
@@ -557,6 +559,20 @@ def test_a_floating_base_is_refused(name):
     assert name not in known_robots()
     with pytest.raises(UnknownNameError, match="floating base"):
         load_robot(name)
+
+
+def test_models_travel_between_processes():
+    robot = load_robot("cicese_2dof").with_payload(1.0, "tool")
+    again = pickle.loads(pickle.dumps(robot))
+    q = np.array([0.3, -0.4])
+    assert_array_equal(again.mass_matrix(q), robot.mass_matrix(q))
+    assert_array_equal(copy.deepcopy(robot).gravity(q), robot.gravity(q))
+    assert again.joint_names == robot.joint_names
+
+
+def test_threads_are_checked():
+    with pytest.raises(InputError, match="threads = 0"):
+        load_robot("cicese_2dof", threads=0)
 
 
 @pytest.mark.parametrize("source", ["nowhere/arm.urdf", "arm.urdf"])

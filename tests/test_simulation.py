@@ -15,14 +15,17 @@ from pathcontrol import (
     InputError,
     Line,
     Lissajous,
+    PathTask,
     Projection,
     Run,
     SampledLoop,
     SimulationError,
     distance_to_gamma,
+    load_robot,
     simulate,
 )
 from pathcontrol.experiments.reproduce import paper_controllers
+from pathcontrol.simulation.sampled import _periods_and_rest
 from pathcontrol.simulation.sensors import Sensors
 
 START = np.deg2rad([40.0, 70.0])
@@ -138,6 +141,71 @@ def test_the_delay_moves_the_torque_in_time(arm, delay):
     first = int(whole) + 1
     expected = prompt.array("qd")[0, 1] * (1 - part / loop.period)
     assert np.allclose(run.array("qd")[0, first], expected, rtol=2e-3)
+
+
+@pytest.mark.parametrize("period", [2.5e-3, 1 / 3000, 0.007322015953741585, 0.001])
+def test_whole_periods_of_delay_leave_no_rest(arm, circle, period):
+    for periods in range(1, 13):
+        assert _periods_and_rest(periods * period, period) == (periods, 0.0)
+        whole, rest = _periods_and_rest((periods + 0.25) * period, period)
+        assert whole == periods
+        assert rest == pytest.approx(0.25 * period)
+
+
+def test_a_filtered_run_starts_at_the_speed_the_arm_has(arm):
+    """An arm that moves steadily from the start on is measured so from the first tick on."""
+    sensors = Sensors(2.5e-3, None, True, 20.0)
+    q, qd = np.array([[0.3, -0.4]]), np.array([[0.5, -1.0]])
+    reading = sensors.read(q, qd, sensors.start(q, qd))
+    assert np.allclose(reading.qd, qd)
+
+
+def test_a_nan_in_the_task_is_found_and_named(arm):
+    class Hole(Circle):
+        at = PathTask.at
+
+        def q_d(self, s):
+            return np.where(np.abs(np.asarray(s)[..., None] - 0.1227) < 0.02, np.nan, super().q_d(s))
+
+    law = paper_law(arm, Hole(1.0, 2.0))
+    with pytest.raises(SimulationError, match=r"diverged|NaN in the task"):
+        simulate(law, START, duration=1.0, progress=False)
+
+
+@pytest.mark.parametrize("start", [[0.0, -0.5], [1.4, 0.9]])
+@pytest.mark.parametrize("kind", ["tracking", "plan", "projection"])
+def test_the_end_of_an_open_path_is_the_same_in_both_modes(ideal_arm, kind, start):
+    task = Line([0.2, -0.3], [0.9, 0.6], 1.0)
+    law = {
+        "tracking": ComputedTorque(ideal_arm, task, 400.0, 40.0),
+        "plan": ExtendedMotionPlan(ideal_arm, task, 400.0, 40.0, 20.0),
+        "projection": Projection(ideal_arm, task, 400.0, 40.0),
+    }[kind]
+    sampled = simulate(law, start, duration=2.5, loop=SampledLoop(period=1e-3), progress=False)
+    continuous = simulate(law, start, duration=2.5, loop=ContinuousTime(output_period=1e-3), progress=False)
+    # the hold makes the loop first order in the period
+    assert np.abs(sampled.array("q") - continuous.array("q")).max() < 0.01
+    for run in (sampled, continuous):
+        assert np.abs(run.array("q")[0, -1] - task.end).max() < 1e-4
+        s, sdot = run.array("s")[0], run.array("sdot")[0]
+        assert (sdot[s >= task.s_end] <= 0).all()
+        assert (sdot[s <= task.s0] >= 0).all()
+
+
+def test_sliding_joints_are_measured_in_metres():
+    urdf = """<robot name="slide"><link name="base"/>
+    <link name="carriage"><inertial><mass value="1"/>
+    <inertia ixx=".1" ixy="0" ixz="0" iyy=".1" iyz="0" izz=".1"/></inertial></link>
+    <joint name="rail" type="prismatic"><parent link="base"/><child link="carriage"/><axis xyz="1 0 0"/>
+    <limit lower="-3" upper="3" effort="100" velocity="10"/></joint></robot>"""
+    robot = load_robot(urdf)
+    law = ComputedTorque(robot, Line([0.0], [1.0], 1.0), 100.0, 20.0)
+    run = simulate(law, [0.0], duration=0.1, progress=False)
+    assert robot.position_units == ("m",)
+    units = {name: run[name].attrs["units"] for name in ("q", "qd", "tau", "s")}
+    assert units == {"q": "m", "qd": "m/s", "tau": "N", "s": "1"}
+    with pytest.raises(InputError, match="rail slides"):
+        simulate(law, [0.0], duration=0.1, loop=SampledLoop(encoders=[1000.0]))
 
 
 def test_a_delay_too_long_destabilises_and_the_error_says_when(arm, circle):
@@ -294,6 +362,7 @@ def test_bad_loops(options, word):
     [
         ({"encoders": [100.0, 0.0]}, "counts per revolution greater than 0"),
         ({"encoders": [100.0]}, "one value for each joint"),
+        ({"torque_limits": [np.nan, 15.0]}, "torque_limits.0. is nan"),
         ({"torque_limits": [10.0, 0.0]}, "torque limit of joint_2 is 0"),
     ],
 )

@@ -154,6 +154,7 @@ def broken(**methods):
         (broken(theta=lambda self, s: 0.0 * s), ["theta(s=0) = 0", "ϑ > 0"]),
         (broken(dq_d=lambda self, s: s), ["Broken.dq_d", "shape"]),
         (broken(period=-1.0), ["period = -1"]),
+        (broken(period=3.0), ["Broken.q_d is not the same", "correct the period"]),
         (broken(s0=np.nan), ["s0 = nan"]),
         (Circle, ["PathTask"]),
     ],

@@ -47,7 +47,8 @@ def made_up_run(robot: RobotModel, q: np.ndarray, duration: float, s: np.ndarray
     q = np.atleast_3d(q.T).T if q.ndim == 2 else q
     s = np.zeros(q.shape[:2]) if s is None else np.broadcast_to(s, q.shape[:2])
     time = np.linspace(0.0, duration, q.shape[1])
-    return Run.from_arrays(time, robot.joint_names, {"q": q, "s": s}, {"controller": {"controller": "None"}})
+    joints = dict.fromkeys(robot.joint_names, "rad")
+    return Run.from_arrays(time, joints, {"q": q, "s": s}, {"controller": {"controller": "None"}})
 
 
 def commands(animation: Animation, kind: str) -> list[dict[str, Any]]:

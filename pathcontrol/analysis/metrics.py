@@ -18,7 +18,8 @@ def steady_state(run: Run, fraction: float = 0.5) -> Run:
     fraction = scalar("fraction", fraction, positive=True)
     if fraction > 1:
         raise InputError(f"fraction = {fraction:g}, expected a number from 0 to 1")
-    return Run(run.data.sel(time=run.time >= (1 - fraction) * run.time[-1]), run.config)
+    first, last = run.time[0], run.time[-1]
+    return Run(run.data.sel(time=run.time >= last - fraction * (last - first)), run.config)
 
 
 def peak(values: Array) -> Array:

@@ -17,6 +17,8 @@ from pathcontrol.tasks.check import check_task
 FrictionCompensation = Literal["none", "viscous", "full"]
 Start = Literal["s0", "nearest"]
 
+_END_TIME = 0.1  # s, time constant with which an open path is brought to rest
+
 
 class ControlOutput(NamedTuple):
     """What a law says at one moment.
@@ -104,12 +106,18 @@ class Controller(ABC):
     # --- for laws -------------------------------------------------------------------------------------------
 
     def point(self, s: Array) -> PathPoint:
-        """The task at s. Past the ends of an open path: its end point, and beyond the last one at rest."""
+        """The task at s, and on open paths how it ends.
+
+        The motion plan comes to rest at s_end with ϑ(s) ≤ (s_end − s)/T, T = 0.1 s: exponentially, and smooth enough
+        for every law. Outside [s0, s_end] the point is the end that was passed.
+        """
         if self.task.closed:
             return self.task.at(s)
         point = self.task.at(np.clip(s, self.task.s0, self.task.s_end))
-        moving = s < self.task.s_end
-        return point._replace(theta=point.theta * moving, dtheta=point.dtheta * moving)
+        left = np.maximum(self.task.s_end - s, 0.0) / _END_TIME
+        braking = left < point.theta
+        theta, dtheta = np.where(braking, left, point.theta), np.where(braking, -1 / _END_TIME, point.dtheta)
+        return point._replace(theta=theta, dtheta=dtheta)
 
     def inside(self, s: Array, sdot: Array) -> Array:
         """ṡ without the part that would leave an open path."""

@@ -28,9 +28,9 @@ class ExtendedMotionPlan(Controller):
         task: path and velocity profile.
         K_p: position gain [1/s²], scalar or diagonal (n,).
         K_v: velocity gain [1/s], scalar or diagonal (n,).
-        k: gain of the extended motion plan [1/(rad² s)], ≥ 0; a scalar or (*batch,). In a sampled loop keep
-            k‖q_d'‖² times the period well below 1: σ lags the arm by a period, and r'σ̇ magnifies that by k. For
-            more, take its limit, :class:`Projection`.
+        k: gain of the extended motion plan [1/(rad² s)], ≥ 0; a scalar, or one for each rollout, (N,) or (N, 1). In
+            a sampled loop keep k‖q_d'‖² times the period well below 1: σ lags the arm by a period, and r'σ̇
+            magnifies that by k. For more, take its limit, :class:`Projection`.
         options: ``friction`` and ``start`` of :class:`Controller`.
     """
 
@@ -41,7 +41,8 @@ class ExtendedMotionPlan(Controller):
     ) -> None:
         super().__init__(robot, task, **options)
         self.K_p, self.K_v = diagonal_gain("K_p", K_p, robot.n), diagonal_gain("K_v", K_v, robot.n)
-        self.k = readonly(finite("k", as_array("k", k)))
+        plan_gain = finite("k", as_array("k", k))
+        self.k = readonly(plan_gain[..., 0] if plan_gain.ndim > 1 else plan_gain)
         if (self.k < 0).any():
             raise InputError(
                 f"k = {self.k.tolist()}, expected k ≥ 0: a negative gain drives the path away from the arm"

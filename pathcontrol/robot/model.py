@@ -82,6 +82,8 @@ class RobotModel:
     _weightless_pool: Any = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        if self.threads < 1:
+            raise InputError(f"threads = {self.threads}, expected 1 or more")
         model = self.pinocchio_model
         weightless = pin.Model(model)
         weightless.gravity = pin.Motion.Zero()
@@ -89,6 +91,10 @@ class RobotModel:
         object.__setattr__(self, "_data", model.createData())
         object.__setattr__(self, "_pool", pin.ModelPool(model, self.threads))
         object.__setattr__(self, "_weightless_pool", pin.ModelPool(weightless, self.threads))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Pinocchio's pools cannot be pickled, the model they are made of can
+        return RobotModel, (self.pinocchio_model, self.actuation, self.source, self.threads)
 
     # --- what it is -----------------------------------------------------------------------------------------
 
@@ -101,6 +107,12 @@ class RobotModel:
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, in the order of every ``(*batch, n)`` array."""
         return tuple(self.pinocchio_model.names)[1:]
+
+    @property
+    def position_units(self) -> tuple[str, ...]:
+        """The unit of each joint's position: ``"rad"`` for those that turn, ``"m"`` for those that slide."""
+        joints = list(self.pinocchio_model.joints)[1:]
+        return tuple("m" if joint.shortname().startswith("JointModelP") else "rad" for joint in joints)
 
     @property
     def frame_names(self) -> tuple[str, ...]:
@@ -249,8 +261,6 @@ class RobotModel:
 
     def with_threads(self, threads: int) -> RobotModel:
         """The same arm whose batched calls use ``threads`` threads."""
-        if threads < 1:
-            raise InputError(f"threads = {threads}, expected 1 or more")
         return RobotModel(self.pinocchio_model, self.actuation, self.source, threads)
 
     def reduced(self, lock: Mapping[str, float]) -> RobotModel:

@@ -60,7 +60,7 @@ def run_continuous(
             return loop.rate(t, y.reshape(start.shape)).reshape(-1)
 
         # the integrator's norm averages over rollouts: tighten it so that each one alone keeps the tolerance
-        share, band = np.sqrt(len(start)), start.shape[1] - 1
+        share, band = np.sqrt(max(1, len(start))), start.shape[1] - 1
         solution = solve_ivp(
             rate,
             (0.0, time[-1]),

@@ -22,7 +22,7 @@ from pathcontrol.errors import SimulationError
 
 _PATIENCE = 3  # block exchanges without progress before single ones
 _MAX_EXCHANGES = 10_000
-_ROUNDING = 1e-12  # relative to the terms of the momentum balance; a joint this close to slipping may stick
+_ROUNDING = 1e-12  # relative to the largest momentum; a joint this close to slipping may stick
 
 _States = NDArray[np.int8]  # +1 slips forward, −1 slips backward, 0 sticks
 
@@ -84,8 +84,9 @@ def _solve(problem: _Problem, states: _States) -> tuple[Array, _States]:
     v = np.linalg.solve(reduced, np.where(stick, 0.0, p - impulse)[..., None])[..., 0]
     v[stick] = 0.0
     needed = p - np.einsum("kij,kj->ki", M, v)
-    terms = np.abs(p) + np.einsum("kij,kj->ki", np.abs(M), np.abs(v))
-    margin = _ROUNDING * terms.max(-1, keepdims=True)
+    # p − Mv may be a small difference of large terms: allow for their rounding, and not for more
+    terms = np.einsum("kij,kj->ki", np.abs(M), np.abs(v)).max(-1, keepdims=True)
+    margin = _ROUNDING * np.abs(p).max(-1, keepdims=True) + 8 * p.shape[1] * np.finfo(np.float64).eps * terms
     released = np.where(needed > high + margin, 1, np.where(needed < low - margin, -1, 0))
     slipping = np.where(v * states < 0, 0, states)
     wanted = np.where(stick, released, slipping).astype(np.int8)

@@ -54,6 +54,9 @@ class SampledLoop:
         counts = _per_joint("encoders", self.encoders, robot.actuation.encoder_counts, robot)
         if counts is None:
             return None
+        if "m" in robot.position_units:
+            sliding = [j for j, unit in zip(robot.joint_names, robot.position_units, strict=True) if unit == "m"]
+            raise InputError(f"encoders count revolutions, but {', '.join(sliding)} slides; use encoders = False")
         if (counts <= 0).any():
             raise InputError(f"encoders = {counts.tolist()}, expected counts per revolution greater than 0")
         return 2 * np.pi / counts
@@ -105,17 +108,19 @@ def _per_joint(
     name: str, value: bool | ArrayLike, own: Array | None, robot: RobotModel, infinite: bool = False
 ) -> Array | None:
     """False: None; True: the robot's own values; else one value for each joint."""
-    if value is False or value is None:
+    if isinstance(value, bool | np.bool_) and not value:
         return None
-    if value is True:
+    if isinstance(value, bool | np.bool_):
         if own is None:
             raise InputError(f"{name} = True, but {robot.name} says nothing about them; give one value per joint")
         return own
     array = as_array(name, value)
     if array.shape != (robot.n,):
         raise InputError(f"{name} has shape {array.shape}, expected ({robot.n},): one value for each joint")
-    return array if infinite else finite(name, array)
+    if infinite and not np.isnan(array).any():
+        return array
+    return finite(name, array)
 
 
 def _plain(settings: dict[str, Any]) -> dict[str, Any]:
-    return {k: np.asarray(v).tolist() if isinstance(v, np.ndarray | list | tuple) else v for k, v in settings.items()}
+    return {name: value if value is None else np.asarray(value).tolist() for name, value in settings.items()}

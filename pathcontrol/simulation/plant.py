@@ -47,6 +47,7 @@ class Plant:
         friction = np.where(qd > 0, plus, np.where(qd < 0, -minus, 0.0))
         v = start + duration * self._inertia.forward_dynamics(q, qd, drive - friction)
         settled = (v > 0) & (qd > 0) | (v < 0) & (qd < 0) | (plus + minus == 0)
+        settled |= ~np.isfinite(v)  # a diverged arm must not be taken for one that sticks
         if settled.all():
             return v
         rows = ~settled.all(-1)

@@ -14,7 +14,7 @@ from pathcontrol._arrays import Array
 from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError
 
-#: every variable of a run: (dimensions, unit, meaning)
+#: every variable of a run: (dimensions, unit, meaning); sliding joints have m for rad and N for N m
 VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "q": (("rollout", "time", "joint"), "rad", "joint position"),
     "qd": (("rollout", "time", "joint"), "rad/s", "joint velocity"),
@@ -48,13 +48,15 @@ class Run:
 
     @classmethod
     def from_arrays(
-        cls, time: Array, joints: tuple[str, ...], arrays: Mapping[str, Array], config: Mapping[str, Any]
+        cls, time: Array, joints: Mapping[str, str], arrays: Mapping[str, Array], config: Mapping[str, Any]
     ) -> Run:
-        """A run from arrays laid out as :data:`VARIABLES` says."""
-        variables = {
-            name: (VARIABLES[name][0], array, {"units": VARIABLES[name][1], "long_name": VARIABLES[name][2]})
-            for name, array in arrays.items()
-        }
+        """A run from arrays laid out as :data:`VARIABLES` says, and the position unit of each joint by its name."""
+        kinds = sorted(set(joints.values()), reverse=True)
+        variables = {}
+        for name, array in arrays.items():
+            dims, unit, meaning = VARIABLES[name]
+            units = {unit if kind == "rad" else unit.replace("rad", "m").replace("N m", "N"): None for kind in kinds}
+            variables[name] = (dims, array, {"units": " or ".join(units), "long_name": meaning})
         rollouts = len(arrays["q"])
         coords = {
             "rollout": np.arange(rollouts),

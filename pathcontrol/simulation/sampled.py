@@ -23,9 +23,8 @@ class Actuator:
 
     def __init__(self, loop: SampledLoop, robot: RobotModel, shape: tuple[int, int]) -> None:
         self._limits = torque_limits(loop, robot)
-        whole, fraction = divmod(loop.delay / loop.period, 1.0)
-        late = round(fraction * loop.period, 15)
-        self._queue = deque([np.zeros(shape)] * (int(whole) + (late > 0)))
+        whole, late = _periods_and_rest(loop.delay, loop.period)
+        self._queue = deque([np.zeros(shape)] * (whole + (late > 0)))
         self._parts = [late, loop.period - late] if late else [loop.period]
 
     @property
@@ -74,9 +73,9 @@ def run_sampled(
             z = controller.advance(z, out, loop.period)
             q, qd = _hold(plants, torques, loop.substeps, q, qd)
             if tick % _CHECK_EVERY == 0:
-                _check_finite(tick * loop.period, q, qd)
+                _check_finite(tick * loop.period, q, qd, out.tau)
                 update(tick)
-    _check_finite(ticks * loop.period, q, qd)
+    _check_finite(ticks * loop.period, q, qd, out.tau)
     return loop.period * np.arange(ticks + 1), recorder.arrays()
 
 
@@ -87,9 +86,24 @@ def _hold(plants: list[Plant], torques: list[Array], substeps: int, q: Array, qd
     return q, qd
 
 
-def _check_finite(time: float, q: Array, qd: Array) -> None:
+def _periods_and_rest(delay: float, period: float) -> tuple[int, float]:
+    """``delay`` as whole periods and a rest below one; rounding makes no rest."""
+    whole = round(delay / period)
+    if abs(delay / period - whole) < 1e-9:
+        return whole, 0.0
+    whole = int(delay // period)
+    return whole, delay - whole * period
+
+
+def _check_finite(time: float, q: Array, qd: Array, tau: Array) -> None:
     lost = ~(np.isfinite(q) & np.isfinite(qd)).all(-1)
     if lost.any():
         raise SimulationError(
             f"rollout {int(np.argmax(lost))} diverged before t = {time:.3g} s; lower the gains or shorten the period"
+        )
+    lost = ~np.isfinite(tau).all(-1)
+    if lost.any():
+        raise SimulationError(
+            f"the law asks rollout {int(np.argmax(lost))} for torques that are no numbers before t = {time:.3g} s; "
+            "look for a NaN in the task, q_d or ϑ, near where the arm is"
         )

@@ -35,7 +35,7 @@ def simulate(
         controller: the law, with its own model of the arm.
         q: initial joint positions [rad], (n,) or a batch (*batch, n); the run counts batches as rollouts.
         qd: initial joint velocities [rad/s], broadcast against ``q``; default at rest.
-        duration: simulated time [s].
+        duration: simulated time [s], rounded to whole periods of the loop, at least one.
         plant: the arm that is really there, with its friction; default the controller's own model.
         loop: how the loop is closed; default ``SampledLoop()``, a 2.5 ms hold and nothing else.
         progress: show a bar on standard error when it takes longer than two seconds.
@@ -51,6 +51,8 @@ def simulate(
             f"the plant has the joints {robot.joint_names}, the controller's model {controller.robot.joint_names}"
         )
     loop = SampledLoop() if loop is None else loop
+    if not isinstance(loop, SampledLoop | ContinuousTime):
+        raise InputError(f"loop = {loop!r}, expected SampledLoop(...) or ContinuousTime(...)")
     q0, qd0 = _initial_state(q, qd, robot.n)
     _check_batch(controller, q0, qd0)
     config = _config(controller, robot, loop, duration)
@@ -58,7 +60,8 @@ def simulate(
         time, arrays = run_sampled(controller, robot, loop, q0, qd0, duration, progress)
     else:
         time, arrays = run_continuous(controller, robot, loop, q0, qd0, duration, progress)
-    return Run.from_arrays(time, robot.joint_names, arrays, config)
+    joints = dict(zip(robot.joint_names, robot.position_units, strict=True))
+    return Run.from_arrays(time, joints, arrays, config)
 
 
 def _initial_state(q: ArrayLike, qd: ArrayLike | None, n: int) -> tuple[Array, Array]:

@@ -172,6 +172,11 @@ class _Reprofiled(PathTask):
     def dtheta(self, s: Array) -> Array:
         return self.profile.dtheta(self.path, s)
 
+    def at(self, s: Array) -> PathPoint:
+        dq_d, ddq_d, zero = self.path.dq_d(s), self.path.ddq_d(s), np.zeros_like(s, dtype=np.float64)
+        theta, dtheta = self.profile.at(dq_d, ddq_d, self.path, s)
+        return PathPoint(self.path.q_d(s), dq_d, ddq_d, theta + zero, dtheta + zero)
+
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
         return self.path.sigma_bar(q, near)
 

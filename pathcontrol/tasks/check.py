@@ -34,6 +34,7 @@ def check_task(task: PathTask, n: int) -> None:
             f"{name}.theta(s={s[i]:g}) = {theta[i]:g}, expected ϑ > 0 everywhere: where it is not, the motion plan "
             "ṡ = ϑ(s) stops for ever"
         )
+    _check_period(task, name)
     for method in ("dq_d", "ddq_d", "dtheta"):
         _check_values(f"{name}.{method}", getattr(task, method), s, None if method == "dtheta" else n)
 
@@ -45,6 +46,20 @@ def _check_domain(task: PathTask, name: str) -> None:
         raise TaskError(
             f"{name} has period = {task.period} and s_end = {task.s_end}; a closed path has a period > 0 and no s_end"
         )
+
+
+def _check_period(task: PathTask, name: str) -> None:
+    """A path that says it is closed is where it was, and as fast, a period later."""
+    if task.period is None:
+        return
+    s = task.s0 + np.array([0.0, 0.37 * task.period])
+    for method in ("q_d", "theta"):
+        here, later = (np.asarray(getattr(task, method)(x)) for x in (s, s + task.period))
+        if not np.allclose(here, later, rtol=1e-6, atol=1e-6 * (1 + np.abs(here).max())):
+            raise TaskError(
+                f"{name}.{method} is not the same at s and s + period = s + {task.period:g}: it differs by "
+                f"{np.abs(here - later).max():.3g}; correct the period, or leave it out and give s_end"
+            )
 
 
 def _check_values(label: str, function: Callable[[Any], Any], s: Array, n: int | None) -> Array:

@@ -2,7 +2,8 @@
 
 The squared distance ½‖p(s) − x‖² has the derivative g(s) = (p(s) − x)ᵀp'(s), whose sign changes are bracketed on a
 grid fine enough to follow the curve's turns, and refined by a bracketing root finder. A bound on the distance within
-a cell of the grid tells which brackets can hold the global minimum.
+a cell of the grid tells which brackets can hold the global minimum. The grid is refined until the tangent turns little
+over every cell; details smaller than 1/65536 of the curve are not resolved.
 """
 
 from __future__ import annotations
@@ -18,8 +19,10 @@ from scipy.optimize.elementwise import find_root
 
 from pathcontrol._arrays import Array, as_array
 
-_MAX_TURN = 0.15  # rad between neighbouring tangents of the grid
-_MAX_CELLS = 1 << 16
+_MAX_TURN = 0.15  # rad over a cell of the grid
+_MIN_CELLS, _MAX_CELLS = 64, 1 << 16
+_REACH = 1 / 8  # of the whole curve: how far the local search may go from where it began
+_GOLDEN = (5**0.5 - 1) / 2  # spreads the points inside the cells irregularly, so that no period of the curve meets them
 _CHUNK = 1 << 22  # distances held at once
 _NEWTON_STEPS = 12
 
@@ -76,27 +79,34 @@ class ClosestPoint:
     # --- the local search -----------------------------------------------------------------------------------
 
     def _descend(self, x: Array, near: Array) -> tuple[Array, Array]:
-        """Newton's method on g from ``near``; also says which results are local minima within reach of ``near``."""
-        reach = 4 * self._grid.cell
-        s = near.copy()
+        """Newton's method on g from ``near``; also says which results are local minima within reach of ``near``.
+
+        A step turns the tangent by half a radian at most, so that it does not leave the branch.
+        """
+        reach = _REACH * (self.upper - self.lower)
+        s, moving = near.copy(), np.ones(near.shape, dtype=bool)
         for _ in range(_NEWTON_STEPS):
-            slope, curvature, gradient = self._slope(s, x)
+            slope, curvature, gradient, bend = self._slope(s, x)
             step = -slope / np.where(curvature > 0.1 * gradient, curvature, gradient)
-            s, previous = self._inside(s + np.clip(step, -reach, reach)), s
-            if (np.abs(s - previous) <= 1e-14 * (1 + np.abs(s))).all():
+            longest = np.minimum(reach, 0.5 * np.sqrt(gradient) / np.maximum(bend, np.finfo(float).tiny))
+            # rows that have arrived stay, so that no result depends on how long others take
+            s, previous = np.where(moving, self._inside(s + np.clip(step, -longest, longest)), s), s
+            moving &= np.abs(s - previous) > 1e-14 * (1 + np.abs(s))
+            if not moving.any():
                 break
-        slope, curvature, gradient = self._slope(s, x)
+        slope, curvature, gradient, _ = self._slope(s, x)
         at_end = ~np.array(self.closed) & ((s <= self.lower) & (slope > 0) | (s >= self.upper) & (slope < 0))
-        stationary = np.abs(slope) <= 1e-9 * gradient * (1 + np.abs(s))
+        stationary = np.abs(slope) <= 1e-9 * gradient * (self.upper - self.lower)
         return s, (stationary & (curvature > 0) | at_end) & (np.abs(s - near) <= reach)
 
-    def _slope(self, s: Array, x: Array) -> tuple[Array, Array, Array]:
-        """G = (p − x)ᵀp', its derivative ‖p'‖² + (p − x)ᵀp'', and ‖p'‖²."""
+    def _slope(self, s: Array, x: Array) -> tuple[Array, Array, Array, Array]:
+        """g = (p − x)ᵀp', its derivative ‖p'‖² + (p − x)ᵀp'', ‖p'‖², and ‖p''‖."""
         difference, dp = self.curve.p(s) - x, self.curve.dp(s)
-        gradient = (dp * dp).sum(-1)
         # without p'' this is the Gauss–Newton method
-        bend = 0.0 if self.curve.ddp is None else (difference * self.curve.ddp(s)).sum(-1)
-        return (difference * dp).sum(-1), gradient + bend, gradient
+        ddp = np.zeros_like(dp) if self.curve.ddp is None else self.curve.ddp(s)
+        gradient = (dp * dp).sum(-1)
+        curvature = gradient + (difference * ddp).sum(-1)
+        return (difference * dp).sum(-1), curvature, gradient, np.linalg.norm(ddp, axis=-1)
 
     def _inside(self, s: Array) -> Array:
         return s if self.closed else np.clip(s, self.lower, self.upper)
@@ -105,10 +115,12 @@ class ClosestPoint:
 
     @cached_property
     def _grid(self) -> _Grid:
-        cells = 64
+        cells, fine_enough = _MIN_CELLS, 0
         while True:
             grid = _Grid.sample(self.curve, np.linspace(self.lower, self.upper, cells + 1))
-            if grid.turn <= _MAX_TURN or cells >= _MAX_CELLS:
+            # twice in a row: a detail may hide between the samples of one grid
+            fine_enough = fine_enough + 1 if grid.turn <= _MAX_TURN else 0
+            if fine_enough == 2 or cells >= _MAX_CELLS:
                 return grid
             cells *= 2
 
@@ -120,8 +132,10 @@ class ClosestPoint:
         exact = np.linalg.norm(self.curve.p(refined) - x[row], axis=-1)
         # rows are sorted: the best of each row's candidates comes first after this
         order = np.lexsort((exact, row))
-        _, first = np.unique(row[order], return_index=True)
-        return refined[order[first]]
+        found, first = np.unique(row[order], return_index=True)
+        nearest = np.full(len(x), np.nan)  # a row with a NaN in it has no candidates
+        nearest[found] = refined[order[first]]
+        return nearest
 
     def _candidates(self, distance: Array) -> Array:
         """Grid points that are nearer than their neighbours and may be next to the global minimum."""
@@ -160,19 +174,28 @@ class _Grid(NamedTuple):
     s: Array
     p: Array
     longest: float  # the longest cell [same unit as p]
-    turn: float  # the largest angle between neighbouring tangents [rad]
-    cell: float  # the spacing in s
+    turn: float  # the largest turn of the tangent over a cell, by way of a point inside it [rad]
 
     @classmethod
     def sample(cls, curve: Curve, s: Array) -> _Grid:
         p, dp = curve.p(s), curve.dp(s)
         speed = np.linalg.norm(dp, axis=-1, keepdims=True)
-        tangent = dp / np.maximum(speed, np.finfo(float).tiny)
-        chord = np.linalg.norm(np.diff(tangent, axis=0), axis=-1)
-        turn = float(2 * np.arcsin(np.minimum(chord / 2, 1.0)).max())
+        tangent = _unit(dp)
         cell = float(s[1] - s[0])
+        inside = s[:-1] + cell * (0.2 + 0.6 * np.modf(_GOLDEN * np.arange(1, len(s)))[0])
+        between = _unit(curve.dp(inside))
+        turn = float((_angle(tangent[:-1], between) + _angle(between, tangent[1:])).max())
         longest = max(float(np.linalg.norm(np.diff(p, axis=0), axis=-1).max()), float(speed.max()) * cell)
-        return cls(s, p, longest, turn, cell)
+        return cls(s, p, longest, turn)
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), np.finfo(float).tiny)
+
+
+def _angle(a: Array, b: Array) -> Array:
+    """Angle between unit vectors [rad], (*batch,)."""
+    return 2 * np.arcsin(np.minimum(np.linalg.norm(a - b, axis=-1) / 2, 1.0))
 
 
 def _squared_distances(x: Array, p: Array) -> Array:

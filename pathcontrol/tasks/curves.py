@@ -36,8 +36,7 @@ class JointCurve(PathTask):
 
     def at(self, s: Array) -> PathPoint:
         dq_d, ddq_d = self.dq_d(s), self.ddq_d(s)
-        theta = self.speed / np.sqrt((dq_d * dq_d).sum(-1))
-        dtheta = -theta * (theta / self.speed) ** 2 * (dq_d * ddq_d).sum(-1)
+        theta, dtheta = ConstantSpeed(self.speed).at(dq_d, ddq_d, self, s)
         return PathPoint(self.q_d(s), dq_d, ddq_d, theta, dtheta)
 
 

@@ -33,6 +33,10 @@ class VelocityProfile(ABC):
     def dtheta(self, path: Path, s: Array) -> Array:
         """ϑ'(s) [1/s], (*batch,)."""
 
+    def at(self, dq_d: Array, ddq_d: Array, path: Path, s: Array) -> tuple[Array, Array]:
+        """ϑ and ϑ' where q_d' and q_d'' are known already. Override where that saves evaluating the path again."""
+        return self.theta(path, s), self.dtheta(path, s)
+
     def describe(self) -> dict[str, Any]:
         """Name and parameters, for the record of a run."""
         return {"profile": type(self).__name__} | plain_attributes(self)
@@ -67,8 +71,11 @@ class ConstantSpeed(VelocityProfile):
         return self.speed / np.linalg.norm(path.dq_d(s), axis=-1)
 
     def dtheta(self, path: Path, s: Array) -> Array:
-        dq_d = path.dq_d(s)
-        return -self.speed * (dq_d * path.ddq_d(s)).sum(-1) / np.linalg.norm(dq_d, axis=-1) ** 3
+        return self.at(path.dq_d(s), path.ddq_d(s), path, s)[1]
+
+    def at(self, dq_d: Array, ddq_d: Array, path: Path, s: Array) -> tuple[Array, Array]:
+        length = np.sqrt((dq_d * dq_d).sum(-1))
+        return self.speed / length, -self.speed * (dq_d * ddq_d).sum(-1) / length**3
 
 
 def plain_attributes(instance: Any) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pathcontrol._files import whole_file
-from pathcontrol.errors import TaskError
+from pathcontrol.errors import InputError, TaskError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
 
@@ -43,42 +43,46 @@ _STYLE: Any = {
 def path_figure(run: Run, task: PathTask | None = None, joints: tuple[int, int] = (0, 1), rollout: int = 0) -> Figure:
     """q_j over q_i [deg], as in the paper's figures 7 and 9, over the desired path."""
     i, j = joints
-    names = [str(name) for name in run["joint"].to_numpy()]
+    names = _joint_names(run)
+    if not {i, j} <= set(range(len(names))):
+        raise InputError(f"joints = {joints}, expected two indices from 0 to {len(names) - 1}: {', '.join(names)}")
+    (q,), unit = _readable(run.rollout(rollout), "q")
     with _style():
         figure = Figure(figsize=(3.5, 3.5), layout="constrained")
         axes = figure.add_subplot(aspect="equal")
         desired = _desired_path(task)
         if desired is not None:
+            desired = np.rad2deg(desired) if unit == "deg" else desired
             axes.plot(desired[:, i], desired[:, j], color=GREY, linewidth=2.4, label="desired path")
-        q = np.rad2deg(run.array("q")[rollout])
         axes.plot(q[:, i], q[:, j], color=BLUE, label="arm")
         axes.plot(q[0, i], q[0, j], "o", color=ORANGE, markersize=5, label="start")
-        axes.set(xlabel=f"{_symbol(i, names)} [deg]", ylabel=f"{_symbol(j, names)} [deg]")
+        axes.set(xlabel=f"{_symbol(i, names)} [{unit}]", ylabel=f"{_symbol(j, names)} [{unit}]")
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.14), ncols=3, handlelength=1.4, columnspacing=1.2)
     return figure
 
 
 def error_figure(run: Run, rollout: int = 0) -> Figure:
     """‖e_p‖ [deg] and ‖e_v‖ [deg/s] over time, as in the paper's figures 8 and 10, with the steady-state peaks."""
+    run = run.rollout(rollout)
     with _style():
         figure = Figure(figsize=(3.5, 4.2), layout="constrained")
         upper, lower = figure.subplots(2, 1, sharex=True)
-        _norm(upper, run, "e_p", rollout, r"$\|\mathbf{e}_p\|$ [deg]", "deg")
-        _norm(lower, run, "e_v", rollout, r"$\|\mathbf{e}_v\|$ [deg/s]", "deg/s")
+        _norm(upper, run, "e_p")
+        _norm(lower, run, "e_v")
         lower.set(xlabel="time [s]", xlim=(0, run.time[-1]))
     return figure
 
 
 def torque_figure(run: Run, limits: np.ndarray | None = None, rollout: int = 0) -> Figure:
     """Applied torques [N m] over time, one panel for each joint, beside their limits (n,) where given."""
-    names = [str(name) for name in run["joint"].to_numpy()]
-    tau = run.array("tau")[rollout]
+    names = _joint_names(run)
+    tau = run.rollout(rollout).array("tau")[0]
     with _style():
         figure = Figure(figsize=(3.5, 1.2 + 1.1 * len(names)), layout="constrained")
         panels = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
         for k, axes in enumerate(panels):
             axes.plot(run.time, tau[:, k], color=BLUE)
-            axes.set_ylabel(rf"$\tau_{{{k + 1}}}$ [N m]")
+            axes.set_ylabel(rf"$\tau_{{{k + 1}}}$ [{run['tau'].attrs['units']}]")
             if limits is not None and np.isfinite(limits[k]):
                 axes.axhline(limits[k], color=ORANGE, linewidth=0.8)
                 axes.axhline(-limits[k], color=ORANGE, linewidth=0.8)
@@ -110,9 +114,12 @@ def run_figure(run: Run, path: str | Path, task: PathTask | None = None) -> list
     return [p for name, f in figures.items() for p in save_figure(f, stem.with_name(f"{stem.name}-{name}"))]
 
 
-def _norm(axes: Axes, run: Run, name: str, rollout: int, label: str, unit: str) -> None:
+def _norm(axes: Axes, run: Run, name: str) -> None:
     """One norm over all the time, and magnified in an inset over the second half, with its peak there."""
-    values = np.rad2deg(run.norm(name)[rollout])
+    vectors, unit = _readable(run, name)
+    values = np.linalg.norm(vectors[0], axis=-1)
+    symbol, index = name.split("_")
+    label = rf"$\|\mathbf{{{symbol}}}_{index}\|$ [{unit}]"
     late = run.time >= 0.5 * run.time[-1]
     peak = values[late].max()
     axes.plot(run.time, values, color=BLUE)
@@ -125,15 +132,27 @@ def _norm(axes: Axes, run: Run, name: str, rollout: int, label: str, unit: str) 
     inset.tick_params(labelsize=7)
 
 
+def _readable(run: Run, name: str) -> tuple[np.ndarray, str]:
+    """A variable in the unit a person reads, and that unit: degrees for angles, as it is where joints slide."""
+    unit = run[name].attrs["units"]
+    if unit.split("/")[0] != "rad" or " or " in unit:
+        return run.array(name), unit
+    return np.rad2deg(run.array(name)), unit.replace("rad", "deg")
+
+
+def _joint_names(run: Run) -> list[str]:
+    return [str(name) for name in run["joint"].to_numpy()]
+
+
 def _desired_path(task: PathTask | None) -> np.ndarray | None:
-    """Samples of the path [deg], (K, n)."""
+    """Samples of the path [rad], (K, n)."""
     if task is None:
         return None
     try:
         lower, upper = task.one_traverse
     except TaskError:
         return None  # an endless path has no whole to draw
-    return np.rad2deg(task.q_d(np.linspace(lower, upper, 721)))
+    return task.q_d(np.linspace(lower, upper, 721))
 
 
 def _symbol(index: int, names: list[str]) -> str:
