@@ -73,14 +73,12 @@ def paper_controllers(robot: RobotModel) -> dict[str, Controller]:
     }
 
 
-def run_experiments(robot: RobotModel | None = None) -> dict[str, Experiment]:
-    """Run both experiments."""
-    robot = load_robot("cicese_2dof") if robot is None else robot
+def paper_experiment(name: str, robot: RobotModel, progress: bool = True) -> Experiment:
+    """Run one of the two, by its name in :data:`PAPER`."""
+    controller = paper_controllers(robot)[name]
     start = np.deg2rad(START_DEG)
-    return {
-        name: Experiment(name, controller, simulate(controller, start, duration=DURATION, loop=paper_loop()))
-        for name, controller in paper_controllers(robot).items()
-    }
+    run = simulate(controller, start, duration=DURATION, loop=paper_loop(), progress=progress)
+    return Experiment(name, controller, run)
 
 
 def reproduce(out: str | Path) -> dict[str, Any]:
@@ -89,24 +87,30 @@ def reproduce(out: str | Path) -> dict[str, Any]:
     Returns:
         What ``summary.json`` holds.
     """
-    from pathcontrol.view.figures import error_figure, path_figure, save_figure
-    from pathcontrol.view.recorder import record
-
-    began, out, robot = time.perf_counter(), Path(out), load_robot("cicese_2dof")
-    with progress_bar("reproducing", 8) as update:
-        experiments = run_experiments(robot)
-        for i, (name, experiment) in enumerate(experiments.items()):
-            update(2 + 3 * i)
-            run, task = experiment.run, experiment.controller.task
-            run.save(out / f"{name}.nc")
-            path_name, error_name = FIGURES[name]
-            save_figure(path_figure(run, task), out / path_name)
-            save_figure(error_figure(run), out / error_name)
-            record(run, robot, task=task).save(out / f"{name}.html")
+    began, out, robot, experiments = time.perf_counter(), Path(out), load_robot("cicese_2dof"), {}
+    with progress_bar("reproducing", 2 * len(PAPER)) as update:
+        for i, name in enumerate(PAPER):
+            experiments[name] = paper_experiment(name, robot, progress=False)
+            update(2 * i + 1)
+            _write(experiments[name], robot, out)
+            update(2 * i + 2)
     summary = summarise(experiments) | {"seconds": round(time.perf_counter() - began, 2)}
     with whole_file(out / "summary.json") as temporary:
         temporary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary
+
+
+def _write(experiment: Experiment, robot: RobotModel, out: Path) -> None:
+    """Data, figures and animation of one experiment."""
+    from pathcontrol.view.figures import error_figure, path_figure, save_figure
+    from pathcontrol.view.recorder import record
+
+    run, task = experiment.run, experiment.controller.task
+    run.save(out / f"{experiment.name}.nc")
+    path_name, error_name = FIGURES[experiment.name]
+    save_figure(path_figure(run, task), out / path_name)
+    save_figure(error_figure(run), out / error_name)
+    record(run, robot, task=task).save(out / f"{experiment.name}.html")
 
 
 def summarise(experiments: dict[str, Experiment]) -> dict[str, Any]:
