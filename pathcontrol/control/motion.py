@@ -41,50 +41,47 @@ class MotionController(Controller):
         return ControlOutput(tau, point.theta[..., None], s, point.theta, point.dtheta, e_p, e_v, regular)
 
 
-class ComputedTorque(MotionController):
+class ProportionalDerivative(MotionController):
+    """A tracking law with a gain on q̃ and one on dq̃/dt, in whatever unit its subclass says.
+
+    Args:
+        robot: the model the law uses.
+        task: path and velocity profile.
+        K_p: position gain, scalar or diagonal (n,).
+        K_v: velocity gain, scalar or diagonal (n,).
+        options: ``friction`` and ``start`` of :class:`Controller`.
+    """
+
+    gains = ("K_p", "K_v")
+
+    def __init__(self, robot: RobotModel, task: PathTask, K_p: ArrayLike, K_v: ArrayLike, **options: Any) -> None:
+        super().__init__(robot, task, **options)
+        self.K_p, self.K_v = diagonal_gain("K_p", K_p, robot.n), diagonal_gain("K_v", K_v, robot.n)
+
+    def correction(self, ref: Tracking) -> Array:
+        """K_v dq̃/dt + K_p q̃, (*batch, n)."""
+        return self.K_v * ref.velocity_error + self.K_p * ref.position_error
+
+
+class ComputedTorque(ProportionalDerivative):
     """Computed torque, eq. (16): τ = M(q)[q̈_r + K_v dq̃/dt + K_p q̃] + C(q,q̇)q̇ + g(q) + f̂(q̇).
 
-    Without unmodelled friction the error obeys (17), d²q̃/dt² + K_v dq̃/dt + K_p q̃ = 0.
-
-    Args:
-        robot: the model the law uses.
-        task: path and velocity profile.
-        K_p: position gain [1/s²], scalar or diagonal (n,).
-        K_v: velocity gain [1/s], scalar or diagonal (n,).
-        options: ``friction`` and ``start`` of :class:`Controller`.
+    Without unmodelled friction the error obeys (17), d²q̃/dt² + K_v dq̃/dt + K_p q̃ = 0. K_p in 1/s², K_v in 1/s;
+    arguments as for :class:`ProportionalDerivative`.
     """
 
-    gains = ("K_p", "K_v")
-
-    def __init__(self, robot: RobotModel, task: PathTask, K_p: ArrayLike, K_v: ArrayLike, **options: Any) -> None:
-        super().__init__(robot, task, **options)
-        self.K_p, self.K_v = diagonal_gain("K_p", K_p, robot.n), diagonal_gain("K_v", K_v, robot.n)
-
     def torque(self, q: Array, qd: Array, ref: Tracking) -> Array:
-        qdd = ref.acceleration + self.K_v * ref.velocity_error + self.K_p * ref.position_error
-        return self.robot.inverse_dynamics(q, qd, qdd)
+        return self.robot.inverse_dynamics(q, qd, ref.acceleration + self.correction(ref))
 
 
-class PDPlus(MotionController):
+class PDPlus(ProportionalDerivative):
     """PD+ (Paden and Panja, Int. J. Control 47, 1988): τ = M(q)q̈_r + C(q,q̇)q̇_r + g(q) + K_v dq̃/dt + K_p q̃ + f̂(q̇).
 
-    Args:
-        robot: the model the law uses.
-        task: path and velocity profile.
-        K_p: position gain [N m/rad], scalar or diagonal (n,).
-        K_v: velocity gain [N m s/rad], scalar or diagonal (n,).
-        options: ``friction`` and ``start`` of :class:`Controller`.
+    K_p in N m/rad, K_v in N m s/rad; arguments as for :class:`ProportionalDerivative`.
     """
 
-    gains = ("K_p", "K_v")
-
-    def __init__(self, robot: RobotModel, task: PathTask, K_p: ArrayLike, K_v: ArrayLike, **options: Any) -> None:
-        super().__init__(robot, task, **options)
-        self.K_p, self.K_v = diagonal_gain("K_p", K_p, robot.n), diagonal_gain("K_v", K_v, robot.n)
-
     def torque(self, q: Array, qd: Array, ref: Tracking) -> Array:
-        feedforward = self.robot.inverse_dynamics(q, qd, ref.acceleration, velocity=ref.velocity)
-        return feedforward + self.K_v * ref.velocity_error + self.K_p * ref.position_error
+        return self.robot.inverse_dynamics(q, qd, ref.acceleration, velocity=ref.velocity) + self.correction(ref)
 
 
 class SlotineLi(MotionController):
