@@ -50,6 +50,8 @@ from .tasks.curves import Lissajous as Lissajous
 from .tasks.profile import ConstantRate as ConstantRate
 from .tasks.profile import ConstantSpeed as ConstantSpeed
 from .tasks.profile import VelocityProfile as VelocityProfile
+from .tasks.waypoints import SplinePath as SplinePath
+from .tasks.waypoints import WaypointPath as WaypointPath
 from .view.figures import error_figure as error_figure
 from .view.figures import path_figure as path_figure
 from .view.figures import save_figure as save_figure

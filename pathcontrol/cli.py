@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import click
 
-from pathcontrol.errors import PathControlError
+from pathcontrol.errors import PathControlError, UnknownNameError
 
 
 class _Group(click.Group):
@@ -26,6 +29,28 @@ class _Group(click.Group):
             sys.exit(130)
 
 
+@contextlib.contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Holds Ctrl-C back until the block is over: compiled modules do not survive it while they are imported."""
+    pressed: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if pressed:
+        raise KeyboardInterrupt
+
+
+def _import_all() -> None:
+    """Everything that a command which simulates and draws will need."""
+    with _uninterrupted():
+        import pathcontrol.experiments.reproduce
+        import pathcontrol.experiments.runner
+        import pathcontrol.view.figures
+        import pathcontrol.view.recorder  # noqa: F401
+
+
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, nothing else.")
 
 
@@ -40,6 +65,7 @@ def main() -> None:
 @json_option
 def reproduce(out: Path, as_json: bool) -> None:
     """Run the paper's two experiments on the bundled arm."""
+    _import_all()
     from pathcontrol.experiments.reproduce import reproduce as run_both
 
     summary = run_both(out)
@@ -55,10 +81,10 @@ def reproduce(out: Path, as_json: bool) -> None:
 
 @main.command()
 @click.argument("file", type=click.Path(exists=False, path_type=Path), required=False)
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=Path("results"), show_default=True)
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Default: results/ and the file's name.")
 @click.option("--example", is_flag=True, help="Print a commented experiment file and stop.")
 @json_option
-def run(file: Path | None, out: Path, example: bool, as_json: bool) -> None:
+def run(file: Path | None, out: Path | None, example: bool, as_json: bool) -> None:
     """Run the experiment that FILE.toml describes."""
     if example:
         from pathcontrol.experiments.template import example_text
@@ -67,17 +93,18 @@ def run(file: Path | None, out: Path, example: bool, as_json: bool) -> None:
         return
     if file is None:
         raise click.UsageError("give an experiment file; --example prints one to start from")
+    _import_all()
+    from pathcontrol.analysis.metrics import UNITS
     from pathcontrol.experiments.runner import run_experiment
 
-    result, written = run_experiment(file, out)
-    report = {
-        "run": repr(result),
-        "written": {name: str(path) for name, path in written.items()},
-    }
+    done = run_experiment(file, Path("results") / file.stem if out is None else out)
+    written = {name: str(path) for name, path in done.written.items()}
     if as_json:
-        click.echo(json.dumps(report))
+        click.echo(json.dumps({"run": repr(done.run), "metrics": done.metrics, "written": written}))
         return
-    click.echo(report["run"])
+    click.echo(repr(done.run))
+    for name, values in done.metrics.items():
+        click.echo(f"  {name:22} {', '.join('never' if v is None else f'{v:.4g}' for v in values)} {UNITS[name]}")
     for name, path in written.items():
         click.echo(f"  {name}: {path}")
 
@@ -91,12 +118,19 @@ def check(file: str, lock: tuple[str, ...], as_json: bool) -> None:
     from pathcontrol.robot.loading import find_urdf
     from pathcontrol.robot.urdf import check_urdf
 
+    with _uninterrupted():
+        import yourdfpy  # noqa: F401
     urdf = find_urdf(file)
     report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=lock)
+    unknown = sorted(set(lock) - set(report.joints))
+    if unknown and report.joints:
+        raise UnknownNameError(f"no movable joint {', '.join(unknown)} to lock; there are {', '.join(report.joints)}")
     if as_json:
         click.echo(json.dumps(report.as_dict()))
     else:
-        click.echo(f"{report.name or file}: {len(report.links)} links, {len(report.joints)} movable joints")
+        free = len(set(report.joints) - set(lock))
+        locked = f" and {len(lock)} locked" if lock else ""
+        click.echo(f"{report.name or file}: {len(report.links)} links, {free} movable joints{locked}")
         for finding in report.findings:
             click.echo(f"  {finding}")
         click.echo("usable" if report.ok else "not usable")

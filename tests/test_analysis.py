@@ -26,6 +26,7 @@ from pathcontrol import (
     simulate,
     steady_state,
 )
+from pathcontrol.analysis.metrics import UNITS
 
 START = np.deg2rad([40.0, 70.0])
 
@@ -123,6 +124,9 @@ def test_metrics_of_a_run(arm, circle):
     run = simulate(law, [START, START + 0.2], duration=2.0, progress=False)
     values, late = metrics(run, circle), run.time >= 1.0
     assert values["e_p_peak"] == pytest.approx(run.norm("e_p")[:, late].max(-1))
+    rate = (run.array("s")[:, -1] - run.array("s")[:, late][:, 0]) / 1.0
+    assert values["speed_ratio"] == pytest.approx(rate / circle.theta(np.zeros(2)), rel=1e-2)
+    assert set(values) == set(UNITS)
     assert values["e_v_rms"] == pytest.approx(np.sqrt((run.norm("e_v")[:, late] ** 2).mean(-1)))
     assert all(len(v) == 2 for v in values.values())
     assert steady_state(run, 0.25).time[0] == pytest.approx(1.5)

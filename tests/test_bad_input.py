@@ -61,6 +61,7 @@ class Slow(Circle):
         (lambda arm: Stribeck([1.0, 1.0], [2.0], [0.1]), InputError, ["different numbers of joints"]),
         (lambda arm: arm.with_payload(-1.0, "tool"), InputError, ["mass = -1"]),
         (lambda arm: arm.with_payload(1.0, "hand"), UnknownNameError, ["'hand'", "tool"]),
+        (lambda arm: load_robot("cicese_2dof", lock=["joint_2"]), InputError, ["lock = ['joint_2']", "0.0"]),
         (lambda arm: load_robot("no_such_arm"), UnknownNameError, ["'no_such_arm'", "cicese_2dof"]),
         (lambda arm: load_robot("lost/arm.urdf"), UrdfError, ["lost/arm.urdf", "No such file"]),
         (lambda arm: load_robot("x" * 5000 + ".urdf"), UrdfError, ["too long"]),

@@ -112,6 +112,40 @@ def test_errors_are_one_message_without_a_traceback(arguments, words):
     assert done.stdout == ""
 
 
+def test_run_prints_metrics_and_writes_beside_its_name(tmp_path):
+    text = call("run", "--example").stdout.replace("duration = 10.0", "duration = 0.2")
+    (tmp_path / "mine.toml").write_text(text)
+    done = call("run", "mine.toml", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    assert report["metrics"]["e_p_peak"][0] > 0
+    assert (tmp_path / report["written"]["data"]).parent == tmp_path / "results" / "mine"
+    again = call("run", "mine.toml", cwd=tmp_path)
+    assert "settling_time" in again.stdout
+    assert "speed_ratio" in again.stdout
+
+
+def test_check_knows_the_joints_that_it_locks():
+    done = call("check", "cicese_2dof", "--lock", "joint_2")
+    assert done.returncode == 0
+    assert "1 movable joints and 1 locked" in done.stdout
+    done = call("check", "cicese_2dof", "--lock", "nose")
+    assert done.returncode == 2
+    assert "nose" in done.stderr
+
+
+@pytest.mark.parametrize("delay", [0.3, 0.7, 1.1])
+def test_ctrl_c_while_everything_is_imported(tmp_path, delay):
+    process = subprocess.Popen(
+        [*COMMAND, "reproduce", "--out", str(tmp_path / "out")], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    time.sleep(delay)
+    os.kill(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert b"Traceback" not in err
+
+
 def test_ctrl_c_leaves_no_half_written_file(tmp_path):
     process = subprocess.Popen(
         [*COMMAND, "reproduce", "--out", str(tmp_path / "out")],

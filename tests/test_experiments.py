@@ -139,7 +139,7 @@ def described(setup) -> dict:
 
 def test_template_is_the_first_experiment(write, tmp_path, arm):
     path = write(example_text().replace("duration = 10.0", "duration = 0.25"))
-    run, _ = run_experiment(path, tmp_path / "out", progress=False)
+    run, _, _ = run_experiment(path, tmp_path / "out", progress=False)
     task = Circle(math.radians(57.3), math.radians(114.59))
     controller = ExtendedMotionPlan(arm, task, 800.0, [45.0, 100.0], 20.0, friction="viscous")
     loop = SampledLoop(period=2.5e-3, encoders=True, velocity="difference", torque_limits=True)
@@ -550,7 +550,7 @@ def test_any_bytes_are_refused(tmp_path_factory, content):
 
 
 def test_only_the_data_unless_asked(write, tmp_path):
-    run, written = run_experiment(write(), tmp_path / "deep" / "out", progress=False)
+    run, _, written = run_experiment(write(), tmp_path / "deep" / "out", progress=False)
     assert written == {"data": tmp_path / "deep" / "out" / "run.nc"}
     assert Run.load(written["data"]).data.equals(run.data)
     assert [p.name for p in (tmp_path / "deep" / "out").iterdir()] == ["run.nc"]
@@ -558,7 +558,7 @@ def test_only_the_data_unless_asked(write, tmp_path):
 
 def test_every_output(write, tmp_path):
     names = {"data": "data/a.nc", "html": "a.html", "figure": "plots/a", "summary": "a.json"}
-    run, written = run_experiment(write({"output": names}), tmp_path / "out", progress=False)
+    run, _, written = run_experiment(write({"output": names}), tmp_path / "out", progress=False)
     assert {"data", "html", "summary", "figure-errors.svg", "figure-path.png"} <= written.keys()
     assert all(path.is_file() and path.stat().st_size for path in written.values())
     assert set((tmp_path / "out").rglob("*.*")) == set(written.values())

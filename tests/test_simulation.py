@@ -172,6 +172,33 @@ def test_a_nan_in_the_task_is_found_and_named(arm):
         simulate(law, START, duration=1.0, progress=False)
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"tau": np.zeros(1)}, ["Odd.law gives tau of shape (1,)", "(1, 2)"]),
+        ({"regular": True}, ["regular of shape ()", "(1,)"]),
+        ({"tau": np.full((1, 2), np.nan)}, ["Odd.law gives tau = [[nan, nan]]"]),
+    ],
+)
+def test_a_law_of_ones_own_is_checked_before_the_run(arm, circle, change, words):
+    class Odd(ComputedTorque):
+        def law(self, t, q, qd, z):
+            return super().law(t, q, qd, z)._replace(**change)
+
+    for loop in (SampledLoop(), ContinuousTime()):
+        with pytest.raises(InputError) as error:
+            simulate(Odd(arm, circle, 1.0, 1.0), START, duration=1.0, loop=loop, progress=False)
+        assert all(word in str(error.value) for word in words), str(error.value)
+
+
+def test_absurd_speeds_are_divergence_even_while_finite(arm, circle):
+    law = ComputedTorque(arm.with_friction(None), circle, 800.0, [45.0, 100.0])
+    with pytest.raises(SimulationError, match="diverged"):
+        simulate(law, START, duration=10.0, loop=SampledLoop(period=0.5), progress=False)
+    with pytest.raises(InputError, match="less than one period"):
+        simulate(law, START, duration=1.0, loop=SampledLoop(period=2.5), progress=False)
+
+
 @pytest.mark.parametrize("start", [[0.0, -0.5], [1.4, 0.9]])
 @pytest.mark.parametrize("kind", ["tracking", "plan", "projection"])
 def test_the_end_of_an_open_path_is_the_same_in_both_modes(ideal_arm, kind, start):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -136,6 +138,18 @@ def test_line():
     assert task.sigma_bar([9.0, 0, -9.0]) == task.s_end
 
 
+class Still(PathTask):
+    """A path that stays where it is."""
+
+    period = 1.0
+
+    def q_d(self, s):
+        return np.zeros((*np.shape(s), 2))
+
+    def theta(self, s):
+        return 1.0
+
+
 # --- the check of a task ------------------------------------------------------------------------------------------
 
 
@@ -156,6 +170,11 @@ def broken(**methods):
         (broken(period=-1.0), ["period = -1"]),
         (broken(period=3.0), ["Broken.q_d is not the same", "correct the period"]),
         (broken(s0=np.nan), ["s0 = nan"]),
+        (broken(dq_d=lambda self, s: np.stack([np.sin(s), np.cos(s)], -1)), ["Broken.dq_d", "leave dq_d out"]),
+        (broken(dq_d=lambda self, s: 2 * Circle.dq_d(self, s)), ["Broken.dq_d", "q_d changes at"]),
+        (broken(dtheta=lambda self, s: 1.0 + s), ["Broken.dtheta", "theta changes at"]),
+        (broken(q_d=lambda self, s: np.stack([math.cos(s), math.sin(s)], -1)), ["Broken.q_d fails", "np.cos"]),
+        (Still(), ["Still.dq_d", "standstill"]),
         (Circle, ["PathTask"]),
     ],
 )

@@ -12,6 +12,16 @@ from pathcontrol.errors import InputError, TaskError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
 
+#: the unit of each metric
+UNITS = {
+    **{f"{name}_{kind}": "rad" for name in ("e_p", "lag_error", "contour_error") for kind in ("peak", "rms")},
+    **{f"{name}_{kind}": "rad/s" for name in ("e_v",) for kind in ("peak", "rms")},
+    **{f"gamma_distance_{kind}": "rad" for kind in ("peak", "rms")},
+    "speed_ratio": "",
+    "settling_time": "s",
+    "tau_demand_peak": "N m",
+}
+
 
 def steady_state(run: Run, fraction: float = 0.5) -> Run:
     """The last ``fraction`` of a run; the paper's peaks are those of the second half."""
@@ -58,7 +68,8 @@ def metrics(run: Run, task: PathTask, fraction: float = 0.5, band: float = np.de
     """The usual numbers of a run, each a list with one entry for each rollout.
 
     Peaks and RMS of ‖e_p‖ [rad], ‖e_v‖ [rad/s], contour and lag error [rad] and distance to Γ over the last
-    ``fraction`` of the time; settling time [s] of ‖e_p‖ into ``band`` [rad]; largest torque demand [N m].
+    ``fraction`` of the time; there also the mean rate of s over the mean of ϑ, 1 for an arm that is as fast as it
+    should be and 0 for one that is stuck; settling time [s] of ‖e_p‖ into ``band`` [rad]; largest torque demand [N m].
     Contour error and distance to Γ are left out for paths that neither end nor repeat.
     """
     late = steady_state(run, fraction)
@@ -70,6 +81,7 @@ def metrics(run: Run, task: PathTask, fraction: float = 0.5, band: float = np.de
         pass  # no nearest point on an endless path
     values = {f"{name}_peak": peak(v) for name, v in signals.items()}
     values |= {f"{name}_rms": rms(v) for name, v in signals.items()}
+    values["speed_ratio"] = late.array("sdot").mean(-1) / task.at(late.array("s")).theta.mean(-1)
     values["settling_time"] = settling_time(run.norm("e_p"), run.time, band)
     values["tau_demand_peak"] = np.abs(run.array("tau_demand")).max((1, 2))
     return {name: value.tolist() for name, value in values.items()}

@@ -94,9 +94,13 @@ class Controller(ABC):
         s = out.s + period * growth * out.sdot
         return (s if self.task.closed else np.clip(s, self.task.s0, self.task.s_end))[..., None]
 
+    def __repr__(self) -> str:
+        gains = ", ".join(f"{name}={np.asarray(getattr(self, name)).tolist()}" for name in self.gains)
+        return f"{type(self).__name__}({self.robot.name}, {self.task!r}, {gains})"
+
     def describe(self) -> dict[str, Any]:
         """Name, gains and choices, for the record of a run."""
-        gains = {key: np.asarray(value).tolist() for key, value in vars(self).items() if key in self.gains}
+        gains = {name: np.asarray(getattr(self, name)).tolist() for name in self.gains}
         name = {"controller": type(self).__name__, "friction": self.friction, "start": self.start_at}
         return name | gains | {"robot": self.robot.name, "task": self.task.describe()}
 

@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from pathcontrol._files import whole_file
+from pathcontrol.analysis.metrics import UNITS, metrics
 from pathcontrol.errors import InputError
 from pathcontrol.experiments.build import Setup
 from pathcontrol.experiments.schema import Output
 from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.base import PathTask
 
 
 def check_folder(out_dir: Path, output: Output) -> None:
@@ -33,7 +35,12 @@ def check_folder(out_dir: Path, output: Output) -> None:
             raise InputError(f"there is a folder where the file {str(target)!r} should go; remove or rename it")
 
 
-def write_outputs(run: Run, setup: Setup, out_dir: Path) -> dict[str, Path]:
+def plain_metrics(run: Run, task: PathTask) -> dict[str, Any]:
+    """The metrics of a run as JSON can hold them."""
+    return _plain(metrics(run, task))
+
+
+def write_outputs(run: Run, numbers: dict[str, Any], setup: Setup, out_dir: Path) -> dict[str, Path]:
     """Write the files that ``setup.output`` names.
 
     Returns:
@@ -42,7 +49,7 @@ def write_outputs(run: Run, setup: Setup, out_dir: Path) -> dict[str, Path]:
     output = setup.output
     written = {"data": run.save(out_dir / output.data)}
     if output.summary:
-        written["summary"] = _write_summary(run, setup, out_dir / output.summary)
+        written["summary"] = _write_summary(numbers, out_dir / output.summary)
     if output.figure:
         written |= _write_figures(run, setup, out_dir / output.figure)
     if output.html:
@@ -50,10 +57,8 @@ def write_outputs(run: Run, setup: Setup, out_dir: Path) -> dict[str, Path]:
     return written
 
 
-def _write_summary(run: Run, setup: Setup, path: Path) -> Path:
-    from pathcontrol.analysis.metrics import metrics
-
-    text = json.dumps(_plain(metrics(run, setup.controller.task)), indent=2, allow_nan=False)
+def _write_summary(numbers: dict[str, Any], path: Path) -> Path:
+    text = json.dumps(numbers | {"units": {name: UNITS[name] for name in numbers}}, indent=2, allow_nan=False)
     with whole_file(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
     return path

@@ -3,25 +3,37 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.build import Setup, build
 from pathcontrol.experiments.load import invalid, load_experiment
-from pathcontrol.experiments.outputs import check_folder, write_outputs
+from pathcontrol.experiments.outputs import check_folder, plain_metrics, write_outputs
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
 
 
-def run_experiment(path: str | Path, out_dir: str | Path, progress: bool = True) -> tuple[Run, dict[str, Path]]:
+class Outcome(NamedTuple):
+    """What came of an experiment.
+
+    Attributes:
+        run: the run.
+        metrics: its :func:`metrics`, fit for JSON: null where a number is not finite.
+        written: the files, by what they are; see :func:`write_outputs`.
+    """
+
+    run: Run
+    metrics: dict[str, Any]
+    written: dict[str, Path]
+
+
+def run_experiment(path: str | Path, out_dir: str | Path, progress: bool = True) -> Outcome:
     """Run the experiment of a file; everything it says is checked before anything is computed.
 
     Args:
         path: the experiment file; paths in it are relative to its folder.
         out_dir: the folder to write to, made if need be.
         progress: show a bar on standard error when it takes longer than two seconds.
-
-    Returns:
-        The run, and the files written, by what they are; see :func:`write_outputs`.
 
     Raises:
         ExperimentError: the file is invalid.
@@ -39,7 +51,8 @@ def run_experiment(path: str | Path, out_dir: str | Path, progress: bool = True)
         loop=setup.loop,
         progress=progress,
     )
-    return run, write_outputs(run, setup, out_dir)
+    numbers = plain_metrics(run, setup.controller.task)
+    return Outcome(run, numbers, write_outputs(run, numbers, setup, out_dir))
 
 
 def load_setup(path: str | Path) -> Setup:

@@ -11,7 +11,7 @@ import numpy as np
 from lxml import etree
 
 from pathcontrol._arrays import Array, readonly
-from pathcontrol.errors import MissingExtraError, UnknownNameError, UrdfError
+from pathcontrol.errors import InputError, MissingExtraError, UnknownNameError, UrdfError
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Viscous
 from pathcontrol.robot.model import Actuation, Limits, RobotModel, UrdfSource, build_model
 from pathcontrol.robot.urdf import check_urdf, parse_urdf
@@ -41,6 +41,8 @@ def load_robot(
         UnknownNameError: no such robot; the message lists the known ones.
     """
     urdf = find_urdf(source, tuple(Path(d) for d in package_dirs))
+    if lock is not None and not isinstance(lock, Mapping):
+        raise InputError(f"lock = {lock!r}, expected angles by joint, as {{'joint name': 0.0}}")
     lock = dict(lock or {})
     report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=tuple(lock))
     if not report.ok:

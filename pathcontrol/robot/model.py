@@ -57,7 +57,7 @@ class Actuation:
         return Actuation(self.limits.select(joints), self.friction.select(joints), counts)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RobotModel:
     """M(q)q̈ + C(q,q̇)q̇ + g(q) = τ of a fixed-base arm, for one configuration or a batch; see :func:`load_robot`.
 
@@ -91,6 +91,9 @@ class RobotModel:
         object.__setattr__(self, "_data", model.createData())
         object.__setattr__(self, "_pool", pin.ModelPool(model, self.threads))
         object.__setattr__(self, "_weightless_pool", pin.ModelPool(weightless, self.threads))
+
+    def __repr__(self) -> str:
+        return f"RobotModel({self.name}; {self.n} joints: {', '.join(self.joint_names)})"
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Pinocchio's pools cannot be pickled, the model they are made of can

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, finite, joint_array, scalar
-from pathcontrol.control.base import Controller
+from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.errors import InputError, PathControlError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.continuous import run_continuous
@@ -35,7 +35,7 @@ def simulate(
         controller: the law, with its own model of the arm.
         q: initial joint positions [rad], (n,) or a batch (*batch, n); the run counts batches as rollouts.
         qd: initial joint velocities [rad/s], broadcast against ``q``; default at rest.
-        duration: simulated time [s], rounded to whole periods of the loop, at least one.
+        duration: simulated time [s], rounded to whole periods of the loop, one at least.
         plant: the arm that is really there, with its friction; default the controller's own model.
         loop: how the loop is closed; default ``SampledLoop()``, a 2.5 ms hold and nothing else.
         progress: show a bar on standard error when it takes longer than two seconds.
@@ -54,7 +54,10 @@ def simulate(
     if not isinstance(loop, SampledLoop | ContinuousTime):
         raise InputError(f"loop = {loop!r}, expected SampledLoop(...) or ContinuousTime(...)")
     q0, qd0 = _initial_state(q, qd, robot.n)
-    _check_batch(controller, q0, qd0)
+    period = loop.period if isinstance(loop, SampledLoop) else loop.output_period
+    if duration < period:
+        raise InputError(f"duration = {duration:g} s is less than one period of {period:g} s; both are in seconds")
+    _check_law(controller, q0, qd0)
     config = _config(controller, robot, loop, duration)
     if isinstance(loop, SampledLoop):
         time, arrays = run_sampled(controller, robot, loop, q0, qd0, duration, progress)
@@ -75,19 +78,28 @@ def _initial_state(q: ArrayLike, qd: ArrayLike | None, n: int) -> tuple[Array, A
     return q0, qd0
 
 
-def _check_batch(controller: Controller, q: Array, qd: Array) -> None:
-    """The law gives one torque for each initial state: batches of gains have one row for each rollout."""
+def _check_law(controller: Controller, q: Array, qd: Array) -> None:
+    """The law, asked once, gives what :class:`ControlOutput` says: shapes that fit the initial states, and numbers."""
+    name = type(controller).__name__
     try:
-        shape = controller.law(0.0, q, qd, controller.start(q, qd)).tau.shape
-    except (ValueError, IndexError) as error:
+        z = controller.start(q, qd)
+        out = controller.law(0.0, q, qd, z)
+    except (ValueError, IndexError, TypeError) as error:
         if isinstance(error, PathControlError):
             raise
-        raise InputError(f"the control law fails at the initial states, of shape {q.shape}: {error}") from error
-    if shape != q.shape:
-        raise InputError(
-            f"the control law gives torques of shape {shape} for initial states of shape {q.shape}; give gains that "
-            "differ between rollouts one row for each, and as many initial states"
-        )
+        raise InputError(f"{name}.law fails at the initial states, of shape {q.shape}: {error}") from error
+    if not isinstance(out, ControlOutput):
+        raise InputError(f"{name}.law returns {type(out).__name__}, expected a ControlOutput")
+    wanted = {"tau": q.shape, "e_p": q.shape, "e_v": q.shape, "zdot": np.shape(z)}
+    for field in ControlOutput._fields:
+        shape, value = wanted.get(field, q.shape[:1]), getattr(out, field)
+        if np.shape(value) != shape:
+            raise InputError(
+                f"{name}.law gives {field} of shape {np.shape(value)} for initial states of shape {q.shape}, expected "
+                f"{shape}; gains that differ between rollouts need one row for each, and as many initial states"
+            )
+        if not np.isfinite(value).all():
+            raise InputError(f"{name}.law gives {field} = {np.asarray(value).tolist()} at the start, expected numbers")
 
 
 def _config(

@@ -125,6 +125,9 @@ class PathTask(ABC):
         """The same path with another velocity profile."""
         return _Reprofiled(self, profile)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{k}={v}' for k, v in plain_attributes(self).items())})"
+
     def describe(self) -> dict[str, Any]:
         """Name and public parameters, for the record of a run."""
         return {"task": type(self).__name__} | plain_attributes(self)

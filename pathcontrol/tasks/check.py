@@ -37,6 +37,9 @@ def check_task(task: PathTask, n: int) -> None:
     _check_period(task, name)
     for method in ("dq_d", "ddq_d", "dtheta"):
         _check_values(f"{name}.{method}", getattr(task, method), s, None if method == "dtheta" else n)
+    _check_regular(task, name, s)
+    for function, derivative in (("q_d", "dq_d"), ("dq_d", "ddq_d"), ("theta", "dtheta")):
+        _check_derivative(task, name, s, function, derivative)
 
 
 def _check_domain(task: PathTask, name: str) -> None:
@@ -45,6 +48,31 @@ def _check_domain(task: PathTask, name: str) -> None:
     if task.period is not None and not (0 < task.period < np.inf and task.s_end == np.inf):
         raise TaskError(
             f"{name} has period = {task.period} and s_end = {task.s_end}; a closed path has a period > 0 and no s_end"
+        )
+
+
+def _check_regular(task: PathTask, name: str, s: Array) -> None:
+    """The path never stands still: q_d' vanishes nowhere."""
+    length = np.linalg.norm(task.dq_d(s), axis=-1)
+    if not length.min() > 1e-9 * length.max():
+        raise TaskError(
+            f"{name}.dq_d(s={s[int(np.argmin(length))]:g}) has length {length.min():.1e}, expected a path that moves "
+            "with s everywhere: q_d' = 0 is a cusp or a standstill"
+        )
+
+
+def _check_derivative(task: PathTask, name: str, s: Array, function: str, derivative: str) -> None:
+    """A derivative given by hand is the one of its function; at most of the samples, since a kink may be at a few."""
+    h = 1e-5 * (s[-1] - s[0])
+    inside = s[1:-1]
+    f, given = getattr(task, function), getattr(task, derivative)(inside)
+    difference = (f(inside + h) - f(inside - h)) / (2 * h) + 0.0 * np.asarray(given)
+    off = np.abs(difference - given) > 1e-3 * (np.abs(difference) + np.abs(difference).max()) + 1e-6
+    if off.mean() > 0.1:
+        i = tuple(np.argwhere(off)[0])
+        raise TaskError(
+            f"{name}.{derivative}(s={inside[i[0]]:g}) = {np.asarray(given)[i[0]]}, but {name}.{function} changes at "
+            f"the rate {difference[i[0]]}; correct it, or leave {derivative} out and have it computed"
         )
 
 
@@ -66,7 +94,13 @@ def _check_values(label: str, function: Callable[[Any], Any], s: Array, n: int |
     """Values at s and at one s alone, with the shapes that the batch convention asks for."""
     for argument in (s, s[0]):
         expected = np.shape(argument) + (() if n is None else (n,))
-        value = np.asarray(function(argument))
+        try:
+            value = np.asarray(function(argument))
+        except (TypeError, ValueError) as error:
+            raise TaskError(
+                f"{label} fails for s of shape {np.shape(argument)}: {error}; work on arrays, with np.cos rather than "
+                "math.cos and np.where rather than if"
+            ) from error
         # ϑ may be a constant that broadcasts
         if value.shape != expected and not (n is None and value.shape == ()):
             raise TaskError(_shape_message(label, np.shape(argument), value.shape, expected, n))

@@ -40,10 +40,15 @@ _STYLE: Any = {
 }
 
 
-def path_figure(run: Run, task: PathTask | None = None, joints: tuple[int, int] = (0, 1), rollout: int = 0) -> Figure:
-    """q_j over q_i [deg], as in the paper's figures 7 and 9, over the desired path."""
-    i, j = joints
+def path_figure(
+    run: Run, task: PathTask | None = None, joints: tuple[int, int] | None = None, rollout: int = 0
+) -> Figure:
+    """q_j over q_i [deg], as in the paper's figures 7 and 9, over the desired path.
+
+    ``joints`` are the indices (i, j); by default the two that move the most.
+    """
     names = _joint_names(run)
+    i, j = joints = _moving_joints(run.rollout(rollout)) if joints is None else joints
     if not {i, j} <= set(range(len(names))):
         raise InputError(f"joints = {joints}, expected two indices from 0 to {len(names) - 1}: {', '.join(names)}")
     (q,), unit = _readable(run.rollout(rollout), "q")
@@ -124,6 +129,10 @@ def _norm(axes: Axes, run: Run, name: str) -> None:
     peak = values[late].max()
     axes.plot(run.time, values, color=BLUE)
     axes.set(ylabel=label, ylim=(0, 1.05 * values.max()))
+    if peak > 0.3 * values.max():  # no room for an inset, and no need
+        axes.axhline(peak, color=ORANGE, linewidth=0.9, linestyle=(0, (4, 2)))
+        axes.set_title(f"steady-state peak {peak:.3g} {unit}", fontsize=8, color=ORANGE, loc="right", pad=3)
+        return
     inset = axes.inset_axes((0.42, 0.36, 0.58, 0.5))
     inset.plot(run.time[late], values[late], color=BLUE, linewidth=0.9)
     inset.axhline(peak, color=ORANGE, linewidth=0.9, linestyle=(0, (4, 2)))
@@ -138,6 +147,15 @@ def _readable(run: Run, name: str) -> tuple[np.ndarray, str]:
     if unit.split("/")[0] != "rad" or " or " in unit:
         return run.array(name), unit
     return np.rad2deg(run.array(name)), unit.replace("rad", "deg")
+
+
+def _moving_joints(run: Run) -> tuple[int, int]:
+    """The two joints that move the most, in their order; needs two."""
+    travel = np.ptp(run.array("q")[0], axis=0)
+    if len(travel) < 2:
+        raise InputError("the arm has one joint only; path_figure draws two over one another")
+    i, j = sorted(np.argsort(travel)[-2:])
+    return int(i), int(j)
 
 
 def _joint_names(run: Run) -> list[str]:

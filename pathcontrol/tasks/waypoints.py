@@ -1,0 +1,160 @@
+"""A smooth path through postures, exactly or within a tolerance."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline, make_interp_spline
+
+from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.tasks.curves import JointCurve
+
+Parametrisation = Literal["centripetal", "chord", "uniform"]
+_POWER = {"uniform": 0.0, "centripetal": 0.5, "chord": 1.0}
+
+
+class SplinePath(JointCurve):
+    """A path given as a spline q_d(s) of at least two continuous derivatives.
+
+    Args:
+        spline: a ``scipy.interpolate.BSpline`` of degree 3 or more with values of shape (n,); it begins at its first
+            knot and ends at its last.
+        speed: path speed ‖q̇‖ [rad/s].
+        closed: whether the spline is periodic.
+    """
+
+    def __init__(self, spline: BSpline, speed: float, closed: bool = False) -> None:
+        super().__init__(speed)
+        if spline.k < 3:
+            raise InputError(f"the spline has degree {spline.k}, expected 3 or more: q_d must be twice differentiable")
+        self._splines = [spline, spline.derivative(1), spline.derivative(2)]
+        first, last = float(spline.t[spline.k]), float(spline.t[-spline.k - 1])
+        self.s0 = first
+        if closed:
+            self.period = last - first
+        else:
+            self.s_end = last
+
+    def q_d(self, s: Array) -> Array:
+        return self._splines[0](self._within(s))
+
+    def dq_d(self, s: Array) -> Array:
+        return self._splines[1](self._within(s))
+
+    def ddq_d(self, s: Array) -> Array:
+        return self._splines[2](self._within(s))
+
+    def _within(self, s: Array) -> Array:
+        if self.period is None:
+            return np.asarray(s)
+        return self.s0 + np.mod(np.asarray(s) - self.s0, self.period)
+
+
+class WaypointPath(SplinePath):
+    """The cubic spline through waypoints, twice continuously differentiable, open or closed.
+
+    The parameter of waypoint i grows by ‖p_{i+1} − p_i‖^α from one to the next: α = ½ is the centripetal
+    parametrisation, which makes neither cusps nor loops between waypoints that lie unevenly (Lee, Computer-Aided
+    Design 21, 1989), α = 1 the chord length, α = 0 uniform. With a tolerance the waypoints are moved, to bend the path
+    less: of all λ the largest for which min Σ‖y_i − p_i‖² + λ∫‖q_d''‖²ds keeps every ‖y_i − p_i‖ within
+    the tolerance.
+
+    Args:
+        points: waypoints [rad], (m, n), m ≥ 2, or 3 for a closed path, no two neighbours the same.
+        speed: path speed ‖q̇‖ [rad/s].
+        closed: whether the path returns to its first point, which is not repeated.
+        tolerance: largest distance from a waypoint [rad]; 0 to pass through each.
+        parametrisation: ``"centripetal"``, ``"chord"`` or ``"uniform"``, or increasing parameters: one for each
+            waypoint, and for a closed path one more for the return to the first.
+    """
+
+    def __init__(
+        self,
+        points: ArrayLike,
+        speed: float,
+        closed: bool = False,
+        tolerance: float = 0.0,
+        parametrisation: Parametrisation | ArrayLike = "centripetal",
+    ) -> None:
+        self.points = readonly(_checked_points(points, closed))
+        self.tolerance = scalar("tolerance", tolerance, least=0.0)
+        ring = np.concatenate([self.points, self.points[:1]]) if closed else self.points
+        self.parameters = readonly(_parameters(ring, parametrisation))
+        if self.tolerance:
+            ring = _smoothed(self.parameters, ring, self.tolerance, closed)
+        super().__init__(_interpolant(self.parameters, ring, closed), speed, closed)
+        self._refuse_standstill()
+
+    def _refuse_standstill(self) -> None:
+        lower, upper = self.one_traverse
+        slope = np.linalg.norm(self.dq_d(np.linspace(lower, upper, 16 * len(self.points) + 1)), axis=-1)
+        if slope.min() < 1e-6 * np.abs(self.points).max(initial=1e-12) / (upper - lower):
+            raise InputError(
+                f"the path through these {len(self.points)} waypoints comes to a standstill (‖q_d'‖ falls to "
+                f"{slope.min():.1e}); lower tolerance = {self.tolerance:g}, or move waypoints that turn straight back"
+            )
+
+
+def _checked_points(points: ArrayLike, closed: bool) -> Array:
+    array = finite("points", as_array("points", points))
+    least = 3 if closed else 2
+    if array.ndim != 2 or len(array) < least:
+        raise InputError(f"points have shape {array.shape}, expected (m, n) with at least {least} waypoints")
+    ring = np.concatenate([array, array[:1]]) if closed else array
+    same = np.flatnonzero((np.diff(ring, axis=0) == 0).all(-1))
+    if same.size:
+        i, j = int(same[0]), int((same[0] + 1) % len(array))
+        hint = "; leave the first point out at the end of a closed path" if j == 0 else "; leave one of them out"
+        raise InputError(f"points {i} and {j} are the same posture {array[i].tolist()}{hint}")
+    return array
+
+
+def _parameters(ring: Array, parametrisation: Parametrisation | ArrayLike) -> Array:
+    if isinstance(parametrisation, str):
+        if parametrisation not in _POWER:
+            choices = ", ".join(map(repr, get_args(Parametrisation)))
+            raise UnknownNameError(f"parametrisation = {parametrisation!r}, expected one of {choices}, or an array")
+        steps = np.linalg.norm(np.diff(ring, axis=0), axis=-1) ** _POWER[parametrisation]
+        return np.concatenate([[0.0], np.cumsum(steps)])
+    values = finite("parametrisation", as_array("parametrisation", parametrisation))
+    if values.shape != (len(ring),) or not (np.diff(values) > 0).all():
+        raise InputError(f"parametrisation has shape {values.shape}, expected {len(ring)} increasing parameters")
+    return values
+
+
+def _interpolant(s: Array, ring: Array, closed: bool) -> BSpline:
+    """The C² cubic through ``ring``: periodic, or natural at the ends (q_d'' = 0)."""
+    return make_interp_spline(s, ring, k=3, bc_type="periodic" if closed else "natural")
+
+
+def _smoothed(s: Array, ring: Array, tolerance: float, closed: bool) -> Array:
+    """The points moved within ``tolerance`` so that the spline through them bends least."""
+    points = ring[:-1] if closed else ring
+    energies, modes = np.linalg.eigh(_bending(s, len(points), closed))
+    energies, weights = np.maximum(energies, 0.0), modes.T @ points
+
+    def moved(stiffness: float) -> Array:
+        return modes @ (weights / (1 + stiffness * energies)[:, None])
+
+    def largest_move(log_stiffness: float) -> float:
+        return float(np.linalg.norm(moved(np.exp(log_stiffness)) - points, axis=-1).max())
+
+    low, high = (np.log(factor / energies.max()) for factor in (1e-9, 1e18))
+    for _ in range(60):  # bisection; the moves grow with the stiffness
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if largest_move(middle) <= tolerance else (low, middle)
+    smooth = moved(np.exp(low))
+    return np.concatenate([smooth, smooth[:1]]) if closed else smooth
+
+
+def _bending(s: Array, m: int, closed: bool) -> Array:
+    """The matrix K of ∫‖q_d''‖²ds = Σ yᵀKy over the spline through y, (m, m)."""
+    unit = np.eye(m)
+    bend = _interpolant(s, np.concatenate([unit, unit[:1]]) if closed else unit, closed).derivative(2)(s)
+    left, right, step = bend[:-1], bend[1:], np.diff(s)[:, None, None]
+    outer = [np.einsum("ki,kj->kij", a, b) for a, b in ((left, left), (left, right), (right, left), (right, right))]
+    # q_d'' is linear between knots: Simpson's rule is exact
+    return (step / 6 * (2 * outer[0] + outer[1] + outer[2] + 2 * outer[3])).sum(0)
