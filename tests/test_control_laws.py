@@ -244,6 +244,38 @@ def test_the_sampled_plan_is_stable_for_any_k(ideal_arm, circle, k):
     assert z[0] - circle.sigma_bar(START) == pytest.approx(circle.theta(z[0]) / (k * np.linalg.norm(START)), rel=0.05)
 
 
+def test_the_sampled_plan_tends_to_the_sampled_projection_law(ideal_arm):
+    """With k up to 25 times the inverse of the period, where an explicit step would be unstable from 2 on."""
+    task = Uneven(0.8, 1.0)
+    reference = simulate(Projection(ideal_arm, task, 100.0, 20.0), START, duration=2.0, progress=False).array("q")
+    distances = []
+    for k in (1e2, 1e3, 1e4):
+        law = ExtendedMotionPlan(ideal_arm, task, 100.0, 20.0, k, start="nearest")
+        distances.append(np.abs(simulate(law, START, duration=2.0, progress=False).array("q") - reference).max())
+    assert distances[0] / distances[1] == pytest.approx(10, rel=0.3)
+    # from there on the error of the sampled loop itself is larger: still less than the arm moves in one period
+    assert distances[2] < 2.5e-3 * 2.0
+
+
+def test_the_sampled_plan_is_second_order_along_a_moving_arm(ideal_arm, circle):
+    """σ after a given motion of the arm, q(t) known, against σ̇ = ϑ − k e_pᵀq_d' integrated finely."""
+    law, speed, errors = ExtendedMotionPlan(ideal_arm, circle, 100.0, 20.0, 30.0), 1.4, []
+
+    def after(period):
+        z = np.array([0.3])
+        for t in np.arange(round(0.5 / period)) * period:
+            angle, rate = speed * t + 0.2 * np.sin(9 * t), speed + 1.8 * np.cos(9 * t)
+            q = 0.7 * np.array([np.cos(angle), np.sin(angle)])
+            qd = 0.7 * rate * np.array([-np.sin(angle), np.cos(angle)])
+            z = law.advance(z, law.law(t, q, qd, z), period)
+        return z[0]
+
+    exact = after(1e-4)
+    errors = [abs(after(period) - exact) for period in (0.02, 0.01, 0.005)]
+    assert 3.3 < errors[0] / errors[1] < 4.7
+    assert 3.3 < errors[1] / errors[2] < 4.7
+
+
 # --- one law for one arm and for many -----------------------------------------------------------------------------
 
 

@@ -29,6 +29,7 @@ class ControlOutput(NamedTuple):
         s: path parameter in use, (*batch,).
         sdot: its rate [1/s], (*batch,).
         slope: ∂ṡ/∂s with the arm held still [1/s], (*batch,).
+        drift: rate at which the arm's motion changes ṡ with s held still [1/s²], (*batch,).
         e_p: position error q_d(s) − q [rad], (*batch, n).
         e_v: velocity error q_d'(s)ϑ(s) − q̇ [rad/s], (*batch, n).
         regular: False where the path parameter is not defined by the law and the last one was kept, (*batch,).
@@ -39,6 +40,7 @@ class ControlOutput(NamedTuple):
     s: Array
     sdot: Array
     slope: Array
+    drift: Array
     e_p: Array
     e_v: Array
     regular: Array
@@ -85,13 +87,15 @@ class Controller(ABC):
     def advance(self, z: Array, out: ControlOutput, period: float) -> Array:
         """State one control ``period`` [s] after z.
 
-        With q held, ṡ = f(s) is taken by the exponential Rosenbrock–Euler step s + h φ₁(h f') f, φ₁(x) = (eˣ − 1)/x:
-        second order, exact for linear f, and with the arm at rest stable for any gain of the extended motion plan,
-        where k → ∞ makes it Newton's method for (29). (Hochbruck and Ostermann, Acta Numerica 19, 2010.)
+        ṡ = f(s, t), where t stands for the motion of the arm at its present velocity, is taken by the exponential
+        Rosenbrock–Euler step s + h φ₁(hf_s) f + h² φ₂(hf_s) f_t, φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x: second
+        order, exact where f is linear, and stable for any gain of the extended motion plan with the arm at rest. For
+        k → ∞ it is a step of Newton's method for (29) from the present arm, plus hσ̄̇ for its motion.
+        (Hochbruck and Ostermann, Acta Numerica 19, 2010.)
         """
         x = np.minimum(period * out.slope, 1.0)
-        growth = np.divide(np.expm1(x), x, out=np.ones_like(x), where=np.abs(x) > 1e-12)
-        s = out.s + period * growth * out.sdot
+        phi_1, phi_2 = _phi(x)
+        s = out.s + period * (phi_1 * out.sdot + period * phi_2 * out.drift)
         return (s if self.task.closed else np.clip(s, self.task.s0, self.task.s_end))[..., None]
 
     def __repr__(self) -> str:
@@ -135,6 +139,15 @@ class Controller(ABC):
         if self.friction == "viscous":
             return self._viscous * qd
         return self.robot.friction.torque(qd) if self.friction == "full" else 0.0
+
+
+def _phi(x: Array) -> tuple[Array, Array]:
+    """φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x, by their series where x is small."""
+    small = np.abs(x) < 1e-3
+    safe = np.where(small, 1.0, x)
+    phi_1 = np.where(small, 1 + x / 2 * (1 + x / 3 * (1 + x / 4)), np.expm1(safe) / safe)
+    phi_2 = np.where(small, 0.5 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5))), (phi_1 - 1) / safe)
+    return phi_1, phi_2
 
 
 def diagonal_gain(name: str, value: ArrayLike, n: int) -> Array:

@@ -28,9 +28,7 @@ class ExtendedMotionPlan(Controller):
         task: path and velocity profile.
         K_p: position gain [1/s²], scalar or diagonal (n,).
         K_v: velocity gain [1/s], scalar or diagonal (n,).
-        k: gain of the extended motion plan [1/(rad² s)], ≥ 0; a scalar, or one for each rollout, (N,) or (N, 1). In
-            a sampled loop keep k‖q_d'‖² times the period well below 1: σ lags the arm by a period, and r'σ̇
-            magnifies that by k. For more, take its limit, :class:`Projection`.
+        k: gain of the extended motion plan [1/(rad² s)], ≥ 0; a scalar, or one for each rollout, (N,) or (N, 1).
         options: ``friction`` and ``start`` of :class:`Controller`.
     """
 
@@ -57,5 +55,6 @@ class ExtendedMotionPlan(Controller):
         qdd = point.velocity_slope * sdot[..., None] + self.K_v * e_v + self.K_p * e_p
         tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd)
         slope = point.dtheta - self.k * curvature
+        drift = self.k * (qd * point.dq_d).sum(-1)
         regular = np.ones(s.shape, dtype=bool)
-        return ControlOutput(tau, sdot[..., None], s, sdot, slope, e_p, e_v, regular)
+        return ControlOutput(tau, sdot[..., None], s, sdot, slope, drift, e_p, e_v, regular)

@@ -48,7 +48,8 @@ class Projection(Controller):
         e_p, e_v = point.q_d - q, point.velocity - qd
         qdd = point.velocity_slope * sdot[..., None] + self.K_v * e_v + self.k_p * e_p
         tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd)
-        return ControlOutput(tau, sdot[..., None], s, sdot, np.zeros_like(s), e_p, e_v, regular)
+        none = np.zeros_like(s)
+        return ControlOutput(tau, sdot[..., None], s, sdot, none, none, e_p, e_v, regular)
 
     def _project(self, q: Array, qd: Array, last: Array) -> tuple[Array, PathPoint, Array, Array]:
         """σ̄, the task there, dσ̄/dt, and where they are defined."""
