@@ -13,6 +13,7 @@ from pathcontrol import (
     ComputedTorque,
     ContinuousTime,
     ExtendedMotionPlan,
+    Line,
     PathTask,
     PDPlus,
     Projection,
@@ -274,6 +275,14 @@ def test_the_sampled_plan_is_second_order_along_a_moving_arm(ideal_arm, circle):
     errors = [abs(after(period) - exact) for period in (0.02, 0.01, 0.005)]
     assert 3.3 < errors[0] / errors[1] < 4.7
     assert 3.3 < errors[1] / errors[2] < 4.7
+
+
+def test_the_plan_waits_at_the_beginning_of_an_open_path(ideal_arm):
+    """An arm behind the start that comes nearer leaves σ exactly where it is until the path begins."""
+    task = Line([0.0, 0.0], [1.0, 0.0], 0.5)
+    law = ExtendedMotionPlan(ideal_arm, task, 100.0, 20.0, 20.0)
+    q, qd, z = np.array([-0.5, 0.0]), np.array([2.0, 0.0]), np.array([0.0])
+    assert law.advance(z, law.law(0.0, q, qd, z), 2.5e-3)[0] == 0.0
 
 
 # --- one law for one arm and for many -----------------------------------------------------------------------------

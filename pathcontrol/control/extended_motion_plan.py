@@ -50,11 +50,13 @@ class ExtendedMotionPlan(Controller):
         s = z[..., 0]
         point = self.point(s)
         e_p, e_v = point.q_d - q, point.velocity - qd
-        sdot = self.inside(s, point.theta - self.k * (e_p * point.dq_d).sum(-1))
+        free = point.theta - self.k * (e_p * point.dq_d).sum(-1)
+        sdot = self.inside(s, free)
         curvature = (point.dq_d * point.dq_d).sum(-1) + (e_p * point.ddq_d).sum(-1)
         qdd = point.velocity_slope * sdot[..., None] + self.K_v * e_v + self.K_p * e_p
         tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd)
-        slope = point.dtheta - self.k * curvature
-        drift = self.k * (qd * point.dq_d).sum(-1)
+        running = sdot == free  # not held at an end of an open path
+        slope = np.where(running, point.dtheta - self.k * curvature, 0.0)
+        drift = np.where(running, self.k * (qd * point.dq_d).sum(-1), 0.0)
         regular = np.ones(s.shape, dtype=bool)
         return ControlOutput(tau, sdot[..., None], s, sdot, slope, drift, e_p, e_v, regular)
