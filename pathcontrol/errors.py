@@ -35,6 +35,10 @@ class TaskError(PathControlError, ValueError):
     """A path task returns something it must not: a wrong shape, a NaN, a velocity profile that is not positive."""
 
 
+class ToolpathError(PathControlError, ValueError):
+    """A toolpath file cannot be used; the message says where in it and why."""
+
+
 class ExperimentError(PathControlError, ValueError):
     """An experiment file is invalid; the message names the key and the choices."""
 

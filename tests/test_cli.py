@@ -76,10 +76,10 @@ def test_the_papers_peaks_come_out_within_ten_percent(results, name):
 def test_reproduce_prints_a_table(monkeypatch, capsys, results):
     from rich.console import Console
 
-    from pathcontrol.cli import _peaks_table
+    from pathcontrol.cli.tables import peaks_table
 
     console = Console(width=120, record=True)
-    console.print(_peaks_table(results[1]))
+    console.print(peaks_table(results[1]))
     text = console.export_text()
     assert "extended motion plan" in text
     assert "14.5" in text
@@ -170,4 +170,4 @@ def test_ctrl_c_leaves_no_half_written_file(tmp_path):
 
 def test_the_console_script_is_the_same_command():
     assert main.name == "main"
-    assert set(main.commands) == {"reproduce", "run", "check"}
+    assert set(main.commands) == {"reproduce", "run", "check", "toolpath"}

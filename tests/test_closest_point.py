@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 from strategies import floats, tasks, vectors, wobbles
 
-from pathcontrol import Circle, Ellipse, Line, Lissajous, PathTask, TaskError
+from pathcontrol import Circle, ConstantRate, Ellipse, Line, Lissajous, PathTask, TaskError, WaypointPath
 
 
 def stationarity(task, s, q):
@@ -147,3 +151,188 @@ def test_line_projection_is_the_numerical_one():
     task = Line([0.0, 1.0, -1.0], [2.0, 0.0, 1.0], 1.0)
     q = np.random.default_rng(0).normal(size=(50, 3)) * 2
     assert np.allclose(task.sigma_bar(q), PathTask.sigma_bar(task, q), atol=1e-9)
+
+
+# --- long paths ---------------------------------------------------------------------------------------------
+
+
+def zigzag(passes: int, each: int) -> np.ndarray:
+    """Waypoints of parallel passes 0.002 apart."""
+    x, y = np.broadcast_arrays(np.linspace(0, 1, each), 0.002 * np.arange(passes)[:, None])
+    points = np.stack([x, y], axis=-1).copy()
+    points[1::2] = points[1::2, ::-1]
+    return points.reshape(-1, 2)
+
+
+def spiral(turns: int, each: int) -> np.ndarray:
+    angle = 2 * np.pi * np.arange(turns * each) / each
+    return (0.05 + 0.001 * angle / np.pi)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def details(count: int, n: int) -> np.ndarray:
+    """A bend of small random details, each a few times larger than the distance between waypoints."""
+    t, rng = np.linspace(0, 3, count), np.random.default_rng(0)
+    return np.stack([np.cos(t * (1 + 0.2 * i) + i) for i in range(n)], axis=-1) + 3e-4 * rng.normal(size=(count, n))
+
+
+LONG = {
+    "zigzag": lambda: zigzag(1000, 100),
+    "long straights and fine passes": lambda: np.concatenate([zigzag(40, 2), 0.2 + 0.01 * zigzag(999, 100)]),
+    "spiral": lambda: spiral(250, 400),
+    "details": lambda: details(100_000, 3),
+}
+
+
+def about(path: PathTask, count: int, seed: int = 0) -> np.ndarray:
+    """Postures on the path, beside it, and far from it."""
+    rng = np.random.default_rng(seed)
+    beside = rng.normal(size=(count, path.n)) * 10 ** rng.uniform(-5, 0, size=(count, 1))
+    return path.q_d(np.sort(rng.uniform(*path.one_traverse, size=count))) + beside
+
+
+class Counting(WaypointPath):
+    """Counts the parameters at which the path is asked for."""
+
+    asked = 0
+
+    def q_d(self, s):
+        self.asked += np.size(s)
+        return super().q_d(s)
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 9999), st.integers(2, 4), st.integers(4, 40), st.booleans())
+def test_the_global_minimum_of_random_splines(seed, n, count, closed):
+    rng = np.random.default_rng(seed)
+    path = WaypointPath(rng.normal(size=(count, n)), 1.0, closed=closed, parametrisation="uniform")
+    q = about(path, 50, seed)
+    s = path.sigma_bar(q)
+    dense = path.q_d(np.linspace(*path.one_traverse, 500 * count))
+    best = np.array([np.linalg.norm(dense - x, axis=-1).min() for x in q])
+    assert (np.linalg.norm(path.q_d(s) - q, axis=-1) <= best * (1 + 1e-12) + 1e-14).all()
+    inside = (s > path.s0) & (s < path.one_traverse[1])
+    assert stationarity(path, s, q)[inside].max(initial=0) < 1e-9
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_the_global_minimum_of_a_hundred_thousand_segments(name):
+    path = WaypointPath(LONG[name](), 1.0)
+    q = about(path, 300)
+    found = np.linalg.norm(path.q_d(path.sigma_bar(q)) - q, axis=-1)
+    dense = path.q_d(np.linspace(*path.one_traverse, 1_000_001))
+    sampled = cKDTree(dense, balanced_tree=False).query(q)[0]
+    assert (found <= sampled * (1 + 1e-12) + 1e-13).all()
+    step = np.linalg.norm(np.diff(dense, axis=0), axis=-1).max()
+    assert (found >= sampled - step).all()
+
+
+def test_a_detail_of_a_long_path_is_not_missed():
+    """One ripple a millionth of the path long, which no equal division would meet."""
+    line = np.stack([np.linspace(0, 100, 101), np.zeros(101)], axis=-1)
+    ripple = 50.5 + 1e-4 * np.array([[0, 0], [0.25, 1], [0.5, 0], [0.75, -1], [1, 0]]) - [0, 50.5]
+    path = WaypointPath(np.concatenate([line[:51], ripple, line[51:]]), 1.0)
+    assert path.sigma_bar(ripple[1] + [0, 1e-5]) == pytest.approx(path.parameters[52], abs=2e-3)
+    assert np.linalg.norm(path.q_d(path.sigma_bar(ripple)) - ripple, axis=-1).max() < 1e-12
+
+
+def test_memory_is_bounded():
+    path = WaypointPath(zigzag(1000, 100), 1.0)
+    q = about(path, 10_000)
+    tracemalloc.start()
+    s = path.sigma_bar(q)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert np.isfinite(s).all()
+    assert peak < 200e6
+
+
+def test_the_local_search_asks_as_little_of_a_long_path_as_of_a_short_one():
+    asked = []
+    for passes in (10, 100, 1000):
+        path = Counting(zigzag(passes, 100), 1.0)
+        s = float(path.parameters[550])
+        q = path.q_d(np.array(s)) + np.array([0.001, 0.01])
+        path.asked = 0
+        found = path.sigma_bar(q, near=s)
+        assert np.linalg.norm(path.q_d(found) - q) == pytest.approx(0.01, abs=1e-6)
+        asked.append(path.asked)
+    assert asked[0] == asked[1] == asked[2] < 15
+
+
+def test_once_built_the_global_search_asks_little():
+    for passes in (10, 100, 1000):
+        path = Counting(zigzag(passes, 100), 1.0)
+        q = about(path, 1)
+        path.sigma_bar(q)
+        path.asked = 0
+        path.sigma_bar(q)
+        assert path.asked < 200
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 9999), st.integers(2, 4), st.integers(6, 20), st.booleans())
+def test_the_local_search_finds_the_first_minimum_downhill(seed, n, count, closed):
+    rng = np.random.default_rng(seed)
+    path = WaypointPath(rng.normal(size=(count, n)), 1.0, closed=closed)
+    lower, upper = path.one_traverse
+    near, size = rng.uniform(lower, upper, size=10), 10 ** rng.uniform(-3, 0.3, size=(10, 1))
+    tangent = path.dq_d(near) / np.linalg.norm(path.dq_d(near), axis=-1, keepdims=True)
+    offset = size * rng.normal(size=(10, n))
+    q = path.q_d(near) + offset - 0.9 * tangent * (offset * tangent).sum(-1, keepdims=True)  # about normal to the path
+    for x, start, found in zip(q, near, path.sigma_bar(q, near), strict=True):
+        direction = -np.sign((path.q_d(start) - x) @ path.dq_d(start))
+        s = start + direction * np.linspace(0, upper - lower, 20_001)
+        s = s if closed else s[(s >= lower) & (s <= upper)]
+        rises = direction * ((path.q_d(s) - x) * path.dq_d(s)).sum(-1) > 0
+        expected = s[rises.argmax()] if rises.any() else s[-1]
+        assert found == pytest.approx(expected, abs=1e-4 * (upper - lower))
+
+
+def test_where_newton_fails_the_next_minimum_downhill_is_found():
+    """Over a row of ripples, at a distance of many of them: from ripple to ripple, never farther, never back."""
+    t, height, ripple, wave = np.linspace(0, 2, 2001), 0.05, 2e-3, 0.02
+    path = WaypointPath(np.stack([t, ripple * np.cos(2 * np.pi * t / wave)], axis=-1), 1.0)
+    x = np.linspace(0.1, 1.9, 1500)
+    s, found = float(path.sigma_bar([0.1, 0.0])), []
+    for q in np.stack([x, np.full_like(x, height)], axis=-1):
+        s = float(path.sigma_bar(q, near=s))
+        found.append(s)
+    p = path.q_d(np.array(found))
+    # a ripple is left where its steepest flank is normal to the error
+    assert (x - p[:, 0]).max() < 1.01 * (height + ripple) * ripple * 2 * np.pi / wave
+    assert np.diff(p[:, 0]).min() > 0
+    assert np.diff(p[:, 0]).max() < wave
+
+
+def test_many_on_a_long_path_are_as_one():
+    path = WaypointPath(zigzag(100, 100), 1.0)
+    q = about(path, 40)
+    q[7] = np.nan
+    s = path.sigma_bar(q)
+    assert np.isnan(s[7])
+    assert np.array_equal(s, [path.sigma_bar(x) for x in q], equal_nan=True)
+    near = np.random.default_rng(0).uniform(*path.one_traverse, size=40)
+    assert np.array_equal(
+        path.sigma_bar(q, near), [path.sigma_bar(x, z) for x, z in zip(q, near, strict=True)], equal_nan=True
+    )
+
+
+def test_knots_are_those_of_the_pieces():
+    path = WaypointPath(zigzag(5, 10), 1.0)
+    assert np.allclose(path.knots, path.parameters)
+    assert path.with_profile(ConstantRate(1.0)).knots is not None
+    assert Lissajous([1.0, 1.0], [1, 2], 1.0).knots is None
+
+
+def test_a_path_with_a_hole_is_refused():
+    class Hole(PathTask):
+        s_end = 1.0
+
+        def q_d(self, s):
+            return np.stack([s, np.where(np.abs(s - 0.5) < 0.01, np.nan, 0.0)], axis=-1)
+
+        def theta(self, s):
+            return 1.0
+
+    with pytest.raises(TaskError, match=r"nan.*at s = 0\.49"):
+        Hole().sigma_bar([0.2, 0.2])

@@ -35,7 +35,8 @@ from pathcontrol.experiments.controller_sections import LAWS, LOOPS
 from pathcontrol.experiments.load import load_experiment
 from pathcontrol.experiments.runner import load_setup, run_experiment
 from pathcontrol.experiments.schema import Experiment
-from pathcontrol.experiments.task_sections import CURVES, PROFILES
+from pathcontrol.experiments.profile_sections import PROFILES
+from pathcontrol.experiments.task_sections import CURVES
 from pathcontrol.experiments.template import example_text
 
 BASE = {
@@ -45,6 +46,10 @@ BASE = {
     "controller": {"type": "extended_motion_plan", "K_p": 800.0, "K_v": [45.0, 100.0], "k": 20.0},
     "start": {"q": [0.7, 1.2]},
 }
+DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" width="300mm" height="120mm" viewBox="0 0 300 120">
+<path d="M 20 20 H 80 V 60" fill="none" stroke="black"/><circle cx="150" cy="60" r="20"/></svg>
+"""
+
 OWN_TASK = """
 import numpy as np
 from pathcontrol import PathTask
@@ -117,6 +122,7 @@ def write(tmp_path):
             data = merged(BASE, changes or {})
             path.write_text(document(data), encoding="utf-8")
         (tmp_path / "tasks.py").write_text(OWN_TASK, encoding="utf-8")
+        (tmp_path / "drawing.svg").write_text(DRAWING, encoding="utf-8")
         return path
 
     return write
@@ -385,7 +391,7 @@ BAD = {
     "wrong kind of task": ({"task.type": "circel"}, "task.type = 'circel', expected one of 'circle'"),
     "no kind": ({"task.type": None}, "task.type: missing; choose one of 'circle'"),
     "kind is no text": ({"loop.mode": 3}, "loop.mode = 3, expected one of 'sampled', 'continuous'"),
-    "missing section": ({"start": None}, "start: missing; needed here: duration, robot"),
+    "missing section": ({"controller": None}, "controller: missing; needed here: robot, task, controller"),
     "missing key": ({"controller.k": None}, "controller.k: missing; needed here: K_p, K_v, k"),
     "section is no table": ({"robot": "cicese_2dof"}, "robot = 'cicese_2dof', expected a table"),
     "kind of no table": ({"task": "circle"}, "task = 'circle', expected a table with the key 'type'"),

@@ -37,7 +37,7 @@ def distance_to_gamma(
         raise InputError(f"q has shape {q.shape} and qd {qd.shape}, expected the same")
     state, gamma = np.concatenate([q, w * qd], axis=-1), gamma_curve(task, w)
     lower, upper = task.one_traverse
-    s = ClosestPoint(gamma, lower, upper, closed=task.closed)(state)
+    s = ClosestPoint(gamma, lower, upper, task.closed, task.knots)(state)
     distance = np.linalg.norm(gamma.p(s) - state, axis=-1)
     return (distance, s) if return_s else distance
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
@@ -23,7 +25,7 @@ class Lyapunov(NamedTuple):
 
 
 def extended_motion_plan_lyapunov(controller: ExtendedMotionPlan, s: Array, e_p: Array, e_v: Array) -> Lyapunov:
-    """V = ½e_pᵀe_p + ½e_vᵀK_p⁻¹e_v [rad²] and V̇ = −e_vᵀK_p⁻¹K_v e_v − k(e_pᵀq_d')² [rad²/s].
+    """V = ½e_pᵀe_p + ½e_vᵀK_p⁻¹e_v [rad²] and V̇ = −e_vᵀK_p⁻¹K_v e_v − k(s)(e_pᵀq_d')² [rad²/s].
 
     Args:
         controller: the law, for its gains and task.
@@ -31,7 +33,7 @@ def extended_motion_plan_lyapunov(controller: ExtendedMotionPlan, s: Array, e_p:
         e_p: position error [rad], (*batch, n).
         e_v: velocity error [rad/s], (*batch, n).
     """
-    return _extended(controller.K_p, controller.K_v, controller.k, e_p, e_v, controller.point(s).dq_d)
+    return _extended(controller.K_p, controller.K_v, controller.plan_gain(s), e_p, e_v, controller.point(s).dq_d)
 
 
 def projection_lyapunov(controller: Projection, e_p: Array, e_v: Array) -> Lyapunov:
@@ -52,8 +54,9 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     """
     e_p, e_v = run.array("e_p"), run.array("e_v")
     if isinstance(controller, ExtendedMotionPlan):
-        K_p, K_v, k = _over_time(controller.K_p), _over_time(controller.K_v), controller.k[..., None]
-        return _extended(K_p, K_v, k, e_p, e_v, controller.point(run.array("s")).dq_d)
+        s, K_p, K_v = run.array("s"), _over_time(controller.K_p), _over_time(controller.K_v)
+        k = np.where(controller.timed(s), 0.0, controller.k[..., None])
+        return _extended(K_p, K_v, k, e_p, e_v, controller.point(s).dq_d)
     if isinstance(controller, Projection):
         return _projected(_over_time(controller.k_p), _over_time(controller.K_v), e_p, e_v)
     raise InputError(

@@ -20,6 +20,10 @@ UNITS = {
     "speed_ratio": "",
     "settling_time": "s",
     "tau_demand_peak": "N m",
+    **{f"tool_deviation_{kind}": "m" for kind in ("peak", "rms")},
+    "smoothing_deviation": "m",
+    "path_time": "s",
+    "end_error": "rad",
 }
 
 
@@ -64,13 +68,28 @@ def settling_time(values: Array, time: Array, band: float) -> Array:
     return np.where(outside.any(-1), after, time[0])
 
 
+def end_error(run: Run, task: PathTask) -> Array:
+    """‖q_d(s_end) − q‖ [rad] when the rollout was finished, (rollout,); NaN where it was not.
+
+    Raises:
+        TaskError: the path has no end.
+    """
+    if not np.isfinite(task.s_end):
+        raise TaskError(f"{type(task).__name__} has no end that an arm could be away from")
+    finished = run.status == "finished"
+    samples = np.searchsorted(run.time, np.where(finished, run.finish_time, run.time[0]))
+    q = run.array("q")[np.arange(run.rollouts), np.minimum(samples, len(run.time) - 1)]
+    return np.where(finished, np.linalg.norm(task.q_d(np.array(task.s_end)) - q, axis=-1), np.nan)
+
+
 def metrics(run: Run, task: PathTask, fraction: float = 0.5, band: float = np.deg2rad(2.0)) -> dict[str, Any]:
     """The usual numbers of a run, each a list with one entry for each rollout.
 
     Peaks and RMS of ‖e_p‖ [rad], ‖e_v‖ [rad/s], contour and lag error [rad] and distance to Γ over the last
     ``fraction`` of the time; there also the mean rate of s over the mean of ϑ, 1 for an arm that is as fast as it
     should be and 0 for one that is stuck; settling time [s] of ‖e_p‖ into ``band`` [rad]; largest torque demand [N m].
-    Contour error and distance to Γ are left out for paths that neither end nor repeat.
+    Contour error and distance to Γ are left out for paths that neither end nor repeat. Open paths have the time [s]
+    after which they were finished, and the :func:`end_error` [rad], each NaN where they were not.
     """
     late = steady_state(run, fraction)
     signals = {"e_p": late.norm("e_p"), "e_v": late.norm("e_v"), "lag_error": np.abs(lag_error(late, task))}
@@ -84,4 +103,6 @@ def metrics(run: Run, task: PathTask, fraction: float = 0.5, band: float = np.de
     values["speed_ratio"] = late.array("sdot").mean(-1) / task.at(late.array("s")).theta.mean(-1)
     values["settling_time"] = settling_time(run.norm("e_p"), run.time, band)
     values["tau_demand_peak"] = np.abs(run.array("tau_demand")).max((1, 2))
+    if np.isfinite(task.s_end):
+        values |= {"path_time": run.finish_time, "end_error": end_error(run, task)}
     return {name: value.tolist() for name, value in values.items()}

@@ -6,9 +6,10 @@ from abc import ABC, abstractmethod
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly
+from pathcontrol.control.ending import Ending
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint, PathTask
@@ -16,8 +17,6 @@ from pathcontrol.tasks.check import check_task
 
 FrictionCompensation = Literal["none", "viscous", "full"]
 Start = Literal["s0", "nearest"]
-
-_END_TIME = 0.1  # s, time constant with which an open path is brought to rest
 
 
 class ControlOutput(NamedTuple):
@@ -56,7 +55,7 @@ class Controller(ABC):
         robot: the model the law uses, which need not be the simulated arm.
         task: path and velocity profile, for as many joints.
         friction: what the torque compensates of ``robot.friction``: ``"none"``, ``"viscous"`` (as in the paper) or
-            ``"full"``, which adds the Coulomb level in the direction of motion.
+            ``"full"``, which adds the Coulomb level in the direction of motion; of the desired one where a joint rests.
         start: the first path parameter: ``"s0"`` of the task, or that of the ``"nearest"`` point of the path.
     """
 
@@ -71,6 +70,7 @@ class Controller(ABC):
         _check_choice("start", start, get_args(Start))
         check_task(task, robot.n)
         self.robot, self.task, self.friction, self.start_at = robot, task, friction, start
+        self.ending = Ending.of(task)
         self._viscous = robot.friction.viscous
 
     @abstractmethod
@@ -114,18 +114,17 @@ class Controller(ABC):
     # --- for laws -------------------------------------------------------------------------------------------
 
     def point(self, s: Array) -> PathPoint:
-        """The task at s, and on open paths how it ends.
+        """The task at s, and on open paths how its plan comes to rest, :meth:`Ending.braked`.
 
-        The motion plan comes to rest at s_end with ϑ(s) ≤ (s_end − s)/T, T = 0.1 s: exponentially, and smooth enough
-        for every law. Outside [s0, s_end] the point is the end that was passed.
+        Outside [s0, s_end] the point is the end that was passed.
         """
-        if self.task.closed:
-            return self.task.at(s)
-        point = self.task.at(np.clip(s, self.task.s0, self.task.s_end))
-        left = np.maximum(self.task.s_end - s, 0.0) / _END_TIME
-        braking = left < point.theta
-        theta, dtheta = np.where(braking, left, point.theta), np.where(braking, -1 / _END_TIME, point.dtheta)
-        return point._replace(theta=theta, dtheta=dtheta)
+        if self.ending is None:
+            return self.task.at(s if self.task.closed else np.maximum(s, self.task.s0))
+        return self.ending.braked(self.task.at(np.minimum(np.maximum(s, self.task.s0), self.task.s_end)), s)
+
+    def timed(self, s: Array) -> NDArray[np.bool_]:
+        """Where the plan σ̇ = ϑ(σ) must not wait for the arm: at the end of an open path, :class:`Ending`, (*batch,)."""
+        return np.zeros(s.shape, dtype=bool) if self.ending is None else s >= self.ending.begin
 
     def inside(self, s: Array, sdot: Array) -> Array:
         """ṡ without the part that would leave an open path."""
@@ -134,11 +133,19 @@ class Controller(ABC):
         sdot = np.where(s >= self.task.s_end, np.minimum(sdot, 0.0), sdot)
         return np.where(s <= self.task.s0, np.maximum(sdot, 0.0), sdot)
 
-    def friction_torque(self, qd: Array) -> Array | float:
-        """f̂(q̇) [N m], the friction that the law compensates."""
+    def friction_torque(self, qd: Array, desired: Array | None = None) -> Array | float:
+        """f̂(q̇) [N m], the friction that the law compensates, (*batch, n).
+
+        Dry friction is compensated in the direction of motion, and where a joint rests, in that of its ``desired``
+        velocity: else it would hold for ever an arm that is to start slowly.
+        """
         if self.friction == "viscous":
             return self._viscous * qd
-        return self.robot.friction.torque(qd) if self.friction == "full" else 0.0
+        if self.friction == "none":
+            return 0.0
+        direction = qd if desired is None else np.where(qd == 0, desired, qd)
+        plus, minus = self.robot.friction.levels(qd)
+        return self._viscous * qd + np.where(direction > 0, plus, 0.0) - np.where(direction < 0, minus, 0.0)
 
 
 def _phi(x: Array) -> tuple[Array, Array]:

@@ -22,6 +22,8 @@ class ExtendedMotionPlan(Controller):
 
     with e_p = q_d(σ) − q and e_v = r(σ) − q̇. V = ½e_pᵀe_p + ½e_vᵀK_p⁻¹e_v falls along the closed loop,
     V̇ = −e_vᵀK_p⁻¹K_v e_v − k(e_pᵀq_d')². k = 0 is computed torque on the timed trajectory, k → ∞ the projection law.
+    Over the last stretch of an open path k is 0 (:class:`Ending`), so that the plan cannot wait there for ever for an
+    arm that dry friction holds; the theorem asks for no more than k(σ) ≥ 0.
 
     Args:
         robot: the model the law uses.
@@ -50,13 +52,18 @@ class ExtendedMotionPlan(Controller):
         s = z[..., 0]
         point = self.point(s)
         e_p, e_v = point.q_d - q, point.velocity - qd
-        free = point.theta - self.k * (e_p * point.dq_d).sum(-1)
+        k = self.plan_gain(s)
+        free = point.theta - k * (e_p * point.dq_d).sum(-1)
         sdot = self.inside(s, free)
         curvature = (point.dq_d * point.dq_d).sum(-1) + (e_p * point.ddq_d).sum(-1)
         qdd = point.velocity_slope * sdot[..., None] + self.K_v * e_v + self.K_p * e_p
-        tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd)
+        tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd, point.velocity)
         running = sdot == free  # not held at an end of an open path
-        slope = np.where(running, point.dtheta - self.k * curvature, 0.0)
-        drift = np.where(running, self.k * (qd * point.dq_d).sum(-1), 0.0)
+        slope = np.where(running, point.dtheta - k * curvature, 0.0)
+        drift = np.where(running, k * (qd * point.dq_d).sum(-1), 0.0)
         regular = np.ones(s.shape, dtype=bool)
         return ControlOutput(tau, sdot[..., None], s, sdot, slope, drift, e_p, e_v, regular)
+
+    def plan_gain(self, s: Array) -> Array:
+        """k(σ) [1/(rad² s)], (*batch,): ``k``, and 0 where the plan is timed."""
+        return self.k if self.ending is None else np.where(self.timed(s), 0.0, self.k)

@@ -36,7 +36,7 @@ class MotionController(Controller):
         velocity = point.velocity
         e_p, e_v = point.q_d - q, velocity - qd
         tracking = Tracking(point.velocity_slope * point.theta[..., None], velocity, e_p, e_v)
-        tau = self.torque(q, qd, tracking) + self.friction_torque(qd)
+        tau = self.torque(q, qd, tracking) + self.friction_torque(qd, velocity)
         drift, regular = np.zeros_like(s), np.ones(s.shape, dtype=bool)
         return ControlOutput(tau, point.theta[..., None], s, point.theta, point.dtheta, drift, e_p, e_v, regular)
 

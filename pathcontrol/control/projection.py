@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain, scalar_gain
+from pathcontrol.control.branch import Branch, BranchPolicy
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint, PathTask
 
@@ -27,41 +28,70 @@ class Projection(Controller):
     (39) loses. Where no nearest point is defined (the denominator vanishes, as at the centre of a circle) the last σ̄
     is kept and ``regular`` is False.
 
-    The state is the last σ̄; it counts laps and tells branches apart.
+    Nothing here pulls along the path an arm that dry friction holds, so the end of an open path is reached by the timed
+    plan σ̇ = ϑ(σ), once σ is where :class:`Ending` begins; V̇ is the same. There the arm is held by k_p.
+
+    The state is the last σ̄; it counts laps and tells branches apart. ``branch`` says when one is left for another.
 
     Args:
         robot: the model the law uses.
         task: path and velocity profile.
         k_p: position gain [1/s²], a scalar.
         K_v: velocity gain [1/s], scalar or diagonal (n,).
-        options: ``friction`` of :class:`Controller`.
+        branch: ``"follow"`` the branch of the path that the arm is on, until it is pushed away to another; always the
+            ``"nearest"`` one; or ``"local"``, never another. See :class:`BranchPolicy`.
+        capture: distance from its branch [rad] from which an arm counts as pushed away.
+        options: ``friction`` and ``start`` of :class:`Controller`; unless given, ``start`` is ``"s0"`` on a path that
+            ends, and ``"nearest"`` on others.
     """
 
     gains = ("k_p", "K_v")
 
-    def __init__(self, robot: RobotModel, task: PathTask, k_p: ArrayLike, K_v: ArrayLike, **options: Any) -> None:
-        super().__init__(robot, task, **({"start": "nearest"} | options))
+    def __init__(
+        self,
+        robot: RobotModel,
+        task: PathTask,
+        k_p: ArrayLike,
+        K_v: ArrayLike,
+        branch: Branch = "follow",
+        capture: float = 0.1,
+        **options: Any,
+    ) -> None:
+        # an open path may end close to where it begins, and an arm at its begin be nearer to the end
+        super().__init__(robot, task, **({"start": "s0" if np.isfinite(task.s_end) else "nearest"} | options))
+        self.branches = BranchPolicy(branch, capture)
         self.k_p, self.K_v = scalar_gain("k_p", k_p), diagonal_gain("K_v", K_v, robot.n)
 
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
-        s, point, sdot, regular = self._project(q, qd, z[..., 0])
+        last, none = z[..., 0], np.zeros(z.shape[:-1])
+        s, point, sdot, regular = self._project(q, qd, last)
+        slope = none
+        if self.ending is not None and (timed := self.timed(last)).any():
+            s = np.where(timed, last, s)
+            point = self.point(s)
+            sdot, slope = np.where(timed, point.theta, sdot), np.where(timed, point.dtheta, 0.0)
+            regular = regular | timed
         e_p, e_v = point.q_d - q, point.velocity - qd
         qdd = point.velocity_slope * sdot[..., None] + self.K_v * e_v + self.k_p * e_p
-        tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd)
-        none = np.zeros_like(s)
-        return ControlOutput(tau, sdot[..., None], s, sdot, none, none, e_p, e_v, regular)
+        tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd, point.velocity)
+        return ControlOutput(tau, sdot[..., None], s, sdot, slope, none, e_p, e_v, regular)
+
+    def describe(self) -> dict[str, Any]:
+        return super().describe() | {"branch": self.branches.branch, "capture": self.branches.capture}
 
     def _project(self, q: Array, qd: Array, last: Array) -> tuple[Array, PathPoint, Array, Array]:
         """σ̄, the task there, dσ̄/dt, and where they are defined."""
-        s = self.task.sigma_bar(q, near=last)
+        s = self.branches.sigma_bar(self.task, q, last)
         point = self.point(s)
-        gradient = (point.dq_d * point.dq_d).sum(-1)
-        denominator = gradient + ((point.q_d - q) * point.ddq_d).sum(-1)
+        if (elsewhere := self.branches.captured(self.task, q, s, point.q_d)) is not s:
+            s, point = elsewhere, self.point(elsewhere)
+        gradient = np.vecdot(point.dq_d, point.dq_d)
+        denominator = gradient + np.vecdot(point.q_d - q, point.ddq_d)
         regular = denominator * _STEEPEST > gradient
         if not regular.all():
             s = np.where(regular, s, last)
             point = self.point(s)
-        along = (point.dq_d * qd).sum(-1)
+        along = np.vecdot(point.dq_d, qd)
         sdot = np.divide(along, denominator, out=np.zeros_like(along), where=regular & ~self._held_by_end(s, q, point))
         return s, point, sdot, regular
 

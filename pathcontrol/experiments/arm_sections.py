@@ -18,6 +18,16 @@ class Payload(Section):
     com: Numbers | None = None
 
 
+class ToolFrame(Section):
+    """A frame ``name`` more, at ``position`` [m] and ``rpy``, in ``angle_unit``, in ``frame``."""
+
+    angles = ("rpy",)
+    frame: Text
+    position: Numbers | None = None
+    rpy: Numbers | None = None
+    name: Text = "tip"
+
+
 class Robot(Section):
     """The arm as the controller knows it. ``lock`` is in ``angle_unit``, and in metres for sliding joints."""
 
@@ -25,6 +35,7 @@ class Robot(Section):
     lock: dict[str, Number] | None = None
     package_dirs: list[Text] | None = None
     payload: Payload | None = None
+    tool: ToolFrame | None = None
 
 
 class Directions(Section):

@@ -14,12 +14,15 @@ from pathcontrol.control.motion import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.build_arms import build_arms
+from pathcontrol.experiments.build_duration import build_duration
 from pathcontrol.experiments.build_task import build_task
 from pathcontrol.experiments.controller_sections import ContinuousSection
 from pathcontrol.experiments.keyed import keyed, users_code
 from pathcontrol.experiments.schema import Experiment, Output
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.modes import ContinuousTime, SampledLoop, torque_limits
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.sequence import PathSequence
 
 _LAWS: dict[str, type[Controller]] = {
     "extended_motion_plan": ExtendedMotionPlan,
@@ -35,22 +38,31 @@ class Setup(NamedTuple):
     """All that :func:`pathcontrol.simulate` needs, checked, and the files to write.
 
     Attributes:
-        controller: the law, with its model of the arm and its task.
+        controllers: the law with its model of the arm and its task, or one for each path of a sequence.
+        task: the task, or the whole sequence.
         plant: the simulated arm.
         loop: how the loop is closed.
         q: initial joint positions [rad], (n,).
         qd: initial joint velocities [rad/s], (n,).
-        duration: simulated time [s].
+        duration: longest simulated time [s]: one number, or one for each path of a sequence.
+        laps: how many times a closed path is gone round, or None.
         output: the files to write.
     """
 
-    controller: Controller
+    controllers: tuple[Controller, ...]
+    task: PathTask
     plant: RobotModel
     loop: SampledLoop | ContinuousTime
     q: Array
     qd: Array
-    duration: float
+    duration: float | Array
+    laps: int | None
     output: Output
+
+    @property
+    def controller(self) -> Controller:
+        """The law, of the first path if there are several."""
+        return self.controllers[0]
 
 
 def build(experiment: Experiment, base_dir: str | Path = ".") -> Setup:
@@ -66,47 +78,54 @@ def build(experiment: Experiment, base_dir: str | Path = ".") -> Setup:
     base_dir = Path(base_dir)
     with np.errstate(all="ignore"):  # absurd numbers overflow in the checks, which find that themselves
         model, plant = build_arms(experiment, base_dir)
-        task = build_task(experiment.task, model.n, base_dir, experiment.to_radians)
-        law = experiment.controller.arguments(float)
-        with keyed("controller", law):
-            controller = _LAWS[experiment.controller.type](model, task, **law)
-        loop = _loop(experiment, plant)
-        q, qd = _state(experiment, controller)
-    return Setup(controller, plant, loop, q, qd, float(experiment.duration), experiment.output)
+        task = build_task(experiment.task, model, base_dir, experiment.to_radians)
+        controllers = _controllers(experiment, model, task)
+        duration, laps = build_duration(experiment, task)
+        loop = _loop(experiment, plant, float(np.max(duration)))
+        q, qd = _state(experiment, controllers[0])
+    return Setup(controllers, task, plant, loop, q, qd, duration, laps, experiment.output)
 
 
-def _loop(experiment: Experiment, plant: RobotModel) -> SampledLoop | ContinuousTime:
+def _controllers(experiment: Experiment, model: RobotModel, task: PathTask) -> tuple[Controller, ...]:
+    """The law for the task, or one for each path of a sequence."""
+    law, made = experiment.controller.arguments(experiment.to_radians), _LAWS[experiment.controller.type]
+    with keyed("controller", law):
+        return tuple(made(model, path, **law) for path in (task.paths if isinstance(task, PathSequence) else [task]))
+
+
+def _loop(experiment: Experiment, plant: RobotModel, duration: float) -> SampledLoop | ContinuousTime:
     """The loop, with encoders and torque limits that fit the simulated arm."""
     section, arguments = experiment.loop, experiment.loop.arguments(experiment.to_radians)
     with keyed("loop", arguments):
         if isinstance(section, ContinuousSection):
             continuous = ContinuousTime(**arguments)
             torque_limits(continuous, plant)
-            _refuse_too_long(experiment, "output_period", continuous.output_period)
+            _refuse_too_long(duration, "output_period", continuous.output_period)
             return continuous
         sampled = SampledLoop(**arguments)
         sampled.sensors(plant)
         torque_limits(sampled, plant)
-        _refuse_too_long(experiment, "period", sampled.period, sampled.delay)
+        _refuse_too_long(duration, "period", sampled.period, sampled.delay)
     return sampled
 
 
-def _refuse_too_long(experiment: Experiment, name: str, period: float, delay: float = 0.0) -> None:
-    samples = experiment.duration / period
+def _refuse_too_long(duration: float, name: str, period: float, delay: float = 0.0) -> None:
+    samples = duration / period
     if samples > _MOST_SAMPLES:
         raise ExperimentError(
-            f"duration = {experiment.duration:g} and loop.{name} = {period:g} make {samples:.3g} samples, "
+            f"duration = {duration:g} and loop.{name} = {period:g} make {samples:.3g} samples, "
             f"expected at most {_MOST_SAMPLES:.0e}: shorten the one or lengthen the other"
         )
-    if delay > experiment.duration:
-        raise ExperimentError(f"loop.delay = {delay:g}, expected at most duration = {experiment.duration:g}")
+    if delay > duration:
+        raise ExperimentError(f"loop.delay = {delay:g}, expected at most duration = {duration:g}")
 
 
 def _state(experiment: Experiment, controller: Controller) -> tuple[Array, Array]:
     """(q, q̇) at the start, for which the law has been tried once."""
     n, given = controller.robot.n, experiment.start.arguments(experiment.to_radians)
     with keyed("start", ("q", "qd")):
-        q = finite("q", joint_array("q", given["q"], n))
+        begin = controller.task.q_d(np.array(controller.task.s0))
+        q = finite("q", joint_array("q", given.get("q", begin), n))
         qd = finite("qd", joint_array("qd", given.get("qd", np.zeros(n)), n))
     with users_code("controller", f"{type(controller).__name__} at the start"):
         controller.law(0.0, q, qd, controller.start(q, qd))

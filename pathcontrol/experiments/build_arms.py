@@ -8,6 +8,7 @@ from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.arm_sections import Payload
 from pathcontrol.experiments.build_friction import with_friction
 from pathcontrol.experiments.keyed import keyed
+from pathcontrol.experiments.placement import pose_of
 from pathcontrol.experiments.schema import Experiment
 from pathcontrol.robot.loading import find_urdf, load_robot
 from pathcontrol.robot.model import RobotModel
@@ -20,7 +21,7 @@ def build_arms(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, Robo
     Raises:
         ExperimentError: a robot, joint or frame does not exist, or a value is out of range.
     """
-    bare = _load(experiment, base_dir)
+    bare = _with_tool(_load(experiment, base_dir), experiment)
     robot, plant = experiment.robot, experiment.plant
     model = _carrying("robot.payload", bare, robot.payload)
     carrier = model if plant.payload is None else _carrying("plant.payload", bare, plant.payload)
@@ -42,6 +43,15 @@ def _load(experiment: Experiment, base_dir: Path) -> RobotModel:
         robot = load_robot(source, lock=lock, package_dirs=package_dirs)
     _refuse_degrees(robot, sliding)
     return robot
+
+
+def _with_tool(robot: RobotModel, experiment: Experiment) -> RobotModel:
+    tool = experiment.robot.tool
+    if tool is None:
+        return robot
+    pose = pose_of("robot.tool", tool.arguments(experiment.to_radians))
+    with keyed("robot.tool", ("name", "frame")):
+        return robot.with_frame(tool.name, tool.frame, pose)
 
 
 def _source(source: str, base_dir: Path) -> str | Path:

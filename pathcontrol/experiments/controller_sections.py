@@ -29,9 +29,12 @@ class ExtendedMotionPlanController(ControllerSection):
 class ProjectionController(ControllerSection):
     """``projection``: see :class:`pathcontrol.Projection`."""
 
+    angles = ("capture",)
     type: Literal["projection"] = "projection"
     k_p: Gain
     K_v: Gain
+    branch: Literal["follow", "nearest", "local"] | None = None
+    capture: Positive | None = None
 
 
 class ComputedTorqueController(ControllerSection):

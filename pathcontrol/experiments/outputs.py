@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from pathcontrol._files import whole_file
+from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.metrics import UNITS, metrics
+from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.experiments.build import Setup
 from pathcontrol.experiments.schema import Output
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
 
 
 def check_folder(out_dir: Path, output: Output) -> None:
@@ -35,9 +36,11 @@ def check_folder(out_dir: Path, output: Output) -> None:
             raise InputError(f"there is a folder where the file {str(target)!r} should go; remove or rename it")
 
 
-def plain_metrics(run: Run, task: PathTask) -> dict[str, Any]:
-    """The metrics of a run as JSON can hold them."""
-    return _plain(metrics(run, task))
+def measured(run: Run, setup: Setup) -> dict[str, Any]:
+    """The metrics of a run as JSON can hold them: those of a toolpath, or the usual ones."""
+    if isinstance(setup.task, ToolpathTask):
+        return _plain(toolpath_metrics(run, setup.plant, setup.task))
+    return _plain(metrics(run, setup.task))
 
 
 def write_outputs(run: Run, numbers: dict[str, Any], setup: Setup, out_dir: Path) -> dict[str, Path]:
@@ -68,14 +71,20 @@ def _write_figures(run: Run, setup: Setup, path: Path) -> dict[str, Path]:
     from pathcontrol.view.figures import run_figure
 
     stem = path.with_suffix("").name
-    figures = run_figure(run, path, setup.controller.task)
+    figures = run_figure(run, path, setup.task)
+    if isinstance(setup.task, ToolpathTask):
+        from pathcontrol.view.deviation_figures import deviation_figure
+        from pathcontrol.view.style import save_figure
+
+        figures += save_figure(deviation_figure(run, setup.plant, setup.task), path.with_name(f"{stem}-deviation"))
     return {f"figure{figure.name.removeprefix(stem)}": figure for figure in figures}
 
 
 def _write_html(run: Run, setup: Setup, path: Path) -> Path:
     from pathcontrol.view.recorder import record
 
-    record(run, setup.plant, task=setup.controller.task).save(path)
+    tool = setup.task.frame if isinstance(setup.task, ToolpathTask) else None
+    record(run, setup.plant, task=setup.task, tool=tool).save(path)
     return path
 
 

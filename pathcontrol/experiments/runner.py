@@ -8,9 +8,11 @@ from typing import Any, NamedTuple
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.build import Setup, build
 from pathcontrol.experiments.load import invalid, load_experiment
-from pathcontrol.experiments.outputs import check_folder, plain_metrics, write_outputs
+from pathcontrol.experiments.outputs import check_folder, measured, write_outputs
 from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.sequence import simulate_sequence
 from pathcontrol.simulation.simulate import simulate
+from pathcontrol.tasks.sequence import PathSequence
 
 
 class Outcome(NamedTuple):
@@ -42,17 +44,17 @@ def run_experiment(path: str | Path, out_dir: str | Path, progress: bool = True)
     """
     setup, out_dir = load_setup(path), Path(out_dir)
     check_folder(out_dir, setup.output)
-    run = simulate(
-        setup.controller,
-        setup.q,
-        setup.qd,
-        duration=setup.duration,
-        plant=setup.plant,
-        loop=setup.loop,
-        progress=progress,
-    )
-    numbers = plain_metrics(run, setup.controller.task)
+    run = _simulated(setup, progress)
+    numbers = measured(run, setup)
     return Outcome(run, numbers, write_outputs(run, numbers, setup, out_dir))
+
+
+def _simulated(setup: Setup, progress: bool) -> Run:
+    options: dict[str, Any] = {"plant": setup.plant, "loop": setup.loop, "progress": progress}
+    if isinstance(setup.task, PathSequence):
+        return simulate_sequence(setup.controllers, setup.q, setup.qd, duration=setup.duration, **options)
+    options["laps"] = setup.laps
+    return simulate(setup.controller, setup.q, setup.qd, duration=float(setup.duration), **options)
 
 
 def load_setup(path: str | Path) -> Setup:

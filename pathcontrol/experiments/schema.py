@@ -13,14 +13,14 @@ from pathcontrol.experiments.arm_sections import Plant, Robot
 from pathcontrol.experiments.controller_sections import Law, Loop, SampledSection
 from pathcontrol.experiments.section import Section
 from pathcontrol.experiments.task_sections import Task
-from pathcontrol.experiments.values import Numbers, Positive, expected
+from pathcontrol.experiments.values import Numbers, Positive, Whole, expected
 
 
 class Start(Section):
-    """``[start]``: the initial state, in ``angle_unit``; at rest unless told."""
+    """``[start]``: the initial state, in ``angle_unit``; at rest at the beginning of the path unless told."""
 
     angles = ("q", "qd")
-    q: Numbers
+    q: Numbers | None = None
     qd: Numbers | None = None
 
 
@@ -55,20 +55,24 @@ class Output(Section):
 
 
 class Experiment(Section):
-    """An experiment file: robot, task, controller, plant, loop, initial state, duration [s] and outputs.
+    """An experiment file: robot, task, controller, plant, loop, initial state and outputs.
 
     Attributes:
+        duration: longest simulated time [s]; left out, a path that ends has twice its time by ϑ and 5 s more, each
+            path of a toolpath for itself.
+        laps: how many times a closed path is gone round; left out, as often as ``duration`` allows.
         angle_unit: of all angles and angular rates: ``lock``, the task's lengths, speeds and phases,
             ``start``, the Stribeck velocity and ``friction_width``. All else is in SI units, as gains are, or
             taken as it is, as ``task.parameters`` are.
     """
 
     angle_unit: Literal["rad", "deg"] = "rad"
-    duration: Positive
+    duration: Positive | None = None
+    laps: Whole | None = None
     robot: Robot
     task: Task
     controller: Law
-    start: Start
+    start: Start = Start()
     plant: Plant = Plant()
     loop: Loop = SampledSection()
     output: Output = Output()

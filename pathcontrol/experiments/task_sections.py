@@ -7,29 +7,12 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PlainValidator
 
+from pathcontrol.experiments.profile_sections import Profile
 from pathcontrol.experiments.section import Section, chooser
+from pathcontrol.experiments.toolpath_section import ToolpathSection
 from pathcontrol.experiments.values import Flag, Numbers, Positive, Positives, Wholes, expected
 
 _OWN = re.compile(r"(?P<file>.+\.py):(?P<name>[^\W\d]\w*)")
-
-
-class RateProfile(Section):
-    """``constant_rate``: ϑ(s) = ``rate`` [1/s], which no ``angle_unit`` applies to."""
-
-    type: Literal["constant_rate"] = "constant_rate"
-    rate: Positive
-
-
-class SpeedProfile(Section):
-    """``constant_speed``: the path speed ‖q̇‖ = ``speed``, in ``angle_unit`` per second."""
-
-    angles = ("speed",)
-    type: Literal["constant_speed"] = "constant_speed"
-    speed: Positive
-
-
-PROFILES: dict[str, type[Section]] = {"constant_rate": RateProfile, "constant_speed": SpeedProfile}
-Profile = Annotated[RateProfile | SpeedProfile, PlainValidator(chooser("type", PROFILES))]
 
 
 class TaskSection(Section):
@@ -113,6 +96,7 @@ CURVES: dict[str, type[Section]] = {
     "ellipse": EllipseTask,
     "lissajous": LissajousTask,
     "line": LineTask,
+    "toolpath": ToolpathSection,
 }
 _choose_curve = chooser("type", CURVES, also=" or 'FILE.py:ClassName'")
 
@@ -124,4 +108,6 @@ def _choose_task(value: Any) -> Any:
     return OwnTask.model_validate(value) if own else _choose_curve(value)
 
 
-Task = Annotated[CircleTask | EllipseTask | LissajousTask | LineTask | OwnTask, PlainValidator(_choose_task)]
+Task = Annotated[
+    CircleTask | EllipseTask | LissajousTask | LineTask | ToolpathSection | OwnTask, PlainValidator(_choose_task)
+]

@@ -19,6 +19,8 @@ from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly, 
 from pathcontrol.errors import InputError, UnknownNameError, UrdfError
 from pathcontrol.robot.friction import FrictionLaw, no_friction
 
+_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED  # the frame's origin, axes parallel to the base's
+
 
 @dataclass(frozen=True)
 class UrdfSource:
@@ -216,10 +218,36 @@ class RobotModel:
 
     def frame_jacobian(self, q: ArrayLike, frame: str) -> Array:
         """Jacobian of ``frame``, (*batch, 6, n): linear [m], then angular velocity, in axes parallel to the base's."""
-        i, axes = self._frame_id(frame), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        i = self._frame_id(frame)
         return self._each(
-            q, (6, self.n), lambda qi: pin.computeFrameJacobian(self.pinocchio_model, self._data, qi, i, axes)
+            q, (6, self.n), lambda qi: pin.computeFrameJacobian(self.pinocchio_model, self._data, qi, i, _ALIGNED)
         )
+
+    def frame_kinematics(self, q: ArrayLike, frame: str) -> tuple[Array, Array]:
+        """Pose of ``frame`` (*batch, 4, 4) and its Jacobian (*batch, 6, n), as above, for the price of one of them."""
+        i, data, array = self._frame_id(frame), self._data, joint_array("q", q, self.n)
+        batch, rows = array.shape[:-1], array.reshape(-1, self.n)
+        poses, jacobians = np.empty((len(rows), 4, 4)), np.empty((len(rows), 6, self.n))
+        for k, qi in enumerate(rows):
+            jacobians[k] = pin.computeFrameJacobian(self.pinocchio_model, data, qi, i, _ALIGNED)
+            poses[k] = data.oMf[i].homogeneous  # which computeFrameJacobian leaves up to date
+        return poses.reshape(*batch, 4, 4), jacobians.reshape(*batch, 6, self.n)
+
+    def frame_motion(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, frame: str) -> tuple[Array, Array]:
+        """Velocity Jq̇ and acceleration Jq̈ + J̇q̇ of ``frame``, each (*batch, 6), for joint motion (q, q̇, q̈).
+
+        Linear [m/s, m/s²], then angular [rad/s, rad/s²], in axes parallel to the base's, without gravity. The linear
+        parts are those of the frame's origin, differentiated in the base frame (the "classical" acceleration).
+        """
+        model, data, i, axes = self.pinocchio_model, self._data, self._frame_id(frame), _ALIGNED
+
+        def motion(qi: Array, qdi: Array, qddi: Array) -> list[Array]:
+            pin.forwardKinematics(model, data, qi, qdi, qddi)
+            velocity = pin.getFrameVelocity(model, data, i, axes)
+            return [velocity.vector, pin.getFrameClassicalAcceleration(model, data, i, axes).vector]
+
+        moments = self._each(q, (2, 6), motion, qd=qd, qdd=qdd)
+        return moments[..., 0, :], moments[..., 1, :]
 
     # --- variations -----------------------------------------------------------------------------------------
 
@@ -251,6 +279,25 @@ class RobotModel:
         model = pin.Model(self.pinocchio_model)
         support = model.frames[self._frame_id(frame)]
         model.appendBodyToJoint(support.parentJoint, pin.Inertia(mass, lever, tensor), support.placement)
+        return RobotModel(model, self.actuation, self.source, self.threads)
+
+    def with_frame(self, name: str, parent: str, pose: ArrayLike) -> RobotModel:
+        """The same arm with one frame more, such as the tip of a tool.
+
+        Args:
+            name: its name, which no other frame has.
+            parent: the frame that carries it.
+            pose: its pose in ``parent`` [m], homogeneous (4, 4), or only the position of its origin, (3,).
+        """
+        if name in self.frame_names:
+            raise InputError(f"{self.name} has a frame {name!r} already; choose another name")
+        model, given = pin.Model(self.pinocchio_model), finite("pose", as_array("pose", pose))
+        if given.shape not in ((3,), (4, 4)):
+            raise InputError(f"pose has shape {given.shape}, expected (4, 4), or (3,) for a position")
+        placement = pin.SE3(np.eye(3), given) if given.shape == (3,) else pin.SE3(given)
+        support = model.frames[self._frame_id(parent)]
+        frame = pin.Frame(name, support.parentJoint, support.placement * placement, pin.FrameType.OP_FRAME)
+        model.addFrame(frame, False)
         return RobotModel(model, self.actuation, self.source, self.threads)
 
     def with_armature(self, armature: ArrayLike) -> RobotModel:
@@ -285,11 +332,8 @@ class RobotModel:
 
     def _batched(self, call: Callable[..., Any], pool: Any, **arguments: ArrayLike) -> Array:
         """One of Pinocchio's batched calls on three (*batch, n) arguments that broadcast."""
-        arrays = [joint_array(name, value, self.n) for name, value in arguments.items()]
+        arrays = self._together(arguments)
         shape = arrays[0].shape
-        if not shape == arrays[1].shape == arrays[2].shape:
-            shape = _broadcast_shape(arguments, arrays)
-            arrays = [np.broadcast_to(a, shape) for a in arrays]
         out: Array = np.empty(shape)
         if len(shape) == 2:
             x, y, z, result = *arrays, out
@@ -299,11 +343,19 @@ class RobotModel:
             call(self.threads, pool, x.T, y.T, z.T, result.T)
         return out
 
-    def _each(self, q: ArrayLike, shape: tuple[int, ...], function: Callable[[Array], Any]) -> Array:
-        """``function`` of each configuration, for what Pinocchio has no batched call for."""
-        array = joint_array("q", q, self.n)
-        values = [function(qi) for qi in array.reshape(-1, self.n)]
-        return np.array(values, dtype=np.float64).reshape(array.shape[:-1] + shape)
+    def _each(self, q: ArrayLike, shape: tuple[int, ...], function: Callable[..., Any], **more: ArrayLike) -> Array:
+        """``function`` of each configuration (and ``more`` beside it), for what Pinocchio has no batched call for."""
+        arrays = self._together({"q": q, **more})
+        values = [function(*rows) for rows in zip(*(a.reshape(-1, self.n) for a in arrays), strict=True)]
+        return np.array(values, dtype=np.float64).reshape(arrays[0].shape[:-1] + shape)
+
+    def _together(self, arguments: Mapping[str, ArrayLike]) -> list[Array]:
+        """Arguments (*batch, n) broadcast to one shape."""
+        arrays = [joint_array(name, value, self.n) for name, value in arguments.items()]
+        if all(a.shape == arrays[0].shape for a in arrays):
+            return arrays
+        shape = _broadcast_shape(arguments, arrays)
+        return [np.broadcast_to(a, shape) for a in arrays]
 
     def _frame_id(self, frame: str) -> int:
         # getFrameId answers nframes for a frame that does not exist, so ask first

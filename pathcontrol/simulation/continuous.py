@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.integrate import LSODA
 
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.errors import SimulationError
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.finish import Finish
 from pathcontrol.simulation.modes import ContinuousTime, torque_limits
 from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sensors import Reading
@@ -40,48 +43,54 @@ class ClosedLoop:
         return np.concatenate([qd, self.robot.forward_dynamics(q, qd, tau - friction), out.zdot], axis=-1)
 
 
-def run_continuous(
-    controller: Controller,
-    plant_robot: RobotModel,
-    mode: ContinuousTime,
-    q: Array,
-    qd: Array,
-    duration: float,
-    progress: bool,
-) -> tuple[Array, dict[str, Array]]:
-    """Times (T,) and arrays (rollout, T, …) of the continuous closed loop from (q, q̇), both (N, n)."""
-    loop = ClosedLoop(controller, plant_robot, mode)
-    start = np.concatenate([q, qd, controller.start(q, qd)], axis=-1)
-    time = mode.output_period * np.arange(max(1, round(duration / mode.output_period)) + 1)
-    with progress_bar("integrating", duration, progress) as update:
+class ContinuousArm:
+    """The arm as a differential equation; controllers may take it over one after the other.
 
-        def rate(t: float, y: Array) -> Array:
-            update(t)
-            return loop.rate(t, y.reshape(start.shape)).reshape(-1)
+    Args:
+        mode: how it is integrated.
+        robot: the arm.
+        q: joint positions it starts at [rad], (N, n).
+        qd: joint velocities it starts with [rad/s], (N, n).
+    """
 
-        # the integrator's norm averages over rollouts: tighten it so that each one alone keeps the tolerance
-        share, band = np.sqrt(max(1, len(start))), start.shape[1] - 1
-        solution = solve_ivp(
-            rate,
-            (0.0, time[-1]),
-            start.reshape(-1),
-            method="LSODA",
-            t_eval=time,
-            rtol=max(mode.rtol / share, 1e-13),
-            atol=mode.atol / share,
-            lband=band,
-            uband=band,
-        )
-    if not solution.success or not np.isfinite(solution.y).all():
-        raise SimulationError(f"the integrator gave up at t = {solution.t[-1]:.3g} s: {solution.message}")
-    return time, _recorded(loop, time, solution.y.T.reshape(len(time), *start.shape))
+    def __init__(self, mode: ContinuousTime, robot: RobotModel, q: Array, qd: Array) -> None:
+        torque_limits(mode, robot)
+        self.q, self.qd = q, qd
+        self._mode, self._robot, self._period = mode, robot, mode.output_period
+
+    def run(self, controller: Controller, duration: float, finish: Finish | None, progress: bool) -> dict[str, Array]:
+        """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
+        loop, recorder = ClosedLoop(controller, self._robot, self._mode), Recorder()
+        start = np.concatenate([self.q, self.qd, controller.start(self.q, self.qd)], axis=-1)
+        time = self._period * np.arange(max(1, round(duration / self._period)) + 1)
+        with progress_bar("integrating", duration, progress) as update:
+            for t, y in zip(time, _solution(loop, start, time, update), strict=False):
+                self.q, self.qd, _ = loop.split(y)
+                out, tau = loop.control(t, y)
+                recorder.write(self.q, self.qd, Reading(self.q, self.qd), out, tau)
+                if finish is not None and finish(t, out.s, self.qd):
+                    break
+        return recorder.arrays()
 
 
-def _recorded(loop: ClosedLoop, time: Array, states: Array) -> dict[str, Array]:
-    """What a run holds, from the states (time, rollout, 2n + m)."""
-    recorder = Recorder(len(time))
-    for tick, (t, y) in enumerate(zip(time, states, strict=True)):
-        q, qd, _ = loop.split(y)
-        out, tau = loop.control(t, y)
-        recorder.write(tick, q, qd, Reading(q, qd), out, tau)
-    return recorder.arrays()
+def _solution(loop: ClosedLoop, start: Array, time: Array, update: Callable[[float], None]) -> Iterator[Array]:
+    """States (N, 2n + m) at each of ``time``, no further integrated than they are asked for."""
+
+    def rate(t: float, y: Array) -> Array:
+        update(t)
+        return loop.rate(t, y.reshape(start.shape)).reshape(-1)
+
+    # the integrator's norm averages over rollouts: tighten it so that each one alone keeps the tolerance
+    share, band = np.sqrt(max(1, len(start))), start.shape[1] - 1
+    rtol, atol = max(loop.mode.rtol / share, 1e-13), loop.mode.atol / share
+    solver = LSODA(rate, 0.0, start.reshape(-1), time[-1], rtol=rtol, atol=atol, lband=band, uband=band)
+    yield start
+    given = 1
+    while given < len(time):
+        message = solver.step()
+        if solver.status == "failed" or not np.isfinite(solver.y).all():
+            raise SimulationError(f"the integrator gave up at t = {solver.t:.3g} s: {message}")
+        known = int(np.searchsorted(time, solver.t, side="right"))
+        if known > given:
+            yield from solver.dense_output()(time[given:known]).T.reshape(-1, *start.shape)
+            given = known

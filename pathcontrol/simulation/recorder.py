@@ -8,16 +8,18 @@ from pathcontrol._arrays import Array
 from pathcontrol.control.base import ControlOutput
 from pathcontrol.simulation.sensors import Reading
 
+_ROOM = 1024  # samples at first
+
 
 class Recorder:
-    """Arrays (time, rollout, …) filled a sample at a time, handed out as (rollout, time, …)."""
+    """Arrays (time, rollout, …) that grow a sample at a time, handed out as (rollout, time, …)."""
 
-    def __init__(self, samples: int) -> None:
-        self._samples = samples
+    def __init__(self) -> None:
+        self._samples, self._room = 0, 0
         self._arrays: dict[str, Array] = {}
 
-    def write(self, sample: int, q: Array, qd: Array, reading: Reading, out: ControlOutput, tau: Array) -> None:
-        """Store one sample: the true state, what was measured, what the law said and the torque that acts."""
+    def write(self, q: Array, qd: Array, reading: Reading, out: ControlOutput, tau: Array) -> None:
+        """Store one more sample: the true state, what was measured, what the law said and the torque that acts."""
         values = {
             "q": q,
             "qd": qd,
@@ -31,11 +33,21 @@ class Recorder:
             "e_v": out.e_v,
             "regular": out.regular,
         }
-        if not self._arrays:
-            self._arrays = {name: np.empty((self._samples, *v.shape), dtype=v.dtype) for name, v in values.items()}
+        if self._samples == self._room:
+            self._grow(values)
         for name, value in values.items():
-            self._arrays[name][sample] = value
+            self._arrays[name][self._samples] = value
+        self._samples += 1
 
     def arrays(self) -> dict[str, Array]:
         """Everything stored, rollouts first."""
-        return {name: np.moveaxis(array, 0, 1) for name, array in self._arrays.items()}
+        return {name: np.moveaxis(array[: self._samples], 0, 1) for name, array in self._arrays.items()}
+
+    def _grow(self, values: dict[str, Array]) -> None:
+        """Twice the room; a run may end long before the time it was given."""
+        self._room = 2 * self._room or _ROOM
+        for name, value in values.items():
+            larger = np.empty((self._room, *value.shape), dtype=value.dtype)
+            if self._samples:
+                larger[: self._samples] = self._arrays[name]
+            self._arrays[name] = larger

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol._files import whole_file
@@ -32,6 +33,16 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     ),
     "regular": (("rollout", "time"), "1", "0 where the path parameter was undefined and the last one kept"),
 }
+#: what a run says about how it went: (dimensions, unit, meaning); coordinates of its data
+OUTCOMES: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "status": (("rollout",), "", "finished, or running when the time was up"),
+    "finish_time": (("rollout",), "s", "when the rollout was finished, NaN while it is running"),
+    "laps": (("rollout",), "1", "whole laps of a closed path"),
+    "path_index": (("time",), "1", "which path of a sequence is followed"),
+    "path_status": (("path",), "", "finished, running when its time was up, or waiting for its turn"),
+    "path_offset": (("path",), "1", "what s of a sequence is more than that of the path"),
+    "path_finish_time": (("path",), "s", "when the path of a sequence was finished, NaN if it was not"),
+}
 _CONFIG = "pathcontrol_config"
 
 
@@ -39,7 +50,8 @@ class Run:
     """What happened in a simulation, one or many rollouts.
 
     Attributes:
-        data: an ``xarray.Dataset`` with the dimensions rollout, time and joint; see :data:`VARIABLES`.
+        data: an ``xarray.Dataset`` with the dimensions rollout, time and joint; see :data:`VARIABLES` and
+            :data:`OUTCOMES`.
         config: everything the run was made with: robot, task, controller, plant, loop, versions.
     """
 
@@ -48,9 +60,17 @@ class Run:
 
     @classmethod
     def from_arrays(
-        cls, time: Array, joints: Mapping[str, str], arrays: Mapping[str, Array], config: Mapping[str, Any]
+        cls,
+        time: Array,
+        joints: Mapping[str, str],
+        arrays: Mapping[str, Array],
+        config: Mapping[str, Any],
+        outcome: Mapping[str, Array] | None = None,
     ) -> Run:
-        """A run from arrays laid out as :data:`VARIABLES` says, and the position unit of each joint by its name."""
+        """A run from arrays laid out as :data:`VARIABLES` says, and the position unit of each joint by its name.
+
+        ``outcome`` is laid out as :data:`OUTCOMES`; a rollout without a time in ``finish_time`` is running.
+        """
         kinds = sorted(set(joints.values()), reverse=True)
         variables = {}
         for name, array in arrays.items():
@@ -63,7 +83,7 @@ class Run:
             "time": ("time", time, {"units": "s"}),
             "joint": list(joints),
         }
-        return cls(xr.Dataset(variables, coords), config)
+        return cls(xr.Dataset(variables, coords).assign_coords(_outcome(rollouts, outcome or {})), config)
 
     def __getitem__(self, name: str) -> xr.DataArray:
         """One variable by its name."""
@@ -71,7 +91,13 @@ class Run:
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{name}: {size}" for name, size in self.data.sizes.items())
-        return f"Run({self.config.get('controller', {}).get('controller', '?')}; {sizes})"
+        return f"Run({self.config.get('controller', {}).get('controller', '?')}; {sizes}{self._ended()})"
+
+    def _ended(self) -> str:
+        finished = self.status == "finished"
+        if finished.all():
+            return f"; finished after {self.finish_time.max():.4g} s"
+        return f"; {finished.sum()} of {self.rollouts} finished" if finished.any() else ""
 
     @property
     def time(self) -> Array:
@@ -82,6 +108,27 @@ class Run:
     def rollouts(self) -> int:
         """Number of rollouts."""
         return self.data.sizes["rollout"]
+
+    @property
+    def status(self) -> NDArray[np.str_]:
+        """``"finished"``, or ``"running"`` when the time was up, (rollout,)."""
+        return self.data["status"].to_numpy()
+
+    @property
+    def finish_time(self) -> Array:
+        """When each rollout was finished [s], NaN where it was not, (rollout,)."""
+        return self.data["finish_time"].to_numpy()
+
+    @property
+    def laps(self) -> NDArray[np.int64]:
+        """Whole laps of a closed path from the first sample to the last, (rollout,); backwards they are negative.
+
+        Raises:
+            InputError: the path is not closed.
+        """
+        if "laps" not in self.data.coords:
+            raise InputError("the run counts no laps: its path is not closed, or it is a sequence of paths")
+        return self.data["laps"].to_numpy()
 
     def array(self, name: str) -> Array:
         """One variable as a plain array, (rollout, time, …)."""
@@ -96,6 +143,22 @@ class Run:
         if not -self.rollouts <= index < self.rollouts:
             raise InputError(f"rollout {index} does not exist: the run has {self.rollouts}, counted from 0")
         return Run(self.data.isel(rollout=[index]), self.config)
+
+    def path(self, index: int) -> Run:
+        """One path of a sequence as a run of its own, that begins at 0 s and where the path before was finished."""
+        if "path_status" not in self.data.coords:
+            raise InputError("the run is no sequence of paths; make one with simulate_sequence")
+        status = self.data["path_status"].to_numpy()
+        if not 0 <= index < len(status) or status[index] == "waiting":
+            followed = int((status != "waiting").sum())
+            raise InputError(f"path {index} was not followed: the run has {followed} paths, counted from 0")
+        data = self.data.isel(time=self.data["path_index"].to_numpy() == index)
+        begin, finished = data["time"].to_numpy()[0], data["path_finish_time"].to_numpy()[[index]]
+        data = data.assign(s=data["s"].copy(data=data["s"] - data["path_offset"].to_numpy()[index]))
+        data = data.drop_vars(name for name in OUTCOMES if name in data.coords)
+        data = data.assign_coords(time=("time", data["time"].to_numpy() - begin, data["time"].attrs))
+        config = self.config | {"controller": self.config["controller"]["sequence"][index]}
+        return Run(data.assign_coords(_outcome(1, {"finish_time": finished - begin})), config)
 
     def save(self, path: str | Path) -> Path:
         """Write netCDF, whole or not at all; :meth:`load` reads it back."""
@@ -122,3 +185,14 @@ class Run:
         except (OSError, KeyError, ValueError) as error:
             raise InputError(f"{str(path)!r} is not a run saved by Run.save: {error}") from error
         return cls(data, config)
+
+
+def _outcome(rollouts: int, outcome: Mapping[str, Array]) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:
+    """Coordinates that say how each rollout went."""
+    values = {"finish_time": np.full(rollouts, np.nan)} | dict(outcome)
+    values = {"status": np.where(np.isnan(values["finish_time"]), "running", "finished")} | values
+    labels = {}
+    for name, value in values.items():
+        dims, unit, meaning = OUTCOMES[name]
+        labels[name] = (dims, value, {"long_name": meaning} | ({"units": unit} if unit else {}))
+    return labels

@@ -11,6 +11,7 @@ from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import SimulationError
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.finish import Finish
 from pathcontrol.simulation.modes import SampledLoop, torque_limits
 from pathcontrol.simulation.plant import Plant
 from pathcontrol.simulation.recorder import Recorder
@@ -38,53 +39,59 @@ class Actuator:
         return tau if self._limits is None else np.clip(tau, -self._limits, self._limits)
 
     def torques(self, tau: Array) -> list[Array]:
-        """The torque in each part of this period, when ``tau`` has just been computed."""
+        """The torque in each part of a period at whose begin ``tau`` is computed."""
+        return [*self._queue, tau][: len(self._parts)]
+
+    def hold(self, tau: Array) -> None:
+        """The period is over at whose begin ``tau`` was computed."""
         self._queue.append(tau)
-        late = len(self._parts) > 1
-        acting = [self._queue[0], self._queue[1]] if late else [self._queue[0]]
         self._queue.popleft()
-        return acting
 
 
-def run_sampled(
-    controller: Controller,
-    plant_robot: RobotModel,
-    loop: SampledLoop,
-    q: Array,
-    qd: Array,
-    duration: float,
-    progress: bool,
-) -> tuple[Array, dict[str, Array]]:
-    """Times (T,) and recorded arrays (rollout, T, …) of the sampled loop from (q, q̇), both (N, n)."""
-    ticks = max(1, round(duration / loop.period))
-    sensors, actuator, recorder = (
-        loop.sensors(plant_robot),
-        Actuator(loop, plant_robot, q.shape),
-        Recorder(ticks + 1),
-    )
-    plants = [Plant(plant_robot, part / loop.substeps) for part in actuator.parts]
-    reading, z = sensors.start(q, qd), controller.start(q, qd)
-    # a rollout that diverges overflows first; that is looked for below
-    with progress_bar("simulating", ticks, progress) as update, np.errstate(over="ignore", invalid="ignore"):
-        for tick in range(ticks + 1):
-            reading = sensors.read(q, qd, reading)
-            out = controller.law(tick * loop.period, reading.q, reading.qd, z)
-            torques = actuator.torques(actuator.limited(out.tau))
-            recorder.write(tick, q, qd, reading, out, torques[0])
-            z = controller.advance(z, out, loop.period)
-            q, qd = _hold(plants, torques, loop.substeps, q, qd)
-            if tick % _CHECK_EVERY == 0:
-                _check_finite(tick * loop.period, q, qd, out.tau)
-                update(tick)
-    _check_finite(ticks * loop.period, q, qd, out.tau)
-    return loop.period * np.arange(ticks + 1), recorder.arrays()
+class SampledArm:
+    """The arm behind its sensors and actuators; controllers may take it over one after the other, at a tick.
 
+    Args:
+        loop: the control computer.
+        robot: the arm.
+        q: joint positions it starts at [rad], (N, n).
+        qd: joint velocities it starts with [rad/s], (N, n).
+    """
 
-def _hold(plants: list[Plant], torques: list[Array], substeps: int, q: Array, qd: Array) -> tuple[Array, Array]:
-    for plant, tau in zip(plants, torques, strict=True):
-        for _ in range(substeps):
-            q, qd = plant.advance(q, qd, tau)
-    return q, qd
+    def __init__(self, loop: SampledLoop, robot: RobotModel, q: Array, qd: Array) -> None:
+        self.q, self.qd, self._period, self._substeps = q, qd, loop.period, loop.substeps
+        self._sensors, self._actuator = loop.sensors(robot), Actuator(loop, robot, q.shape)
+        self._plants = [Plant(robot, part / loop.substeps) for part in self._actuator.parts]
+        self._reading = self._sensors.read(q, qd, self._sensors.start(q, qd))
+
+    def run(self, controller: Controller, duration: float, finish: Finish | None, progress: bool) -> dict[str, Array]:
+        """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
+        ticks, recorder = max(1, round(duration / self._period)), Recorder()
+        z = controller.start(self.q, self.qd)
+        # a rollout that diverges overflows first; that is looked for below
+        with progress_bar("simulating", ticks, progress) as update, np.errstate(over="ignore", invalid="ignore"):
+            for tick in range(ticks + 1):
+                t, reading = tick * self._period, self._reading
+                out = controller.law(t, reading.q, reading.qd, z)
+                tau = self._actuator.limited(out.tau)
+                recorder.write(self.q, self.qd, reading, out, self._actuator.torques(tau)[0])
+                ended = tick == ticks or (finish is not None and finish(t, out.s, self.qd))
+                if ended or tick % _CHECK_EVERY == 0:
+                    _check_finite(t, self.q, self.qd, out.tau)
+                    update(tick)
+                if ended:
+                    break
+                z = controller.advance(z, out, self._period)
+                self._advance(tau)
+        return recorder.arrays()
+
+    def _advance(self, tau: Array) -> None:
+        """One period on, when ``tau`` was computed at its begin."""
+        for plant, acting in zip(self._plants, self._actuator.torques(tau), strict=True):
+            for _ in range(self._substeps):
+                self.q, self.qd = plant.advance(self.q, self.qd, acting)
+        self._actuator.hold(tau)
+        self._reading = self._sensors.read(self.q, self.qd, self._reading)
 
 
 def _periods_and_rest(delay: float, period: float) -> tuple[int, float]:

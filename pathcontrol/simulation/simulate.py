@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-import platform
-from importlib.metadata import version
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, finite, joint_array, scalar
-from pathcontrol.control.base import Controller, ControlOutput
-from pathcontrol.errors import InputError, PathControlError
+from pathcontrol._arrays import scalar
+from pathcontrol.control.base import Controller
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.continuous import run_continuous
+from pathcontrol.simulation.finish import Until, finish_of, whole_laps
 from pathcontrol.simulation.modes import ContinuousTime, SampledLoop
 from pathcontrol.simulation.run import Run
-from pathcontrol.simulation.sampled import run_sampled
+from pathcontrol.simulation.setup import (
+    check_joints,
+    check_law,
+    checked_loop,
+    initial_state,
+    joints_of,
+    period_of,
+    record_of,
+    simulated_arm,
+)
 
 
 def simulate(
@@ -25,17 +29,25 @@ def simulate(
     qd: ArrayLike | None = None,
     *,
     duration: float,
+    laps: int | None = None,
+    until: Until = "end",
     plant: RobotModel | None = None,
     loop: SampledLoop | ContinuousTime | None = None,
     progress: bool = True,
 ) -> Run:
     """Simulate a control law on an arm.
 
+    The run ends when all rollouts are finished, or after ``duration``. On an open path a rollout is finished when its
+    plan has 0.1 mrad of the path left at most and the arm is at rest, ‖q̇‖ ≤ 0.01 rad/s, for 50 ms; it is held there
+    while others go on. On a closed path it is finished after ``laps``, and goes on moving; without ``laps`` never.
+
     Args:
         controller: the law, with its own model of the arm.
         q: initial joint positions [rad], (n,) or a batch (*batch, n); the run counts batches as rollouts.
         qd: initial joint velocities [rad/s], broadcast against ``q``; default at rest.
-        duration: simulated time [s], rounded to whole periods of the loop, one at least.
+        duration: longest simulated time [s], rounded to whole periods of the loop, one at least.
+        laps: how many times a closed path is gone round, counted from where its plan starts.
+        until: ``"end"`` as said above, or ``"duration"`` to go on to the end of ``duration`` in any case.
         plant: the arm that is really there, with its friction; default the controller's own model.
         loop: how the loop is closed; default ``SampledLoop()``, a 2.5 ms hold and nothing else.
         progress: show a bar on standard error when it takes longer than two seconds.
@@ -46,70 +58,15 @@ def simulate(
     """
     duration = scalar("duration", duration, positive=True)
     robot = controller.robot if plant is None else plant
-    if robot.joint_names != controller.robot.joint_names:
-        raise InputError(
-            f"the plant has the joints {robot.joint_names}, the controller's model {controller.robot.joint_names}"
-        )
-    loop = SampledLoop() if loop is None else loop
-    if not isinstance(loop, SampledLoop | ContinuousTime):
-        raise InputError(f"loop = {loop!r}, expected SampledLoop(...) or ContinuousTime(...)")
-    q0, qd0 = _initial_state(q, qd, robot.n)
-    period = loop.period if isinstance(loop, SampledLoop) else loop.output_period
-    if duration < period:
-        raise InputError(f"duration = {duration:g} s is less than one period of {period:g} s; both are in seconds")
-    _check_law(controller, q0, qd0)
-    config = _config(controller, robot, loop, duration)
-    if isinstance(loop, SampledLoop):
-        time, arrays = run_sampled(controller, robot, loop, q0, qd0, duration, progress)
-    else:
-        time, arrays = run_continuous(controller, robot, loop, q0, qd0, duration, progress)
-    joints = dict(zip(robot.joint_names, robot.position_units, strict=True))
-    return Run.from_arrays(time, joints, arrays, config)
-
-
-def _initial_state(q: ArrayLike, qd: ArrayLike | None, n: int) -> tuple[Array, Array]:
-    position = finite("q", joint_array("q", q, n))
-    velocity = np.zeros(n) if qd is None else finite("qd", joint_array("qd", qd, n))
-    try:
-        pair = np.broadcast_arrays(position, velocity)
-    except ValueError as error:
-        raise InputError(f"q has shape {position.shape} and qd {velocity.shape}, which do not fit together") from error
-    q0, qd0 = (np.array(a).reshape(-1, n) for a in pair)
-    return q0, qd0
-
-
-def _check_law(controller: Controller, q: Array, qd: Array) -> None:
-    """The law, asked once, gives what :class:`ControlOutput` says: shapes that fit the initial states, and numbers."""
-    name = type(controller).__name__
-    try:
-        z = controller.start(q, qd)
-        out = controller.law(0.0, q, qd, z)
-    except (ValueError, IndexError, TypeError) as error:
-        if isinstance(error, PathControlError):
-            raise
-        raise InputError(f"{name}.law fails at the initial states, of shape {q.shape}: {error}") from error
-    if not isinstance(out, ControlOutput):
-        raise InputError(f"{name}.law returns {type(out).__name__}, expected a ControlOutput")
-    wanted = {"tau": q.shape, "e_p": q.shape, "e_v": q.shape, "zdot": np.shape(z)}
-    for field in ControlOutput._fields:
-        shape, value = wanted.get(field, q.shape[:1]), getattr(out, field)
-        if np.shape(value) != shape:
-            raise InputError(
-                f"{name}.law gives {field} of shape {np.shape(value)} for initial states of shape {q.shape}, expected "
-                f"{shape}; gains that differ between rollouts need one row for each, and as many initial states"
-            )
-        if not np.isfinite(value).all():
-            raise InputError(f"{name}.law gives {field} = {np.asarray(value).tolist()} at the start, expected numbers")
-
-
-def _config(
-    controller: Controller, robot: RobotModel, loop: SampledLoop | ContinuousTime, duration: float
-) -> dict[str, Any]:
-    packages = ("pathcontrol", "pin", "numpy", "scipy")
-    return {
-        "controller": controller.describe(),
-        "plant": {"robot": robot.name, "friction": robot.friction.describe()},
-        "loop": loop.describe(),
-        "duration": duration,
-        "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
-    }
+    check_joints(controller, robot)
+    loop = checked_loop(loop)
+    q0, qd0 = initial_state(q, qd, robot.n)
+    period, finish = period_of(loop, duration), finish_of(controller.task, laps, until, len(q0))
+    check_law(controller, q0, qd0)
+    config = record_of(controller.describe(), robot, loop, duration=duration, laps=laps, until=until)
+    arrays = simulated_arm(loop, robot, q0, qd0).run(controller, duration, finish, progress)
+    outcome = {} if finish is None else {"finish_time": finish.time}
+    if controller.task.closed:
+        outcome["laps"] = whole_laps(controller.task, arrays["s"][:, 0], arrays["s"][:, -1])
+    time = period * np.arange(arrays["s"].shape[1])
+    return Run.from_arrays(time, joints_of(robot), arrays, config, outcome)

@@ -80,8 +80,12 @@ class PathTask(ABC):
         """Projection σ̄(q) [-], (*batch,): the path parameter of the point of the path nearest to q (*batch, n).
 
         It solves (q_d(σ̄) − q)ᵀ q_d'(σ̄) = 0, eq. (29). Without ``near`` it is the global minimum, in [s0, s0 + period)
-        for closed paths. With ``near`` (*batch,), the parameter of a moment ago, the branch is followed by
-        continuity where that is possible, and laps are counted.
+        for closed paths. With ``near`` (*batch,), the parameter of a moment ago, it is the local minimum downhill from
+        there, so that the branch is followed by continuity, and laps are counted. Only where ``near`` cannot be of a
+        moment ago, since q − q_d(near) is far from normal to the path, and no minimum is close by, it is global.
+
+        Override it where there is a closed form. When to leave a branch for a nearer one is up to the controller:
+        see :class:`BranchPolicy`.
         """
         return self._closest_point(q, near)
 
@@ -116,6 +120,14 @@ class PathTask(ABC):
         return self.s0, end
 
     @property
+    def knots(self) -> Array | None:
+        """Where the pieces of a path made of pieces meet, increasing, (K,); ``None`` for a path all of one piece.
+
+        The projection cuts the path there first, and so misses no piece of a long one.
+        """
+        return None
+
+    @property
     def sampled_interval(self) -> tuple[float, float]:
         """A finite part of the domain that stands for the whole."""
         end = self.s_end if self.period is None else self.s0 + self.period
@@ -124,6 +136,51 @@ class PathTask(ABC):
     def with_profile(self, profile: VelocityProfile) -> PathTask:
         """The same path with another velocity profile."""
         return _Reprofiled(self, profile)
+
+    def reversed(self) -> PathTask:
+        """The path taken backwards: ϑ(s) is that of the mirrored parameter. A closed one begins where it did."""
+        from pathcontrol.tasks.transforms import ReversedPath
+
+        return ReversedPath(self)
+
+    def shifted(self, offset: ArrayLike) -> PathTask:
+        """The path moved by an ``offset`` [rad], (n,)."""
+        from pathcontrol.tasks.transforms import ShiftedPath
+
+        return ShiftedPath(self, offset)
+
+    def scaled(self, factor: ArrayLike, about: ArrayLike | None = None) -> PathTask:
+        """The path scaled by a ``factor``, one for all joints or (n,), ``about`` a posture [rad], (n,).
+
+        By default about q_d(s0). The parameter keeps its rate ϑ(s), so that the joints move faster by the factor.
+        """
+        from pathcontrol.tasks.transforms import ScaledPath
+
+        return ScaledPath(self, factor, about)
+
+    def between(self, s0: float, s_end: float) -> PathTask:
+        """The stretch from ``s0`` to ``s_end`` as an open path with the same parameter; of a closed path any laps."""
+        from pathcontrol.tasks.transforms import PathSection
+
+        return PathSection(self, s0, s_end)
+
+    def by_arc_length(self) -> PathTask:
+        """The same path, taken as fast as this one, with its arc length [rad] as parameter: ‖q_d'‖ = 1."""
+        from pathcontrol.tasks.arc_length_path import ArcLengthPath
+
+        return ArcLengthPath(self)
+
+    def arc_length(self, s0: ArrayLike | None = None, s_end: ArrayLike | None = None) -> Array:
+        """Length [rad], (*batch,), from ``s0`` to ``s_end``, (*batch,); by default of the whole path, or of one lap."""
+        from pathcontrol.tasks.arc_length import arc_length
+
+        return arc_length(self, s0, s_end)
+
+    def curvature(self, s: ArrayLike) -> Array:
+        """Curvature κ = ‖q_d' ∧ q_d''‖/‖q_d'‖³ [1/rad], (*batch,), at s (*batch,)."""
+        from pathcontrol.tasks.arc_length import curvature
+
+        return curvature(self, s)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{k}={v}' for k, v in plain_attributes(self).items())})"
@@ -150,7 +207,7 @@ class PathTask(ABC):
     @cached_property
     def _closest_point(self) -> ClosestPoint:
         lower, upper = self.one_traverse
-        return ClosestPoint(Curve(self.q_d, self.dq_d, self.ddq_d), lower, upper, closed=self.closed)
+        return ClosestPoint(Curve(self.q_d, self.dq_d, self.ddq_d), lower, upper, self.closed, self.knots)
 
 
 class _Reprofiled(PathTask):
@@ -182,6 +239,10 @@ class _Reprofiled(PathTask):
 
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
         return self.path.sigma_bar(q, near)
+
+    @property
+    def knots(self) -> Array | None:
+        return self.path.knots
 
     def describe(self) -> dict[str, Any]:
         return self.path.describe() | self.profile.describe()

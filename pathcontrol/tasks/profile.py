@@ -11,9 +11,23 @@ import numpy as np
 
 from pathcontrol._arrays import Array, scalar
 
+#: time constant [s] T with which every controller brings its plan to rest on the end of an open path, ṡ ∝ (s_end − s)/T
+END_TIME = 0.1
+
 
 class Path(Protocol):
     """What a profile may ask of a path; every :class:`PathTask` is one."""
+
+    s0: float
+    s_end: float
+    period: float | None
+
+    @property
+    def knots(self) -> Array | None:
+        """Where the pieces of the path meet; ``None`` for a path all of one piece."""
+
+    def q_d(self, s: Array) -> Array:
+        """The desired path, (*batch, n)."""
 
     def dq_d(self, s: Array) -> Array:
         """First derivative q_d'(s), (*batch, n)."""

@@ -10,47 +10,10 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError, UnknownNameError
-from pathcontrol.tasks.curves import JointCurve
+from pathcontrol.tasks.spline import SplinePath
 
 Parametrisation = Literal["centripetal", "chord", "uniform"]
 _POWER = {"uniform": 0.0, "centripetal": 0.5, "chord": 1.0}
-
-
-class SplinePath(JointCurve):
-    """A path given as a spline q_d(s) of at least two continuous derivatives.
-
-    Args:
-        spline: a ``scipy.interpolate.BSpline`` of degree 3 or more with values of shape (n,); it begins at its first
-            knot and ends at its last.
-        speed: path speed ‖q̇‖ [rad/s].
-        closed: whether the spline is periodic.
-    """
-
-    def __init__(self, spline: BSpline, speed: float, closed: bool = False) -> None:
-        super().__init__(speed)
-        if spline.k < 3:
-            raise InputError(f"the spline has degree {spline.k}, expected 3 or more: q_d must be twice differentiable")
-        self._splines = [spline, spline.derivative(1), spline.derivative(2)]
-        first, last = float(spline.t[spline.k]), float(spline.t[-spline.k - 1])
-        self.s0 = first
-        if closed:
-            self.period = last - first
-        else:
-            self.s_end = last
-
-    def q_d(self, s: Array) -> Array:
-        return self._splines[0](self._within(s))
-
-    def dq_d(self, s: Array) -> Array:
-        return self._splines[1](self._within(s))
-
-    def ddq_d(self, s: Array) -> Array:
-        return self._splines[2](self._within(s))
-
-    def _within(self, s: Array) -> Array:
-        if self.period is None:
-            return np.asarray(s)
-        return self.s0 + np.mod(np.asarray(s) - self.s0, self.period)
 
 
 class WaypointPath(SplinePath):

@@ -1,43 +1,20 @@
 """The paper's figures for any run: the path in joint space, and the error norms over time.
 
-Degrees here only, where a person reads. One style for all; SVG and PNG, written whole.
+Degrees here only, where a person reads.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
-
-# Okabe and Ito's colours, told apart with any colour vision
-BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#8A8A8A"
-
-_STYLE: Any = {
-    "font.size": 9.0,
-    "axes.linewidth": 0.7,
-    "axes.grid": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "grid.color": "#E3E3E3",
-    "grid.linewidth": 0.6,
-    "lines.linewidth": 1.1,
-    "legend.frameon": False,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "pathcontrol",
-    "savefig.dpi": 300,
-}
+from pathcontrol.view.style import BLUE, GREY, ORANGE, save_figure, style
 
 
 def path_figure(
@@ -52,7 +29,7 @@ def path_figure(
     if not {i, j} <= set(range(len(names))):
         raise InputError(f"joints = {joints}, expected two indices from 0 to {len(names) - 1}: {', '.join(names)}")
     (q,), unit = _readable(run.rollout(rollout), "q")
-    with _style():
+    with style():
         figure = Figure(figsize=(3.5, 3.5), layout="constrained")
         axes = figure.add_subplot(aspect="equal")
         desired = _desired_path(task)
@@ -69,7 +46,7 @@ def path_figure(
 def error_figure(run: Run, rollout: int = 0) -> Figure:
     """‖e_p‖ [deg] and ‖e_v‖ [deg/s] over time, as in the paper's figures 8 and 10, with the steady-state peaks."""
     run = run.rollout(rollout)
-    with _style():
+    with style():
         figure = Figure(figsize=(3.5, 4.2), layout="constrained")
         upper, lower = figure.subplots(2, 1, sharex=True)
         _norm(upper, run, "e_p")
@@ -82,7 +59,7 @@ def torque_figure(run: Run, limits: np.ndarray | None = None, rollout: int = 0) 
     """Applied torques [N m] over time, one panel for each joint, beside their limits (n,) where given."""
     names = _joint_names(run)
     tau = run.rollout(rollout).array("tau")[0]
-    with _style():
+    with style():
         figure = Figure(figsize=(3.5, 1.2 + 1.1 * len(names)), layout="constrained")
         panels = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
         for k, axes in enumerate(panels):
@@ -93,21 +70,6 @@ def torque_figure(run: Run, limits: np.ndarray | None = None, rollout: int = 0) 
                 axes.axhline(-limits[k], color=ORANGE, linewidth=0.8)
         panels[-1].set(xlabel="time [s]", xlim=(0, run.time[-1]))
     return figure
-
-
-def save_figure(figure: Figure, path: str | Path) -> list[Path]:
-    """Write ``path`` with the suffixes .svg and .png; returns both paths."""
-    stem = Path(path)
-    stem = stem.with_suffix("") if stem.suffix in (".svg", ".png") else stem
-    written = []
-    with _style():
-        for suffix in (".svg", ".png"):
-            target = stem.with_name(stem.name + suffix)
-            with whole_file(target) as temporary:
-                # no date inside, so that the same run gives the same file
-                figure.savefig(temporary, metadata={"Date": None} if suffix == ".svg" else None)
-            written.append(target)
-    return written
 
 
 def run_figure(run: Run, path: str | Path, task: PathTask | None = None) -> list[Path]:
@@ -175,9 +137,3 @@ def _desired_path(task: PathTask | None) -> np.ndarray | None:
 
 def _symbol(index: int, names: list[str]) -> str:
     return rf"$q_{{{index + 1}}}$" if len(names) <= 2 else rf"$q_{{{index + 1}}}$ ({names[index]})"
-
-
-@contextmanager
-def _style() -> Iterator[None]:
-    with mpl.rc_context(_STYLE):
-        yield

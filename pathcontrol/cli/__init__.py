@@ -74,8 +74,10 @@ def reproduce(out: Path, as_json: bool) -> None:
         return
     from rich.console import Console
 
+    from pathcontrol.cli.tables import peaks_table
+
     console = Console()
-    console.print(_peaks_table(summary))
+    console.print(peaks_table(summary))
     console.print(f"Figures 7 to 10, data, animations and summary.json are in {out}/ ({summary['seconds']} s).")
 
 
@@ -137,21 +139,38 @@ def check(file: str, lock: tuple[str, ...], as_json: bool) -> None:
     sys.exit(0 if report.ok else 1)
 
 
-def _peaks_table(summary: dict[str, Any]) -> Any:
-    """Steady-state peaks, measured beside the paper's."""
-    from rich.table import Table
+@main.command()
+@click.argument("file", type=click.Path(exists=False, path_type=Path))
+@click.option("--unit", metavar="UNIT", help="Unit of length of a file that does not say: mm, in, …")
+@click.option("--layer", "layers", multiple=True, metavar="LAYER", help="A layer of a DXF file; repeat for more.")
+@click.option("--ppi", type=float, help="Pixels per inch of an SVG file.  [default: 96]")
+@click.option("--feed", type=float, metavar="M/S", help="Feed of contours for which the file gives none.")
+@click.option(
+    "--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw it: writes this name as SVG and PNG."
+)
+@json_option
+def toolpath(file: Path, layers: tuple[str, ...], plot: Path | None, as_json: bool, **options: Any) -> None:
+    """Show what is in a toolpath FILE: CSV, G-code, SVG or DXF."""
+    from pathcontrol.cli.tables import toolpath_table
+    from pathcontrol.toolpaths.read import read_toolpath
+    from pathcontrol.toolpaths.summary import summary
 
-    table = Table(title="Steady-state peaks: measured here, and in the paper")
-    for column in ("experiment", r"‖e_p‖ \[deg]", "paper", "", r"‖e_v‖ \[deg/s]", "paper", ""):
-        table.add_column(column, justify="left" if column == "experiment" else "right")
-    for name in ("extended_motion_plan", "projection"):
-        measured, paper = summary[name], summary[name]["paper"]
-        row = [name.replace("_", " ")]
-        for key in ("e_p_peak_deg", "e_v_peak_deg_s"):
-            row += [
-                f"{measured[key]:.2f}",
-                f"{paper[key]:.1f}",
-                f"{100 * (measured[key] / paper[key] - 1):+.1f} %",
-            ]
-        table.add_row(*row)
-    return table
+    given = {name: value for name, value in (options | {"layers": list(layers) or None}).items() if value is not None}
+    read = read_toolpath(file, **given)
+    content = summary(read)
+    if plot is not None:
+        with _uninterrupted():
+            from pathcontrol.view.style import save_figure
+            from pathcontrol.view.toolpath_figures import toolpath_figure
+        content["figures"] = [str(path) for path in save_figure(toolpath_figure(read), plot)]
+    if as_json:
+        click.echo(json.dumps(content))
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console()
+    for part in toolpath_table(content):
+        console.print(part)
+    for name in content.get("figures", []):
+        console.print(Text(f"  figure: {name}"))

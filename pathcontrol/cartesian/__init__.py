@@ -1,0 +1,1 @@
+"""Curves of a tool in space become paths of the joints."""

@@ -1,0 +1,92 @@
+"""What the tool has to satisfy at each point of the curve, and how far a posture is from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.cartesian.orientation import Orientation
+from pathcontrol.cartesian.postures import spread_postures
+from pathcontrol.cartesian.tool import Tool
+from pathcontrol.errors import InputError
+from pathcontrol.toolpaths.curve import ToolCurve
+
+_SAMPLES = 64
+_NO_RANK = 1e-6  # singular values below this share of the largest are none
+
+
+@dataclass(frozen=True, eq=False)
+class ToolConstraint:
+    """f(q, s) = 0: the tool is on the curve and turned as asked.
+
+    f has m = 3 + ``orientation.rows`` rows: (x(q) − p(s))/ℓ, then the rotation that is left [rad].
+
+    Attributes:
+        tool: the tool of the arm.
+        curve: the curve of its origin.
+        orientation: how it is turned along the curve.
+        tolerance: what counts as on the curve: [m] and [rad].
+        length: ℓ [m], the lever arm of the joints in the root mean square over the workspace: it makes linear and
+            angular motion comparable.
+        rank: rank of ∂f/∂q almost everywhere, at most min(m, n).
+        moving: which joints move the tool, (n,).
+    """
+
+    tool: Tool
+    curve: ToolCurve
+    orientation: Orientation
+    tolerance: tuple[float, float]
+    length: float = 1.0
+    rank: int = 0
+    moving: Array = field(default_factory=lambda: np.empty(0, dtype=bool))
+
+    @classmethod
+    def of(
+        cls, tool: Tool, curve: ToolCurve, orientation: Orientation, tolerance: tuple[float, float]
+    ) -> ToolConstraint:
+        """The constraint with ℓ, rank and moving joints found on postures all over the workspace.
+
+        Raises:
+            InputError: no joint moves the tool.
+        """
+        postures = spread_postures(tool.robot, _SAMPLES)
+        jacobian = tool.kinematics(postures).jacobian
+        moving = (np.abs(jacobian) > _NO_RANK * np.abs(jacobian).max()).any((0, 1))
+        if not moving.any():
+            raise InputError(f"no joint of {tool.robot.name} moves the frame {tool.frame!r}; name one at its tool")
+        linear, angular = (np.sqrt((jacobian[:, rows] ** 2).mean()) for rows in (slice(3), slice(3, 6)))
+        length = float(linear / angular) if linear > 0 and angular > 0 else 1.0
+        unranked = cls(tool, curve, orientation, tolerance, length)
+        _, slopes = unranked.at(postures, np.linspace(curve.s0, curve.s_end, _SAMPLES))
+        values = np.linalg.svd(slopes, compute_uv=False)
+        rank = int((values > _NO_RANK * values.max()).sum(-1).max())
+        return replace(unranked, rank=rank, moving=moving)
+
+    @property
+    def freedom(self) -> int:
+        """How many ways the joints can move without moving the tool: n − rank."""
+        return self.tool.robot.n - self.rank
+
+    def seeds(self, count: int) -> Array:
+        """Postures (count, n) spread over the joint range; joints that do not move the tool are at 0 or next to it."""
+        robot = self.tool.robot
+        still = np.clip(np.zeros(robot.n), robot.limits.lower, robot.limits.upper)
+        return np.where(self.moving, spread_postures(robot, count), still)
+
+    def at(self, q: Array, s: Array) -> tuple[Array, Array]:
+        """f (N, m) and ∂f/∂q (N, m, n) at q (N, n), s (N,)."""
+        position, rotation, jacobian = self.tool.kinematics(q)
+        turn, slope = self.orientation.error(self.curve, s, rotation)
+        f = np.concatenate([(position - self.curve.position(s)) / self.length, turn], axis=-1)
+        return f, np.concatenate([jacobian[:, :3] / self.length, slope @ jacobian[:, 3:]], axis=-2)
+
+    def deviation(self, f: Array) -> tuple[Array, Array]:
+        """Distance [m] and angle [rad] that f (N, m) stands for, each (N,)."""
+        return self.length * np.linalg.norm(f[:, :3], axis=-1), np.linalg.norm(f[:, 3:], axis=-1)
+
+    def excess(self, f: Array) -> Array:
+        """Deviation as a multiple of the tolerance, the larger of position and angle, (N,)."""
+        position, angle = self.deviation(f)
+        return np.maximum(position / self.tolerance[0], angle / self.tolerance[1])

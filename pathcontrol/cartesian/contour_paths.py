@@ -1,0 +1,124 @@
+"""From smoothed contours to paths of the joints, one after another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array
+from pathcontrol.cartesian.orientation import NormalOrientation, Orientation, TangentOrientation
+from pathcontrol.cartesian.path import CartesianPath
+from pathcontrol.errors import InputError, TaskError, UnknownNameError
+from pathcontrol.profiles.limited import limited
+from pathcontrol.profiles.motion import ToolMotion
+from pathcontrol.profiles.motion_limit import MotionLimit
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.toolpaths.contour import Contour
+from pathcontrol.toolpaths.curve import ToolCurve
+from pathcontrol.toolpaths.smoothing import Smoothed
+
+_START_TIME = 0.1  # s
+
+Held = Literal["free", "down", "normals", "tangent"]
+
+
+@dataclass(frozen=True, eq=False)
+class ContourPaths:
+    """What the paths of all contours have in common.
+
+    Attributes:
+        robot: the arm.
+        frame: the frame that follows the contours.
+        held: how the tool is turned; see :class:`ToolpathTask`.
+        up: the workpiece's z axis in the base frame, (3,).
+        feed: speed of cuts for which the file gives none [m/s], or None.
+        rapid_speed: speed of rapids [m/s].
+        acceleration: largest acceleration of the tool, along its curve and across it [m/s²].
+    """
+
+    robot: RobotModel
+    frame: str
+    held: Held | Orientation
+    up: Array
+    feed: float | None
+    rapid_speed: float
+    acceleration: float
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.held, Orientation) and self.held not in get_args(Held):
+            choices = ", ".join(map(repr, get_args(Held)))
+            raise UnknownNameError(f"orientation = {self.held!r}, expected one of {choices}, or an Orientation")
+
+    def along(
+        self, contours: Sequence[Contour], smoothed: Sequence[Smoothed], start: ArrayLike | None
+    ) -> Iterator[tuple[PathTask, Contour]]:
+        """The path of each curve with the contour it follows, each from where the one before it ends.
+
+        Raises:
+            TaskError: a contour cannot be followed.
+        """
+        for i, (contour, smooth) in enumerate(zip(contours, smoothed, strict=True)):
+            for j, curve in enumerate(smooth.curves):
+                try:
+                    path = self._path(contour, curve, self._orientation(smoothed, i, j), start)
+                except (TaskError, InputError) as error:
+                    name = f" ({contour.name})" if contour.name else ""
+                    raise TaskError(f"contour {i} of {len(contours)}{name}: {error}") from error
+                yield path, contour
+                start = path.q_d(np.array(path.s_end))
+
+    def start_on(self, tour: ToolCurve) -> Array | None:
+        """A posture at the beginning of a curve from which all of it is in reach, or None."""
+        orientation = self.held if isinstance(self.held, Orientation) else None
+        if orientation is None and self.held != "free":
+            orientation = NormalOrientation(self.up)
+        try:
+            found = CartesianPath(self.robot, self.frame, tour, orientation, speed=1.0)
+        except (TaskError, InputError):
+            return None  # the contours themselves may still be in reach
+        return found.start_posture
+
+    def _path(
+        self, contour: Contour, curve: ToolCurve, orientation: Orientation | None, start: ArrayLike | None
+    ) -> PathTask:
+        """One curve as a path of the joints, at its feed within the acceleration of the tool."""
+        speed = self.rapid_speed if contour.rapid else contour.feed or self.feed
+        assert speed is not None
+        path = CartesianPath(self.robot, self.frame, curve, orientation, speed=speed, start=start, closed=False)
+        limit = MotionLimit(
+            ToolMotion(self.robot, self.frame), speed, tangential=self.acceleration, normal=self.acceleration
+        )
+        # at once as fast as friction lets go of: a plan that waits for the arm would wait for ever at a creep
+        begin = min(speed, _START_TIME * self.acceleration)
+        return path.with_profile(limited(path, limit, start_rate=begin))
+
+    def _orientation(self, smoothed: Sequence[Smoothed], i: int, j: int) -> Orientation | None:
+        """How the tool is turned along curve j of contour i."""
+        if isinstance(self.held, Orientation):
+            return self.held
+        if self.held == "free":
+            return None
+        if self.held == "tangent":
+            return TangentOrientation(-self.up)
+        given, curve = smoothed[i].normals[j], smoothed[i].curves[j]
+        if self.held == "down":
+            return NormalOrientation(self.up)
+        if given is not None:
+            return NormalOrientation(given[1], at=given[0])
+        before, after = self._normal(smoothed[:i][::-1], -1), self._normal(smoothed[i + 1 :], 0)
+        if np.allclose(before, after):
+            return NormalOrientation(before)
+        return NormalOrientation(np.array([before, after]), at=np.array([curve.s0, curve.s_end]))
+
+    def _normal(self, neighbours: Sequence[Smoothed], end: int) -> Array:
+        """The first normal that neighbouring contours give, at their last (-1) or first (0) point."""
+        for smooth in neighbours:
+            given = smooth.normals[end]
+            if given is not None:
+                return given[1][end]
+        return self.up

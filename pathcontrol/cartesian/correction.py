@@ -1,0 +1,93 @@
+"""Newton's method from nearly right postures to right ones, many at a time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.cartesian.constraint import ToolConstraint
+from pathcontrol.cartesian.redundancy import PostureCost
+
+_STEPS = 12
+_ARRIVED = 1e-9  # rad; the next step would be its square
+_LONGEST = 0.3  # rad, longest step of a joint
+_DAMPING = 1e-5  # singular values below this are taken for none
+_PROBE = 1e-6  # rad, step of the difference quotient for second derivatives
+_FLAT = 1e-3  # curvatures of H below this do not make a step longer
+
+
+class Corrected(NamedTuple):
+    """Postures (N, n) and what is known about each of them, (N,).
+
+    Attributes:
+        q: the postures [rad].
+        converged: whether Newton's method converged, to half the tolerance at least.
+        conditioning: smallest singular value of ∂f/∂q, of those that are not zero everywhere.
+    """
+
+    q: Array
+    converged: Array
+    conditioning: Array
+
+
+class _Linear(NamedTuple):
+    """f (N, m) at postures, ∂f/∂q (N, m, n), its inverse (N, n, m), and rows that span its null space (N, k, n)."""
+
+    f: Array
+    slope: Array
+    inverse: Array
+    free: Array
+    conditioning: Array
+
+
+def correct(constraint: ToolConstraint, cost: PostureCost, q: Array, s: Array) -> Corrected:
+    """Postures that satisfy the constraint at s (N,) and minimise H, by Newton's method from q (N, n)."""
+    out = Corrected(q.copy(), np.zeros(len(q), dtype=bool), np.zeros(len(q)))
+    moving = np.arange(len(q))
+    for _ in range(_STEPS):
+        linear = _linearised(constraint, out.q[moving], s[moving])
+        step = -(linear.inverse @ linear.f[..., None])[..., 0]
+        if constraint.freedom:
+            step += _null_step(constraint, cost.rows(moving), out.q[moving], s[moving], linear, step)
+        size = np.abs(step).max(-1)
+        out.q[moving] += step * np.minimum(1.0, _LONGEST / np.maximum(size, _LONGEST))[:, None]
+        out.conditioning[moving] = linear.conditioning
+        arrived = size < _ARRIVED
+        out.converged[moving[arrived]] = constraint.excess(linear.f[arrived]) < 0.5
+        moving = moving[~arrived]
+        if not moving.size:
+            break
+    return out
+
+
+def _linearised(constraint: ToolConstraint, q: Array, s: Array) -> _Linear:
+    f, slope = constraint.at(q, s)
+    u, values, v = np.linalg.svd(slope)
+    rank = constraint.rank
+    used, rows = values[:, :rank], v[:, :rank]
+    inverse = (rows.swapaxes(1, 2) * (used / (used**2 + _DAMPING**2))[:, None]) @ u[:, :, :rank].swapaxes(1, 2)
+    return _Linear(f, slope, inverse, v[:, rank:], used[:, -1])
+
+
+def _null_step(
+    constraint: ToolConstraint, cost: PostureCost, q: Array, s: Array, linear: _Linear, step: Array
+) -> Array:
+    """The part of Newton's step that does not move the tool, (N, n).
+
+    With the Lagrangian L = H + λᵀf and λ = −(∂f/∂q)⁺ᵀ∇H, Z∇L = 0 at the optimum, Z the rows ``linear.free``; ∇²L
+    along them is a difference quotient of ∇L. Where it is not positive the step still goes downhill.
+    """
+    free, gradient = linear.free, cost.gradient(q)
+    multipliers = -(linear.inverse.swapaxes(1, 2) @ gradient[..., None])
+    count, k, n = free.shape
+    beside = q[:, None] + _PROBE * free
+    _, slopes = constraint.at(beside.reshape(-1, n), np.repeat(s, k))
+    turned = (slopes.reshape(count, k, -1, n) - linear.slope[:, None]).swapaxes(-1, -2) @ multipliers[:, None]
+    bend = (turned[..., 0] + cost.beside(beside) - gradient[:, None]) / _PROBE
+    hessian = bend @ free.swapaxes(1, 2)
+    curvature, axes = np.linalg.eigh(0.5 * (hessian + hessian.swapaxes(1, 2)))
+    downhill = -(free @ gradient[..., None] + bend @ step[..., None])
+    inside = axes.swapaxes(1, 2) @ downhill / np.maximum(np.abs(curvature), _FLAT)[..., None]
+    return (free.swapaxes(1, 2) @ axes @ inside)[..., 0]

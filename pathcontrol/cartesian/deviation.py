@@ -1,0 +1,46 @@
+"""How far the tool of an arm that follows a joint spline is from the curve."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from pathcontrol._arrays import Array
+from pathcontrol.cartesian.constraint import ToolConstraint
+
+VELOCITY = 1e-3  # share of p' by which the tool's velocity may be off, in size and direction
+_CHUNK = 1 << 14  # postures looked at together
+
+
+class Deviations(NamedTuple):
+    """What was found at parameters s (N,), each (N,).
+
+    Attributes:
+        position: distance between the tool and p(s) [m], not less than that to the curve.
+        angle: angle between the tool and its orientation at s [rad].
+        velocity: ‖J_v q_d' − p'‖/‖p'‖.
+        conditioning: smallest singular value of ∂f/∂q, of those that are not zero everywhere.
+    """
+
+    position: Array
+    angle: Array
+    velocity: Array
+    conditioning: Array
+
+
+def deviations(constraint: ToolConstraint, spline: BSpline, s: Array) -> Deviations:
+    """The deviations at s (N,) of an arm led by q_d = ``spline``."""
+    slope = spline.derivative()
+    parts = [_chunk(constraint, spline(part), slope(part), part) for part in np.array_split(s, len(s) // _CHUNK + 1)]
+    return Deviations(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+
+
+def _chunk(constraint: ToolConstraint, q: Array, dq: Array, s: Array) -> Deviations:
+    f, jacobian = constraint.at(q, s)
+    wanted = constraint.curve.at(s).dp
+    velocity = constraint.length * (jacobian[:, :3] @ dq[..., None])[..., 0]
+    off = np.linalg.norm(velocity - wanted, axis=-1) / np.linalg.norm(wanted, axis=-1)
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    return Deviations(*constraint.deviation(f), off, values[:, constraint.rank - 1])

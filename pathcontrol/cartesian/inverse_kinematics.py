@@ -1,0 +1,75 @@
+"""Inverse kinematics at any parameters of a curve, once a trail along it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from pathcontrol._arrays import Array
+from pathcontrol.cartesian.constraint import ToolConstraint
+from pathcontrol.cartesian.continuation import Stop, follow, verdicts
+from pathcontrol.cartesian.correction import correct
+from pathcontrol.cartesian.redundancy import PostureCost
+from pathcontrol.cartesian.refusal import refusal
+
+_NEAR = 0.2  # rad, largest correction of an interpolated posture; more may be another branch
+
+
+class Samples(NamedTuple):
+    """Postures q [rad] (K, n) at increasing parameters s [m] (K,)."""
+
+    s: Array
+    q: Array
+
+    def with_more(self, s: Array, q: Array) -> Samples:
+        """These and others at other parameters."""
+        places, first = np.unique(np.concatenate([self.s, s]), return_index=True)
+        return Samples(places, np.concatenate([self.q, q])[first])
+
+    def only(self, s: Array) -> Samples:
+        """Those at the parameters s, which are among them."""
+        return Samples(s, self.q[np.searchsorted(self.s, s)])
+
+
+@dataclass(frozen=True, eq=False)
+class InverseKinematics:
+    """q(s): of the postures that hold the tool on the curve at s the one nearest to ``rest``(s), (N, n)."""
+
+    constraint: ToolConstraint
+    rest: Callable[[Array], Array]
+
+    def near(self, s: Array, guess: Array) -> tuple[Array, Array]:
+        """Postures (N, n) at s (N,) by Newton's method, and which of them are fit and near their ``guess``, (N,)."""
+        cost = PostureCost.nearest(self.rest(s), self.constraint.tool.robot.limits)
+        found = correct(self.constraint, cost, guess, s)
+        near = np.abs(found.q - guess).max(-1) < _NEAR
+        return found.q, near & (verdicts(self.constraint, found) == Stop.NONE)
+
+    def fill(self, known: Samples, s: Array) -> Samples:
+        """Postures at the increasing parameters s (N,), between those of ``known`` postures.
+
+        What Newton's method does not reach from an interpolation of known postures is found by continuation.
+
+        Raises:
+            TaskError: the curve cannot be followed to one of them.
+        """
+        missing = np.setdiff1d(s, known.s)
+        while missing.size:
+            q, good = self.near(missing, PchipInterpolator(known.s, known.q)(missing))
+            if good.any():
+                known, missing = known.with_more(missing[good], q[good]), missing[~good]
+            else:
+                known, missing = self._walk(known, missing[0]), missing[1:]
+        return known.only(s)
+
+    def _walk(self, known: Samples, s: float) -> Samples:
+        """Continuation to s from the known posture before it."""
+        before = int(np.searchsorted(known.s, s)) - 1
+        trail = follow(self.constraint, known.q[before][None], float(known.s[before]), float(s), self.rest)[0]
+        if trail.stop is not Stop.NONE:
+            raise refusal(self.constraint, trail)
+        return known.with_more(np.array(trail.s[1:]), np.array(trail.q[1:]))

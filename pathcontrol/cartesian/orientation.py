@@ -1,0 +1,217 @@
+"""How a tool is turned along its curve: not at all prescribed, fixed, along the tangent, or against normals."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import make_interp_spline
+from scipy.spatial.transform import Rotation
+
+from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol.errors import InputError
+from pathcontrol.toolpaths.curve import ToolCurve
+
+_PARALLEL = 1e-6  # sine of an angle that counts as none
+
+
+class Orientation(ABC):
+    """The frame R_d(s) that the tool is to have along a curve, all of it or its z axis only.
+
+    Attributes:
+        rows: how many rotations it prescribes: 3 (the frame), 2 (its z axis, about which the tool may turn) or 0.
+    """
+
+    rows: int = 3
+
+    @abstractmethod
+    def frames(self, curve: ToolCurve, s: Array) -> Array:
+        """R_d(s), (N, 3, 3), at s (N,): its columns are the tool's axes in the base frame."""
+
+    def error(self, curve: ToolCurve, s: Array, rotation: Array) -> tuple[Array, Array]:
+        """The rotation e [rad] from R_d(s) to ``rotation`` (N, 3, 3), and de/dω where e = 0.
+
+        With 3 rows e is the rotation vector of R R_dᵀ, with 2 that of the shortest rotation from R_d's z axis to the
+        tool's, along R_d's x and y axes: (N, rows) and (N, rows, 3). ‖e‖ is the angle. ω is in axes parallel to the
+        base's; ½‖e‖² has the gradient e with respect to it wherever e is defined.
+        """
+        wanted = self.frames(curve, s)
+        if self.rows == 3:
+            return _rotation_vector(rotation @ wanted.swapaxes(-1, -2)), np.broadcast_to(np.eye(3), wanted.shape)
+        z, towards = rotation[..., :, 2], wanted[..., :, 2]
+        across = wanted[..., :, :2].swapaxes(-1, -2)
+        turn = _scaled(np.cross(towards, z), (towards * z).sum(-1))
+        return (across @ turn[..., None])[..., 0], across
+
+
+class FreeOrientation(Orientation):
+    """Only the position of the tool is prescribed."""
+
+    rows = 0
+
+    def frames(self, curve: ToolCurve, s: Array) -> Array:
+        return np.broadcast_to(np.eye(3), (*np.shape(s), 3, 3))
+
+    def error(self, curve: ToolCurve, s: Array, rotation: Array) -> tuple[Array, Array]:
+        return np.empty((len(s), 0)), np.empty((len(s), 0, 3))
+
+
+class FixedOrientation(Orientation):
+    """The same orientation all along.
+
+    Args:
+        rotation: rotation matrix (3, 3) of the tool in the base frame, or a unit quaternion (x, y, z, w).
+    """
+
+    def __init__(self, rotation: ArrayLike) -> None:
+        given = finite("rotation", as_array("rotation", rotation))
+        if given.shape not in ((3, 3), (4,)):
+            raise InputError(f"rotation has shape {given.shape}, expected a matrix (3, 3) or a quaternion (x, y, z, w)")
+        if given.shape == (4,) and not abs(np.linalg.norm(given) - 1) < 1e-6:
+            raise InputError(f"rotation = {given.tolist()} has the norm {np.linalg.norm(given):g}, expected 1")
+        matrix = Rotation.from_quat(given).as_matrix() if given.shape == (4,) else given
+        if not (np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) and np.linalg.det(matrix) > 0):
+            raise InputError("rotation is no rotation matrix: its columns are not orthonormal and right-handed")
+        self.rotation = readonly(Rotation.from_matrix(matrix).as_matrix())
+
+    def frames(self, curve: ToolCurve, s: Array) -> Array:
+        return np.broadcast_to(self.rotation, (*np.shape(s), 3, 3))
+
+
+class TangentOrientation(Orientation):
+    """The tool's x axis along the curve, its z axis as near to ``up`` as that allows.
+
+    The frame turns with the curvature of the curve: q_d'' changes fast where the curvature does, at the ends of a
+    blended corner for instance.
+
+    Args:
+        up: direction for z in the base frame, (3,), of any length; (0, 0, -1) for a tool that points downwards.
+
+    Raises:
+        InputError: on evaluation, where the tangent is parallel to ``up``.
+    """
+
+    def __init__(self, up: ArrayLike = (0.0, 0.0, 1.0)) -> None:
+        self.up = readonly(_direction("up", up))
+
+    def frames(self, curve: ToolCurve, s: Array) -> Array:
+        x = curve.tangent(s)
+        z = _perpendicular(self.up, x, "the tangent", "up", s)
+        return np.stack([x, np.cross(z, x), z], axis=-1)
+
+
+class NormalOrientation(Orientation):
+    """The tool's z axis against given normals, so that it points into the surface they stand on.
+
+    The rotation about z is left free, five constraints in all, unless a reference direction is given for x.
+
+    Args:
+        normals: directions of any length in the base frame: one for the whole curve, (3,); one for each parameter of
+            ``at``, (k, 3), between which a C² cubic spline is drawn; or a function of s (N,) that gives (N, 3) and is
+            twice continuously differentiable.
+        at: increasing parameters s [m] of the normals, (k,), from the beginning of the curve to its end.
+        reference: the x axis is as near to this direction (3,) as the normals allow; None for free.
+
+    Raises:
+        InputError: wrong shapes; on evaluation, normals that vanish, do not cover the curve, or are parallel to the
+            reference.
+    """
+
+    def __init__(
+        self,
+        normals: ArrayLike | Callable[[Array], Array],
+        at: ArrayLike | None = None,
+        reference: ArrayLike | None = None,
+    ) -> None:
+        self.reference = None if reference is None else readonly(_direction("reference", reference))
+        self.rows = 2 if reference is None else 3
+        self.at = None if at is None else readonly(finite("at", as_array("at", at)))
+        self._normals = normals if callable(normals) else _interpolated(as_array("normals", normals), self.at)
+
+    def frames(self, curve: ToolCurve, s: Array) -> Array:
+        self._check_cover(curve)
+        z = -_unit(np.asarray(self._normals(s), dtype=np.float64), s)
+        if self.reference is None:
+            x = _unit(np.cross(z, np.eye(3)[np.abs(z).argmin(-1)]), s)  # any direction across z will do
+        else:
+            x = _perpendicular(self.reference, z, "the normal", "reference", s)
+        return np.stack([x, np.cross(z, x), z], axis=-1)
+
+    def _check_cover(self, curve: ToolCurve) -> None:
+        if self.at is not None and (self.at[0] > curve.s0 + 1e-9 or self.at[-1] < curve.s_end - 1e-9):
+            raise InputError(
+                f"the normals are given for s from {self.at[0]:g} to {self.at[-1]:g} m, but the curve goes from "
+                f"{curve.s0:g} to {curve.s_end:g} m"
+            )
+
+
+def _interpolated(normals: Array, at: Array | None) -> Callable[[Array], Array]:
+    """Normals as a function of s."""
+    finite("normals", normals)
+    if normals.shape == (3,):
+        return partial(_constant, _direction("normals", normals))
+    if normals.ndim != 2 or normals.shape[1] != 3 or at is None or at.shape != normals.shape[:1] or len(at) < 2:
+        places = "no parameters at" if at is None else f"parameters at of shape {at.shape}"
+        raise InputError(
+            f"normals have shape {normals.shape} and {places}, expected (3,), or (k, 3) with parameters (k,), k ≥ 2; "
+            "for normals at the knots of a curve: at=curve.knots"
+        )
+    if not (np.diff(at) > 0).all():
+        raise InputError("the parameters at of the normals do not increase")
+    unit = _unit(normals, at)
+    periodic = len(at) > 2 and np.linalg.norm(unit[0] - unit[-1]) < _PARALLEL
+    if periodic:
+        unit = np.concatenate([unit[:-1], unit[:1]])
+    return make_interp_spline(at, unit, k=3, bc_type="periodic" if periodic else "natural")
+
+
+def _constant(direction: Array, s: Array) -> Array:
+    return np.broadcast_to(direction, (*np.shape(s), 3))
+
+
+def _direction(name: str, value: ArrayLike) -> Array:
+    vector = finite(name, as_array(name, value))
+    if vector.shape != (3,) or not np.linalg.norm(vector) > 0:
+        raise InputError(f"{name} = {np.asarray(value).tolist()}, expected a direction (3,) with a length")
+    return vector / np.linalg.norm(vector)
+
+
+def _unit(vectors: Array, s: Array) -> Array:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    if not (length > _PARALLEL).all():
+        where = float(np.asarray(s)[int(np.argmin(length > _PARALLEL))])
+        raise InputError(f"the normal at s = {where:g} m has no length; between opposite normals give more of them")
+    return vectors / length
+
+
+def _perpendicular(direction: Array, axis: Array, axis_name: str, name: str, s: Array) -> Array:
+    """The unit vector across ``axis`` (N, 3) nearest to ``direction`` (3,)."""
+    across = direction - (axis @ direction)[..., None] * axis
+    length = np.linalg.norm(across, axis=-1, keepdims=True)
+    if (length < _PARALLEL).any():
+        where = float(np.asarray(s)[int(np.argmin(length))])
+        raise InputError(
+            f"{axis_name} is parallel to {name} = {direction.tolist()} at s = {where:g} m; give another {name}"
+        )
+    return across / length
+
+
+def _rotation_vector(rotation: Array) -> Array:
+    """The rotation vector [rad] of rotation matrices (N, 3, 3), (N, 3)."""
+    skew = 0.5 * (rotation - rotation.swapaxes(-1, -2))
+    axis = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
+    return _scaled(axis, 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1))
+
+
+def _scaled(axis: Array, cosine: Array) -> Array:
+    """The rotation vector of an axis (N, 3) as long as the sine of the angle, whose ``cosine`` is given."""
+    sine = np.linalg.norm(axis, axis=-1)
+    angle = np.arctan2(sine, cosine)
+    factor = np.divide(angle, sine, out=np.ones_like(sine), where=sine > 1e-12)
+    turn = factor[..., None] * axis
+    opposite = (sine <= 1e-12) & (cosine < 0)  # half a turn: about any axis
+    turn[opposite] = [np.pi, 0.0, 0.0]
+    return turn

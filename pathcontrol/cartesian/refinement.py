@@ -1,0 +1,94 @@
+"""The joint spline along a curve, with as many knots as the tolerance needs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
+
+from pathcontrol._arrays import Array
+from pathcontrol.cartesian.constraint import ToolConstraint
+from pathcontrol.cartesian.deviation import VELOCITY, Deviations, deviations
+from pathcontrol.cartesian.inverse_kinematics import InverseKinematics, Samples
+from pathcontrol.cartesian.mesh import between, first_mesh, graded, subdivided
+from pathcontrol.cartesian.refusal import place
+from pathcontrol.errors import TaskError
+
+_DEGREE = 5
+_PIECES = 8  # intervals to begin with, at least
+_PROBES = np.array([0.2, 0.5, 0.8])  # of an interval: where the deviation is looked at
+_CHECKS = (np.arange(8) + 0.5 * (5**0.5 - 1)) / 8  # of an interval: where it is verified, none of them a probe
+_SHARE = 0.5  # of what is allowed, used up at the probes; the rest is for what lies between them
+_QUARTER = 50.0  # an interval so many times too far off is cut in four, for the error falls with a power of its length
+_SMALLEST = 1e-8  # part of the curve: an interval so short does not help by being cut
+_MOST_KNOTS = 300_000
+
+
+class Refined(NamedTuple):
+    """A joint spline that keeps the tolerance.
+
+    Attributes:
+        spline: q_d(s) [rad], of degree 5, four times continuously differentiable.
+        mesh: its knots and, for a closed path, the return to the first [m], (K,).
+        rounds: how often knots were added.
+        checks: where the tolerance was verified [m], (C,).
+        deviations: what was found there, each (C,).
+    """
+
+    spline: BSpline
+    mesh: Array
+    rounds: int
+    checks: Array
+    deviations: Deviations
+
+
+def refine(kinematics: InverseKinematics, known: Samples, closed: bool) -> Refined:
+    """The spline through postures on the curve, with knots added between them until the tolerance is kept.
+
+    It begins with the knots of the curve, where p''' jumps. The tool's velocity is kept too, within 0.1 % of p'.
+
+    Raises:
+        TaskError: the curve cannot be followed, or not with 300 000 knots.
+    """
+    constraint, curve, rounds = kinematics.constraint, kinematics.constraint.curve, 0
+    mesh = first_mesh(curve.knots, curve.length / _PIECES)
+    while True:
+        known = kinematics.fill(known, mesh)
+        spline = _interpolant(known, closed)
+        worst, _, _ = _worst(constraint, spline, mesh, _PROBES)
+        worst = worst / _SHARE
+        if (worst <= 1).all():
+            worst, checks, found = _worst(constraint, spline, mesh, _CHECKS)
+            if (worst <= 1).all():
+                return Refined(spline, mesh, rounds, checks, found)
+        _refuse_endless(constraint, mesh, worst)
+        mesh, rounds = graded(subdivided(mesh, np.select([worst > _QUARTER, worst > 1], [4, 2], 1))), rounds + 1
+
+
+def _interpolant(known: Samples, closed: bool) -> BSpline:
+    if not closed:
+        return make_interp_spline(known.s, known.q, k=_DEGREE)
+    ring = np.concatenate([known.q[:-1], known.q[:1]])
+    return make_interp_spline(known.s, ring, k=_DEGREE, bc_type="periodic")
+
+
+def _worst(
+    constraint: ToolConstraint, spline: BSpline, mesh: Array, fractions: Array
+) -> tuple[Array, Array, Deviations]:
+    """The largest deviation in each interval as a multiple of what is allowed, where it was looked for, and all."""
+    s = between(mesh, fractions)
+    found = deviations(constraint, spline, s.ravel())
+    position, angle = constraint.tolerance
+    excess = np.maximum.reduce([found.position / position, found.angle / angle, found.velocity / VELOCITY])
+    return excess.reshape(s.shape).max(-1), s.ravel(), found
+
+
+def _refuse_endless(constraint: ToolConstraint, mesh: Array, worst: Array) -> None:
+    i = int(np.argmax(worst))
+    if len(mesh) > _MOST_KNOTS or mesh[i + 1] - mesh[i] < _SMALLEST * constraint.curve.length:
+        raise TaskError(
+            f"the path of the joints does not come within the tolerance of the curve with {len(mesh)} knots: near "
+            f"{place(constraint, float(mesh[i]))}, it is still {worst[i]:.3g} times too far off; the curve or the "
+            "orientation along it may have a kink there (both have to be smooth), or the tolerance is too small"
+        )

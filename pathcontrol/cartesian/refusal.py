@@ -1,0 +1,140 @@
+"""Why a curve cannot be followed, in words that say where, how far it went, and what to change."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.cartesian.constraint import ToolConstraint
+from pathcontrol.cartesian.continuation import Stop, Trail
+from pathcontrol.cartesian.orientation import FreeOrientation
+from pathcontrol.cartesian.postures import distance_to_limits
+from pathcontrol.cartesian.reach import nearest_postures
+from pathcontrol.errors import TaskError
+
+_SEEDS = 64
+_AHEAD = np.array([1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0])  # parts of the curve
+_REGULAR = 0.02  # singular values above this are none that stops an arm
+_NEXT = 4  # of those ahead; out of reach in one of them is why the arm does not go on
+
+
+def refusal(constraint: ToolConstraint, trail: Trail, tries: int = 1) -> TaskError:
+    """The error for a trail that does not go on, the best of those from ``tries`` start postures."""
+    s = trail.s[-1]
+    along = 100 * (s - constraint.curve.s0) / constraint.curve.length
+    best = f", from the best of {tries} start postures" if tries > 1 else ""
+    return TaskError(
+        f"{_tool(constraint)} follows the curve to {place(constraint, s)}, {along:.3g} % of it{best}: "
+        f"{_reason(constraint, trail)}"
+    )
+
+
+def unreached(constraint: ToolConstraint, start: Array | None = None) -> TaskError:
+    """The error for a first point that is not reached from the posture ``start`` (n,), or from anywhere."""
+    seeds = constraint.seeds(_SEEDS) if start is None else start[None]
+    whence = "from any posture" if start is None else "from this start posture"
+    other = "" if start is None else "; give another start posture, or none to have one searched"
+    return TaskError(
+        f"{_tool(constraint)} does not reach the first point of the curve {whence}: at "
+        f"{place(constraint, constraint.curve.s0)}, {_gap(constraint, seeds, constraint.curve.s0)}{other}"
+    )
+
+
+def not_closing(constraint: ToolConstraint, trail: Trail) -> TaskError:
+    """The error for a trail round a closed curve that does not come back to where it began."""
+    robot, change = constraint.tool.robot, trail.q[-1] - trail.q[0]
+    i = int(np.argmax(np.abs(change)))
+    return TaskError(
+        f"{_tool(constraint)} follows the closed curve, but at {place(constraint, trail.s[-1])}, one lap on, "
+        f"{robot.joint_names[i]} is {change[i]:+.6g} {robot.position_units[i]} from where it began, so the path of the "
+        f"joints does not close; closed=False makes one lap an open path{_also_freedom(constraint)}"
+    )
+
+
+def place(constraint: ToolConstraint, s: float) -> str:
+    """A point of the curve as text."""
+    x, y, z = constraint.curve.position(np.array(s))
+    return f"s = {s:.6g} m, the point ({x:.4f}, {y:.4f}, {z:.4f}) m"
+
+
+def _tool(constraint: ToolConstraint) -> str:
+    tool = constraint.tool
+    return f"{'the tool in ' if tool.offset is not None else ''}{tool.frame} of {tool.robot.name}"
+
+
+def _reason(constraint: ToolConstraint, trail: Trail) -> str:
+    if trail.stop is Stop.LIMIT:
+        return _limit(constraint, trail.beyond)
+    return _out_of_reach(constraint, trail) or _stuck(constraint, trail)
+
+
+def _limit(constraint: ToolConstraint, beyond: Array) -> str:
+    robot = constraint.tool.robot
+    i = int(np.argmin(distance_to_limits(robot, beyond)))
+    upper = beyond[i] > robot.limits.upper[i]
+    side, value = ("upper", robot.limits.upper[i]) if upper else ("lower", robot.limits.lower[i])
+    return (
+        f"there {robot.joint_names[i]} is at its {side} limit, {value:.6g} {robot.position_units[i]}; give another "
+        f"start posture or move the curve{_also_freedom(constraint)}"
+    )
+
+
+def _stuck(constraint: ToolConstraint, trail: Trail) -> str:
+    robot, rank = constraint.tool.robot, constraint.rank
+    _, slope = constraint.at(trail.q[-1][None], np.array([trail.s[-1]]))
+    _, values, motions = np.linalg.svd(slope[0])
+    if values[rank - 1] > _REGULAR:
+        return (
+            "no posture next to the last one continues it; the curve or the orientation along it may jump there "
+            "(both have to be smooth), or give another start posture"
+        )
+    motion = np.abs(motions[rank - 1])
+    joints = [name for name, size in zip(robot.joint_names, motion, strict=True) if size > 0.3 * motion.max()]
+    return (
+        f"there the arm comes to a singularity (smallest singular value {values[rank - 1]:.1e}), in which "
+        f"{' and '.join(joints)} can move without moving the tool; give another start posture, or move or tilt the "
+        f"curve{_also_freedom(constraint)}"
+    )
+
+
+def _also_freedom(constraint: ToolConstraint) -> str:
+    """Advice for tools whose rotation is all prescribed."""
+    free = "; or leave the rotation about the tool axis free (NormalOrientation without reference)"
+    return free if constraint.orientation.rows == 3 else ""
+
+
+def _out_of_reach(constraint: ToolConstraint, trail: Trail) -> str | None:
+    """What is out of reach ahead of the end of a trail, if that is what ended it."""
+    curve = constraint.curve
+    ahead = np.unique(np.minimum(trail.s[-1] + _AHEAD * curve.length, curve.s_end))
+    seeds = np.concatenate([trail.q[-1][None], constraint.seeds(_SEEDS)])
+    excess = constraint.excess(constraint.at(nearest_postures(constraint, seeds, ahead), ahead)[0])
+    if (excess[:_NEXT] <= 1).all():
+        return None
+    worst = float(ahead[np.argmax(excess)])
+    return f"from there on it is out of reach; at {place(constraint, worst)}, {_gap(constraint, seeds, worst)}"
+
+
+def _gap(constraint: ToolConstraint, seeds: Array, s: float) -> str:
+    """How near the tool gets to the curve at s, and what would bring them together."""
+    position, angle = _miss(constraint, seeds, s)
+    turned = f" and {angle:.3g} rad" if constraint.orientation.rows else ""
+    text = f"the nearest it gets is {np.linalg.norm(position):.3g} m{turned} away"
+    if constraint.orientation.rows:
+        position, _ = _miss(replace(constraint, orientation=FreeOrientation()), seeds, s)
+        if np.linalg.norm(position) <= constraint.tolerance[0]:
+            return (
+                f"{text}, but the position alone is in reach: turn the tool, leave its orientation (partly) free, or "
+                "move the curve"
+            )
+    x, y, z = position
+    return f"{text}; move the curve by ({x:.3f}, {y:.3f}, {z:.3f}) m there, or more"
+
+
+def _miss(constraint: ToolConstraint, seeds: Array, s: float) -> tuple[Array, float]:
+    """The vector from the curve at s to the tool in the nearest posture [m], and the angle left [rad]."""
+    places = np.array([s])
+    f, _ = constraint.at(nearest_postures(constraint, seeds, places), places)
+    return constraint.length * f[0, :3], float(np.linalg.norm(f[0, 3:]))

@@ -1,0 +1,102 @@
+"""What a Cartesian path keeps, as measured on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.cartesian.constraint import ToolConstraint
+from pathcontrol.cartesian.deviation import deviations
+from pathcontrol.cartesian.postures import distance_to_limits
+from pathcontrol.cartesian.refinement import Refined
+
+_VALLEYS = 8  # of a function along the path, looked at more closely
+_FINE, _ZOOMS = 33, 3  # points in each, and how often
+
+
+@dataclass(frozen=True)
+class CartesianReport:
+    """What was measured between the knots, on ``points`` places that the refinement had not looked at.
+
+    Attributes:
+        position_deviation: largest distance between the tool and p(s) [m].
+        angle_deviation: largest angle between the tool and its orientation at s [rad].
+        velocity_deviation: largest ‖J_v q_d' − p'‖/‖p'‖: how far the feed is from constant and along the curve.
+        points: number of places.
+        knots: number of knots of q_d.
+        rounds: how often knots were added.
+        length: lever arm ℓ of the joints [m] by which lengths are divided for singular values.
+        smallest_singular_value: least singular value of the tool's Jacobian, of those not zero everywhere: a joint
+            speed of 1/σ rad/s is needed for a tool speed of ℓ in the worst direction.
+        singular_at: where that is [m].
+        limit_distance: least distance of a joint to a limit [rad, or m if it slides]; inf if there are none.
+        limit_joint: name of that joint; empty if there are no limits.
+        limit_at: where that is [m].
+        fastest: largest ‖q_d'‖ [rad/m], joint motion for a motion of the tool.
+        start_postures: number of start postures from which the curve was followed.
+    """
+
+    position_deviation: float
+    angle_deviation: float
+    velocity_deviation: float
+    points: int
+    knots: int
+    rounds: int
+    length: float
+    smallest_singular_value: float
+    singular_at: float
+    limit_distance: float
+    limit_joint: str
+    limit_at: float
+    fastest: float
+    start_postures: int
+
+
+def measured(constraint: ToolConstraint, refined: Refined, start_postures: int) -> CartesianReport:
+    """The report on a refined spline."""
+    robot, spline, found, s = constraint.tool.robot, refined.spline, refined.deviations, refined.checks
+
+    def conditioning(s: Array) -> Array:
+        return deviations(constraint, spline, s).conditioning
+
+    def distance(s: Array) -> Array:
+        return distance_to_limits(robot, spline(s)).min(-1)
+
+    singular_at = _lowest(conditioning, refined, found.conditioning)
+    limit_at = _lowest(distance, refined, distance(s))
+    distances = distance_to_limits(robot, spline(limit_at))
+    joint = int(np.argmin(distances))
+    return CartesianReport(
+        position_deviation=float(found.position.max()),
+        angle_deviation=float(found.angle.max()),
+        velocity_deviation=float(found.velocity.max()),
+        points=len(s),
+        knots=len(refined.mesh),
+        rounds=refined.rounds,
+        length=constraint.length,
+        smallest_singular_value=float(conditioning(np.array([singular_at]))[0]),
+        singular_at=singular_at,
+        limit_distance=float(distances[joint]),
+        limit_joint=robot.joint_names[joint] if np.isfinite(distances[joint]) else "",
+        limit_at=limit_at,
+        fastest=float(np.linalg.norm(spline(s, 1), axis=-1).max()),
+        start_postures=start_postures,
+    )
+
+
+def _lowest(function: Callable[[Array], Array], refined: Refined, values: Array) -> float:
+    """Where a function of s (N,) is least, looked for around the deepest of its ``values`` at the checks."""
+    s, ends = refined.checks, (refined.mesh[0], refined.mesh[-1])
+    padded = np.concatenate([[np.inf], values, [np.inf]])
+    valleys = np.flatnonzero((values <= padded[:-2]) & (values <= padded[2:]))
+    centre = s[valleys[np.argsort(values[valleys], kind="stable")[:_VALLEYS]]]
+    width = float(np.diff(s).max())
+    for _ in range(_ZOOMS):
+        fine = np.clip(centre[:, None] + width * np.linspace(-1, 1, _FINE), *ends)
+        depth = function(fine.ravel()).reshape(fine.shape)
+        centre = fine[np.arange(len(fine)), depth.argmin(-1)]
+        width *= 2 / _FINE
+    return float(centre[np.argmin(depth.min(-1))])

@@ -1,0 +1,93 @@
+"""From a constraint to a joint spline that keeps it: start posture, continuation, refinement, verification."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline
+
+from pathcontrol._arrays import Array, finite, joint_array
+from pathcontrol.cartesian.closing import closed_lap
+from pathcontrol.cartesian.constraint import ToolConstraint
+from pathcontrol.cartesian.continuation import SINGULAR, Stop, Trail, follow
+from pathcontrol.cartesian.inverse_kinematics import InverseKinematics, Samples
+from pathcontrol.cartesian.postures import distance_to_limits, outside
+from pathcontrol.cartesian.redundancy import rest_curve
+from pathcontrol.cartesian.refinement import Refined, refine
+from pathcontrol.cartesian.refusal import not_closing, refusal
+from pathcontrol.cartesian.report import CartesianReport, measured
+from pathcontrol.cartesian.start_posture import moved_start, rewound_starts, search_starts
+from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
+
+_REWINDS = 3  # joints that are wound back one after another
+
+
+def solve(constraint: ToolConstraint, start: Array | None, closed: bool) -> tuple[BSpline, CartesianReport]:
+    """The joint spline along the curve and what was measured on it.
+
+    Raises:
+        TaskError: the curve cannot be followed, or a closed path does not close.
+    """
+    trails = _searched(constraint) if start is None else _followed(constraint, moved_start(constraint, start))
+    lap = _best(constraint, trails, closed)
+    kinematics = InverseKinematics(constraint, rest_curve(lap.s, lap.q, closed))
+    refined = refine(kinematics, lap, closed)
+    report = measured(constraint, refined, len(trails))
+    _check_between(constraint, refined, report)
+    return refined.spline, report
+
+
+def _searched(constraint: ToolConstraint) -> list[Trail]:
+    """Trails from the start postures that a search finds, a whole turn back where none gets along otherwise."""
+    latest = _followed(constraint, search_starts(constraint))
+    trails = list(latest)
+    for _ in range(_REWINDS):
+        starts = rewound_starts(constraint, latest)
+        if any(trail.stop is Stop.NONE for trail in trails) or not len(starts):
+            break
+        latest = _followed(constraint, starts)
+        trails += latest
+    return trails
+
+
+def _followed(constraint: ToolConstraint, starts: Array) -> list[Trail]:
+    return follow(constraint, starts, constraint.curve.s0, constraint.curve.s_end)
+
+
+def posture(robot: RobotModel, start: ArrayLike) -> Array:
+    """``start`` as a posture (n,) within the joint limits."""
+    q = finite("start", joint_array("start", start, robot.n))
+    if q.shape != (robot.n,):
+        raise InputError(f"start has shape {q.shape}, expected one posture ({robot.n},)")
+    if outside(robot, q):
+        i = int(np.argmin(distance_to_limits(robot, q)))
+        low, high = robot.limits.lower[i], robot.limits.upper[i]
+        raise InputError(f"start has {robot.joint_names[i]} at {q[i]:g}, outside its limits from {low:g} to {high:g}")
+    return np.clip(q, robot.limits.lower, robot.limits.upper)
+
+
+def _best(constraint: ToolConstraint, trails: list[Trail], closed: bool) -> Samples:
+    """The most comfortable of the trails that go all the way, and come back if they have to."""
+    complete = [trail for trail in trails if trail.stop is Stop.NONE]
+    for trail in sorted(complete, key=lambda trail: -trail.comfort):
+        s, q = np.array(trail.s), np.array(trail.q)
+        lap = closed_lap(constraint, s, q) if closed else q
+        if lap is not None:
+            return Samples(s, lap)
+    if complete:
+        raise not_closing(constraint, complete[0])
+    raise refusal(constraint, max(trails, key=lambda trail: trail.s[-1]), len(trails))
+
+
+def _check_between(constraint: ToolConstraint, refined: Refined, report: CartesianReport) -> None:
+    """Limits and singularities between the knots, where Newton's method has not been."""
+    if outside(constraint.tool.robot, refined.spline(report.limit_at)):
+        raise _refused_at(constraint, refined, report.limit_at, Stop.LIMIT)
+    if report.smallest_singular_value < SINGULAR:
+        raise _refused_at(constraint, refined, report.singular_at, Stop.SINGULAR)
+
+
+def _refused_at(constraint: ToolConstraint, refined: Refined, s: float, stop: Stop) -> Exception:
+    q = refined.spline(s)
+    return refusal(constraint, Trail([s], [q], stop=stop, beyond=q))

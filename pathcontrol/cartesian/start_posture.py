@@ -1,0 +1,95 @@
+"""Postures that put the tool on the first point of a curve."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.cartesian.constraint import ToolConstraint
+from pathcontrol.cartesian.continuation import Stop, Trail, comforts, verdicts
+from pathcontrol.cartesian.correction import Corrected, correct
+from pathcontrol.cartesian.postures import distance_to_limits, unwound
+from pathcontrol.cartesian.reach import reach
+from pathcontrol.cartesian.redundancy import PostureCost
+from pathcontrol.cartesian.refusal import refusal, unreached
+from pathcontrol.errors import TaskError
+
+_SEEDS = 256
+_MOST = 12  # start postures from which the whole curve is tried
+_APART = np.pi  # rad; start postures nearer to each other than this are too alike to be worth as much
+_SAME = 1e-3  # rad
+
+
+def search_starts(constraint: ToolConstraint) -> Array:
+    """Good start postures (N, n), the most comfortable first.
+
+    Seeds spread over the joint range are moved onto the curve by :func:`reach`. Kept are at most 12 postures that are
+    comfortable and differ from each other.
+
+    Raises:
+        TaskError: the first point was not reached from any of them, or only where the arm is singular.
+    """
+    reached = _reached(constraint, constraint.seeds(_SEEDS))
+    found = _placed(constraint, unwound(constraint.tool.robot, reached))
+    stops = verdicts(constraint, found)
+    fit = stops == Stop.NONE
+    if not fit.any():
+        raise _no_start(constraint, found, stops)
+    return found.q[_comfortable_and_different(found.q, np.where(fit, comforts(constraint, found), 0.0))]
+
+
+def rewound_starts(constraint: ToolConstraint, trails: list[Trail]) -> Array:
+    """The starts (N, n) of trails that came to a joint limit, with that joint a whole turn back if it has room."""
+    robot, starts = constraint.tool.robot, []
+    for trail in trails:
+        if trail.stop is Stop.LIMIT:
+            i = int(np.argmin(distance_to_limits(robot, trail.beyond)))
+            turn = 2 * np.pi if trail.beyond[i] < robot.limits.lower[i] else -2 * np.pi
+            start = trail.q[0] + turn * (np.arange(robot.n) == i)
+            if robot.position_units[i] == "rad" and (distance_to_limits(robot, start) > 0).all():
+                starts.append(start)
+    return np.array(starts).reshape(-1, robot.n)
+
+
+def _no_start(constraint: ToolConstraint, found: Corrected, stops: Array) -> TaskError:
+    singular = np.flatnonzero(stops == Stop.SINGULAR)
+    if not singular.size:
+        return unreached(constraint)
+    return refusal(constraint, Trail([constraint.curve.s0], [found.q[singular[0]]], stop=Stop.SINGULAR))
+
+
+def moved_start(constraint: ToolConstraint, start: Array) -> Array:
+    """The posture ``start`` (n,) moved onto the first point, (1, n).
+
+    Raises:
+        TaskError: it does not get there, or is singular.
+    """
+    found = _placed(constraint, _reached(constraint, start[None]))
+    stop = Stop(verdicts(constraint, found)[0])
+    if stop is Stop.LOST:
+        raise unreached(constraint, start)
+    if stop is not Stop.NONE:
+        raise refusal(constraint, Trail([constraint.curve.s0], [found.q[0]], stop=stop, beyond=found.q[0]))
+    return found.q
+
+
+def _reached(constraint: ToolConstraint, q: Array) -> Array:
+    """Postures q (N, n) moved as near to the first point as they get."""
+    return reach(constraint, q, np.full(len(q), constraint.curve.s0))
+
+
+def _placed(constraint: ToolConstraint, q: Array) -> Corrected:
+    """Postures near q (N, n) that are exactly on the first point, if those are nearly."""
+    cost = PostureCost.nearest(q, constraint.tool.robot.limits)
+    return correct(constraint, cost, q, np.full(len(q), constraint.curve.s0))
+
+
+def _comfortable_and_different(q: Array, comfort: Array) -> list[int]:
+    """Indices of postures (N, n), each the best by comfort times its distance to those before it."""
+    chosen: list[int] = []
+    worth = comfort.copy()
+    while len(chosen) < _MOST and worth.max(initial=0.0) > 0:
+        chosen.append(int(np.argmax(worth)))
+        distance = np.linalg.norm(q - q[chosen[-1]], axis=-1)
+        worth = np.minimum(worth, comfort * np.where(distance > _SAME, np.minimum(distance / _APART, 1.0), 0.0))
+    return chosen

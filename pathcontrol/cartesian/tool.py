@@ -1,0 +1,66 @@
+"""The frame that follows the curve: a frame of the arm, or a tool that it carries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
+
+
+class ToolKinematics(NamedTuple):
+    """Position [m] (N, 3), rotation (N, 3, 3) and Jacobian (N, 6, n): linear, then angular, in the base's axes."""
+
+    position: Array
+    rotation: Array
+    jacobian: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Tool:
+    """The tool of an arm.
+
+    Args:
+        robot: the arm.
+        frame: name of the frame that carries the tool.
+        offset: pose of the tool in that frame, (4, 4), or its tip [m], (3,); by default the frame itself.
+    """
+
+    robot: RobotModel
+    frame: str
+    offset: ArrayLike | None = None
+    _offset: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_offset", readonly(_transform(self.offset)))
+        self.robot.frame_pose(np.zeros(self.robot.n), self.frame)  # an unknown frame is told here
+
+    def kinematics(self, q: Array) -> ToolKinematics:
+        """Pose and Jacobian at q (N, n)."""
+        pose, jacobian = self.robot.frame_kinematics(q, self.frame)
+        if self.offset is not None:
+            lever = pose[..., :3, :3] @ self._offset[:3, 3]
+            pose = pose @ self._offset
+            jacobian[..., :3, :] += np.cross(jacobian[..., 3:, :], lever[..., :, None], axis=-2)
+        return ToolKinematics(pose[..., :3, 3], pose[..., :3, :3], jacobian)
+
+
+def _transform(offset: ArrayLike | None) -> Array:
+    transform = np.eye(4)
+    if offset is None:
+        return transform
+    given = finite("tool", as_array("tool", offset))
+    if given.shape == (3,):
+        transform[:3, 3] = given
+        return transform
+    turn = given[:3, :3] if given.shape == (4, 4) else np.zeros((3, 3))
+    if not (np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0):
+        raise InputError(
+            f"tool has shape {given.shape}, expected its tip (3,), or a pose (4, 4) without scale or mirror"
+        )
+    return given

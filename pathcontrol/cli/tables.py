@@ -1,0 +1,58 @@
+"""What the commands print for a person to read."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+_MOST_ROWS = 50
+
+
+def peaks_table(summary: dict[str, Any]) -> Table:
+    """Steady-state peaks, measured beside the paper's."""
+    table = Table(title="Steady-state peaks: measured here, and in the paper")
+    for column in ("experiment", r"‖e_p‖ \[deg]", "paper", "", r"‖e_v‖ \[deg/s]", "paper", ""):
+        table.add_column(column, justify="left" if column == "experiment" else "right")
+    for name in ("extended_motion_plan", "projection"):
+        measured, paper = summary[name], summary[name]["paper"]
+        row = [name.replace("_", " ")]
+        for key in ("e_p_peak_deg", "e_v_peak_deg_s"):
+            row += [
+                f"{measured[key]:.2f}",
+                f"{paper[key]:.1f}",
+                f"{100 * (measured[key] / paper[key] - 1):+.1f} %",
+            ]
+        table.add_row(*row)
+    return table
+
+
+def toolpath_table(content: dict[str, Any]) -> list[Text | Table]:
+    """What is in a toolpath, from its summary: a line on the whole, and a row for each contour. Millimetres."""
+    contours = content["contours"]
+    size = " × ".join(f"{1e3 * (b - a):.6g}" for a, b in zip(*content["bounds_m"], strict=True))
+    cuts, rapids = (f"{1e3 * content[key]:.6g}" for key in ("cut_length_m", "rapid_length_m"))
+    head = (
+        f"{content['source']}: {len(contours)} contours, drawn in {content['unit']}: {cuts} mm of cuts and "
+        f"{rapids} mm of rapids, within {size} mm"
+    )
+    table = Table()
+    for column in ("contour", "", "length [mm]", "feed [mm/s]", "points", "corners", "sharpest [°]"):
+        table.add_column(Text(column), justify="left" if column in ("contour", "") else "right")
+    for contour in contours[:_MOST_ROWS]:
+        table.add_row(*_contour_row(contour))
+    left_out = len(contours) - _MOST_ROWS
+    return [Text(head), table, *([Text(f"and {left_out} more; --json lists them all")] if left_out > 0 else [])]
+
+
+def _contour_row(contour: dict[str, Any]) -> list[Text | str]:
+    return [
+        Text(contour["name"]),
+        "rapid" if contour["rapid"] else "closed" if contour["closed"] else "open",
+        f"{1e3 * contour['length_m']:.6g}",
+        "" if contour["feed_m_s"] is None else f"{1e3 * contour['feed_m_s']:.4g}",
+        str(contour["points"]),
+        str(contour["corners"]),
+        f"{contour['sharpest_deg']:.1f}" if contour["corners"] else "",
+    ]

@@ -1,0 +1,51 @@
+"""How the motion plan of an open path comes to its end."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.profile import END_TIME
+
+_SAMPLES = 257  # of the path, for its average speed
+
+
+class Ending(NamedTuple):
+    """The last stretch of an open path, where the plan no longer waits for the arm and comes to rest.
+
+    The plan comes to rest at s_end exponentially, with the time constant T = 0.1 s: over the last s_end − s < Tϑ(s_end)
+    its rate is ϑ(s)(s_end − s)/(Tϑ(s_end)). A profile that is slow at its end has little left to brake.
+
+    A plan that listens to the arm would wait for ever where dry friction holds the arm and ϑ tends to 0. So every
+    plan is timed, σ̇ = ϑ(σ), once it has come to the last joint path that takes T at the average speed of the whole,
+    or to the braking if that is longer. The arm is drawn to the end by its position gain and held there.
+
+    Attributes:
+        s_end: last path parameter.
+        braking: Tϑ(s_end), the length of parameter over which ϑ is brought to 0.
+        begin: path parameter from which on the plan is timed.
+    """
+
+    s_end: float
+    braking: float
+    begin: float
+
+    @classmethod
+    def of(cls, task: PathTask) -> Self | None:
+        """The ending of ``task``, None where it has none."""
+        if not np.isfinite(task.s_end):
+            return None
+        s = np.linspace(task.s0, task.s_end, _SAMPLES)
+        theta, length = task.theta(s) + np.zeros_like(s), np.linalg.norm(task.dq_d(s), axis=-1)
+        speed = np.trapezoid(length, s) / np.trapezoid(1 / theta, s)
+        braking = END_TIME * float(theta[-1])
+        return cls(task.s_end, braking, task.s_end - max(braking, END_TIME * float(speed / length[-1])))
+
+    def braked(self, point: PathPoint, s: Array) -> PathPoint:
+        """``point``, the task at s, with ϑ and ϑ' of the plan that comes to rest."""
+        left = (self.s_end - s) / self.braking
+        share, slope = np.minimum(np.maximum(left, 0.0), 1.0), np.where(left < 1.0, -1.0 / self.braking, 0.0)
+        return point._replace(theta=point.theta * share, dtheta=point.dtheta * share + point.theta * slope)

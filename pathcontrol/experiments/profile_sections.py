@@ -1,0 +1,70 @@
+"""``profile`` of a task: a section for each velocity profile that it may be given instead of its own."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import PlainValidator
+
+from pathcontrol.experiments.section import Section, chooser
+from pathcontrol.experiments.values import NotNegative, Numbers, Positive, Text
+
+
+class RateProfile(Section):
+    """``constant_rate``: ϑ(s) = ``rate`` [1/s], which no ``angle_unit`` applies to."""
+
+    type: Literal["constant_rate"] = "constant_rate"
+    rate: Positive
+
+
+class SpeedProfile(Section):
+    """``constant_speed``: the path speed ‖q̇‖ = ``speed``, in ``angle_unit`` per second."""
+
+    angles = ("speed",)
+    type: Literal["constant_speed"] = "constant_speed"
+    speed: Positive
+
+
+class ToolSpeedProfile(Section):
+    """``tool_speed``: the origin of ``frame`` moves at ``speed`` [m/s]; see :class:`pathcontrol.ToolSpeed`."""
+
+    type: Literal["tool_speed"] = "tool_speed"
+    frame: Text
+    speed: Positive
+
+
+class LimitedProfile(Section):
+    """``limited``: see :func:`pathcontrol.limited`, with one :class:`pathcontrol.MotionLimit`.
+
+    With ``frame`` it is on the tool [m], else on the joints, in ``angle_unit``.
+    """
+
+    angles = ("speed", "tangential", "normal", "chord_error")
+    type: Literal["limited"] = "limited"
+    frame: Text | None = None
+    speed: Positive | None = None
+    tangential: Positive | None = None
+    normal: Positive | None = None
+    chord_error: Positive | None = None
+
+
+class TimeOptimalProfile(Section):
+    """``time_optimal``: see :func:`pathcontrol.time_optimal`; ``acceleration`` of each joint is in ``angle_unit``."""
+
+    angles = ("acceleration",)
+    type: Literal["time_optimal"] = "time_optimal"
+    margin: NotNegative | None = None
+    acceleration: Numbers | None = None
+
+
+PROFILES: dict[str, type[Section]] = {
+    "constant_rate": RateProfile,
+    "constant_speed": SpeedProfile,
+    "tool_speed": ToolSpeedProfile,
+    "limited": LimitedProfile,
+    "time_optimal": TimeOptimalProfile,
+}
+Profile = Annotated[
+    RateProfile | SpeedProfile | ToolSpeedProfile | LimitedProfile | TimeOptimalProfile,
+    PlainValidator(chooser("type", PROFILES)),
+]

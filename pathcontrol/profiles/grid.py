@@ -1,0 +1,72 @@
+"""Cells of a path that follow a function of s, and values at their edges whose chords stay below it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import TaskError
+from pathcontrol.tasks.profile import Path
+
+_SHARES = np.linspace(0, 1, 5)
+_PEAK = 4.0
+_HALVINGS = 12
+
+
+def edges(path: Path, cells: int) -> Array:
+    """The edges of so many cells or a few more over one traverse of a path, each within one piece of it.
+
+    Raises:
+        TaskError: the path neither ends nor closes.
+    """
+    lower, upper = path.s0, path.s_end if path.period is None else path.s0 + path.period
+    if not np.isfinite(upper):
+        raise TaskError(f"{type(path).__name__} neither ends nor closes, so ϑ cannot be tabulated; give it an s_end")
+    knots = np.empty(0) if path.knots is None else path.knots
+    margin = 1e-9 * (upper - lower)
+    pieces = np.concatenate([[lower], knots[(knots > lower + margin) & (knots < upper - margin)], [upper]])
+    counts = np.ceil(np.diff(pieces) * cells / (upper - lower) - 1e-6).clip(1)
+    return np.interp(np.arange(counts.sum() + 1), np.append(0, np.cumsum(counts)), pieces)
+
+
+def quarters(edges: Array) -> Array:
+    """The ends and the quarters of the cells between the ``edges`` (cells + 1,), (cells, 5)."""
+    return edges[:-1, None] + np.diff(edges)[:, None] * _SHARES
+
+
+def refined(resolved: Callable[[Array], NDArray[np.bool_]], edges: Array) -> Array:
+    """The ``edges`` of cells, and more: cells are halved, at most 12 times, unless their points (cells, 5) suffice."""
+    left, right, kept = edges[:-1], edges[1:], []
+    for _ in range(_HALVINGS):
+        coarse = ~resolved(left[:, None] + (right - left)[:, None] * _SHARES)
+        kept.append(left[~coarse])
+        middle = 0.5 * (left + right)[coarse]
+        left, right = np.concatenate([left[coarse], middle]), np.concatenate([middle, right[coarse]])
+    return np.append(np.sort(np.concatenate([*kept, left])), edges[-1])
+
+
+def below(values: Array) -> Array:
+    """Values at the edges that are those of a function, known at the ``quarters`` (cells, 5), or less: (cells + 1,).
+
+    They are lowered where a chord would exceed the function at a quarter.
+    """
+    cells = _without_peaks(values)
+    cells = cells / np.maximum(excess(values), 1.0)[:, None]
+    return np.minimum(np.append(cells[:, 0], np.inf), np.append(np.inf, cells[:, -1]))
+
+
+def excess(values: Array) -> Array:
+    """How many times larger than the ``values`` (cells, 5) the chord between the ends is at most, (cells,)."""
+    values = _without_peaks(values)
+    with np.errstate(invalid="ignore"):
+        chord = values[:, :1] + (values[:, -1:] - values[:, :1]) * _SHARES
+        # an end is infinite only where all is
+        return np.where(np.isfinite(chord), chord / values, 1.0).max(-1)
+
+
+def _without_peaks(values: Array) -> Array:
+    """The values with ends near those inside, so that no lone peak lowers the other end of its cell."""
+    return np.minimum(values, _PEAK * values[:, 1:-1].min(-1, keepdims=True))

@@ -1,0 +1,56 @@
+"""The fastest profile within limits on speed, curvature and acceleration of the joints and of tools."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import scalar
+from pathcontrol.errors import InputError
+from pathcontrol.profiles.demands import Demands
+from pathcontrol.profiles.grid import below, edges, quarters, refined
+from pathcontrol.profiles.motion_limit import MotionLimit
+from pathcontrol.profiles.sweeps import largest
+from pathcontrol.profiles.table import TabulatedProfile
+from pathcontrol.profiles.tangential import all_steps
+from pathcontrol.tasks.profile import Path
+
+
+def limited(
+    path: Path,
+    *limits: MotionLimit,
+    velocity: ArrayLike | None = None,
+    points: int = 1000,
+    start_rate: float | None = None,
+) -> TabulatedProfile:
+    """The largest ϑ(s) that keeps every limit: curvature- and tolerance-limited speed with bounded acceleration.
+
+    Speed and curvature cap ϑ at every s; a forward and a backward sweep lower it until |v̇| is within the tangential
+    limits, with ϑ² linear in each cell of a table. All limits hold at the quarters of every cell, and between these to
+    second order in their width; cells are halved where a cap or ‖p'‖ changes much, as in a rounded corner.
+
+    With a tangential limit an open path begins with the speed that the limit builds up in 2.5 ms, and ends with the
+    speed that it takes away in 0.25 ms: never 0, where the motion plan ṡ = ϑ(s) would stop. The controllers take this
+    last bit of speed away exponentially and hold the arm at s_end, where ``simulate`` reports it as finished.
+
+    Args:
+        path: a path that ends or closes.
+        limits: on the motion of the joints and of tools; see :class:`MotionLimit`.
+        velocity: |q̇_i| ≤ ``velocity`` [rad/s] for each joint, (n,), as ``robot.limits.velocity``; ``inf`` for none.
+        points: cells of the table, or more where they are halved.
+        start_rate: largest ϑ at the start of an open path [1/s], if not what the tangential limits build up. Laws that
+            see only where the arm is, as ``Projection``, need more where dry friction that they do not compensate holds
+            it at first.
+
+    Raises:
+        InputError: a value is not positive, or nothing limits the speed somewhere.
+        TaskError: the path neither ends nor closes, or leaves a tool standing whose tangential acceleration is limited.
+    """
+    cells = edges(path, int(scalar("points", points, least=1)))
+    demands = Demands(path, limits, velocity, start_rate)
+    s = refined(demands.resolved, cells)
+    ceiling, tangential = demands.at(quarters(s))
+    squared = largest(below(ceiling), *all_steps(tangential, len(s) - 1), closed=path.period is not None)
+    if not np.isfinite(squared).all():
+        raise InputError(f"nothing limits the speed at s = {s[np.argmax(squared)]:g}; give a MotionLimit with a speed")
+    return TabulatedProfile(s, squared, path.period)

@@ -1,0 +1,72 @@
+"""Ramps from the ends of a path to the speed of a profile, where they meet it or each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from pathcontrol._arrays import Array
+from pathcontrol.profiles.s_curve import Approach, SCurve
+
+Curve = SCurve | Approach
+
+
+class Ramp(NamedTuple):
+    """A curve of speed over distance that counts up to the distance ``until`` where a profile takes over."""
+
+    curve: Curve
+    until: float
+
+    def speed(self, distance: Array) -> tuple[Array, Array]:
+        """v and dv/dd at a ``distance`` d (*batch,) from the end of the path; ``inf`` and 0 where it does not count."""
+        over = distance >= self.until
+        if over.all():  # so it is nearly all along a path
+            return np.full_like(distance, np.inf), np.zeros_like(distance)
+        v, slope = self.curve.speed(distance)
+        return np.where(over, np.inf, v), np.where(over, 0.0, slope)
+
+
+class Course(NamedTuple):
+    """A profile between two ramps: speed v(s), distance σ(s) covered, at increasing parameters ``s`` (m,)."""
+
+    s: Array
+    speed: Callable[[Array], Array]
+    distance: Callable[[Array], Array]
+
+    def ramps(self, rise: Callable[[Any], Curve], fall: Callable[[Any], Curve]) -> tuple[Ramp, Ramp]:
+        """The first and the last ramp: to the profile's speed, or to the speed at which they meet on a short path."""
+        total = self.distance(self.s[-1])
+        first = self._meeting(self.s, self.distance, rise)
+        last = self._meeting(self.s[::-1], lambda s: total - self.distance(s), fall)
+        highest = np.inf
+        if rise(first).length + fall(last).length > total:
+            highest = _root(lambda v: rise(v).length + fall(v).length - total)
+        return _ramp(rise, first, highest), _ramp(fall, last, highest)
+
+    def _meeting(self, s: Array, distance: Callable[[Array], Array], curve: Callable[[Any], Curve]) -> float:
+        """The profile's speed where a ramp up to it first fits into the distance; ``inf`` if it nowhere does."""
+
+        def spare(s: Array) -> Array:
+            return distance(s) - curve(self.speed(s)).length
+
+        fits = spare(s) >= 0
+        first = int(np.argmax(fits))
+        if not fits[first]:
+            return np.inf
+        return float(self.speed(np.asarray(brentq(spare, s[first - 1], s[first]) if first else s[0])))
+
+
+def _ramp(curve: Callable[[Any], Curve], speed: float, highest: float) -> Ramp:
+    met = curve(np.asarray(min(speed, highest)))
+    return Ramp(met, float(met.length) if speed <= highest else np.inf)
+
+
+def _root(function: Callable[[Any], Array]) -> float:
+    """Where an increasing function of a speed is 0."""
+    most = 1.0
+    while function(np.asarray(most)) < 0:
+        most *= 2
+    return brentq(function, 1e-12 * most, most)

@@ -1,0 +1,105 @@
+"""Smooth start and stop: jerk-limited ends around another velocity profile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array, scalar
+from pathcontrol.errors import TaskError
+from pathcontrol.profiles.distance import distance
+from pathcontrol.profiles.grid import edges
+from pathcontrol.profiles.motion import JointMotion, Motion, growth
+from pathcontrol.profiles.ramps import Course
+from pathcontrol.profiles.s_curve import Approach, SCurve
+from pathcontrol.tasks.profile import Path, VelocityProfile
+
+_CELLS = 2000
+_FIRST_INSTANT = 0.01  # s
+
+
+class SmoothStartStop(VelocityProfile):
+    """Another profile on an open path, begun and ended with limited acceleration and jerk.
+
+    The speed v = ‖p'‖ϑ of the joints, or of a tool, rises by an S-curve, from ``start_speed`` at s0 to the speed of the
+    other profile where it meets it, and falls likewise at the end; between the two ϑ is that of the other profile, if
+    the path is long enough to reach it, and never larger. Where the other profile keeps v constant, v̇ is continuous and
+    |v̇| and |v̈| are within the limits; elsewhere v̇ jumps by what the other profile has where it is met or is slower.
+
+    The fall ends exponentially, v = d/T for a distance d left with T = 0.1 s, down to the speed that the jerk builds up
+    in 10 ms, which is kept: never 0, where the motion plan ṡ = ϑ(s) would stop. At s_end − Tϑ(s_end) the controllers
+    take over and bring the plan to rest on the same exponential; they hold the arm at s_end, where ``simulate`` reports
+    it as finished.
+
+    Args:
+        path: the path that the profile is for; it has an end.
+        profile: the profile between start and stop.
+        acceleration: |v̇| ≤ ``acceleration`` [rad/s² or m/s²].
+        jerk: |v̈| ≤ ``jerk`` [rad/s³ or m/s³].
+        motion: whose speed v is, the joints' or a tool's.
+        start_speed: v at the start, at most; by default what the jerk builds up in 10 ms. Laws that see only where the
+            arm is, as ``Projection``, need more where dry friction that they do not compensate holds it at first.
+
+    Raises:
+        TaskError: the path is closed or has no end.
+        InputError: a limit is not positive.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        profile: VelocityProfile,
+        acceleration: float,
+        jerk: float,
+        motion: Motion | None = None,
+        start_speed: float | None = None,
+    ) -> None:
+        _check_open(path)
+        self.profile, self.motion = profile, JointMotion() if motion is None else motion
+        self.acceleration = scalar("acceleration", acceleration, positive=True)
+        self.jerk = scalar("jerk", jerk, positive=True)
+        self._least = 0.5 * self.jerk * _FIRST_INSTANT**2
+        self.start_speed = self._least if start_speed is None else scalar("start_speed", start_speed, positive=True)
+        s = edges(path, _CELLS)
+        self._distance = distance(path, self.motion, s)
+        course = Course(s, lambda s: profile.theta(path, s) * self.motion.stretch(path, s)[0], self._distance)
+        self._start, self._stop = course.ramps(
+            lambda v: SCurve(self.start_speed, v, self.acceleration, self.jerk),
+            lambda v: Approach(v, self.acceleration, self.jerk),
+        )
+
+    def theta(self, path: Path, s: Array) -> Array:
+        return self.at(path.dq_d(s), path.ddq_d(s), path, s)[0]
+
+    def dtheta(self, path: Path, s: Array) -> Array:
+        return self.at(path.dq_d(s), path.ddq_d(s), path, s)[1]
+
+    def at(self, dq_d: Array, ddq_d: Array, path: Path, s: Array) -> tuple[Array, Array]:
+        dp, ddp = self.motion.of(path.q_d(s), dq_d, ddq_d)
+        stretch, relative_growth = np.linalg.norm(dp, axis=-1), growth(dp, ddp)
+        theta, dtheta = self.profile.at(dq_d, ddq_d, path, s)
+        for v, slope in self._ramp_speeds(np.clip(s, path.s0, path.s_end)):
+            slower = v < stretch * theta
+            theta = np.where(slower, v / stretch, theta)
+            dtheta = np.where(slower, slope - theta * relative_growth, dtheta)
+        return theta, dtheta
+
+    def describe(self) -> dict[str, Any]:
+        return super().describe() | {"motion": str(self.motion), "around": self.profile.describe()}
+
+    def _ramp_speeds(self, s: Array) -> Iterator[tuple[Array, Array]]:
+        """v and dv/dσ of start and stop after the distance σ(s)."""
+        covered = self._distance(s)
+        yield self._start.speed(covered)
+        v, slope = self._stop.speed(self._distance(self._distance.x[-1]) - covered)
+        yield np.maximum(v, self._least), np.where(v < self._least, 0.0, -slope)
+
+
+def _check_open(path: Path) -> None:
+    if path.period is not None or not np.isfinite(path.s_end):
+        raise TaskError(
+            f"{type(path).__name__} has period = {path.period} and s_end = {path.s_end}: only an open path with a "
+            "finite s_end has a start and a stop"
+        )

@@ -1,0 +1,126 @@
+"""The fastest traversal of a path that the arm's drives allow."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array, readonly, scalar
+from pathcontrol.errors import InputError, TaskError
+from pathcontrol.profiles.table import TabulatedProfile
+from pathcontrol.profiles.topp.along import sample, torques
+from pathcontrol.profiles.topp.limits import LimitChoice, joint_limits
+from pathcontrol.profiles.topp.solve import Demand, fastest
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.tasks.profile import Path
+
+_BINDING = 0.999
+
+
+class TimeOptimal(TabulatedProfile):
+    """The profile that :func:`time_optimal` computes: a table of ϑ² that knows what limits it.
+
+    Attributes:
+        limiting: the limit that is used most at each knot, as ``"torque of elbow_joint"``, m of them.
+        used: the share of that limit in use, (m,); 1 where it binds.
+        margin: the share of each torque limit that is left for feedback.
+    """
+
+    def __init__(
+        self, s: Array, squared: Array, period: float | None, limiting: tuple[str, ...], used: Array, margin: float
+    ) -> None:
+        super().__init__(s, squared, period)
+        self.limiting, self.used, self.margin = limiting, readonly(used), margin
+
+    @property
+    def limited_by(self) -> dict[str, float]:
+        """The share of the traversal time during which each limit binds, the largest first."""
+        rate = np.sqrt(self.squared)
+        times = np.diff(self.s) / (rate[:-1] + rate[1:])  # half of each cell's
+        at_knots = (np.append(times, 0.0) + np.append(0.0, times)) / (2 * times.sum())
+        names, index = np.unique(self.limiting, return_inverse=True)
+        shares = np.bincount(index, np.where(self.used > _BINDING, at_knots, 0.0))
+        return {str(names[i]): float(shares[i]) for i in np.argsort(-shares) if shares[i]}
+
+    def describe(self) -> dict[str, Any]:
+        """Name, number of knots, traversal time [s], margin, and the share of the time for which each limit binds."""
+        return super().describe() | {"margin": self.margin, "limited_by": self.limited_by}
+
+
+def time_optimal(
+    robot: RobotModel,
+    path: Path,
+    *,
+    velocity: LimitChoice = True,
+    acceleration: LimitChoice = None,
+    torque: LimitChoice = True,
+    margin: float = 0.05,
+    points: int = 1000,
+    start_rate: float | None = None,
+    end_rate: float | None = None,
+    end_time: float | None = None,
+) -> TimeOptimal:
+    """The profile ϑ(s) that takes an arm along a path in the least time within the limits of its joints.
+
+    Along the path the torques are τ = a s̈ + b ṡ² + d ṡ + c + F with ṡ = ϑ and s̈ = ϑϑ': inertia, centrifugal and
+    Coriolis terms, viscous friction, weight, and dry friction in the direction of motion. On a grid, with ϑ² linear in
+    s between its knots, a backward pass finds the ϑ² from which the rest of the path can still be passed, and a forward
+    pass takes the largest of them (reachability analysis: Pham and Pham, IEEE Trans. Robotics 34, 2018; viscous
+    friction, with which the sets of allowed ϑ² and s̈ are not convex, is kept exactly, as quadratics in ϑ). Each limit
+    is kept at both ends of every cell; where inverse dynamics between the knots finds more than 0.07 % too much, the
+    cell is given less and the passes are repeated: no limit is exceeded by more than 0.1 % anywhere.
+
+    A joint that turns back within a cell is given the dry friction of both directions there. Friction that falls with
+    velocity (Stribeck) is taken to be anything between its levels at rest and at high speed.
+
+    An open path begins and ends slowly, but not with ϑ = 0, where the motion plan ṡ = ϑ(s) would stop for ever: by
+    default with the rate that the arm reaches from rest if it accelerates for 2.5 ms as fast as it can. The controllers
+    bring what is left to rest with ϑ ≤ (s_end − s)/T, T = 0.1 s, which for some 10 ms brakes harder than the limits
+    allow; ``end_time = 0.1`` makes the profile approach the end like that, within the limits to the last. The profile
+    of a closed path is periodic.
+
+    Every posture must be one that the arm can pass slowly: a controller of the path may slow down anywhere.
+
+    Args:
+        robot: the arm, with the friction to be overcome, ``robot.friction``.
+        path: a path that ends or closes; its own ϑ does not matter.
+        velocity: |q̇| ≤ ``velocity`` [rad/s], (n,); ``True`` for the limits of the URDF, ``None`` for none.
+        acceleration: |q̈| ≤ ``acceleration`` [rad/s²], (n,); ``None`` for no limit.
+        torque: |τ| ≤ ``torque`` [N m], (n,); ``True`` for the limits of the URDF, ``None`` for none.
+        margin: share of each torque limit left for feedback, 0 ≤ margin < 1.
+        points: knots of the grid, 10 or more.
+        start_rate: ϑ at the start of an open path [1/s].
+        end_rate: ϑ at its end [1/s].
+        end_time: time constant [s] of the approach to its end, instead of ``end_rate``.
+
+    Raises:
+        InputError: a limit or rate is not positive or of the wrong shape, or nothing limits the speed somewhere.
+        TaskError: the path neither ends nor closes or is for another number of joints; or the demand cannot be met: the
+            message says which limit of which joint is in the way, at which s and posture.
+    """
+    limits = joint_limits(robot, velocity, acceleration, torque, margin)
+    ends = _ends(path, start_rate=start_rate, end_rate=end_rate, end_time=end_time)
+    samples = sample(path, _knots(path, points), robot.n)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # bounds that do not exist are infinite
+        demand = Demand(limits, samples, torques(robot, samples), path.period is not None, *ends)
+        squared, binding = fastest(demand)
+    names = robot.joint_names
+    limiting = tuple(f"{kind} of {names[i]}" for kind, i in zip(binding.kinds, binding.joints, strict=True))
+    return TimeOptimal(samples.knots.s, squared, path.period, limiting, binding.shares, margin)
+
+
+def _knots(path: Path, points: int) -> Array:
+    end = path.s_end if path.period is None else path.s0 + path.period
+    if not np.isfinite(end):
+        raise TaskError(f"{type(path).__name__} neither ends nor closes, so ϑ cannot be tabulated; give it an s_end")
+    return np.linspace(path.s0, end, int(scalar("points", points, least=10)))
+
+
+def _ends(path: Path, **ends: float | None) -> list[float | None]:
+    given = {name: scalar(name, value, positive=True) for name, value in ends.items() if value is not None}
+    if given and path.period is not None:
+        raise InputError(f"{' and '.join(given)} for a closed path, which begins as fast as it ends; leave them out")
+    if given.keys() >= {"end_rate", "end_time"}:
+        raise InputError("both end_rate and end_time are given; one of them says how an open path ends")
+    return [given.get(name) for name in ends]

@@ -1,0 +1,79 @@
+"""Backwards along the path for the ṡ² from which the rest can still be passed, forwards for the largest of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.profiles.topp.cells import Cells
+from pathcontrol.profiles.topp.sweep import steps_of, swept
+
+_FIRST_INSTANT = 2.5e-3  # s
+_LAPS = 100
+
+
+class Allowed(NamedTuple):
+    """What the limits allow.
+
+    Attributes:
+        cells: the pairs of ṡ² at the ends of each of the N cells.
+        speed: the largest ṡ² at the knots, (N + 1,).
+        enter: ṡ² at the beginning of each cell if it is passed the fastest, (N,); see :func:`fastest_pair`.
+        leave: ṡ² at its end then, (N,).
+    """
+
+    cells: Cells
+    speed: Array
+    leave: Array
+    enter: Array
+
+
+def across(allowed: Allowed, widths: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
+    """The largest ṡ² at the knots of an open path from which its end can be reached, and the fastest, (N + 1,).
+
+    ``start`` and ``end`` are the rates ṡ [1/s] at the ends; ``None`` for what the arm reaches from rest in a first
+    instant, 2.5 ms, of the acceleration it is then capable of.
+    """
+    cells = allowed.cells
+    last = _from_rest(cells.some(-1), widths[-1]) if end is None else end
+    largest = _backwards(allowed, min(last**2, allowed.leave[-1]))
+    first = _from_rest(cells.swapped().some(0), widths[0]) if start is None else start
+    return largest, _forwards(allowed, largest, min(first**2, largest[0]))
+
+
+def around(allowed: Allowed) -> Array:
+    """ṡ² at the knots of the fastest traversal of a closed path, (N + 1,): after a lap it is what it was."""
+    largest = _repeated(lambda x: _backwards(allowed, x)[::-1], allowed.leave[-1])[::-1]
+    fastest = _repeated(lambda x: _forwards(allowed, largest, x), largest[0])
+    fastest[0] = fastest[-1]
+    return fastest
+
+
+def _from_rest(cell: Cells, width: float) -> float:
+    """ṡ [1/s] that one cell of ``width`` Δs lets the arm reach from rest in a first instant."""
+    A, C = cell.A[:-1], cell.C[:-1]  # without the row of velocity
+    largest = np.where(A > 0, -C / A, np.inf).min(initial=np.inf)
+    return float(largest) / (2 * width) * _FIRST_INSTANT
+
+
+def _backwards(allowed: Allowed, last: float) -> Array:
+    cells, speed, leave, enter = allowed
+    return swept(steps_of(cells, leave, enter).reversed(), last, speed[-2::-1])[::-1]
+
+
+def _forwards(allowed: Allowed, largest: Array, first: float) -> Array:
+    scale = np.minimum(largest[1:], allowed.leave)
+    return swept(steps_of(allowed.cells.swapped(), largest[:-1], scale), first, largest[1:])
+
+
+def _repeated(lap: Callable[[float], Array], first: float) -> Array:
+    """Laps, each begun as the last one ended, until it ends as it began; they only become slower."""
+    for _ in range(_LAPS):
+        values = lap(first)
+        if values[-1] >= (1 - 1e-12) * first:
+            break
+        first = values[-1]
+    return values

@@ -1,0 +1,79 @@
+"""The limits checked inside the cells, and what is asked of a cell instead where they are exceeded."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.profiles.topp.along import Samples, Torques
+from pathcontrol.profiles.topp.cells import Cells
+from pathcontrol.profiles.topp.fastest_pair import fastest_pair
+from pathcontrol.profiles.topp.limits import JointLimits
+from pathcontrol.profiles.topp.passes import Allowed
+
+_ACCEPTED = 1 + 7e-4  # at the samples, a little less than is promised between them
+_KEPT = 0.1  # of what rest leaves of a limit
+
+
+class Excess(NamedTuple):
+    """By how much ṡ² exceeds the limits in each cell, in shares; 0 where it does not.
+
+    Attributes:
+        inside: of the m rows at the samples, over the chord between the ends, (N, m).
+        ends: of the m rows at the ends, (N, m).
+        velocity: of the velocity limits at the samples, (N,).
+    """
+
+    inside: Array
+    ends: Array
+    velocity: Array
+
+    @property
+    def cells(self) -> Array:
+        """The cells with any, (N,) of bool."""
+        return self.inside.any(-1) | self.ends.any(-1) | (self.velocity > 0)
+
+
+def excess(limits: JointLimits, samples: Samples, torques: Torques, cells: Cells, x: Array) -> Excess:
+    """What ṡ² = x at the knots (N + 1,) uses too much of the limits, by inverse dynamics at the samples."""
+    rows, velocity = _inside(limits, samples, torques, x)
+    first, last = np.split(cells.used(x)[:, :-1], 2, axis=-1)
+    chord = first[:, None] + (last - first)[:, None] * _shares(samples)
+    ends = np.maximum(first, last)
+    return Excess(
+        np.where(rows > _ACCEPTED, rows - chord, 0.0).max(1),
+        np.where(ends > _ACCEPTED, ends - 1, 0.0),
+        np.where(velocity > _ACCEPTED, velocity - 1, 0.0),
+    )
+
+
+def tightened(allowed: Allowed, cells: Cells, over: Excess) -> Allowed:
+    """Less than ``allowed`` of the ``cells`` where it was too much, but never so little that the arm could not rest."""
+    slower = (1 + over.velocity) ** -2
+    speed = allowed.speed * np.minimum(np.append(slower, 1.0), np.append(1.0, slower))
+    A = np.hstack([cells.A[:, :-1], 1 / speed[:-1, None]])
+    inside, ends = (np.hstack([rows, rows, 0 * A[:, -1:]]) for rows in (over.inside, over.ends))
+    C = np.maximum(cells.C + inside, allowed.cells.C + ends)
+    C = np.maximum(np.minimum(C, _KEPT * cells.C), allowed.cells.C)
+    slowed = speed < allowed.speed
+    changed = np.flatnonzero((C > allowed.cells.C).any(-1) | slowed[:-1] | slowed[1:])
+    tighter, leave, enter = cells._replace(A=A, C=C), allowed.leave.copy(), allowed.enter.copy()
+    leave[changed], enter[changed] = fastest_pair(tighter.some(changed), speed[1:][changed])
+    return Allowed(tighter, speed, leave, enter)
+
+
+def _inside(limits: JointLimits, samples: Samples, torques: Torques, x: Array) -> tuple[Array, Array]:
+    """The shares used at the samples within the cells of the m rows, (N, k − 1, m), and at most of velocity, (N,)."""
+    q, dq, ddq = (samples.by_cell(a)[:, 1:] for a in (samples.q, samples.dq, samples.ddq))
+    x_inside = x[:-1, None, None] + np.diff(x)[:, None, None] * _shares(samples)
+    u = (np.diff(x) / (2 * samples.widths))[:, None, None]
+    qd, qdd = dq * np.sqrt(x_inside), dq * u + ddq * x_inside
+    tau = limits.robot.inverse_dynamics(q, qd, qdd) + limits.robot.friction.viscous * qd
+    rows = limits.shares(qdd, tau + torques.most[:, None], tau + torques.least[:, None])
+    return rows, (np.abs(qd) / limits.velocity).max((1, 2))
+
+
+def _shares(samples: Samples) -> Array:
+    return np.arange(1, samples.k)[:, None] / samples.k

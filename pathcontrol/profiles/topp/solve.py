@@ -1,0 +1,77 @@
+"""The fastest traversal of a path, sought again where a recheck inside the cells finds a limit exceeded."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import TaskError
+from pathcontrol.profiles.topp.along import Samples, Torques
+from pathcontrol.profiles.topp.binding import Binding, binding, refuse_rate, refuse_static_overload
+from pathcontrol.profiles.topp.cells import cells_of
+from pathcontrol.profiles.topp.fastest_pair import fastest_pair
+from pathcontrol.profiles.topp.limits import JointLimits
+from pathcontrol.profiles.topp.passes import Allowed, across, around
+from pathcontrol.profiles.topp.recheck import excess, tightened
+from pathcontrol.profiles.topp.speed import end_limit, endless_speed, refuse_endless, speed_limit
+
+_ROUNDS = 12
+
+
+class Demand(NamedTuple):
+    """A path to be passed within limits, and what is asked of the ends of an open one, ``None`` for nothing.
+
+    Attributes:
+        start_rate: ṡ at the start [1/s].
+        end_rate: ṡ at the end [1/s].
+        end_time: time constant of the approach to the end [s].
+    """
+
+    limits: JointLimits
+    samples: Samples
+    torques: Torques
+    closed: bool
+    start_rate: float | None
+    end_rate: float | None
+    end_time: float | None
+
+
+def fastest(demand: Demand) -> tuple[Array, Binding]:
+    """ṡ² at the knots (N + 1,) of the fastest traversal, and what limits it there.
+
+    Raises:
+        InputError: nothing limits the speed somewhere.
+        TaskError: the demand cannot be met; the message names the joint, the limit and s.
+    """
+    limits, samples, torques = demand.limits, demand.samples, demand.torques
+    refuse_static_overload(limits, samples, torques)
+    endless = endless_speed(limits, samples, torques)
+    speed = speed_limit(limits, samples, endless)
+    if demand.end_time is not None:
+        speed = np.minimum(speed, end_limit(samples, demand.end_time))
+    refuse_endless(samples, np.where(np.isinf(speed), speed, 0.0), endless)
+    cells = cells_of(limits, samples, torques, speed)
+    allowed = Allowed(cells, speed, *fastest_pair(cells, speed[1:]))
+    for _ in range(_ROUNDS):
+        x = _traversal(demand, allowed)
+        over = excess(limits, samples, torques, cells, x)
+        if not over.cells.any():
+            refuse_endless(samples, x, endless)
+            return x, binding(limits, samples, cells, x)
+        allowed = tightened(allowed, cells, over)
+    where = samples.knots.s[over.cells.argmax()]
+    raise TaskError(
+        f"{len(x)} points do not resolve the path near s = {where:.6g}: limits are exceeded between them; give more"
+    )
+
+
+def _traversal(demand: Demand, allowed: Allowed) -> Array:
+    limits, samples, _, closed, start_rate, end_rate, end_time = demand
+    if closed:
+        return around(allowed)
+    largest, x = across(allowed, samples.widths, start_rate, end_rate if end_time is None else np.inf)
+    refuse_rate(limits, samples, allowed.cells, "start_rate", start_rate, largest)
+    refuse_rate(limits, samples, allowed.cells, "end_rate", end_rate, x)
+    return x

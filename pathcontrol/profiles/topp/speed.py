@@ -1,0 +1,49 @@
+"""The velocity limits along a path, and what an endless speed is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import InputError
+from pathcontrol.profiles.topp.along import Samples, Torques
+from pathcontrol.profiles.topp.limits import JointLimits
+
+_ENDLESS = 1e6  # times the ṡ² that the arm's strength builds up over the path
+_PEAK = 4.0
+
+
+def speed_limit(limits: JointLimits, samples: Samples, endless: float) -> Array:
+    """The largest ṡ² at the knots that the velocity limits allow, and ``endless`` where they allow any, (N + 1,).
+
+    Where the joints with a limit stand still it is 4 times what is allowed beside the knot, where they move.
+    """
+    rates = (limits.velocity / np.abs(samples.dq)).min(-1) ** 2
+    beside = _PEAK * np.minimum(np.append(np.inf, rates[:-1]), np.append(rates[1:], np.inf))
+    return np.minimum(np.minimum(rates, beside)[:: samples.k], endless)
+
+
+def end_limit(samples: Samples, end_time: float) -> Array:
+    """ṡ² of an approach to the end with the time constant ``end_time`` [s], but for the last cell, (N + 1,)."""
+    s = samples.knots.s
+    return (np.maximum(s[-1] - s, s[-1] - s[-2]) / end_time) ** 2
+
+
+def endless_speed(limits: JointLimits, samples: Samples, torques: Torques) -> float:
+    """An ṡ² out of reach of any arm that something limits; ``inf`` without limits of acceleration and torque."""
+    strength = limits.shares(samples.knots.dq, torques.a, torques.a).max(initial=0.0)
+    return float(_ENDLESS * samples.widths.sum() / strength)
+
+
+def refuse_endless(samples: Samples, x: Array, endless: float) -> None:
+    """Something has to limit ṡ² everywhere.
+
+    Raises:
+        InputError: ṡ² = x at the knots, (N + 1,), is ``endless`` somewhere.
+    """
+    fastest = int(x.argmax())
+    if x[fastest] > 0.9 * endless or np.isinf(x[fastest]):
+        raise InputError(
+            f"nothing limits the speed at s = {samples.knots.s[fastest]:.6g}, where joints without limits move; limit "
+            "their velocity"
+        )

@@ -1,0 +1,104 @@
+"""When a run has come to its end: at rest on the end of an open path, or after so many laps of a closed one."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.tasks.base import PathTask
+
+Until = Literal["end", "duration"]
+
+_REMAINING = 1e-4  # rad (or m) of joint path that a plan at the end may have left
+_AT_REST = 1e-2  # rad/s (or m/s), the speed ‖q̇‖ of an arm at rest
+_REST = 0.05  # s at rest; a shorter one may be the turning point of an oscillation
+
+
+class Finish(ABC):
+    """Looks at one sample after the other, and keeps when each rollout was finished.
+
+    Attributes:
+        time: when each rollout was finished [s], NaN while it is not, (N,).
+        ends_run: whether the run ends when all rollouts are finished.
+    """
+
+    def __init__(self, rollouts: int, ends_run: bool = True) -> None:
+        self.time, self.ends_run = np.full(rollouts, np.nan), ends_run
+
+    @abstractmethod
+    def finished(self, t: float, s: Array, qd: Array) -> Array | None:
+        """The times at which rollouts were finished, as known at t [s], NaN for others, (N,); None for no news."""
+
+    def __call__(self, t: float, s: Array, qd: Array) -> bool:
+        """Whether the run ends at t [s], with the path parameters s (N,) and the joint velocities q̇ [rad/s], (N, n)."""
+        news = self.finished(t, s, qd)
+        if news is None:
+            return False
+        self.time = np.where(np.isnan(self.time), news, self.time)
+        return self.ends_run and not np.isnan(self.time).any()
+
+
+class AtEnd(Finish):
+    """An open path is finished when its plan has 0.1 mrad of the path left at most and the arm has come to rest.
+
+    At rest is an arm of ‖q̇‖ ≤ 0.01 rad/s for 50 ms; it is finished at the beginning of them. How far from the end of
+    the path it rests is another matter: friction that is not compensated holds it where K_p M(q) e_p is less.
+    """
+
+    def __init__(self, task: PathTask, rollouts: int, ends_run: bool = True) -> None:
+        super().__init__(rollouts, ends_run)
+        self._arrival = task.s_end - _REMAINING / np.linalg.norm(task.dq_d(np.array(task.s_end)))
+        self._since = np.full(rollouts, np.inf)
+
+    def finished(self, t: float, s: Array, qd: Array) -> Array | None:
+        arrived = s >= self._arrival
+        if not arrived.any():
+            return None
+        resting = arrived & (np.linalg.norm(qd, axis=-1) <= _AT_REST)
+        self._since = np.where(resting, np.minimum(self._since, t), np.inf)
+        return np.where(t - self._since >= _REST * (1 - 1e-9), self._since, np.nan)
+
+
+class AfterLaps(Finish):
+    """A closed path is finished when s has grown by so many periods since the start; the arm goes on moving."""
+
+    def __init__(self, task: PathTask, laps: int, rollouts: int, ends_run: bool = True) -> None:
+        super().__init__(rollouts, ends_run)
+        self._task, self._laps = task, laps
+        self._start: Array | None = None
+
+    def finished(self, t: float, s: Array, qd: Array) -> Array | None:
+        self._start = s if self._start is None else self._start
+        done = whole_laps(self._task, self._start, s) >= self._laps
+        return np.where(done, t, np.nan) if done.any() else None
+
+
+def whole_laps(task: PathTask, start: Array, s: Array) -> Array:
+    """How many times the path was gone round from ``start`` to ``s``, negative backwards, integers (*batch,)."""
+    return np.trunc((s - start) / task.period).astype(np.int64)
+
+
+def finish_of(task: PathTask, laps: int | None, until: Until, rollouts: int) -> Finish | None:
+    """What to look for in ``rollouts`` of ``task``; None where nothing ends.
+
+    Raises:
+        InputError: ``laps`` is no whole number from 1, or the path is not closed.
+        UnknownNameError: ``until`` is none of its choices.
+    """
+    if until not in get_args(Until):
+        raise UnknownNameError(f"until = {until!r}, expected one of {', '.join(map(repr, get_args(Until)))}")
+    if laps is not None:
+        _check_laps(task, laps)
+        return AfterLaps(task, laps, rollouts, until == "end")
+    return AtEnd(task, rollouts, until == "end") if np.isfinite(task.s_end) else None
+
+
+def _check_laps(task: PathTask, laps: Any) -> None:
+    if isinstance(laps, bool) or not isinstance(laps, int | np.integer) or laps < 1:
+        raise InputError(f"laps = {laps!r}, expected a whole number from 1")
+    if not task.closed:
+        raise InputError(f"laps = {laps}, but {type(task).__name__} is no closed path; leave laps out")

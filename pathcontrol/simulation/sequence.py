@@ -1,0 +1,158 @@
+"""Several paths of one arm, one after another, as one :class:`Run`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_array, finite
+from pathcontrol.control.base import Controller
+from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.finish import Finish, finish_of
+from pathcontrol.simulation.modes import ContinuousTime, SampledLoop
+from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.setup import (
+    check_joints,
+    check_law,
+    checked_loop,
+    initial_state,
+    joints_of,
+    period_of,
+    record_of,
+    simulated_arm,
+)
+from pathcontrol.tasks.base import PathTask
+
+
+class _Leg(NamedTuple):
+    """What was recorded on one path, when it was finished [s] since its begin, its first s, and by how much s grows."""
+
+    arrays: dict[str, Array]
+    finish_time: float
+    s0: float
+    length: float
+
+
+def simulate_sequence(
+    controllers: Iterable[Controller],
+    q: ArrayLike,
+    qd: ArrayLike | None = None,
+    *,
+    duration: ArrayLike,
+    laps: int = 1,
+    plant: RobotModel | None = None,
+    loop: SampledLoop | ContinuousTime | None = None,
+    progress: bool = True,
+) -> Run:
+    """Simulate several paths of one arm, each from where the arm is when the one before is finished.
+
+    Finished is as for :func:`simulate`: an open path when the arm rests at its end, a closed one after ``laps``. Each
+    path has a controller of its own, which is told the time since its begin; sensors, filters and delayed torques go
+    on across the seams, and the sample at a seam belongs to the path that begins there. A path that is not finished
+    within its duration ends the run.
+
+    Its s goes on: path i begins at S_i, where the one before it ends, as in a :class:`PathSequence` of them.
+    The run has the coordinates ``path_index`` (time), and ``path_status`` and ``path_finish_time`` (path);
+    :meth:`Run.path` gives one path as a run of its own. Its rollout is finished when the last path is.
+
+    Args:
+        controllers: one controller for each path, in order, all for the joints of one arm.
+        q: initial joint positions [rad], (n,): of one arm, not of a batch.
+        qd: initial joint velocities [rad/s], (n,); default at rest.
+        duration: longest time for each path [s]: one for all, or one for each, (paths,).
+        laps: how many times each closed path is gone round.
+        plant: the arm that is really there; default the model of the first controller.
+        loop: how the loop is closed, as for :func:`simulate`.
+        progress: show a bar on standard error when it takes longer than two seconds.
+
+    Raises:
+        InputError: an argument has the wrong shape or value, or a path neither ends nor repeats.
+        SimulationError: the arm diverged, or the integrator gave up.
+    """
+    laws = _checked_controllers(controllers)
+    robot = laws[0].robot if plant is None else plant
+    durations, loop = _durations(duration, len(laws)), checked_loop(loop)
+    q0, qd0 = _one_state(q, qd, robot.n)
+    period, ends = period_of(loop, durations.min()), [_finish(law, laps) for law in laws]
+    for law in laws:
+        check_joints(law, robot)
+        check_law(law, q0, qd0)
+    arm, legs = simulated_arm(loop, robot, q0, qd0), []
+    for law, longest, finish in zip(laws, durations, ends, strict=True):
+        arrays = arm.run(law, longest, finish, progress)
+        legs.append(_Leg(arrays, float(finish.time[0]), law.task.s0, _length(law.task, laps)))
+        if np.isnan(legs[-1].finish_time):
+            break
+    arrays, outcome = _joined(legs, len(laws), period)
+    names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws))
+    described = {"controller": f"{len(laws)} paths with {names}", "sequence": [law.describe() for law in laws]}
+    config = record_of(described, robot, loop, duration=durations.tolist(), laps=laps)
+    return Run.from_arrays(period * np.arange(arrays["s"].shape[1]), joints_of(robot), arrays, config, outcome)
+
+
+def _joined(legs: Sequence[_Leg], paths: int, period: float) -> tuple[dict[str, Array], dict[str, Array]]:
+    """One series of samples, (1, time, …), and what happened when; the last of a path is the first of the next one."""
+    kept = [leg.arrays["s"].shape[1] - 1 for leg in legs]
+    kept[-1] += 1
+    arrays = {
+        name: np.concatenate([leg.arrays[name][:, :samples] for leg, samples in zip(legs, kept, strict=True)], axis=1)
+        for name in legs[0].arrays
+    }
+    offsets = np.concatenate([[0.0], np.cumsum([leg.length for leg in legs])[:-1]]) - [leg.s0 for leg in legs]
+    arrays["s"] = arrays["s"] + np.repeat(offsets, kept)
+    begins = period * np.cumsum([0, *kept[:-1]])
+    times, status = np.full(paths, np.nan), np.full(paths, "waiting", dtype="<U8")
+    times[: len(legs)] = begins + [leg.finish_time for leg in legs]
+    status[: len(legs)] = np.where(np.isnan(times[: len(legs)]), "running", "finished")
+    return arrays, {
+        "finish_time": times[-1:],
+        "path_index": np.repeat(np.arange(len(legs)), kept),
+        "path_status": status,
+        "path_finish_time": times,
+        "path_offset": np.append(offsets, np.full(paths - len(legs), np.nan)),
+    }
+
+
+def _length(task: PathTask, laps: int) -> float:
+    """By how much s grows on a path."""
+    return task.s_end - task.s0 if task.period is None else laps * task.period
+
+
+def _checked_controllers(controllers: Iterable[Controller]) -> list[Controller]:
+    laws = [] if isinstance(controllers, Controller) else list(controllers)
+    if not laws:
+        raise InputError(f"controllers = {controllers!r}, expected a list with one controller for each path")
+    for i, law in enumerate(laws):
+        if not isinstance(law, Controller):
+            raise InputError(f"controllers[{i}] = {law!r}, expected a Controller")
+    return laws
+
+
+def _finish(law: Controller, laps: int) -> Finish:
+    finish = finish_of(law.task, laps if law.task.closed else None, "end", 1)
+    if finish is None:
+        raise InputError(f"{law.task!r} neither ends nor repeats, so no path can follow it; give it an s_end")
+    return finish
+
+
+def _durations(duration: ArrayLike, paths: int) -> Array:
+    durations = finite("duration", as_array("duration", duration))
+    if durations.shape not in ((), (paths,)):
+        raise InputError(f"duration has shape {durations.shape}, expected one number or one for each of {paths} paths")
+    if (durations <= 0).any():
+        raise InputError(f"duration = {durations.tolist()}, expected numbers greater than 0")
+    return np.broadcast_to(durations, (paths,))
+
+
+def _one_state(q: ArrayLike, qd: ArrayLike | None, n: int) -> tuple[Array, Array]:
+    q0, qd0 = initial_state(q, qd, n)
+    if len(q0) != 1:
+        raise InputError(
+            f"q and qd are {len(q0)} initial states, expected one: rollouts would not end their paths together; call "
+            "simulate_sequence once for each"
+        )
+    return q0, qd0

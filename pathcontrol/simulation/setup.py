@@ -1,0 +1,105 @@
+"""What a simulation is made of, checked before it starts."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, finite, joint_array
+from pathcontrol.control.base import Controller, ControlOutput
+from pathcontrol.errors import InputError, PathControlError
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.continuous import ContinuousArm
+from pathcontrol.simulation.modes import ContinuousTime, SampledLoop
+from pathcontrol.simulation.sampled import SampledArm
+
+Loop = SampledLoop | ContinuousTime
+
+
+def checked_loop(loop: Loop | None) -> Loop:
+    """How the loop is closed, a ``SampledLoop()`` unless given."""
+    loop = SampledLoop() if loop is None else loop
+    if not isinstance(loop, SampledLoop | ContinuousTime):
+        raise InputError(f"loop = {loop!r}, expected SampledLoop(...) or ContinuousTime(...)")
+    return loop
+
+
+def period_of(loop: Loop, duration: float) -> float:
+    """Time between samples [s], of which ``duration`` [s] holds one at least."""
+    period = loop.period if isinstance(loop, SampledLoop) else loop.output_period
+    if duration < period:
+        raise InputError(f"duration = {duration:g} s is less than one period of {period:g} s; both are in seconds")
+    return period
+
+
+def check_joints(controller: Controller, robot: RobotModel) -> None:
+    """The controller is for the joints of the plant."""
+    if robot.joint_names != controller.robot.joint_names:
+        raise InputError(
+            f"the plant has the joints {robot.joint_names}, the controller's model {controller.robot.joint_names}"
+        )
+
+
+def initial_state(q: ArrayLike, qd: ArrayLike | None, n: int) -> tuple[Array, Array]:
+    """q and q̇ as (N, n) each, of any batch shape and broadcast against each other."""
+    position = finite("q", joint_array("q", q, n))
+    velocity = np.zeros(n) if qd is None else finite("qd", joint_array("qd", qd, n))
+    try:
+        pair = np.broadcast_arrays(position, velocity)
+    except ValueError as error:
+        raise InputError(f"q has shape {position.shape} and qd {velocity.shape}, which do not fit together") from error
+    q0, qd0 = (np.array(a).reshape(-1, n) for a in pair)
+    return q0, qd0
+
+
+def check_law(controller: Controller, q: Array, qd: Array) -> None:
+    """The law, asked once, gives what :class:`ControlOutput` says: shapes that fit the initial states, and numbers."""
+    name = type(controller).__name__
+    try:
+        z = controller.start(q, qd)
+        out = controller.law(0.0, q, qd, z)
+    except (ValueError, IndexError, TypeError) as error:
+        if isinstance(error, PathControlError):
+            raise
+        raise InputError(f"{name}.law fails at the initial states, of shape {q.shape}: {error}") from error
+    if not isinstance(out, ControlOutput):
+        raise InputError(f"{name}.law returns {type(out).__name__}, expected a ControlOutput")
+    wanted = {"tau": q.shape, "e_p": q.shape, "e_v": q.shape, "zdot": np.shape(z)}
+    for field in ControlOutput._fields:
+        shape, value = wanted.get(field, q.shape[:1]), getattr(out, field)
+        if np.shape(value) != shape:
+            raise InputError(
+                f"{name}.law gives {field} of shape {np.shape(value)} for initial states of shape {q.shape}, expected "
+                f"{shape}; gains that differ between rollouts need one row for each, and as many initial states"
+            )
+        if not np.isfinite(value).all():
+            raise InputError(f"{name}.law gives {field} = {np.asarray(value).tolist()} at the start, expected numbers")
+
+
+def simulated_arm(loop: Loop, robot: RobotModel, q: Array, qd: Array) -> SampledArm | ContinuousArm:
+    """The arm that controllers drive, at rest or not, (N, n) each."""
+    if isinstance(loop, SampledLoop):
+        return SampledArm(loop, robot, q, qd)
+    return ContinuousArm(loop, robot, q, qd)
+
+
+def record_of(controller: Mapping[str, Any], robot: RobotModel, loop: Loop, **settings: Any) -> dict[str, Any]:
+    """Everything that a run is made with."""
+    packages = ("pathcontrol", "pin", "numpy", "scipy")
+    return {
+        "controller": dict(controller),
+        "plant": {"robot": robot.name, "friction": robot.friction.describe()},
+        "loop": loop.describe(),
+        **settings,
+        "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
+    }
+
+
+def joints_of(robot: RobotModel) -> dict[str, str]:
+    """The unit of each joint's position by its name."""
+    return dict(zip(robot.joint_names, robot.position_units, strict=True))

@@ -1,0 +1,135 @@
+"""A curve cut into cells, over each of which its tangent turns little.
+
+Each cell is looked at once more inside, at an irregular place, and is cut there where the tangent turns too much on
+the way from end to end. A curve that says where its pieces meet begins with these pieces, each of which is simple. Any
+other begins with 512 equal cells, and the neighbours of a cell that turns too much are cut too, since a detail that
+repeats may hide from one cell but not from several. What is smaller than a cell and does not show in its tangents
+there is not resolved, nor is what asks for more than 2^19 cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import TaskError
+from pathcontrol.tasks.closest_point.curve import Curve, Interval
+
+_MAX_TURN = 0.5  # rad over a cell
+_FIRST_CELLS, _MAX_CELLS = 512, 1 << 19
+_NEIGHBOURS = 4  # cut with a cell on either side
+_NARROWEST = 1e-10  # of the whole curve
+_GOLDEN = (5**0.5 - 1) / 2  # spreads the places inside the cells irregularly, so that no period of the curve meets them
+_BLOCK = 1 << 15  # parameters evaluated at once
+
+
+class Cells(NamedTuple):
+    """K cells of a curve: their ends, and bounds on what the curve does in between.
+
+    Attributes:
+        s: parameters of the ends, increasing, (K + 1,).
+        p: the curve there, (K + 1, m).
+        middle: a point of the curve in each cell, (K, m).
+        radius: bound on how far the curve in the cell is from there, (K,).
+        sag: bound on the distance between the curve in the cell and its chord, (K,).
+        turn: of the tangent in the cell [rad], (K,).
+    """
+
+    s: Array
+    p: Array
+    middle: Array
+    radius: Array
+    sag: Array
+    turn: Array
+
+    @classmethod
+    def cut(cls, curve: Curve, interval: Interval, knots: Array | None = None) -> Cells:
+        """The cells of ``curve``, whose pieces meet at ``knots`` where it has any.
+
+        Raises:
+            TaskError: the curve is not finite somewhere.
+        """
+        s, turn = _resolved(curve, _first_ends(interval, knots), 0 if knots is not None else _NEIGHBOURS)
+        p, middle = _points(curve, s), _points(curve, (s[:-1] + s[1:]) / 2)
+        # an arc whose tangent stays within ±φ/2 of a direction is no longer than its chord over cos φ/2
+        stretch = 1 / np.cos(np.minimum(turn, 2.0) / 2)
+        before, after = (np.linalg.norm(middle - end, axis=-1) * stretch for end in (p[:-1], p[1:]))
+        sag = 0.5 * (before + after) * np.sin(np.minimum(turn, np.pi / 2))
+        return cls(s, p, middle, np.maximum(before, after), sag, turn)
+
+    def place(self, s: Array, interval: Interval) -> Array:
+        """Where ``s`` (*batch,) is, counted in cells: i + u at the share u of cell i, laps counted."""
+        lap = interval.lap(s)
+        s = s - lap * interval.length
+        i = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.sag) - 1)
+        return lap * len(self.sag) + i + (s - self.s[i]) / (self.s[i + 1] - self.s[i])
+
+    def parameter(self, place: Array, interval: Interval) -> Array:
+        """The parameter at a place (*batch,): the inverse of :meth:`place`; ends of an open curve hold it."""
+        count = len(self.sag)
+        lap = np.floor(place / count) if interval.closed else np.zeros_like(place)
+        place = np.clip(place - lap * count, 0, count)
+        i = np.minimum(place.astype(int), count - 1)
+        return lap * interval.length + self.s[i] + (place - i) * (self.s[i + 1] - self.s[i])
+
+
+def _first_ends(interval: Interval, knots: Array | None) -> Array:
+    if knots is None:
+        return np.linspace(interval.lower, interval.upper, _FIRST_CELLS + 1)
+    inside = knots[(knots > interval.lower) & (knots < interval.upper)]
+    return np.unique(np.concatenate([[interval.lower], inside, [interval.upper]]))
+
+
+def _resolved(curve: Curve, s: Array, neighbours: int) -> tuple[Array, Array]:
+    """The ends of the cells, cut until the tangent turns little over each, and its turn [rad] there."""
+    tangent, turn = _tangents(curve, s), np.zeros(len(s) - 1)
+    narrowest, cells = _NARROWEST * (s[-1] - s[0]), np.arange(len(s) - 1)
+    while cells.size:
+        share = 0.3 + 0.4 * np.modf(_GOLDEN * np.arange(1, len(cells) + 1))[0]
+        middle = s[cells] + share * (s[cells + 1] - s[cells])
+        between = _tangents(curve, middle)
+        turn[cells] = _angle(tangent[cells], between) + _angle(between, tangent[cells + 1])
+        chosen = _widened(turn[cells] > _MAX_TURN, neighbours) & (s[cells + 1] - s[cells] > narrowest)
+        chosen = _worst(chosen, turn[cells], _MAX_CELLS - len(turn))
+        cut = cells[chosen]
+        s, tangent = np.insert(s, cut + 1, middle[chosen]), np.insert(tangent, cut + 1, between[chosen], axis=0)
+        turn = np.insert(turn, cut + 1, turn[cut])
+        halves = cut + np.arange(len(cut))
+        cells = np.stack([halves, halves + 1], axis=-1).reshape(-1)
+    return s, turn
+
+
+def _widened(chosen: Array, neighbours: int) -> Array:
+    """``chosen`` and so many to either side of it."""
+    return np.convolve(chosen, np.ones(2 * neighbours + 1), "same")[: len(chosen)] > 0.5 if neighbours else chosen
+
+
+def _worst(chosen: Array, turn: Array, room: int) -> Array:
+    """``chosen``, or those of it that turn most where there is no ``room`` for all."""
+    index = np.flatnonzero(chosen)
+    return np.sort(index[np.argsort(-turn[index], kind="stable")[: max(room, 0)]])
+
+
+def _points(curve: Curve, s: Array) -> Array:
+    p = _by_blocks(curve.p, s)
+    if not np.isfinite(p).all():
+        i = int(np.argmax(~np.isfinite(p).all(-1)))
+        raise TaskError(f"the path is {p[i].tolist()} at s = {s[i]:g}, expected finite numbers on the whole domain")
+    return p
+
+
+def _tangents(curve: Curve, s: Array) -> Array:
+    dp = _by_blocks(curve.dp, s)
+    return dp / np.maximum(np.linalg.norm(dp, axis=-1, keepdims=True), np.finfo(float).tiny)
+
+
+def _by_blocks(function: Callable[[Array], Array], s: Array) -> Array:
+    return np.concatenate([function(s[i : i + _BLOCK]) for i in range(0, len(s), _BLOCK)])
+
+
+def _angle(a: Array, b: Array) -> Array:
+    """Angle between unit vectors [rad], (*batch,)."""
+    return 2 * np.arcsin(np.minimum(np.linalg.norm(a - b, axis=-1) / 2, 1.0))

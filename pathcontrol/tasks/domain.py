@@ -1,0 +1,46 @@
+"""What a task given from outside says beside its path: its domain, and one of speed and profile."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import as_array, scalar
+from pathcontrol.errors import InputError
+from pathcontrol.tasks.base import PathTask
+
+
+def take_domain(task: PathTask, s0: Any, s_end: Any, period: Any) -> None:
+    """Set s0, s_end and period of ``task``; anything that is a number will do, 2π of sympy too.
+
+    Raises:
+        InputError: the domain is empty, begins at infinity, or both ends and repeats.
+    """
+    task.s0 = scalar("s0", s0)
+    if period is not None:
+        task.period = scalar("period", period, positive=True)
+    end = as_array("s_end", s_end)
+    if end.ndim != 0 or not end > task.s0:
+        raise InputError(f"s0 = {task.s0:g} and s_end = {s_end}, expected a number s_end > s0")
+    if end == np.inf:
+        return
+    task.s_end = float(end)
+    if task.period is not None:
+        raise InputError(
+            f"period = {task.period:g} and s_end = {task.s_end:g} are both given, expected one: a closed path has a "
+            "period and goes on for ever, an open one has an s_end"
+        )
+
+
+def refuse_two_rates(speed: Any, theta: Any) -> None:
+    """One of ``speed`` and ``theta`` says how fast the path is taken.
+
+    Raises:
+        InputError: both or none are given.
+    """
+    if (speed is None) == (theta is None):
+        both = "neither speed nor theta is" if speed is None else "speed and theta are both"
+        raise InputError(
+            f"{both} given, expected one: speed [rad/s] for a constant path speed, theta for a profile ϑ(s)"
+        )

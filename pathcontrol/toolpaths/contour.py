@@ -1,0 +1,170 @@
+"""Contours and the toolpath they make up, in the order and at the feed a file gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol.errors import InputError
+from pathcontrol.toolpaths.segments import Polyline, Segment
+
+_MEET = 1e-9  # m, how near the ends of neighbouring segments are
+
+
+@dataclass(frozen=True, eq=False)
+class Contour:
+    """Segments one after another, the tool's way without lifting it [m].
+
+    Attributes:
+        segments: the pieces; each begins where the one before ends.
+        closed: whether the last ends where the first begins.
+        feed: speed of the tool [m/s], or None where the file gives none.
+        rapid: a positioning move, not a cut.
+        name: what the file calls it: a layer, an id, a line number.
+        normals: tool axes given with the points of the only segment, a polyline: unit vectors (k + 1, 3), or None.
+    """
+
+    segments: tuple[Segment, ...]
+    closed: bool = False
+    feed: float | None = None
+    rapid: bool = False
+    name: str = ""
+    normals: Array | None = None
+
+    def __post_init__(self) -> None:
+        if not self.segments:
+            raise InputError("a contour needs at least one segment")
+        if self.feed is not None and not 0 < self.feed < np.inf:
+            raise InputError(f"feed = {self.feed!r} m/s, expected a number greater than 0, or None")
+        ends, starts = self._ends
+        gap = np.linalg.norm(ends[:-1] - starts[1:], axis=-1).max(initial=0.0)
+        if self.closed:
+            gap = max(gap, float(np.linalg.norm(ends[-1] - starts[0])))
+        if gap > _MEET * (1 + np.abs(starts).max()):
+            raise InputError(f"the segments of contour {self.name!r} do not meet: there is a gap of {gap:g} m")
+
+    @property
+    def length(self) -> float:
+        """Arc length [m]."""
+        return sum(segment.length for segment in self.segments)
+
+    @property
+    def start(self) -> Array:
+        """First point [m], (3,)."""
+        return self._ends[1][0]
+
+    @property
+    def end(self) -> Array:
+        """Last point [m], (3,)."""
+        return self._ends[0][-1]
+
+    @property
+    def points(self) -> int:
+        """Number of points that delimit the segments and the edges of polylines."""
+        return 1 + sum(len(s.edges) if isinstance(s, Polyline) else 1 for s in self.segments)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper corner of the bounding box [m], each (3,)."""
+        lower, upper = zip(*(segment.bounds for segment in self.segments), strict=True)
+        return np.min(lower, axis=0), np.max(upper, axis=0)
+
+    def distance(self, x: ArrayLike) -> Array:
+        """Distance from points x (*batch, 3) to the contour [m], (*batch,)."""
+        x = as_array("x", x)
+        flat = x.reshape(-1, 3)
+        best = np.full(len(flat), np.inf)
+        boxes = np.stack([_to_box(flat, *segment.bounds) for segment in self.segments])
+        for rank in np.argsort(boxes.min(1)):
+            near = boxes[rank] < best
+            if near.any():
+                best[near] = np.minimum(best[near], self.segments[rank].distance(flat[near]))
+        return best.reshape(x.shape[:-1])
+
+    def placed(self, pose: ArrayLike) -> Contour:
+        """The contour moved from the workpiece's frame by a homogeneous transform (4, 4)."""
+        transform = rigid("pose", pose)
+        normals = None if self.normals is None else self.normals @ transform[:3, :3].T
+        return replace(self, segments=tuple(s.placed(transform) for s in self.segments), normals=normals)
+
+    def reversed(self) -> Contour:
+        """The contour from its end to its start."""
+        normals = None if self.normals is None else self.normals[::-1]
+        return replace(self, segments=tuple(s.reversed() for s in self.segments[::-1]), normals=normals)
+
+    @cached_property
+    def _ends(self) -> tuple[Array, Array]:
+        """Last and first points of the segments, each (k, 3)."""
+        ends = np.array([s.point(np.array(1.0)) for s in self.segments])
+        return ends, np.array([s.point(np.array(0.0)) for s in self.segments])
+
+
+@dataclass(frozen=True, eq=False)
+class Toolpath:
+    """The contours of a file [m], in its order; iterating goes through them.
+
+    Attributes:
+        contours: cuts and rapids.
+        source: the file they come from.
+        unit: the file's unit of length, as it is called there: ``"mm"``, ``"in"``, …
+    """
+
+    contours: tuple[Contour, ...]
+    source: str = ""
+    unit: str = "m"
+
+    def __post_init__(self) -> None:
+        if not self.contours:
+            raise InputError(f"there is no contour in {self.source or 'this toolpath'}")
+
+    def __iter__(self) -> Iterator[Contour]:
+        return iter(self.contours)
+
+    def __len__(self) -> int:
+        return len(self.contours)
+
+    def __getitem__(self, index: int) -> Contour:
+        return self.contours[index]
+
+    @property
+    def cuts(self) -> tuple[Contour, ...]:
+        """The contours that are no rapids."""
+        return tuple(contour for contour in self.contours if not contour.rapid)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper corner of the bounding box [m], each (3,)."""
+        lower, upper = zip(*(contour.bounds for contour in self.contours), strict=True)
+        return np.min(lower, axis=0), np.max(upper, axis=0)
+
+    def placed(self, pose: ArrayLike) -> Toolpath:
+        """The toolpath moved from the workpiece's frame into the robot's base frame by a transform (4, 4)."""
+        return replace(self, contours=tuple(contour.placed(pose) for contour in self.contours))
+
+    def distance(self, x: ArrayLike, contours: Sequence[Contour] | None = None) -> Array:
+        """Distance from points x (*batch, 3) to the nearest of the contours, by default of the cuts [m], (*batch,)."""
+        chosen = self.cuts if contours is None else contours
+        return np.min([contour.distance(x) for contour in chosen], axis=0)
+
+
+def rigid(name: str, pose: ArrayLike) -> Array:
+    """``pose`` as a homogeneous transform (4, 4) whose rotation is one; errors name it."""
+    transform = finite(name, as_array(name, pose))
+    if transform.shape != (4, 4):
+        raise InputError(f"{name} has shape {transform.shape}, expected (4, 4), a homogeneous transform")
+    turn = transform[:3, :3]
+    proper = np.allclose(turn @ turn.T, np.eye(3), atol=1e-9) and np.linalg.det(turn) > 0
+    if not proper or not np.allclose(transform[3], [0, 0, 0, 1]):
+        raise InputError(f"{name} is no rigid motion: its rotation is not orthonormal, or its last row not 0 0 0 1")
+    return readonly(transform)
+
+
+def _to_box(x: Array, lower: Array, upper: Array) -> Array:
+    """Distance from x (N, 3) to a box [m], (N,), rounded down a little: bounds of curves are sampled."""
+    outside = np.linalg.norm(np.maximum(np.maximum(lower - x, x - upper), 0.0), axis=-1)
+    return outside - 1e-5 * float(np.linalg.norm(upper - lower))

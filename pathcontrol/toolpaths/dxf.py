@@ -1,0 +1,157 @@
+"""Reader of DXF drawings.
+
+ezdxf reads the file; the geometry is worked out here, so that curves stay exact under any block transform, and what
+ezdxf would fill in, such as a missing radius or the unit of a file without header, is asked for instead of guessed.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array, scalar
+from pathcontrol.errors import InputError, ToolpathError, UnknownNameError
+from pathcontrol.toolpaths.contour import Contour, Toolpath
+from pathcontrol.toolpaths.dxf_blocks import Entities
+from pathcontrol.toolpaths.dxf_chain import Strand, chained
+from pathcontrol.toolpaths.dxf_entities import pieces
+from pathcontrol.toolpaths.dxf_layers import Layers
+from pathcontrol.toolpaths.pieces import contour_of
+from pathcontrol.toolpaths.segments import Polyline, Segment
+from pathcontrol.toolpaths.text import MAX_SEGMENTS, read_text
+
+#: units of length by name [m]
+UNITS = {
+    "m": 1.0,
+    "dm": 0.1,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "nm": 1e-9,
+    "km": 1e3,
+    "in": 0.0254,
+    "ft": 0.3048,
+    "yd": 0.9144,
+    "mil": 2.54e-5,
+    "uin": 2.54e-8,
+}
+_BY_CODE = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 8: "uin", 9: "mil", 10: "yd"}
+_BY_CODE |= {12: "nm", 13: "um", 14: "dm"}
+_MOST_LINES, _LONGEST_LINE, _MOST_ENTITIES = 5_000_000, 100_000, 500_000
+
+
+def read_dxf(
+    path: str | os.PathLike[str],
+    unit: str | None = None,
+    layers: str | Sequence[str] | None = None,
+    feed: float | None = None,
+) -> Toolpath:
+    """The contours of a DXF drawing's modelspace, in its order.
+
+    LINE, ARC, CIRCLE, ELLIPSE, LWPOLYLINE, POLYLINE, SPLINE and HELIX are read, and the blocks that INSERT places.
+    Splines become exact Bézier curves, bulges arcs. Loose curves of one layer that meet end to end, within 1 µm or
+    0.01 % of the drawing's diagonal if that is less, are chained into one contour, in the place and direction of the
+    first of them; where more than two meet, chains end. Widths, colours and line types are not looked at.
+
+    Args:
+        path: the file.
+        unit: unit of its lengths: m, dm, cm, mm, um, nm, km, in, ft, yd, mil or uin; by default the one that the file
+            names ($INSUNITS). It is never guessed.
+        layers: which layers to read; by default all that are neither off nor frozen.
+        feed: speed of the tool [m/s] along all contours, or None: DXF has none.
+
+    Raises:
+        ToolpathError: the file is no DXF drawing, names no unit, or holds what cannot be cut on the layers read: text,
+            hatches, dimensions, solids. The message says which, and on which layers.
+        UnknownNameError: there is no such unit or layer.
+        InputError: ``feed`` is not greater than 0.
+    """
+    if feed is not None:
+        scalar("feed", feed, positive=True)
+    source = os.fspath(path)
+    text = read_text(path, "a DXF drawing")
+    document = _loaded(source, text)
+    unit = _unit(source, unit, document.units if "$INSUNITS" in text else 0)
+    found = Layers(document, [layers] if isinstance(layers, str) else layers)
+    entities = Entities(source, document, found.frozen)
+    strands = _strands(source, entities, found, np.diag([UNITS[unit]] * 3 + [1.0]))
+    if not strands:
+        raise ToolpathError(f"{source} draws no outline on the layers read; its layers are {found.listed}")
+    return Toolpath(tuple(_contour(source, strand, feed) for strand in chained(strands)), source, unit)
+
+
+def _loaded(source: str, text: str) -> Any:
+    """The drawing, if it is small enough for ezdxf to read it in bounded time and memory."""
+    from ezdxf.filemanagement import read
+
+    lines = text.split("\n")
+    entities = sum(line.strip() == "0" for line in lines[::2])  # of pairs of lines, the first says what the second is
+    if len(lines) > _MOST_LINES or entities > _MOST_ENTITIES:
+        raise ToolpathError(
+            f"{source} has {len(lines)} lines and {entities} entities, expected at most {_MOST_LINES} and "
+            f"{_MOST_ENTITIES}; split it into several files"
+        )
+    if max(map(len, lines)) > _LONGEST_LINE:
+        raise ToolpathError(f"{source} has a line of more than {_LONGEST_LINE} characters; is it a DXF drawing?")
+    try:
+        return read(io.StringIO(text))
+    except Exception as error:  # ezdxf raises whatever its parts raise on a malformed file
+        raise ToolpathError(f"{source} is no DXF drawing that can be read: {error}; save it again as DXF") from error
+
+
+def _unit(source: str, unit: str | None, code: int) -> str:
+    """The unit's name, from the argument or else the file's $INSUNITS."""
+    known = ", ".join(UNITS)
+    if unit is not None:
+        if unit not in UNITS:
+            raise UnknownNameError(f"unit = {unit!r}, expected one of {known}")
+        return unit
+    if code not in _BY_CODE:
+        reason = f"a unit that is not known ($INSUNITS = {code})" if code else "no unit of length"
+        raise ToolpathError(f"{source} names {reason}; give it: unit= one of {known}")
+    return _BY_CODE[code]
+
+
+def _strands(source: str, entities: Entities, layers: Layers, scale: Array) -> list[Strand]:
+    """What each entity draws that has a length [m]."""
+    strands: list[Strand] = []
+    refused: Counter[tuple[str, str]] = Counter()
+    points = 0
+    for entity, layer, matrix in entities:
+        if not layers.read(layer):
+            continue
+        with entities.at(entity, layer):
+            segments = _segments(entity, scale @ matrix)
+        if segments is None:
+            refused[entity.dxftype(), layer] += 1
+        elif segments:
+            name = f"{layer}: {entity.dxftype()} {entity.dxf.get('handle') or ''}".strip()
+            strands.append(Strand(name, layer.lower(), len(strands), segments))
+            points += sum(len(s.points) if isinstance(s, Polyline) else 1 for s in segments)
+        if points > MAX_SEGMENTS:
+            raise ToolpathError(f"{source} has more than {MAX_SEGMENTS} segments; split it into several files")
+    if refused:
+        what = ", ".join(f"{count} {kind} on layer {layer!r}" for (kind, layer), count in refused.most_common(8))
+        raise ToolpathError(
+            f"{source} holds what cannot be cut: {what}; take it away, or choose layers= without it of {layers.listed}"
+        )
+    return strands
+
+
+def _contour(source: str, strand: Strand, feed: float | None) -> Contour:
+    try:
+        return contour_of(strand.segments, feed, strand.name)
+    except InputError as error:
+        raise ToolpathError(f"{source}, {strand.name}: {error}") from error
+
+
+def _segments(entity: Any, matrix: Array) -> list[Segment] | None:
+    found = pieces(entity)
+    if found is None:
+        return None
+    return [segment for piece in found for segment in piece.mapped(matrix).segments()]

@@ -1,0 +1,64 @@
+"""Values of DXF entities, checked, and their coordinate systems."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import ToolpathError
+
+
+def common(entity: Any, name: str, default: Any) -> Any:
+    """What all entities have, such as a layer, also of those that ezdxf does not know."""
+    if entity.dxf.is_supported(name):
+        return entity.dxf.get(name, default)
+    known: dict[str, Any] = entity.graphic_properties() if hasattr(entity, "graphic_properties") else {}
+    return known.get(name, default)
+
+
+def layer_of(entity: Any) -> str:
+    """Name of an entity's layer, ``"0"`` where it has none."""
+    return str(common(entity, "layer", "0"))
+
+
+def given(entity: Any, *names: str) -> None:
+    """An error for what the file leaves out, which would otherwise be read as a default."""
+    missing = [name for name in names if not entity.dxf.hasattr(name)]
+    if missing:
+        raise ToolpathError(f"it has no {' and no '.join(missing)}")
+
+
+def number(entity: Any, name: str) -> float:
+    """A number of an entity, which the file gives or the format has a default for."""
+    value = entity.dxf.get_default(name)
+    if value is None or not np.isfinite(value):
+        raise ToolpathError(f"its {name} is {value}, expected a finite number")
+    return float(value)
+
+
+def vector(entity: Any, name: str) -> Array:
+    """A point or direction of an entity, (3,)."""
+    value = entity.dxf.get_default(name)
+    if value is None or not np.isfinite(tuple(value)).all():
+        raise ToolpathError(f"its {name} is {value}, expected finite coordinates")
+    return np.array(tuple(value), dtype=np.float64)
+
+
+def object_axes(entity: Any) -> Array:
+    """Axes of the object coordinate system in world coordinates, as columns (3, 3): the arbitrary axis algorithm."""
+    normal = vector(entity, "extrusion")
+    size = np.linalg.norm(normal)
+    if not 0 < size < np.inf:
+        raise ToolpathError(f"its extrusion is {normal.tolist()}, expected a direction")
+    z = normal / size
+    helper = [0.0, 1.0, 0.0] if max(abs(z[0]), abs(z[1])) < 1 / 64 else [0.0, 0.0, 1.0]
+    x = np.cross(helper, z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def in_space(plane: Array) -> Array:
+    """Complex numbers x + iy as points (k, 3) with z = 0."""
+    return np.column_stack([plane.real, plane.imag, np.zeros(len(plane))])

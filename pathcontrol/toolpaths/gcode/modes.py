@@ -1,0 +1,69 @@
+"""The modal state of a G-code program: what stays in force until something else is said."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pathcontrol.errors import ToolpathError
+from pathcontrol.toolpaths.gcode.units import UNITS, Unit
+from pathcontrol.toolpaths.gcode.words import Block
+from pathcontrol.toolpaths.text import MAX_COORDINATE
+
+_UNIT_CODES = {200: UNITS["in"], 210: UNITS["mm"]}
+
+
+@dataclass
+class Modes:
+    """The modes in force, at the beginning those of RS274/NGC; unit, motion and feed are what the program says first.
+
+    Attributes:
+        unit: unit of length, G20 or G21.
+        motion: code of the motion times ten, G0 to G3, or None after G80.
+        feed: F [m/s].
+        plane: code of the plane of arcs times ten, G17 to G19.
+        absolute: whether coordinates are absolute, G90, and not relative to where the tool is, G91.
+        absolute_centers: whether centres of arcs are absolute, G90.1, and not relative to the start, G91.1.
+    """
+
+    unit: Unit | None = None
+    motion: int | None = None
+    feed: float | None = None
+    plane: int = 170
+    absolute: bool = True
+    absolute_centers: bool = False
+
+    def update(self, block: Block, codes: dict[str, int]) -> None:
+        """Put into force what the block says, given its code of each group."""
+        before = self.unit
+        self.unit = _UNIT_CODES[codes["unit"]] if "unit" in codes else before
+        if "F" in block.words:
+            if before not in (None, self.unit):
+                raise ToolpathError("F where the unit changes is another feed on other machines: give it its own line")
+            self.feed = self.length("F", block.words["F"]) / 60
+            if not 0 < self.feed < math.inf:
+                raise ToolpathError(f"F{block.words['F']:g} is no feed, expected a number greater than 0")
+        self.motion = codes.get("motion", None if "end of motion" in codes else self.motion)
+        self.plane = codes.get("plane", self.plane)
+        self.absolute = codes.get("distance", 900 if self.absolute else 910) == 900
+        self.absolute_centers = codes.get("arc centre", 901 if self.absolute_centers else 911) == 901
+
+    def length(self, letter: str, value: float) -> float:
+        """The value of a word [m]."""
+        return value * self.known_unit(f"{letter}{value:g}").scale
+
+    def known_unit(self, needed_by: str) -> Unit:
+        """The unit in force, which must be known by now."""
+        if self.unit is None:
+            raise ToolpathError(
+                f"{needed_by} has no unit: write G20, inches, or G21, millimetres, before it, or read the file with "
+                "unit='mm' or unit='in'"
+            )
+        return self.unit
+
+    def coordinate(self, letter: str, value: float, here: float) -> float:
+        """Where the value of an axis word leads on that axis from ``here`` [m]."""
+        target = self.length(letter, value) + (0.0 if self.absolute else here)
+        if abs(target) > MAX_COORDINATE:
+            raise ToolpathError(f"{letter}{value:g} leads further than {MAX_COORDINATE:g} m from the origin")
+        return target

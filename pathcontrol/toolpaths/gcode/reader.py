@@ -1,0 +1,90 @@
+"""Tool paths from G-code files."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import as_array, finite
+from pathcontrol.errors import InputError, ToolpathError
+from pathcontrol.toolpaths.contour import Toolpath
+from pathcontrol.toolpaths.gcode.program import Program
+from pathcontrol.toolpaths.gcode.units import UNITS
+from pathcontrol.toolpaths.gcode.words import PERCENT, PROGRAM_NAME, parse, without_comments
+from pathcontrol.toolpaths.text import MAX_COORDINATE, read_lines
+
+
+def read_gcode(path: str | os.PathLike[str], unit: str | None = None, start: ArrayLike | None = None) -> Toolpath:
+    """Contours from a G-code program, RS274/NGC as LinuxCNC and most CAM programs write it.
+
+    Cuts (G1, G2 and G3, one after another, at one feed) and rapids (G0, straight) are contours, called by their first
+    line: ``"N20"``, or ``"line 14"`` where it has no number. What is not understood is refused, never guessed.
+
+    - Motion: G0, G1, and the arcs G2 and G3 by I J K or R, helices too, in the planes of G17, G18 and G19.
+    - Modes: G20 inch, G21 mm; G90 absolute, G91 relative; G90.1 and G91.1, the same for centres; G80 no motion; G94,
+      F is per minute. At the beginning G17, G90 and G91.1 are in force.
+    - No effect here: G4 P, G40, G43, G49, G54, G61, G61.1, G64, G97, M0, M1, M3-M9, S, T, comments, line numbers,
+      program numbers and %. The coordinates are those of the tool's tip in one workpiece frame.
+    - M2, M30 and the second % end the program; what follows is not read.
+    - Where the tool is at the beginning is in no program. An axis is known once the program gives it absolutely; rapids
+      before that are left out, cuts refused. An axis that is named nowhere is 0. After G28, G30 and G53 G0 the axes are
+      unknown again.
+
+    Args:
+        path: the file.
+        unit: ``"mm"`` or ``"in"``, the unit before the program says G20 or G21; by default it must say it.
+        start: where the tool is before the first move [m], (3,); by default that is not known.
+
+    Raises:
+        InputError: ``path``, ``unit`` or ``start`` is none.
+        ToolpathError: the file cannot be used; the message says in which line and why.
+    """
+    if unit is not None and unit not in UNITS:
+        raise InputError(f"unit = {unit!r}, expected one of {', '.join(UNITS)}, or None")
+    texts = [without_comments(line) for line in read_lines(path, "a G-code program")]
+    program = Program(None if unit is None else UNITS[unit], _start(start, texts))
+    try:
+        _run(program, texts)
+        contours = program.strokes.contours()
+        if not contours:
+            raise ToolpathError("there is no move in it between places that it gives, expected G0, G1, G2 or G3")
+    except ToolpathError as error:
+        raise ToolpathError(f"{os.fspath(path)}: {error}") from None
+    return Toolpath(contours, os.fspath(path), program.modes.known_unit("the program").name)
+
+
+def _start(start: ArrayLike | None, texts: list[str]) -> list[float]:
+    """Position before the first move, NaN where it is not known."""
+    if start is None:
+        named = [any(axis in text or axis.lower() in text for text in texts) for axis in "XYZ"]
+        return [math.nan if known else 0.0 for known in named]
+    position = finite("start", as_array("start", start))
+    if position.shape != (3,):
+        raise InputError(f"start has shape {position.shape}, expected (3,)")
+    if np.abs(position).max() > MAX_COORDINATE:
+        raise InputError(f"start = {position.tolist()} m is further than {MAX_COORDINATE:g} m from the origin")
+    return position.tolist()
+
+
+def _run(program: Program, texts: Sequence[str]) -> None:
+    """Carry out the lines, each an error by its number, until the program ends."""
+    began = False
+    for number, text in enumerate((text.strip(" \t") for text in texts), 1):
+        try:
+            if PERCENT.fullmatch(text):
+                if began:
+                    return
+            elif PROGRAM_NAME.fullmatch(text):
+                if began:
+                    raise ToolpathError("a second program begins before the first ended with M2, M30 or %")
+            elif text:
+                began = True
+                block = parse(text)
+                if not program.carry_out(block, block.label or f"line {number}"):
+                    return
+        except ToolpathError as error:
+            raise ToolpathError(f"line {number}: {error}") from None

@@ -1,0 +1,49 @@
+"""Moves one after another made into contours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pathcontrol.errors import ToolpathError
+from pathcontrol.toolpaths.arc import Arc
+from pathcontrol.toolpaths.builder import ContourBuilder
+from pathcontrol.toolpaths.contour import Contour
+from pathcontrol.toolpaths.text import MAX_SEGMENTS
+
+
+class Strokes:
+    """Contours of moves that follow each other at one feed, or as rapids."""
+
+    def __init__(self) -> None:
+        self._contours: list[Contour] = []
+        self._builder: ContourBuilder | None = None
+        self._feed: float | None = None
+        self._name = ""
+        self._moves = 0
+
+    def move(self, start: Sequence[float], way: Sequence[float] | Arc, feed: float | None, name: str) -> None:
+        """Go from ``start`` [m], (3,), along an arc or straight to a point at ``feed`` [m/s], or None for a rapid."""
+        self._moves += 1
+        if self._moves > MAX_SEGMENTS:
+            raise ToolpathError(f"more than {MAX_SEGMENTS} moves; split the program")
+        if self._builder is None or feed != self._feed:
+            self.end()
+            self._builder, self._feed = ContourBuilder(start), feed
+        if self._builder.empty:
+            self._name = name
+        if isinstance(way, Arc):
+            self._builder.add(way)
+        else:
+            self._builder.line_to(way)
+
+    def end(self) -> None:
+        """The next move begins a new contour."""
+        if self._builder is not None and not self._builder.empty:
+            rapid = self._feed is None
+            self._contours.append(self._builder.contour(feed=self._feed, rapid=rapid, name=self._name))
+        self._builder = None
+
+    def contours(self) -> tuple[Contour, ...]:
+        """All contours, in order."""
+        self.end()
+        return tuple(self._contours)

@@ -1,0 +1,67 @@
+"""Arc length of a curve, and the way back from it to the curve's own parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array
+
+_FIRST_CELLS = 8
+_NARROWEST = 2.0**-40
+_ACCURACY = 1e-13  # of the length, in each cell
+_NEWTON_STEPS = 64  # where the speed vanishes Newton's method begins by halving
+_SMALLEST = np.finfo(float).tiny
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+
+
+class ArcLength:
+    """s(u) = ∫₀ᵘ ‖dp/du‖ du [m] for u ∈ [0, 1], by Gauss–Legendre quadrature in cells small enough for it.
+
+    Args:
+        speed: ‖dp/du‖ [m] at u (*batch,).
+    """
+
+    def __init__(self, speed: Callable[[Array], Array]) -> None:
+        self._speed = speed
+        self._u, lengths = _cells(speed)
+        self._s = np.concatenate([[0.0], np.cumsum(lengths)])
+
+    @property
+    def total(self) -> float:
+        """s(1) [m]."""
+        return float(self._s[-1])
+
+    def parameter(self, s: ArrayLike) -> Array:
+        """The u at which the arc length is s (*batch,) [m]."""
+        s = np.asarray(s, dtype=np.float64)
+        cell = np.clip(np.searchsorted(self._s, s, side="right") - 1, 0, len(self._u) - 2)
+        left, right, wanted = self._u[cell], self._u[cell + 1], s - self._s[cell]
+        u = left + (right - left) * np.clip(wanted / np.maximum(self._s[cell + 1] - self._s[cell], _SMALLEST), 0, 1)
+        for _ in range(_NEWTON_STEPS):
+            error = _integral(self._speed, left, u) - wanted
+            if (np.abs(error) <= 1e-15 * self.total).all():
+                break
+            u = np.clip(u - error / np.maximum(self._speed(u), _SMALLEST), left, right)
+        return u
+
+
+def _cells(speed: Callable[[Array], Array]) -> tuple[Array, Array]:
+    """Ends of cells over which the quadrature is accurate (k + 1,), and the length over each [m], (k,)."""
+    u = np.linspace(0.0, 1.0, _FIRST_CELLS + 1)
+    while True:
+        middle = 0.5 * (u[:-1] + u[1:])
+        whole = _integral(speed, u[:-1], u[1:])
+        halves = _integral(speed, u[:-1], middle) + _integral(speed, middle, u[1:])
+        coarse = (np.abs(halves - whole) > _ACCURACY * halves.sum()) & (np.diff(u) > _NARROWEST)
+        if not coarse.any():
+            return u, whole
+        u = np.sort(np.concatenate([u, middle[coarse]]))
+
+
+def _integral(speed: Callable[[Array], Array], a: Array, b: Array) -> Array:
+    """∫ₐᵇ speed(u) du for each a and b (*batch,)."""
+    half = 0.5 * (b - a)[..., None]
+    return (speed(0.5 * (a + b)[..., None] + half * _NODES) * _WEIGHTS * half).sum(-1)

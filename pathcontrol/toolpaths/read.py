@@ -1,0 +1,52 @@
+"""A toolpath from a file of any kind that there is a reader for."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from pathcontrol.errors import InputError, ToolpathError
+from pathcontrol.toolpaths.contour import Toolpath
+
+#: readers by the end of a file's name: the module of this package, and the function in it
+READERS = {
+    (".csv", ".tsv", ".txt", ".xyz"): ("points", "read_csv"),
+    (".ngc", ".nc", ".gcode", ".gc", ".tap", ".cnc"): ("gcode", "read_gcode"),
+    (".svg",): ("svg", "read_svg"),
+    (".dxf",): ("dxf", "read_dxf"),
+}
+
+
+def read_toolpath(path: str | Path, **options: Any) -> Toolpath:
+    """The contours of a file: CSV, G-code, SVG or DXF, by the end of its name.
+
+    Args:
+        path: the file.
+        options: what the reader for such files takes besides: :func:`read_csv` ``unit`` and ``feed``,
+            :func:`read_gcode` ``unit`` and ``start``, :func:`read_svg` ``ppi`` and ``feed``, :func:`read_dxf` ``unit``,
+            ``layers`` and ``feed``.
+
+    Raises:
+        ToolpathError: no reader knows such files, or the file cannot be used; the message says where and why.
+        InputError: the reader has no such option.
+    """
+    reader = _reader(Path(path))
+    known = [name for name in inspect.signature(reader).parameters if name != "path"]
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        takes = ", ".join(known) or "no options"
+        raise InputError(
+            f"{Path(path).name!r} is read by {reader.__name__}, which takes {takes}, not {', '.join(unknown)}"
+        )
+    return reader(path, **options)
+
+
+def _reader(path: Path) -> Callable[..., Toolpath]:
+    for suffixes, (module, name) in READERS.items():
+        if path.suffix.lower() in suffixes:
+            return getattr(import_module(f"pathcontrol.toolpaths.{module}"), name)
+    known = ", ".join(suffix for suffixes in READERS for suffix in suffixes)
+    raise ToolpathError(f"{str(path)!r} ends in {path.suffix or 'nothing'!r}, expected one of {known}")

@@ -1,0 +1,103 @@
+"""SVG documents: parsed without reading anything but the file, and looked things up in."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from pathcontrol.errors import InputError, ToolpathError
+from pathcontrol.toolpaths.svg_shapes import Attributes
+from pathcontrol.toolpaths.svg_style import StyleSheet
+from pathcontrol.toolpaths.text import read_text
+
+_NAMESPACES = ("", "http://www.w3.org/2000/svg")
+_HREF = ("href", "{http://www.w3.org/1999/xlink}href")
+
+
+class Document:
+    """An SVG file.
+
+    Attributes:
+        path: its name, for errors.
+        root: the outermost element.
+
+    Raises:
+        ToolpathError: it cannot be read, is no SVG, or defines entities.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        text = read_text(path, "an SVG drawing")
+        self.path = os.fspath(path)
+        self.root = self._parsed(text)
+        self._targets: dict[str, Any] = {}
+        self._sheet = StyleSheet()
+        self._styles: dict[Any, dict[str, str]] = {}
+        for element in self.root.iter("*"):
+            if element.get("id") is not None:
+                self._targets.setdefault(element.get("id"), element)
+            if tag_of(element) == "style" and element.get("type") in (None, "", "text/css"):
+                with self.at(element):
+                    self._sheet.add(_rules(element))
+
+    @contextmanager
+    def at(self, element: Any) -> Iterator[None]:
+        """Errors inside say at which element they arose."""
+        try:
+            yield
+        except (InputError, ToolpathError) as error:
+            identity = element.get("id")
+            label = tag_of(element) if identity is None else f"{tag_of(element)} {identity!r}"
+            raise ToolpathError(f"{self.path}, line {element.sourceline}, {label}: {error}") from error
+
+    def style(self, element: Any) -> dict[str, str]:
+        """The properties of an element that have a say in the geometry."""
+        if element not in self._styles:
+            self._styles[element] = self._sheet.of(element, tag_of(element) or "")
+        return self._styles[element]
+
+    def attributes(self, element: Any) -> Attributes:
+        """Its attributes, or what its style gives instead."""
+        style = self.style(element)
+        return lambda name: style.get(name, element.get(name))
+
+    def target(self, element: Any) -> Any:
+        """The element that a use element refers to."""
+        link = next((element.get(name) for name in _HREF if element.get(name) is not None), "")
+        if link.startswith("#") and link[1:] in self._targets:
+            return self._targets[link[1:]]
+        raise ToolpathError(f"it refers to {link[:60]!r}, expected # and the id of an element in this file")
+
+    def _parsed(self, text: str) -> Any:
+        from lxml import etree
+
+        entity = text.find("<!ENTITY")
+        if entity >= 0:
+            line = text.count("\n", 0, entity) + 1
+            raise ToolpathError(
+                f"{self.path}, line {line}: definitions of entities are refused; save the drawing as plain SVG"
+            )
+        parser = etree.XMLParser(encoding="utf-8", resolve_entities=False, no_network=True, load_dtd=False)
+        try:
+            root = etree.fromstring(text.encode("utf-8", "replace"), parser)
+        except etree.XMLSyntaxError as error:
+            raise ToolpathError(f"{self.path} is no well-formed SVG drawing: {error}") from error
+        if tag_of(root) != "svg":
+            raise ToolpathError(f"{self.path} begins with the element {str(root.tag)[:60]!r}, expected svg")
+        if any(node.target == "xml-stylesheet" for node in root.itersiblings(etree.PI, preceding=True)):
+            raise ToolpathError(f"{self.path} has its style in another file, which is not fetched; write it in")
+        return root
+
+
+def tag_of(element: Any) -> str | None:
+    """The name of an SVG element; None for comments and for what other programs keep in the file."""
+    if not isinstance(element.tag, str):
+        return None
+    namespace, _, name = element.tag.removeprefix("{").rpartition("}")
+    return name if namespace in _NAMESPACES else None
+
+
+def _rules(element: Any) -> str:
+    text, media = "".join(element.itertext()), element.get("media") or "all"
+    return text if media in ("all", "screen") else f"@media {media} {{{text}}}"

@@ -1,0 +1,83 @@
+"""Text files of toolpaths, read within bounds: whatever the file is, reading it takes little time and memory."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from pathcontrol.errors import InputError, ToolpathError
+
+#: most segments, moves or points that a file may hold
+MAX_SEGMENTS = 2_000_000
+#: largest coordinate, radius or length [m]: what lies further is a mistake in the unit, or an attack
+MAX_COORDINATE = 1e4
+
+_MAX_BYTES = 64 << 20
+_MAX_LINES = 2 * MAX_SEGMENTS
+_MAX_LINE_LENGTH = 100_000
+
+
+def read_text(path: str | os.PathLike[str], what: str = "a toolpath") -> str:
+    r"""The text of a file, decoded from UTF-8, or from Latin-1 where it is none; lines end in ``\n``.
+
+    Args:
+        path: the file.
+        what: what is expected in it, for the errors: ``"a G-code file"``.
+
+    Raises:
+        InputError: ``path`` is no path.
+        ToolpathError: there is no such regular file, it cannot be read, is larger than 64 MiB, or holds NUL bytes.
+    """
+    data = _read_bytes(path, what)
+    if b"\0" in data:
+        raise ToolpathError(
+            f"{os.fspath(path)} holds NUL bytes and is no text, expected {what}; if it is UTF-16, save it as UTF-8"
+        )
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_lines(path: str | os.PathLike[str], what: str = "a toolpath") -> list[str]:
+    """The lines of a file as :func:`read_text` reads it, without their ends.
+
+    Raises:
+        InputError: ``path`` is no path.
+        ToolpathError: see :func:`read_text`; more than 4 000 000 lines, or more than 100 000 characters in one of them.
+    """
+    text = read_text(path, what)
+    if text.count("\n") > _MAX_LINES:
+        raise ToolpathError(f"{os.fspath(path)} has more than {_MAX_LINES} lines; split it into several files")
+    lines = text.split("\n")
+    for number, line in enumerate(lines, 1):
+        if len(line) > _MAX_LINE_LENGTH:
+            raise ToolpathError(
+                f"{os.fspath(path)}: line {number}: {len(line)} characters, expected at most {_MAX_LINE_LENGTH} in a "
+                f"line; is it {what}?"
+            )
+    return lines
+
+
+def _read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
+    try:
+        file = Path(path)
+    except TypeError as error:
+        raise InputError(f"path = {path!r}, expected the path of {what}") from error
+    data = None
+    try:
+        if stat.S_ISREG(file.stat().st_mode):  # a pipe or a device could be read for ever
+            with file.open("rb") as stream:
+                data = stream.read(_MAX_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise ToolpathError(f"{str(path)!r} cannot be read, expected {what}: {reason}") from error
+    if data is None:
+        raise ToolpathError(f"{path} is no regular file, expected {what}")
+    if len(data) > _MAX_BYTES:
+        raise ToolpathError(
+            f"{path} is larger than the {_MAX_BYTES >> 20} MiB that are read at most; split it into several files"
+        )
+    return data

@@ -1,0 +1,91 @@
+"""Figures of tool paths: what a file contains, and how near to it the tool came. Millimetres, where a person reads."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pathcontrol._arrays import Array
+from pathcontrol.toolpaths.contour import Contour, Toolpath
+from pathcontrol.toolpaths.corners import corners
+from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.view.style import BLUE, GREY, ORANGE, style
+
+_CURVE_SAMPLES = 64
+_MOST_POINTS = 200_000
+_MOST_NUMBERS = 40  # contours that are numbered
+_AXES = "xyz"
+
+
+def toolpath_figure(toolpath: Toolpath) -> Figure:
+    """The contours in order, seen against the axis along which they extend least: cuts, rapids, starts and corners."""
+    with style():
+        figure, (axes,), (i, j) = plan_figure(toolpath)
+        for contour in toolpath:
+            _draw(axes, contour, i, j)
+        _number(axes, toolpath, i, j)
+        bends = [corner.point for contour in toolpath.cuts for corner in corners(contour)]
+        if 0 < len(bends) <= _MOST_POINTS:
+            x, y = 1e3 * np.array(bends)[:, [i, j]].T
+            axes.plot(x, y, ".", color=ORANGE, markersize=3, label=f"corner ({len(bends)})")
+        _legend(figure, axes)
+    return figure
+
+
+def plan_figure(toolpath: Toolpath, extra: float = 0.0) -> tuple[Figure, list[Axes], tuple[int, int]]:
+    """An empty plan of a toolpath in millimetres, with axes ``extra`` inches high below it, and which axes it shows."""
+    lower, upper = toolpath.bounds
+    i, j = plane_axes(upper - lower)
+    width, height = np.maximum((upper - lower)[[i, j]], 1e-9)
+    tall = float(np.clip(4.6 * height / width, 1.2, 7.0))
+    figure = Figure(figsize=(5.2, 0.7 + tall + extra), layout="constrained")
+    parts = figure.add_gridspec(2 if extra else 1, 1, height_ratios=[tall, extra] if extra else None)
+    plan = figure.add_subplot(parts[0], aspect="equal")
+    plan.set(xlabel=f"{_AXES[i]} [mm]", ylabel=f"{_AXES[j]} [mm]")
+    return figure, [plan, *([figure.add_subplot(parts[1])] if extra else [])], (i, j)
+
+
+def plane_axes(extent: Array) -> tuple[int, int]:
+    """Indices of the two axes in which something extends most, in their order."""
+    i, j = sorted(np.argsort(-np.asarray(extent), kind="stable")[:2])
+    return int(i), int(j)
+
+
+def outline(contour: Contour) -> Array:
+    """Points of a contour [m], (k, 3), near enough for a picture."""
+    parts = []
+    for segment in contour.segments:
+        u = np.linspace(0.0, 1.0, _CURVE_SAMPLES + 1)
+        parts.append(segment.points if isinstance(segment, Polyline) else segment.point(u))
+    points = np.concatenate(parts)
+    return points[:: -(-len(points) // _MOST_POINTS)]
+
+
+def _draw(axes: Axes, contour: Contour, i: int, j: int) -> None:
+    x, y = 1e3 * outline(contour)[:, [i, j]].T
+    if contour.rapid:
+        axes.plot(x, y, color=GREY, linewidth=0.7, linestyle=(0, (4, 3)), label="rapid")
+    else:
+        axes.plot(x, y, color=BLUE, label="cut")
+
+
+def _number(axes: Axes, toolpath: Toolpath, i: int, j: int) -> None:
+    """Where each cut starts, numbered in the order of cutting; cuts that start at the same place share a label."""
+    starts = 1e3 * np.array([contour.start for contour in toolpath.cuts])[:, [i, j]]
+    if len(starts):
+        axes.plot(*starts.T, "o", color=BLUE, markersize=3.5, label="start of a cut")
+    if len(starts) > _MOST_NUMBERS:
+        return
+    labels: dict[tuple[float, ...], list[str]] = {}
+    for rank, start in enumerate(starts):
+        labels.setdefault(tuple(np.round(start, 3)), []).append(str(rank + 1))
+    for start, ranks in labels.items():
+        text, above = ", ".join(ranks), (4.0, 4.0)
+        axes.annotate(text, (start[0], start[1]), above, textcoords="offset points", color=BLUE, fontsize=8)
+
+
+def _legend(figure: Figure, axes: Axes) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    figure.legend(once.values(), once.keys(), loc="outside upper center", ncols=4, handlelength=1.6)

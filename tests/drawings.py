@@ -1,0 +1,52 @@
+"""Drawings for the tests of the SVG and DXF readers, and what their contours consist of."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from pathcontrol.toolpaths.contour import Contour
+from pathcontrol.toolpaths.segments import Polyline
+
+U = np.linspace(0.0, 1.0, 9)
+MM_PAGE = 'width="100mm" height="50mm" viewBox="0 0 100 50"'
+
+
+def svg(body: str, attributes: str = MM_PAGE) -> str:
+    """A document whose user unit is 1 mm, unless other attributes are given."""
+    spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+    return f"<svg {spaces} {attributes}>{body}</svg>"
+
+
+def write(folder: Path, text: str, name: str = "drawing.svg") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def samples(contour: Contour) -> np.ndarray:
+    """Points on every edge and curve of a contour, (pieces, 9, 3)."""
+    found = []
+    for segment in contour.segments:
+        if isinstance(segment, Polyline):
+            start, step = segment.points[:-1], np.diff(segment.points, axis=0)
+            found += list(start[:, None] + U[:, None] * step[:, None])
+        else:
+            found.append(segment.point(U))
+    return np.array(found)
+
+
+def upright(x: np.ndarray, height: float = 50.0) -> np.ndarray:
+    """Points of an SVG drawing in mm, as complex numbers, in the frame of the workpiece [m]."""
+    x = np.asarray(x)
+    return np.stack([x.real, height - x.imag, 0 * x.real], axis=-1) * 1e-3
+
+
+def bezier(points: list[complex]) -> np.ndarray:
+    """A Bézier curve by de Casteljau's algorithm at U."""
+    rows = [np.full(len(U), p, dtype=complex) for p in points]
+    while len(rows) > 1:
+        rows = [(1 - U) * a + U * b for a, b in pairwise(rows)]
+    return rows[0]
