@@ -16,11 +16,11 @@ bracket = Path(__file__).parent / "drawings" / "bracket.dxf"
 drawing = pc.read_toolpath(bracket, layers=["OUTLINE", "HOLES"], feed=0.03)
 
 robot = pc.load_robot("ur5").with_payload(1.2, frame="tool0", com=[0.0, 0.0, 0.06])
-tip = np.array([0.0, 0.0, 0.15])
+robot = robot.with_frame("tip", parent="tool0", pose=[0.0, 0.0, 0.15])
 table = np.eye(4)
 table[:3, 3] = [0.4, -0.1, 0.1]
 ready = [0.0, -1.2, 1.8, -2.1, -1.6, 0.0]
-task = pc.ToolpathTask(robot, "tool0", drawing, table, orientation="down", tool=tip, start=ready, clearance=0.02)
+task = pc.ToolpathTask(robot, "tip", drawing, table, orientation="down", start=ready, clearance=0.02)
 
 known = pc.Viscous(np.full(6, 0.5)) + pc.Coulomb([6.0, 6.0, 4.0, 1.0, 1.0, 1.0])
 actual = pc.Viscous(np.full(6, 0.6)) + pc.Coulomb([7.0, 7.0, 4.5, 1.1, 1.1, 1.1])
@@ -33,4 +33,4 @@ numbers = pc.toolpath_metrics(run, plant, task)
 print(f"{len(drawing)} contours, {run.status[0]} after {numbers['path_time'][0]:.1f} s")
 print(f"largest distance from the drawing: {1e6 * numbers['tool_deviation_peak'][0]:.0f} µm")
 pc.save_figure(pc.deviation_figure(run, plant, task), out / "deburr_bracket")
-pc.record(run, plant, task=task, tool="tool0").save(out / "deburr_bracket.html")
+pc.record(run, plant, task=task, tool="tip").save(out / "deburr_bracket.html")

@@ -16,21 +16,21 @@ program = pc.read_toolpath(Path(__file__).parent / "drawings" / "pocket.ngc")
 
 robot = pc.load_robot("panda", lock={"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0})
 robot = robot.with_payload(1.0, frame="panda_link8", com=[0.0, 0.0, 0.05])
-spindle = np.array([0.0, 0.0, 0.12])  # tip of the cutter in the flange
+robot = robot.with_frame("cutter", parent="panda_link8", pose=[0.0, 0.0, 0.12])
 table = np.eye(4)
 table[:3, 3] = [0.5, 0.0, 0.15]
 ready = [0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.8]
-task = pc.ToolpathTask(robot, "panda_link8", program, table, orientation="down", tool=spindle, start=ready)
+task = pc.ToolpathTask(robot, "cutter", program, table, orientation="down", start=ready)
 
 friction = pc.Viscous(np.full(7, 0.5)) + pc.Coulomb([0.6, 0.6, 0.5, 0.5, 0.3, 0.3, 0.3])
 plant = robot.with_payload(0.2, frame="panda_link8", com=[0.0, 0.0, 0.08]).with_friction(friction)
 model = robot.with_friction(friction)
 laws = [pc.ExtendedMotionPlan(model, path, K_p=1600.0, K_v=80.0, k=0.5, friction="full") for path in task]
-loop = pc.SampledLoop(period=1e-3, torque_limits=True)
+loop = pc.SampledLoop(period=2e-3, torque_limits=True)
 run = pc.simulate_sequence(laws, task.q_d(np.array(0.0)), duration=60.0, plant=plant, loop=loop)
 
 numbers = pc.toolpath_metrics(run, plant, task)
 print(f"{len(program)} moves, {run.status[0]} after {numbers['path_time'][0]:.1f} s")
 print(f"largest distance from the program: {1e6 * numbers['tool_deviation_peak'][0]:.0f} µm")
 pc.save_figure(pc.deviation_figure(run, plant, task), out / "mill_pocket")
-pc.record(run, plant, task=task, tool="panda_link8").save(out / "mill_pocket.html")
+pc.record(run, plant, task=task, tool="cutter").save(out / "mill_pocket.html")

@@ -198,6 +198,6 @@ def test_files_that_are_too_large_are_not_loaded(tmp_path, monkeypatch):
     with pytest.raises(ToolpathError, match="entities, expected at most"):
         read_dxf(path)
     monkeypatch.setattr("pathcontrol.toolpaths.dxf._MOST_ENTITIES", 100)
-    monkeypatch.setattr("pathcontrol.toolpaths.dxf.MAX_SEGMENTS", 25)
-    with pytest.raises(ToolpathError, match="more than 25 segments"):
+    monkeypatch.setattr("pathcontrol.toolpaths.pieces.MAX_SEGMENTS", 39)
+    with pytest.raises(ToolpathError, match="more than 39 lines"):
         read_dxf(path)

@@ -252,9 +252,10 @@ def test_too_many_segments_end_in_an_error(read, monkeypatch):
     monkeypatch.setattr("pathcontrol.toolpaths.svg_path.MAX_SEGMENTS", 1000)
     with pytest.raises(ToolpathError, match="more than 1000 segments"):
         read(f'<path d="M0 0{"h1" * 1001}"/>')
-    monkeypatch.setattr("pathcontrol.toolpaths.svg.MAX_SEGMENTS", 1000)
-    with pytest.raises(ToolpathError, match="more than 1000 segments"):
-        read(f'<path d="M0 0{"h1" * 501}"/>' * 2)
+    monkeypatch.setattr("pathcontrol.toolpaths.pieces.MAX_SEGMENTS", 1000)
+    for body in (f'<path d="M0 0{"h1" * 501}"/>' * 2, f'<path d="M0 0{"q1 1 2 0" * 101}"/>', '<circle r="1"/>' * 101):
+        with pytest.raises(ToolpathError, match="more than 1000 lines, or 100 curves"):
+            read(body)
 
 
 def test_a_public_doctype_is_not_fetched(read):

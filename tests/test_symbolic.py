@@ -205,6 +205,7 @@ def test_a_text_is_read_and_never_run(text, tmp_path: Path, monkeypatch):
         "-" * 2900 + "s",
         "*".join(f"sin({i}*s)" for i in range(1, 60)),
         "(" * 30 + "s" + "*sin(s))**s" * 30,
+        "sinh((cosh(tan(atan2(a,0)))**atan2(atan2(2,3),log(((1/3)**1e-300)))))",
     ],
 )
 def test_constants_that_no_float_holds_and_endless_work_are_refused(text):
@@ -217,10 +218,9 @@ def test_constants_that_no_float_holds_and_endless_work_are_refused(text):
 def test_any_text_is_a_formula_or_refused(text):
     try:
         path = SymbolicPath([text, "s"], 1.0, s_end=1, parameters={"a": 2})
-    except (InputError, UnknownNameError) as error:
-        assert "\n" not in str(error)
-    else:
-        assert path.at(S).ddq_d.shape == (len(S), 2)
+    except (InputError, UnknownNameError):
+        return
+    assert path.ddq_d(S).shape == (len(S), 2)
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,7 @@
-"""Time-optimal profiles: within every limit, as fast as the limits allow, and clear about what cannot be."""
+"""Time-optimal profiles: within every limit, and as fast as the limits allow."""
 
 from __future__ import annotations
 
-import json
-import pickle
 from functools import cache
 
 import numpy as np
@@ -12,10 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol import (
-    Circle,
     Coulomb,
     ExtendedMotionPlan,
-    InputError,
     Line,
     Lissajous,
     PathTask,
@@ -131,6 +127,34 @@ def test_a_joint_that_holds_still_has_no_dry_friction_to_overcome(seed):
     assert max(shares(arm, path.with_profile(profile).at(densely(profile)), own_limits(arm)).values()) < 1.001
     with pytest.raises(TaskError, match="joint_2"):
         time_optimal(arm, Line([0.1, 0.2], [1.0, 0.9], 1.0), margin=0.0)
+
+
+class Slow(PathTask):
+    """Joint 2 is slowest at s = 0, q_2' = s² + ``least``: it turns back and forth again there if that is negative."""
+
+    s0, s_end = -1.0, 1.0
+
+    def __init__(self, least):
+        self.least = least
+
+    def q_d(self, s):
+        return np.stack([0.3 * s, s**3 / 3 + self.least * s], -1)
+
+    def dq_d(self, s):
+        return np.stack([0.3 + 0 * s, s**2 + self.least], -1)
+
+    def ddq_d(self, s):
+        return np.stack([0 * s, 2 * s], -1)
+
+    def theta(self, s):
+        return np.ones_like(s)
+
+
+def test_a_joint_that_turns_back_between_two_samples_is_noticed():
+    arm = load("cicese_2dof").with_friction(Coulomb(np.array([7.0, 1.0]), np.array([7.0, 20.0])))
+    time_optimal(arm, Slow(1e-5))
+    with pytest.raises(TaskError, match="joint_2"):
+        time_optimal(arm, Slow(-1e-9))
 
 
 # --- as fast as they allow ----------------------------------------------------------------------------------
@@ -313,90 +337,3 @@ def test_an_open_path_begins_and_ends_slowly_but_not_at_rest():
     assert np.allclose(profile.theta(path, np.array([0.0, 1.0])), 4.0 * 2.5e-3)  # after 2.5 ms
     given_rates = time_optimal(arm, path, start_rate=0.3, end_rate=0.05)
     assert np.allclose(given_rates.theta(path, np.array([0.0, 1.0])), [0.3, 0.05])
-
-
-# --- what it says -------------------------------------------------------------------------------------------
-
-
-def test_it_knows_what_limits_it():
-    arm, path = load("cicese_2dof"), Circle(0.4, 1.0)
-    slow = time_optimal(arm, path, velocity=[0.2, 0.2])
-    assert set(slow.limiting) == {"velocity of joint_1", "velocity of joint_2"}
-    assert sum(slow.limited_by.values()) == pytest.approx(1.0)
-    weak = time_optimal(arm, path, torque=[150.0, 4.0], velocity=None)
-    assert max(weak.limited_by, key=weak.limited_by.get) == "torque of joint_2"
-    record = path.with_profile(weak).describe()
-    assert record["margin"] == 0.05
-    assert json.loads(json.dumps(record))["limited_by"] == weak.limited_by
-    assert pickle.loads(pickle.dumps(weak)).limiting == weak.limiting
-
-
-def test_an_overloaded_joint_is_named_where_it_is():
-    arm = load("cicese_2dof").with_payload(5.0, "tool")
-    path = Line([0.0, 0.0], [np.pi / 2, 0.0], 1.0)
-    with pytest.raises(
-        TaskError, match=r"torque limit of joint_2, 13\.5 N m \(15 N m less the margin of 0\.1\)"
-    ) as error:
-        time_optimal(arm, path, margin=0.1)
-    s = float(str(error.value).split("at s = ")[1].split()[0])
-    load_there = arm.gravity(path.q_d(s)) + arm.friction.torque(path.dq_d(s))
-    assert f"{load_there[1]:.4g}" in str(error.value)
-    assert load_there[1] > 13.5
-    assert str(np.round(path.q_d(s), 4).tolist()) in str(error.value)
-
-
-def test_what_the_recheck_cannot_cure_is_refused(monkeypatch):
-    monkeypatch.setattr("pathcontrol.profiles.topp.solve._ROUNDS", 1)
-    with pytest.raises(TaskError, match="10 points do not resolve the path near s = "):
-        time_optimal(ARM, spline(ARM, 0), points=10)
-    time_optimal(ARM, spline(ARM, 0), points=1000)
-
-
-ARM = load_robot("cicese_2dof")
-LINE = Line([0, 0], [1.0, 0.5], 1.0)
-
-
-@pytest.mark.parametrize(
-    ("make", "error", "words"),
-    [
-        (
-            lambda: time_optimal(ARM, LINE, start_rate=99.0),
-            TaskError,
-            ["start_rate = 99", "s = 0,", "limit of joint_1"],
-        ),
-        (
-            lambda: time_optimal(ARM, LINE, end_rate=99.0),
-            TaskError,
-            ["end_rate = 99", "s = 1.11803", "limit of joint_"],
-        ),
-        (lambda: time_optimal(ARM, LINE, start_rate=0.0), InputError, ["start_rate = 0"]),
-        (lambda: time_optimal(ARM, LINE, end_rate=0.1, end_time=0.1), InputError, ["end_rate and end_time"]),
-        (lambda: time_optimal(ARM, Circle(1.0, 1.0), end_rate=0.1), InputError, ["end_rate for a closed path"]),
-        (lambda: time_optimal(ARM, LINE, margin=1.0), InputError, ["margin = 1"]),
-        (lambda: time_optimal(ARM, LINE, torque=[150, 0]), InputError, ["torque limit of joint_2 is 0"]),
-        (lambda: time_optimal(ARM, LINE, velocity=[1, -1]), InputError, ["velocity limit of joint_2 is -1"]),
-        (lambda: time_optimal(ARM, LINE, velocity=[1, 1, 1]), InputError, ["(3,)", "2 joints"]),
-        (lambda: time_optimal(ARM, LINE, acceleration=True), InputError, ["no acceleration limits"]),
-        (lambda: time_optimal(ARM, LINE, velocity=None, torque=None), InputError, ["nothing bounds the speed"]),
-        (
-            lambda: time_optimal(ARM, Line([0, 0], [1, 0], 1.0), velocity=[np.inf, 1], torque=None),
-            InputError,
-            ["nothing limits the speed at s = 0"],
-        ),
-        (lambda: time_optimal(ARM, LINE, points=2), InputError, ["points = 2"]),
-        (lambda: time_optimal(ARM, Line([0, 0, 0], [1, 1, 1], 1.0)), TaskError, ["Line.q_d", "2 joints"]),
-        (lambda: time_optimal(ARM, Endless()), TaskError, ["neither ends nor closes"]),
-    ],
-)
-def test_what_cannot_be_is_refused(make, error, words):
-    with pytest.raises(error) as caught:
-        make()
-    assert all(word in str(caught.value) for word in words), str(caught.value)
-
-
-class Endless(PathTask):
-    def q_d(self, s):
-        return np.stack([np.asarray(s), np.asarray(s)], axis=-1)
-
-    def theta(self, s):
-        return np.ones_like(s)

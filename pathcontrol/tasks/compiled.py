@@ -38,8 +38,8 @@ def derivatives(label: str, formula: sympy.Expr, s: sympy.Symbol, bounded: bool)
         if bounded and first.count_ops() > _LARGEST:
             raise InputError(f"the derivative of {label} has more than {_LARGEST} operations; simplify the formula")
         second = first.diff(s)
-    except RecursionError:
-        raise InputError(f"{label} is nested too deeply to be differentiated; simplify it") from None
+    except (RecursionError, TypeError, ArithmeticError) as error:
+        raise InputError(f"{label} cannot be differentiated ({error}); simplify it") from None
     rough = [a for e in (formula, first, second) for a in e.atoms(*(getattr(sympy, r) for r in _ROUGH)) if a.has(s)]
     if rough:
         raise InputError(
@@ -60,5 +60,5 @@ def compiled(s: sympy.Symbol, expressions: list[sympy.Expr]) -> Callable[[Array]
     long = {a: sympy.Float(a) for e in expressions for a in e.atoms(sympy.Rational) if max(abs(a.p), a.q) >= 2**53}
     try:
         return sympy.lambdify([s], [e.xreplace(long) for e in expressions], modules=["scipy", "numpy"], cse=True)
-    except (RecursionError, MemoryError, SyntaxError) as error:
-        raise InputError(f"the expressions are nested too deeply to be compiled ({error}); simplify them") from None
+    except (RecursionError, MemoryError, SyntaxError, TypeError, ArithmeticError) as error:
+        raise InputError(f"the expressions cannot be compiled ({error}); simplify them") from None

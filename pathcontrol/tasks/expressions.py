@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import math
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -47,13 +48,16 @@ def parse(label: str, text: str, names: Mapping[str, Any]) -> Any:
         if len(text) > _LONGEST:
             raise _FormulaError(f"it has {len(text)} characters, at most {_LONGEST} are read")
         return _expression(_tree(text), names, _DEEPEST)
-    except _FormulaError as reason:
-        raise InputError(
-            f"{label} = {shown!r} is not understood: {reason}. A formula is made of numbers, + - * / **, brackets, "
-            f"{', '.join(_CONSTANTS)}, {', '.join(_FUNCTIONS)} and {', '.join(names)}"
-        ) from None
     except UnknownNameError as error:
         raise UnknownNameError(f"{label} = {shown!r}: {error}") from None
+    except _FormulaError as error:
+        reason = str(error)
+    except (ArithmeticError, TypeError, ValueError, RecursionError) as error:
+        reason = f"sympy fails with {error!r}"
+    raise InputError(
+        f"{label} = {shown!r} is not understood: {reason}. A formula is made of numbers, + - * / **, brackets, "
+        f"{', '.join(_CONSTANTS)}, {', '.join(_FUNCTIONS)} and {', '.join(names)}"
+    )
 
 
 def number(value: float) -> Any:
@@ -66,7 +70,9 @@ def number(value: float) -> Any:
 
 def _tree(text: str) -> ast.expr:
     try:
-        return ast.parse(text.strip(), mode="eval").body
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SyntaxWarning)
+            return ast.parse(text.strip(), mode="eval").body
     except SyntaxError as error:
         raise _FormulaError(f"{error.msg} at character {error.offset} (a product needs its *: 2*s)") from None
     except (ValueError, RecursionError, MemoryError):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError
@@ -48,6 +50,30 @@ class Arc(Segment):
         """Whether it is an arc of a circle, or a helix over one."""
         size = float(self.x @ self.x)
         return bool(abs(self.x @ self.y) <= 1e-12 * size and abs(self.y @ self.y - size) <= 1e-12 * size)
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        # a coordinate cᵢ + Rᵢ cos(φ − αᵢ) + u hᵢ is extreme at an end, or where sin(φ − αᵢ) = hᵢ / (Rᵢ Δφ)
+        radius, alpha = np.hypot(self.x, self.y), np.arctan2(self.y, self.x)
+        turn = np.arcsin(np.clip(self.rise / np.where(radius > 0, radius, np.inf) / self.sweep, -1.0, 1.0))
+        angles = np.stack([alpha + turn, alpha + np.pi - turn])
+        low, high = sorted((self.start, self.start + self.sweep))
+        first = angles + 2 * np.pi * np.ceil((low - angles) / (2 * np.pi))
+        last = angles + 2 * np.pi * np.floor((high - angles) / (2 * np.pi))
+        u = (np.concatenate([first, last]).clip(low, high) - self.start) / self.sweep
+        points = np.concatenate([np.diagonal(self.point(u), axis1=1, axis2=2), self.point(np.array([0.0, 1.0]))])
+        return points.min(0), points.max(0)
+
+    def distance(self, x: ArrayLike) -> Array:
+        if not self.circular or self.rise.any():
+            return super().distance(x)
+        x = as_array("x", x)
+        offset = (x - self.center)[..., None, :]
+        angle = np.arctan2((offset * self.y).sum(-1), (offset * self.x).sum(-1))
+        u = np.mod((angle - self.start) * np.sign(self.sweep), 2 * np.pi) / abs(self.sweep)
+        ends = np.broadcast_to([0.0, 1.0], (*x.shape[:-1], 2))
+        nearest = self.point(np.concatenate([np.where(u <= 1, u, 0.0), ends], axis=-1))
+        return np.linalg.norm(nearest - x[..., None, :], axis=-1).min(-1)
 
     def point(self, u: Array) -> Array:
         u = np.asarray(u)[..., None]

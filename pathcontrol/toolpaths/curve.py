@@ -49,7 +49,8 @@ class ToolCurve:
         if closed and not np.allclose(values[0], values[-1], rtol=1e-6, atol=1e-9):
             raise InputError("the curve is said to be closed, but its last knot is not its first one again")
         self.s0, self.s_end, self.closed = float(self.knots[0]), float(self.knots[-1]), bool(closed)
-        curve = PPoly.from_bernstein_basis(_quintic(self.knots, values))
+        points = quintic_points(np.diff(self.knots), values[:-1], values[1:])
+        curve = PPoly.from_bernstein_basis(BPoly(np.moveaxis(points, -2, 0), self.knots))
         self._curves = [curve, curve.derivative(1), curve.derivative(2)]
 
     @property
@@ -86,7 +87,7 @@ class ToolCurve:
     @cached_property
     def _closest_point(self) -> ClosestPoint:
         functions = (lambda s, c=c: c(self._within(s)) for c in self._curves)
-        return ClosestPoint(Curve(*functions), self.s0, self.s_end, self.closed)
+        return ClosestPoint(Curve(*functions), self.s0, self.s_end, self.closed, self.knots)
 
     def _within(self, s: Array) -> Array:
         return self.s0 + np.mod(s - self.s0, self.length) if self.closed else np.clip(s, self.s0, self.s_end)
@@ -129,7 +130,7 @@ class ToolCurve:
 
     @classmethod
     def spline(cls, points: ArrayLike, closed: bool = False) -> ToolCurve:
-        """The smooth curve through points [m], (m, 3): a quintic-smooth interpolant, chord-length parametrised.
+        """The C² cubic spline through points [m], (m, 3), parametrised by chord length.
 
         Args:
             points: m ≥ 4 points, or 5 for a closed curve, no two neighbours the same; the first is not repeated.
@@ -149,14 +150,14 @@ class ToolCurve:
         return cls(s, ring, curve(s, 1), curve(s, 2), closed)
 
 
-def _quintic(s: Array, values: Array) -> BPoly:
-    """The quintics with the derivatives ``values`` (k + 1, 3, 3) at the knots, in Bernstein form."""
-    step = np.diff(s)[:, None]
-    (p0, v0, a0), (p1, v1, a1) = (np.moveaxis(part, 1, 0) for part in (values[:-1], values[1:]))
+def quintic_points(length: Array, start: Array, end: Array) -> Array:
+    """Bézier points (*batch, 6, 3) of the quintics of a ``length`` (*batch,) with p, p' and p'' (*batch, 3, 3) given."""
+    h = length[..., None]
+    (p0, v0, a0), (p1, v1, a1) = (np.moveaxis(values, -2, 0) for values in (start, end))
     # a Bézier curve's end derivatives in terms of its control points, solved for them
-    first = [p0, p0 + step * v0 / 5, p0 + 2 * step * v0 / 5 + step**2 * a0 / 20]
-    last = [p1 - 2 * step * v1 / 5 + step**2 * a1 / 20, p1 - step * v1 / 5, p1]
-    return BPoly(np.stack(first + last), s)
+    first = [p0, p0 + h * v0 / 5, p0 + 2 * h * v0 / 5 + h**2 * a0 / 20]
+    last = [p1 - 2 * h * v1 / 5 + h**2 * a1 / 20, p1 - h * v1 / 5, p1]
+    return np.stack(first + last, axis=-2)
 
 
 def _vector(name: str, value: ArrayLike) -> Array:

@@ -21,9 +21,9 @@ from pathcontrol.toolpaths.dxf_blocks import Entities
 from pathcontrol.toolpaths.dxf_chain import Strand, chained
 from pathcontrol.toolpaths.dxf_entities import pieces
 from pathcontrol.toolpaths.dxf_layers import Layers
-from pathcontrol.toolpaths.pieces import contour_of
-from pathcontrol.toolpaths.segments import Polyline, Segment
-from pathcontrol.toolpaths.text import MAX_SEGMENTS, read_text
+from pathcontrol.toolpaths.pieces import Budget, contour_of
+from pathcontrol.toolpaths.segments import Segment
+from pathcontrol.toolpaths.text import read_text
 
 #: units of length by name [m]
 UNITS = {
@@ -121,20 +121,17 @@ def _strands(source: str, entities: Entities, layers: Layers, scale: Array) -> l
     """What each entity draws that has a length [m]."""
     strands: list[Strand] = []
     refused: Counter[tuple[str, str]] = Counter()
-    points = 0
+    budget = Budget()
     for entity, layer, matrix in entities:
         if not layers.read(layer):
             continue
         with entities.at(entity, layer):
-            segments = _segments(entity, scale @ matrix)
+            segments = _segments(entity, scale @ matrix, budget)
         if segments is None:
             refused[entity.dxftype(), layer] += 1
         elif segments:
             name = f"{layer}: {entity.dxftype()} {entity.dxf.get('handle') or ''}".strip()
             strands.append(Strand(name, layer.lower(), len(strands), segments))
-            points += sum(len(s.points) if isinstance(s, Polyline) else 1 for s in segments)
-        if points > MAX_SEGMENTS:
-            raise ToolpathError(f"{source} has more than {MAX_SEGMENTS} segments; split it into several files")
     if refused:
         what = ", ".join(f"{count} {kind} on layer {layer!r}" for (kind, layer), count in refused.most_common(8))
         raise ToolpathError(
@@ -150,8 +147,10 @@ def _contour(source: str, strand: Strand, feed: float | None) -> Contour:
         raise ToolpathError(f"{source}, {strand.name}: {error}") from error
 
 
-def _segments(entity: Any, matrix: Array) -> list[Segment] | None:
+def _segments(entity: Any, matrix: Array, budget: Budget) -> list[Segment] | None:
+    """What an entity draws [m]; None if it cannot be cut."""
     found = pieces(entity)
     if found is None:
         return None
+    budget.take(found)
     return [segment for piece in found for segment in piece.mapped(matrix).segments()]

@@ -16,9 +16,10 @@ from pathcontrol.toolpaths.bezier import Bezier
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.cusps import straight_turns, without_cusps
 from pathcontrol.toolpaths.segments import Polyline, Segment
-from pathcontrol.toolpaths.text import MAX_COORDINATE
+from pathcontrol.toolpaths.text import MAX_COORDINATE, MAX_SEGMENTS
 
 NOTHING = 1e-9  # m, what is shorter than this has no length
+_CURVE = 10  # lines
 _LARGEST_RADIUS = 100 * MAX_COORDINATE  # m; the ends of an arc of a larger one would not be known to 1 nm
 
 
@@ -103,6 +104,25 @@ class EllipticArc:
         inside = first + np.pi * np.arange(np.ceil((low - first) / np.pi), np.floor((high - first) / np.pi) + 1)
         angles = np.unique(np.concatenate([[low, high], inside]))
         return angles if self.sweep > 0 else angles[::-1]
+
+
+class Budget:
+    """Counts what a drawing holds: up to 2 000 000 lines, or 200 000 curves, each of which takes as long as ten."""
+
+    def __init__(self) -> None:
+        self._used = 0
+
+    def take(self, pieces: Sequence[Piece]) -> None:
+        """Count more.
+
+        Raises:
+            ToolpathError: it is too much.
+        """
+        self._used += sum(len(piece.points) if isinstance(piece, Lines) else _CURVE for piece in pieces)
+        if self._used > MAX_SEGMENTS:
+            raise ToolpathError(
+                f"the drawing has more than {MAX_SEGMENTS} lines, or {MAX_SEGMENTS // _CURVE} curves; split it"
+            )
 
 
 def distinct(points: Array) -> Array:

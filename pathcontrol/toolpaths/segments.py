@@ -15,6 +15,7 @@ from pathcontrol.errors import InputError
 from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 from pathcontrol.toolpaths.lengths import ArcLength
 
+_SAMPLES = 1025
 _PAIRS = 1 << 21  # point-edge pairs held at once
 
 
@@ -37,11 +38,10 @@ class Segment(ABC):
     def reversed(self) -> Segment:
         """The same points from the end to the start."""
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper corner of the bounding box [m], each (3,), up to a millionth of the segment's size."""
-        points = self.point(np.linspace(0.0, 1.0, 1025))
-        return points.min(0), points.max(0)
+        """Lower and upper corner of the bounding box [m], each (3,), up to a billionth of the segment's size."""
+        return self._least(1.0), -self._least(-1.0)
 
     def speed(self, u: Array) -> Array:
         """‖dp/du‖ [m], (*batch,)."""
@@ -61,6 +61,13 @@ class Segment(ABC):
         """Distance from points x (*batch, 3) to the segment [m], (*batch,)."""
         x = as_array("x", x)
         return np.linalg.norm(self.point(self._closest_point(x)) - x, axis=-1)
+
+    def _least(self, sign: float) -> Array:
+        """Least value of each coordinate times ``sign`` [m], (3,): at samples, and again between those next to them."""
+        u = np.linspace(0.0, 1.0, _SAMPLES)
+        near = u[(sign * self.point(u)).argmin(0)]
+        finer = np.clip(near + np.linspace(-1.0, 1.0, 129)[:, None] / (_SAMPLES - 1), 0.0, 1.0)
+        return (sign * np.diagonal(self.point(finer), axis1=1, axis2=2)).min(0)
 
     @cached_property
     def _closest_point(self) -> ClosestPoint:

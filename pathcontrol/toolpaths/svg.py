@@ -18,13 +18,12 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.contour import Contour, Toolpath
-from pathcontrol.toolpaths.pieces import contour_of
+from pathcontrol.toolpaths.pieces import Budget, contour_of
 from pathcontrol.toolpaths.svg_document import Document, tag_of
 from pathcontrol.toolpaths.svg_shapes import SHAPES, Attributes, subpaths
 from pathcontrol.toolpaths.svg_style import REFUSED
 from pathcontrol.toolpaths.svg_values import Viewport, transform
 from pathcontrol.toolpaths.svg_view import nested, page, page_unit
-from pathcontrol.toolpaths.text import MAX_SEGMENTS
 
 _GROUPS = frozenset({"g", "a", "svg", "switch", "use"})
 _DEFINITIONS = frozenset({"defs", "symbol", "clipPath", "mask", "marker", "pattern", "linearGradient"}) | {
@@ -78,7 +77,7 @@ class _Walk:
     def __init__(self, document: Document, feed: float | None) -> None:
         self._document, self._feed = document, feed
         self._ahead: list[tuple[Any, _Place]] = []
-        self._shapes = self._points = 0
+        self._shapes, self._budget = 0, Budget()
 
     def contours(self, ppi: float) -> Iterator[Contour]:
         """The contours of all that is drawn."""
@@ -118,7 +117,7 @@ class _Walk:
         place = place._replace(visible=visible)
         if "transform" in style:
             place = place._replace(matrix=place.matrix @ transform(style["transform"]))
-            if not np.linalg.det(place.matrix[:2, :2]):
+            if _flat(place.matrix):
                 return []  # by the specification it is not drawn
         if tag in SHAPES:
             return self._cut(element, place) if visible else []
@@ -158,12 +157,10 @@ class _Walk:
         name = element.get("id") or f"{tag} {self._shapes}"
         found = []
         for k, subpath in enumerate(drawn, 1):
+            self._budget.take(subpath.pieces)
             segments = [s for piece in subpath.pieces for s in piece.mapped(place.matrix).segments()]
             if segments:
                 found.append(contour_of(segments, self._feed, f"{name}/{k}" if len(drawn) > 1 else name))
-        self._points += sum(contour.points for contour in found)
-        if self._points > MAX_SEGMENTS:
-            raise ToolpathError(f"the drawing has more than {MAX_SEGMENTS} segments; split it into several files")
         return found
 
 
@@ -178,6 +175,12 @@ def _refuse(style: dict[str, str], element: Any) -> None:
                 f"{name} = {style[name][:60]!r} is not understood: apply it to the shapes in the drawing program, "
                 "or take it away"
             )
+
+
+def _flat(matrix: Array) -> bool:
+    """Whether a map has no inverse."""
+    a, c, b, d = matrix[:2, :2].ravel().tolist()
+    return a * d == b * c
 
 
 def _cannot_cut(tag: str) -> str:

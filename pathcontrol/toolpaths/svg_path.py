@@ -130,7 +130,7 @@ class Pen:
         self.at, self._handle = point, ("", 0j)
         self._strokes += 1
         if self._strokes > MAX_SEGMENTS:
-            raise ToolpathError(f"path data has more than {MAX_SEGMENTS} segments; split the drawing")
+            raise ToolpathError(f"path data has more than {MAX_SEGMENTS} segments; split it")
 
     def _add(self, piece: Piece, end: complex) -> None:
         self._end_line()

@@ -16,6 +16,7 @@ from pathcontrol.view.style import GREY, ORANGE, style
 from pathcontrol.view.toolpath_figures import outline, plan_figure
 
 _COLOURS = "viridis"
+_MOST_PIECES = 4000
 
 
 def deviation_figure(run: Run, robot: RobotModel, task: ToolpathTask, rollout: int = 0) -> Figure:
@@ -42,6 +43,8 @@ def _on_workpiece(x: Array, pose: Array) -> Array:
 
 
 def _coloured(figure: Figure, axes: Axes, way: Array, deviation: Array, cutting: Array) -> None:
+    some = np.arange(0, len(way), -(-len(way) // _MOST_PIECES))
+    way, deviation, cutting = way[some], deviation[some], cutting[some]
     pieces = np.stack([way[:-1], way[1:]], axis=1)
     cut = cutting[:-1] & cutting[1:]
     axes.add_collection(LineCollection(list(pieces[~cut]), colors=GREY, linewidths=0.5))

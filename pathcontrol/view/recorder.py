@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 DESIRED: Color = (0.33, 0.62, 0.85, 1.0)
 MARKER: Color = (0.0, 0.35, 0.62, 1.0)
 TAKEN: Color = (0.84, 0.37, 0.0, 1.0)
-LINE_WIDTH = 0.002  # radius of the line the tool has drawn, of the diagonal of the scene
+LINE_WIDTH = 0.002  # radius of the line the tool has drawn, of the diagonal of the scene …
+FINE_LINE_WIDTH = 0.012  # … or of that of the line, if that is less: a small drawing stays legible
+THINNEST = 0.0003  # of the diagonal of the scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,7 @@ def record(
     desired = taken[:0] if task is None else stage.desired_path(task)
     seen = np.concatenate([body, taken, desired])
     stage.add_ground(seen)
-    legend = _add_lines(stage, task, desired, taken, LINE_WIDTH * float(np.linalg.norm(np.ptp(seen, axis=0))))
+    legend = _add_lines(stage, task, desired, taken, _line_width(seen, np.concatenate([taken, desired])))
     camera = Camera.framing(seen, view_direction(desired if len(desired) else taken, body))
     return Animation(_title(run, robot, rollout), legend, stage.finish(), camera, stage.times)
 
@@ -102,6 +104,12 @@ def default_tool(robot: RobotModel) -> str:
     """The last of the robot's frames that is a link carrying no other link."""
     leaves = leaf_links(robot.source)
     return [name for name in robot.frame_names if name in leaves][-1]
+
+
+def _line_width(seen: Array, line: Array) -> float:
+    """Radius of the line that the tool draws [m]."""
+    scene, drawing = (float(np.linalg.norm(np.ptp(points, axis=0))) for points in (seen, line))
+    return max(min(LINE_WIDTH * scene, FINE_LINE_WIDTH * drawing), THINNEST * scene)
 
 
 def _add_lines(stage: Stage, task: PathTask | None, desired: Array, taken: Array, width: float) -> dict[str, Color]:

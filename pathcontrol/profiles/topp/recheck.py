@@ -49,10 +49,10 @@ def excess(limits: JointLimits, samples: Samples, torques: Torques, cells: Cells
     )
 
 
-def tightened(allowed: Allowed, cells: Cells, over: Excess) -> Allowed:
-    """Less than ``allowed`` of the ``cells`` where it was too much, but never so little that the arm could not rest."""
-    slower = (1 + over.velocity) ** -2
-    speed = allowed.speed * np.minimum(np.append(slower, 1.0), np.append(1.0, slower))
+def tightened(allowed: Allowed, cells: Cells, over: Excess, x: Array) -> Allowed:
+    """Less than ``allowed`` of the ``cells`` where ṡ² = x is too much, never so little that the arm could not rest."""
+    slower = np.where(over.velocity > 0, (1 + over.velocity) ** -2, np.inf)
+    speed = np.minimum(allowed.speed, x * np.minimum(np.append(slower, np.inf), np.append(np.inf, slower)))
     A = np.hstack([cells.A[:, :-1], 1 / speed[:-1, None]])
     inside, ends = (np.hstack([rows, rows, 0 * A[:, -1:]]) for rows in (over.inside, over.ends))
     C = np.maximum(cells.C + inside, allowed.cells.C + ends)

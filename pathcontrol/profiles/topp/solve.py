@@ -60,7 +60,7 @@ def fastest(demand: Demand) -> tuple[Array, Binding]:
         if not over.cells.any():
             refuse_endless(samples, x, endless)
             return x, binding(limits, samples, cells, x)
-        allowed = tightened(allowed, cells, over)
+        allowed = tightened(allowed, cells, over, x)
     where = samples.knots.s[over.cells.argmax()]
     raise TaskError(
         f"{len(x)} points do not resolve the path near s = {where:.6g}: limits are exceeded between them; give more"

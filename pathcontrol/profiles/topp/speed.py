@@ -10,17 +10,11 @@ from pathcontrol.profiles.topp.along import Samples, Torques
 from pathcontrol.profiles.topp.limits import JointLimits
 
 _ENDLESS = 1e6  # times the ṡ² that the arm's strength builds up over the path
-_PEAK = 4.0
 
 
 def speed_limit(limits: JointLimits, samples: Samples, endless: float) -> Array:
-    """The largest ṡ² at the knots that the velocity limits allow, and ``endless`` where they allow any, (N + 1,).
-
-    Where the joints with a limit stand still it is 4 times what is allowed beside the knot, where they move.
-    """
-    rates = (limits.velocity / np.abs(samples.dq)).min(-1) ** 2
-    beside = _PEAK * np.minimum(np.append(np.inf, rates[:-1]), np.append(rates[1:], np.inf))
-    return np.minimum(np.minimum(rates, beside)[:: samples.k], endless)
+    """The largest ṡ² at the knots that the velocity limits allow, and ``endless`` where they allow any, (N + 1,)."""
+    return np.minimum((limits.velocity / np.abs(samples.knots.dq)).min(-1) ** 2, endless)
 
 
 def end_limit(samples: Samples, end_time: float) -> Array:

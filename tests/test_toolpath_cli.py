@@ -1,0 +1,178 @@
+"""``pathcontrol toolpath`` and experiments along a toolpath, as a user runs them."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from pathcontrol import ExperimentError, Run
+from pathcontrol.cli import main
+from pathcontrol.experiments.runner import load_setup, run_experiment
+
+SQUARE = """G21 G90 G17
+G0 X0 Y0 Z0
+G1 X100 F1200
+G1 Y50
+G3 X80 Y70 I-20 J0
+G1 X0
+G1 Y0
+M30
+"""
+
+EXPERIMENT = """
+angle_unit = "deg"
+[robot]
+source = "cicese_2dof"
+tool = { frame = "tool", position = [0.0, 0.0, -0.05] }
+[task]
+type = "toolpath"
+file = "part.ngc"
+frame = "tip"
+workpiece = { position = [0.3, -0.05, 0.7], rpy = [90.0, 0.0, 0.0] }
+clearance = 0.0
+acceleration = 2.0
+[controller]
+type = "extended_motion_plan"
+K_p = 800.0
+K_v = 45.0
+k = 2.0
+friction = "full"
+[loop]
+torque_limits = true
+[output]
+html = "part.html"
+figure = "part"
+summary = "part.json"
+"""
+
+
+def called(*arguments) -> tuple[int, str, str]:
+    done = CliRunner().invoke(main, [str(a) for a in arguments])
+    return done.exit_code, done.stdout, done.stderr
+
+
+@pytest.fixture
+def part(tmp_path) -> Path:
+    path = tmp_path / "part.ngc"
+    path.write_text(SQUARE, encoding="utf-8")
+    return path
+
+
+def test_json_says_what_is_in_a_file(part):
+    code, out, _ = called("toolpath", part, "--json")
+    content = json.loads(out)
+    assert code == 0
+    (cut,) = content["contours"]
+    assert cut["length_m"] == pytest.approx(0.1 + 0.05 + 0.02 * math.pi / 2 + 0.08 + 0.07)
+    assert (cut["closed"], cut["rapid"], cut["corners"]) == (True, False, 3)
+    assert cut["feed_m_s"] == pytest.approx(0.02)
+    assert cut["sharpest_deg"] == pytest.approx(90.0)
+    assert np.allclose(content["bounds_m"], [[0, 0, 0], [0.1, 0.07, 0]])
+    assert content["cut_length_m"] == pytest.approx(cut["length_m"])
+
+
+def test_the_table_is_in_millimetres(part):
+    code, out, _ = called("toolpath", part)
+    words = " ".join(out.split())
+    assert code == 0
+    assert "331.416 mm of cuts" in words
+    assert "within 100 × 70 × 0 mm" in words
+    assert "closed" in words
+
+
+def test_plot_writes_a_picture(part, tmp_path):
+    code, out, _ = called("toolpath", part, "--plot", tmp_path / "plan.svg", "--json")
+    assert code == 0
+    assert [Path(name).name for name in json.loads(out)["figures"]] == ["plan.svg", "plan.png"]
+    assert "corner (3)" in (tmp_path / "plan.svg").read_text()
+    assert (tmp_path / "plan.png").stat().st_size > 5000
+
+
+def test_names_from_a_file_are_text(tmp_path, monkeypatch):
+    """Neither the markup of the terminal nor that of the figure."""
+    path = tmp_path / "odd.svg"
+    line = '<path id="[bold]$x$[/]" d="M0 0 H9"/>'
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm">{line}</svg>')
+    monkeypatch.setenv("COLUMNS", "200")
+    code, out, _ = called("toolpath", path)
+    assert code == 0
+    assert "[bold]$x$[/]" in out
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "options", "message"),
+    [
+        ("part.ngc", "G21 G90\nG1 X1\n", [], "line 2"),
+        ("part.stp", "", [], "ends in '.stp', expected one of .csv"),
+        ("part.ngc", SQUARE, ["--ppi", "96"], "is read by read_gcode, which takes unit, start, not ppi"),
+        ("part.csv", "x,y,z\n0,0,0\n1,nan,0\n", [], "line 3"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(tmp_path, name, text, options, message):
+    (tmp_path / name).write_text(text)
+    code, _, err = called("toolpath", tmp_path / name, *options)
+    assert code == 2
+    assert message in err
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    code, _, err = called("toolpath", tmp_path / "none.dxf")
+    assert code == 2
+    assert "none.dxf" in err
+
+
+# --- experiments --------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def experiment(part) -> Path:
+    path = part.with_name("part.toml")
+    path.write_text(EXPERIMENT, encoding="utf-8")
+    return path
+
+
+def test_an_experiment_follows_the_program(experiment, tmp_path):
+    done = run_experiment(experiment, tmp_path / "out", progress=False)
+    assert done.run.status[0] == "finished"
+    assert done.metrics["tool_deviation_peak"][0] < 1e-3
+    assert done.metrics["smoothing_deviation"][0] <= 1.001e-4
+    assert {path.name for path in done.written.values()} >= {"run.nc", "part.json", "part.html", "part-deviation.svg"}
+    again = Run.load(done.written["data"])
+    assert list(again["path_status"].to_numpy()) == ["finished"]
+
+
+def test_the_arm_begins_on_the_path_and_in_time(experiment):
+    setup = load_setup(experiment)
+    assert np.array_equal(setup.q, setup.task.q_d(np.array(0.0)))
+    tip = setup.plant.frame_pose(setup.q, "tip")[:3, 3]
+    assert np.allclose(tip, [0.3, -0.05, 0.7], atol=2e-4)
+    s = np.linspace(0, setup.task.s_end, 4001)
+    assert setup.duration == pytest.approx(2 * np.trapezoid(1 / setup.task.theta(s), s) + 5, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('file = "part.ngc"', 'file = "none.ngc"', "task.file: .*none.ngc"),
+        ('frame = "tip"', 'frame = "top"', "has no frame 'top'"),
+        ("position = [0.3, -0.05, 0.7]", "position = [0.3, -0.05]", "workpiece.position = .*expected three"),
+        ("position = [0.3, -0.05, 0.7]", "position = [3.0, -0.05, 0.7]", "task: contour 0 of 1 .*: "),
+        ("clearance = 0.0", "clearance = -1.0", "task.clearance = -1.0, expected a number not below 0"),
+        ("clearance = 0.0", 'unit = "furlong"', "furlong"),
+        ("clearance = 0.0", "ppi = 96.0", "task.file: .*which takes unit, start, not ppi"),
+        ('tool = { frame = "tool"', 'tool = { frame = "hand"', "robot.tool: .*has no frame 'hand'"),
+        ("clearance = 0.0", 'orientation = "up"', "task.orientation = 'up', expected 'free', 'down'"),
+        ('angle_unit = "deg"', 'angle_unit = "deg"\nlaps = 2', "laps = 2, expected .*closed path"),
+    ],
+)
+def test_mistakes_are_told_by_key(experiment, old, new, message):
+    text = EXPERIMENT.replace(old, new)
+    assert text != EXPERIMENT
+    experiment.write_text(text)
+    with pytest.raises(ExperimentError, match=message):
+        load_setup(experiment)
