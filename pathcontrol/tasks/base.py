@@ -15,6 +15,8 @@ from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 from pathcontrol.tasks.differentiation import Differentiator, best_width
 from pathcontrol.tasks.profile import VelocityProfile, plain_attributes
 
+_MOST_SHOWN = 16  # values of an array in a repr
+
 
 class PathPoint(NamedTuple):
     """A task at path parameter s: all that a controller asks of it."""
@@ -183,7 +185,7 @@ class PathTask(ABC):
         return curvature(self, s)
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(f'{k}={v}' for k, v in plain_attributes(self).items())})"
+        return f"{type(self).__name__}({', '.join(f'{k}={_short(v)}' for k, v in plain_attributes(self).items())})"
 
     def describe(self) -> dict[str, Any]:
         """Name and public parameters, for the record of a run."""
@@ -202,7 +204,10 @@ class PathTask(ABC):
 
     @cached_property
     def _profile_derivative(self) -> Differentiator:
-        return self._differentiator(lambda s: self.theta(s) + np.zeros_like(s))
+        return self._differentiator(self._broadcast_theta)
+
+    def _broadcast_theta(self, s: Array) -> Array:
+        return self.theta(s) + np.zeros_like(s)
 
     @cached_property
     def _closest_point(self) -> ClosestPoint:
@@ -246,3 +251,9 @@ class _Reprofiled(PathTask):
 
     def describe(self) -> dict[str, Any]:
         return self.path.describe() | self.profile.describe()
+
+
+def _short(value: Any) -> str:
+    """A number, a text or a small array in full, of a large array its shape."""
+    shape = np.shape(value)
+    return f"<{' × '.join(map(str, shape))} values>" if np.size(value) > _MOST_SHOWN else str(value)

@@ -66,7 +66,7 @@ class ConstantRate(VelocityProfile):
         scalar("rate", self.rate, positive=True)
 
     def theta(self, path: Path, s: Array) -> Array:
-        return np.full_like(s, self.rate)
+        return np.full_like(s, self.rate, dtype=np.float64)
 
     def dtheta(self, path: Path, s: Array) -> Array:
         return np.zeros_like(s)
