@@ -30,11 +30,15 @@ napoleon_numpy_docstring = False
 napoleon_use_ivar = True  # as fields of the class; as attributes they would be listed twice
 
 
+#: what would be markup: of a ``(*batch, n)``, an absolute value, an operator that stands alone
+_MARKUP = r"(?<=\()\*(?=batch)|\||(?<=\s)\*+(?=[\s,])"
+
+
 def _docstring(app, what, name, obj, options, lines):
-    """Make reStructuredText of what the docstrings leave plain: equations and ``(*batch, n)``."""
+    """Make reStructuredText of what the docstrings leave plain: equations, ``(*batch, n)``, |v| and operators."""
     for i, line in enumerate(lines):
         parts = re.split(r"(``.*?``)", line)
-        lines[i] = "".join(p if p.startswith("``") else p.replace("(*batch", r"(\*batch") for p in parts)
+        lines[i] = "".join(p if p.startswith("``") else re.sub(_MARKUP, r"\\\g<0>", p) for p in parts)
     _keep_equation_lines(lines)
 
 

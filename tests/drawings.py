@@ -5,9 +5,11 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
+import ezdxf
 import numpy as np
 
 from pathcontrol.toolpaths.contour import Contour
+from pathcontrol.toolpaths.dxf import read_dxf
 from pathcontrol.toolpaths.segments import Polyline
 
 U = np.linspace(0.0, 1.0, 9)
@@ -18,6 +20,18 @@ def svg(body: str, attributes: str = MM_PAGE) -> str:
     """A document whose user unit is 1 mm, unless other attributes are given."""
     spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
     return f"<svg {spaces} {attributes}>{body}</svg>"
+
+
+def dxf_reader(folder: Path):
+    """Reads what a function puts into a modelspace, in metres unless other units are given."""
+
+    def read(draw, units=6, version="R2010", **options):
+        document = ezdxf.new(version, units=units)
+        draw(document.modelspace())
+        document.saveas(folder / "drawing.dxf")
+        return read_dxf(folder / "drawing.dxf", **options)
+
+    return read
 
 
 def write(folder: Path, text: str, name: str = "drawing.svg") -> Path:

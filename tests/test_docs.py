@@ -21,7 +21,7 @@ from pathcontrol.simulation.run import VARIABLES
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted(page.stem for page in DOCS.glob("*.md"))
-NEEDS = {"robots": "example_robot_data"}
+NEEDS = {"robots": "example_robot_data", "path_tool_curve": "example_robot_data"}
 
 _BLOCK = re.compile(r"^```(python|text|toml)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")

@@ -202,6 +202,16 @@ def test_a_cusp_divides_a_curve_and_a_loop_does_not(read):
     assert len(smooth.segments) == 1
 
 
+@given(st.integers(0, 10**6))
+def test_both_sides_of_a_cusp_stand_still_there(read, seed):
+    """So that rounding does not decide about the tangent."""
+    cusp = '<path d="M0 0C10 10 0 10 10 0"/>'
+    (contour,) = read(f'<g transform="{random_transform(np.random.default_rng(seed))[0]}">{cusp}</g>')
+    before, after = contour.segments
+    assert not before.derivative(np.array(1.0)).any()
+    assert np.abs(after.derivative(np.array(0.0))).max() < 1e-16
+
+
 def test_a_curve_on_a_line_becomes_lines_with_its_turning_points(read):
     (fold,) = read('<path d="M0 0C20 0-10 0 10 0"/>')
     assert [type(s) for s in fold.segments] == [Polyline]
@@ -209,6 +219,10 @@ def test_a_curve_on_a_line_becomes_lines_with_its_turning_points(read):
     assert np.allclose(fold.segments[0].points, upright(np.array([0, *x, 10], dtype=complex)))
     (flat,) = read('<ellipse transform="scale(1,1e-13)" rx="10" ry="1"/>')
     assert flat.length == pytest.approx(0.04)
+    for sweep in (0, 1):
+        (arc,) = read(f'<path transform="scale(1e-13 1)" d="M0 0A6 6 0 1 {sweep} 0 10"/>')
+        (polyline,) = arc.segments
+        assert np.allclose(polyline.points, upright(1j * np.array([0, -1, 11, 10])), atol=1e-12)
 
 
 # --- units, page and transforms -------------------------------------------------------------------------------------

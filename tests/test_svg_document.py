@@ -249,7 +249,7 @@ def test_a_bomb_of_uses_ends_in_an_error(read, monkeypatch):
 
 
 def test_too_many_segments_end_in_an_error(read, monkeypatch):
-    monkeypatch.setattr("pathcontrol.toolpaths.svg_path.MAX_SEGMENTS", 1000)
+    monkeypatch.setattr("pathcontrol.toolpaths.svg_pen.MAX_SEGMENTS", 1000)
     with pytest.raises(ToolpathError, match="more than 1000 segments"):
         read(f'<path d="M0 0{"h1" * 1001}"/>')
     monkeypatch.setattr("pathcontrol.toolpaths.pieces.MAX_SEGMENTS", 1000)

@@ -16,7 +16,7 @@ from pathcontrol.toolpaths.segments import Segment
 
 _ACCURACY = 1e-9  # m, between a segment and the quintics that stand for it
 _MOST_PIECES = 1 << 16
-_STILL = 1e-9  # of the mean speed, what counts as standing still
+_STILL = 1e-6  # of the mean speed, what counts as standing still
 _SHORTEST = 1e-12  # m
 
 

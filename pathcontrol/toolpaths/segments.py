@@ -16,7 +16,9 @@ from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 from pathcontrol.toolpaths.lengths import ArcLength
 
 _SAMPLES = 1025
-_PAIRS = 1 << 21  # point-edge pairs held at once
+_PIECES = 1  # times as many as edges
+_NEAREST = 4  # pieces looked at first
+_PAIRS = 1 << 20  # of points and pieces, held at once
 
 
 class Segment(ABC):
@@ -134,19 +136,29 @@ class Polyline(Segment):
     def distance(self, x: ArrayLike) -> Array:
         x = as_array("x", x)
         flat = x.reshape(-1, 3)
-        start, step = self._pieces
-        tree, half = self._tree
-        near = tree.query(flat)[1] if len(flat) else np.empty(0, dtype=int)
-        best = _to_edges(flat, start[near], step[near])
-        for rows in np.array_split(np.arange(len(flat)), max(1, len(flat) // 1024)):
-            found = tree.query_ball_point(flat[rows], best[rows] + half, return_sorted=False)
-            _improve(best, rows, found, flat, start, step)
+        best, count = np.full(len(flat), np.nan), _NEAREST
+        rows = np.flatnonzero(np.isfinite(flat).all(-1))
+        while rows.size:
+            blocks = np.array_split(rows, rows.size * count // _PAIRS + 1)
+            rows = np.concatenate([self._look(best, block, flat[block], count) for block in blocks])
+            count *= 4
         return best.reshape(x.shape[:-1])
+
+    def _look(self, best: Array, rows: Array, x: Array, count: int) -> Array:
+        """Write the distance to the ``count`` nearest pieces to ``best``; the rows where another may be nearer."""
+        (start, step), (tree, half) = self._pieces, self._tree
+        count = min(count, len(start))
+        away, piece = tree.query(x, np.arange(1, count + 1))
+        offset, step = x[:, None] - start[piece], step[piece]
+        share = np.clip((offset * step).sum(-1) / (step * step).sum(-1), 0.0, 1.0)
+        best[rows] = np.linalg.norm(offset - share[..., None] * step, axis=-1).min(-1)
+        return rows[away[:, -1] < best[rows] + half] if count < len(start) else rows[:0]
 
     @cached_property
     def _pieces(self) -> tuple[Array, Array]:
-        """The edges cut into pieces of similar length, at most twice as many as edges: starts and steps."""
-        parts = np.maximum(1, np.ceil(self.edges * max(64, len(self.edges)) / self.length)).astype(int)
+        """The edges cut into pieces of similar length: starts and steps."""
+        most = _PIECES * max(64, len(self.edges))
+        parts = np.ceil(self.edges * (most / self.length)).astype(int)
         edge = np.repeat(np.arange(len(parts)), parts)
         rank = np.arange(len(edge)) - np.repeat(np.cumsum(parts) - parts, parts)
         step = np.diff(self.points, axis=0)[edge] / parts[edge, None]
@@ -154,6 +166,7 @@ class Polyline(Segment):
 
     @cached_property
     def _tree(self) -> tuple[cKDTree, float]:
+        """The middles of the pieces, and half the length of the longest [m]."""
         start, step = self._pieces
         return cKDTree(start + 0.5 * step), 0.5 * float(np.linalg.norm(step, axis=-1).max())
 
@@ -162,19 +175,3 @@ class Polyline(Segment):
         s = np.asarray(u) * self.length
         edge = np.clip(np.searchsorted(self.stations, s, side="right") - 1, 0, len(self.edges) - 1)
         return edge, s - self.stations[edge]
-
-
-def _to_edges(x: Array, start: Array, step: Array) -> Array:
-    """Distance from each x (N, 3) to the edge from start (N, 3) to start + step."""
-    along = ((x - start) * step).sum(-1) / (step * step).sum(-1)
-    return np.linalg.norm(x - start - np.clip(along, 0.0, 1.0)[:, None] * step, axis=-1)
-
-
-def _improve(best: Array, rows: Array, found: Array, x: Array, start: Array, step: Array) -> None:
-    """Lower ``best`` at ``rows`` to the distance to the nearest of the pieces ``found`` for each."""
-    counts = np.array([len(f) for f in found])
-    for block in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(np.cumsum(counts) // _PAIRS)) + 1):
-        row = np.repeat(rows[block], counts[block])
-        if row.size:
-            piece = np.concatenate([np.asarray(found[i], dtype=int) for i in block])
-            np.minimum.at(best, row, _to_edges(x[row], start[piece], step[piece]))

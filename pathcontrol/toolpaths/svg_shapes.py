@@ -9,7 +9,8 @@ import numpy as np
 
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.pieces import EllipticArc
-from pathcontrol.toolpaths.svg_path import Pen, Subpath, parse_path
+from pathcontrol.toolpaths.svg_path import parse_path
+from pathcontrol.toolpaths.svg_pen import Pen, Subpath
 from pathcontrol.toolpaths.svg_values import Viewport, numbers
 
 #: the value of an attribute or style property by its name, or None
