@@ -33,9 +33,9 @@ from pathcontrol import (
 )
 from pathcontrol.experiments.controller_sections import LAWS, LOOPS
 from pathcontrol.experiments.load import load_experiment
+from pathcontrol.experiments.profile_sections import PROFILES
 from pathcontrol.experiments.runner import load_setup, run_experiment
 from pathcontrol.experiments.schema import Experiment
-from pathcontrol.experiments.profile_sections import PROFILES
 from pathcontrol.experiments.task_sections import CURVES
 from pathcontrol.experiments.template import example_text
 

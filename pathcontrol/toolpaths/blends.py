@@ -55,11 +55,11 @@ class Junction(NamedTuple):
         """The longest one of all with d up to ``longest``, or none where tangent and curvature go through."""
         zero = np.array(0.0)
         (_, t_a, k_a), (_, t_b, k_b) = before(zero), after(zero)
-        turn, jump = angles(t_a, t_b), np.linalg.norm(k_b - k_a)
+        turn, jump = float(angles(t_a, t_b)), float(np.linalg.norm(k_b - k_a))
         # a tenth of a nanometre away from the junction nothing shows
         if turn <= _SMOOTH and jump <= 1e-5 * (1 + np.linalg.norm(k_a) + np.linalg.norm(k_b)):
             return cls(0.0, 0.0)
-        d = min(longest, float(straight_trims(np.maximum(turn, 2 * _SMOOTH), tolerance)))
+        d = min(longest, float(straight_trims(np.array(max(turn, 2 * _SMOOTH)), tolerance)))
         d = min(d, float(np.sqrt(_TANGENT * tolerance / max(jump, 1e-12))))
         while (deviation := _deviation(before, after, d)) > _MARGIN * tolerance:
             d *= min(0.9, max(0.3, 0.97 * float(np.sqrt(tolerance / deviation))))
@@ -100,7 +100,7 @@ def _deviation(before: Arm, after: Arm, d: float) -> float:
     turn = angles(start.dp, end.dp)
     if turn > _MOST_TURN:
         return np.inf
-    length = blend_length(np.linalg.norm(end.p - start.p), turn)
+    length = blend_length(np.asarray(np.linalg.norm(end.p - start.p)), turn)
     return float(Blends.between(start, end, length, _SAMPLES).deviation(a.p, b.p))
 
 

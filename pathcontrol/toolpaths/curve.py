@@ -151,7 +151,7 @@ class ToolCurve:
 
 
 def quintic_points(length: Array, start: Array, end: Array) -> Array:
-    """Bézier points (*batch, 6, 3) of the quintics of a ``length`` (*batch,) with p, p' and p'' (*batch, 3, 3) given."""
+    """Bézier points (*batch, 6, 3) of quintics of a ``length`` (*batch,) with p, p' and p'' (*batch, 3, 3) given."""
     h = length[..., None]
     (p0, v0, a0), (p1, v1, a1) = (np.moveaxis(values, -2, 0) for values in (start, end))
     # a Bézier curve's end derivatives in terms of its control points, solved for them

@@ -66,7 +66,7 @@ def _bends(polyline: Polyline, edges: _Edges, tolerance: float) -> tuple[Array, 
     while look.size:
         for block in np.array_split(look, len(look) // _BLOCK + 1):
             deviation[block] = _deviations(polyline, edges, bend, block)
-        curved = bend.any(-1)
+        curved = np.any(bend != 0, axis=-1)
         wrong = look[(deviation[look] > 0.99 * tolerance) & (curved[look] | curved[look + 1])]
         straight = np.unique(np.append(wrong, wrong + 1))
         bend[straight] = 0.0

@@ -16,7 +16,7 @@ from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 from pathcontrol.toolpaths.lengths import ArcLength
 
 _SAMPLES = 1025
-_PIECES = 1  # times as many as edges
+_PIECES = 4  # times as many as edges
 _NEAREST = 4  # pieces looked at first
 _PAIRS = 1 << 20  # of points and pieces, held at once
 

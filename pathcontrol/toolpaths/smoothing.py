@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
-from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.errors import UnknownNameError
 from pathcontrol.toolpaths.bends import regular
 from pathcontrol.toolpaths.blends import Arm, Junction, blend_length
 from pathcontrol.toolpaths.contour import Contour
@@ -142,7 +142,7 @@ def _gap(before: Knots, after: Knots, junction: Junction) -> float:
     """Parameter length of the blend between two parts [m]; 0 where there is none."""
     if junction.trim == 0:
         return 0.0
-    chord = np.linalg.norm(after.p[0] - before.p[-1])
+    chord = np.asarray(np.linalg.norm(after.p[0] - before.p[-1]))
     return float(blend_length(chord, angles(before.dp[-1], after.dp[0])))
 
 
@@ -151,7 +151,7 @@ def _ring(parts: Sequence[Knots], gaps: Sequence[float]) -> Knots:
     first, last, gap = parts[0], parts[-1], gaps[-1]
     if gap == 0:
         return _chain([*parts, Knots(*(column[:1] for column in first))], gaps)
-    seam = ToolCurve([0.0, gap], *([a[-1], b[0]] for a, b in zip(last[1:], first[1:], strict=True)))
+    seam = ToolCurve([0.0, gap], [last.p[-1], first.p[0]], [last.dp[-1], first.dp[0]], [last.ddp[-1], first.ddp[0]])
     middle = Knots(np.zeros(1), *seam.at([0.5 * gap]))
     return _chain([middle, *parts, middle], [0.5 * gap, *gaps[:-1], 0.5 * gap])
 
