@@ -120,6 +120,23 @@ def test_what_cannot_be_used_is_refused(tmp_path, name, text, options, message):
     assert message in err
 
 
+def test_a_file_cannot_command_the_terminal(tmp_path):
+    path = tmp_path / "odd.dxf"
+    path.write_text("\033[31mEVIL\033]0;pwned\007 x\n0\n")
+    code, _, err = called("toolpath", path)
+    assert code == 2
+    assert "\033" not in err
+
+
+def test_a_feed_does_not_hurt_a_program_and_a_start_helps_it(part):
+    assert called("toolpath", part, "--feed", "0.05")[0] == 0
+    part.write_text("G21 G90\nG1 X10 F600\n")
+    assert called("toolpath", part)[0] == 2
+    code, out, _ = called("toolpath", part, "--start", "0", "0", "0", "--json")
+    assert code == 0
+    assert json.loads(out)["cut_length_m"] == pytest.approx(0.01)
+
+
 def test_a_missing_file_is_refused(tmp_path):
     code, _, err = called("toolpath", tmp_path / "none.dxf")
     assert code == 2

@@ -69,13 +69,14 @@ def tool(arm, path, count=2001):
 # --- ways between contours ----------------------------------------------------------------------------------
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(*[floats(-1, 1)] * 6), min_size=1, max_size=6), floats(0.0, 0.3))
 def test_linked_contours_meet_and_keep_the_files(ends, clearance):
-    contours = tuple(drawn([np.array(e[:3]), np.array(e[3:]) + 3.0], feed=1.0) for e in ends)
-    whole = linked(Toolpath(contours), clearance)
-    assert [contour for contour in whole if not contour.rapid] == list(contours)
-    for before, after in itertools.pairwise(whole):
-        assert np.linalg.norm(before.end - after.start) <= 1e-7
+    contours = [drawn([np.array(e[:3]), np.array(e[3:]) + 3.0], feed=1.0) for e in ends]
+    whole = linked(contours, clearance, np.array([0.0, 0.0, 1.0]), 1e-4, "blend")
+    assert [contour for contour, _ in whole if not contour.rapid] == contours
+    for (before, _), (after, _) in itertools.pairwise(whole):
+        assert np.linalg.norm(before.end - after.start) <= 1e-6
         if after.rapid and clearance:
             top = max(after.start[2], after.end[2]) + clearance
             assert after.segments[0].points[:, 2].max() == pytest.approx(top)
@@ -84,8 +85,15 @@ def test_linked_contours_meet_and_keep_the_files(ends, clearance):
 
 
 def test_contours_that_meet_need_no_link():
-    first, second = drawn([[0, 0, 0], [1, 0, 0]]), drawn([[1, 0, 0], [1, 1, 0]])
-    assert linked(Toolpath((first, second)), 0.1) == [first, second]
+    contours = [drawn([[0, 0, 0], [1, 0, 0]]), drawn([[1, 0, 0], [1, 1, 0]])]
+    assert [contour for contour, _ in linked(contours, 0.1, np.array([0.0, 0.0, 1.0]), 1e-4, "blend")] == contours
+
+
+def test_a_sharp_tip_that_is_stopped_at_may_be_anywhere_on_a_closed_contour(arm):
+    tip = drawn([[0.01, 0.02, 0], [0.08, 0.02, 0], [0.01, 0.03, 0], [0.01, 0.02, 0]], feed=0.05)
+    after = drawn([[0.04, 0.05, 0], [0.06, 0.05, 0]], feed=0.05)
+    task = ToolpathTask(arm, "tool", Toolpath((tip, after)), BOARD, clearance=0.0)
+    assert [contour.rapid for contour in task.contours] == [False, True, False]
 
 
 # --- the paths ----------------------------------------------------------------------------------------------
@@ -174,6 +182,28 @@ def test_a_contour_out_of_reach_is_named(arm):
 def test_bad_arguments_are_named(arm, options, error, message):
     with pytest.raises(error, match=message):
         ToolpathTask(arm, "tool", letters(), **({"workpiece": BOARD} | options))
+
+
+def test_orientations_that_do_not_suit_are_refused(arm):
+    with pytest.raises(InputError, match="no contour has any; give i j k in a CSV, or take 'down'"):
+        ToolpathTask(arm, "tool", letters(), BOARD, orientation="normals")
+    with pytest.raises(InputError, match="'tangent', but the contours have 1 stops at corners"):
+        ToolpathTask(arm, "tool", letters(), BOARD, orientation="tangent", corner="stop")
+
+
+def test_rapids_turn_a_tool_that_goes_along_the_tangent():
+    pytest.importorskip("example_robot_data")
+    ur5 = load_robot("ur5").with_frame("tip", "tool0", [0.0, 0.0, 0.1])
+    table = np.eye(4)
+    table[:3, 3] = [0.42, -0.1, 0.15]
+    strokes = Toolpath((drawn([[0, 0, 0], [0.1, 0, 0]], feed=0.05), drawn([[0.1, 0.05, 0], [0.1, 0.1, 0]], feed=0.05)))
+    ready = [0.0, -1.2, 1.8, -2.1, -1.6, 0.0]
+    task = ToolpathTask(ur5, "tip", strokes, table, orientation="tangent", start=ready)
+    assert len(task) == 3
+    for path, direction in ((task.paths[0], [1, 0, 0]), (task.paths[2], [0, 1, 0])):
+        poses = ur5.frame_pose(path.q_d(np.linspace(path.s0, path.s_end, 50)), "tip")
+        assert np.allclose(poses[:, :3, 0], direction, atol=2e-4)
+        assert np.allclose(poses[:, :3, 2], [0, 0, -1], atol=2e-4)
 
 
 # --- sequences ----------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.orientation import NormalOrientation, Orientation, TangentOrientation
 from pathcontrol.cartesian.path import CartesianPath
+from pathcontrol.cartesian.turning import TurningOrientation
 from pathcontrol.errors import InputError, TaskError, UnknownNameError
 from pathcontrol.profiles.limited import limited
 from pathcontrol.profiles.motion import ToolMotion
@@ -55,20 +56,22 @@ class ContourPaths:
             raise UnknownNameError(f"orientation = {self.held!r}, expected one of {choices}, or an Orientation")
 
     def along(
-        self, contours: Sequence[Contour], smoothed: Sequence[Smoothed], start: ArrayLike | None
+        self, whole: Sequence[tuple[Contour, Smoothed]], start: ArrayLike | None
     ) -> Iterator[tuple[PathTask, Contour]]:
         """The path of each curve with the contour it follows, each from where the one before it ends.
 
         Raises:
+            InputError: the orientation does not suit the contours.
             TaskError: a contour cannot be followed.
         """
-        for i, (contour, smooth) in enumerate(zip(contours, smoothed, strict=True)):
+        self._check_held(whole)
+        for i, (contour, smooth) in enumerate(whole):
             for j, curve in enumerate(smooth.curves):
                 try:
-                    path = self._path(contour, curve, self._orientation(smoothed, i, j), start)
+                    path = self._path(contour, curve, self._orientation(whole, i, j), start)
                 except (TaskError, InputError) as error:
                     name = f" ({contour.name})" if contour.name else ""
-                    raise TaskError(f"contour {i} of {len(contours)}{name}: {error}") from error
+                    raise TaskError(f"contour {i} of {len(whole)}{name}: {error}") from error
                 yield path, contour
                 start = path.q_d(np.array(path.s_end))
 
@@ -97,27 +100,53 @@ class ContourPaths:
         begin = min(speed, _START_TIME * self.acceleration)
         return path.with_profile(limited(path, limit, start_rate=begin))
 
-    def _orientation(self, smoothed: Sequence[Smoothed], i: int, j: int) -> Orientation | None:
+    def _check_held(self, whole: Sequence[tuple[Contour, Smoothed]]) -> None:
+        if self.held == "normals" and all(contour.normals is None for contour, _ in whole):
+            raise InputError("orientation = 'normals', but no contour has any; give i j k in a CSV, or take 'down'")
+        stops = sum(len(smooth.curves) - 1 for contour, smooth in whole if not contour.rapid)
+        if self.held == "tangent" and stops:
+            raise InputError(
+                f"orientation = 'tangent', but the contours have {stops} stops at corners, where the tool would have "
+                "to turn on the spot; blend the corners, or hold the tool 'down'"
+            )
+
+    def _orientation(self, whole: Sequence[tuple[Contour, Smoothed]], i: int, j: int) -> Orientation | None:
         """How the tool is turned along curve j of contour i."""
         if isinstance(self.held, Orientation):
             return self.held
         if self.held == "free":
             return None
-        if self.held == "tangent":
-            return TangentOrientation(-self.up)
-        given, curve = smoothed[i].normals[j], smoothed[i].curves[j]
         if self.held == "down":
             return NormalOrientation(self.up)
+        contour, smooth = whole[i]
+        if self.held == "tangent":
+            if not contour.rapid:
+                return TangentOrientation(-self.up)
+            return TurningOrientation(*(self._frames(whole, i, j)))
+        given, curve = smooth.normals[j], smooth.curves[j]
         if given is not None:
             return NormalOrientation(given[1], at=given[0])
-        before, after = self._normal(smoothed[:i][::-1], -1), self._normal(smoothed[i + 1 :], 0)
+        before, after = self._normal(whole[:i][::-1], -1), self._normal(whole[i + 1 :], 0)
         if np.allclose(before, after):
             return NormalOrientation(before)
         return NormalOrientation(np.array([before, after]), at=np.array([curve.s0, curve.s_end]))
 
-    def _normal(self, neighbours: Sequence[Smoothed], end: int) -> Array:
+    def _frames(self, whole: Sequence[tuple[Contour, Smoothed]], i: int, j: int) -> tuple[Array, Array]:
+        """The frames along the tangent that rapids turn between, on the last of their curves."""
+        before = next((smooth.curves[-1] for contour, smooth in whole[:i][::-1] if not contour.rapid), None)
+        after = next((smooth.curves[0] for contour, smooth in whole[i + 1 :] if not contour.rapid), None)
+        tangent = TangentOrientation(-self.up)
+        first = None if before is None else tangent.frames(before, np.array([before.s_end]))[0]
+        last = None if after is None else tangent.frames(after, np.array([after.s0]))[0]
+        first, last = (last if first is None else first), (first if last is None else last)
+        if first is None or last is None:
+            raise InputError("orientation = 'tangent', but there are only rapids; take 'down'")
+        turns_here = j == len(whole[i][1].curves) - 1 and (i + 1 == len(whole) or not whole[i + 1][0].rapid)
+        return (first, last) if turns_here else (first, first)
+
+    def _normal(self, neighbours: Sequence[tuple[Contour, Smoothed]], end: int) -> Array:
         """The first normal that neighbouring contours give, at their last (-1) or first (0) point."""
-        for smooth in neighbours:
+        for _, smooth in neighbours:
             given = smooth.normals[end]
             if given is not None:
                 return given[1][end]

@@ -2,37 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.toolpaths.contour import Contour, Toolpath
+from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.smoothing import Corners, Smoothed, smooth
 
 _MEET = 1e-7  # m
 
 
-def linked(toolpath: Toolpath, clearance: float) -> list[Contour]:
-    """The contours, each beginning where the one before it ends: rapids are put in between where there is a gap.
+def linked(
+    contours: Sequence[Contour], clearance: float, up: Array, tolerance: float, corner: Corners
+) -> list[tuple[Contour, Smoothed]]:
+    """The contours with the curves that stand for them, and rapids in between where those do not meet.
 
-    A rapid goes ``clearance`` [m] above the higher of the two points along z, across and down again; straight where the
+    A rapid goes ``clearance`` [m] above the higher of its ends, along ``up``, across and down again; straight where the
     clearance is 0, for arms that move in a plane.
     """
-    contours = [toolpath[0]]
-    for contour in toolpath.contours[1:]:
-        gap = _way(contours[-1].end, contour.start, clearance)
-        if gap is not None:
-            contours.append(Contour((Polyline(gap),), rapid=True, name="between contours"))
-        contours.append(contour)
-    return contours
+    done: list[tuple[Contour, Smoothed]] = []
+    for contour in contours:
+        curves = smooth(contour, tolerance, corner)
+        if done:
+            last, first = done[-1][1].curves[-1], curves.curves[0]
+            way = _way(last.position(last.s_end), first.position(first.s0), clearance, up)
+            if way is not None:
+                rapid = Contour((Polyline(way),), rapid=True, name=f"rapid to {contour.name or 'the next contour'}")
+                done.append((rapid, smooth(rapid, tolerance, corner)))
+        done.append((contour, curves))
+    return done
 
 
-def _way(start: Array, end: Array, clearance: float) -> Array | None:
+def _way(start: Array, end: Array, clearance: float, up: Array) -> Array | None:
     """Points (k, 3) on the way, None where there is nowhere to go."""
     if np.linalg.norm(end - start) < _MEET:
         return None
     if clearance == 0:
         return np.array([start, end])
-    top = max(start[2], end[2]) + clearance
-    above = [np.array([*point[:2], top]) for point in (start, end)]
-    points = np.array([start, *above, end])
+    top = max(start @ up, end @ up) + clearance
+    points = np.array([start, *(point + (top - point @ up) * up for point in (start, end)), end])
     return points[np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=-1) > _MEET)]

@@ -78,12 +78,14 @@ class ToolpathTask(PathSequence):
         self.rapid_speed = scalar("rapid_speed", rapid_speed, positive=True)
         self.acceleration = scalar("acceleration", acceleration, positive=True)
         self.tolerance, self.corner = scalar("tolerance", tolerance, positive=True), corner
-        self.drawing = Toolpath(tuple(linked(toolpath, scalar("clearance", clearance, least=0.0))), toolpath.source)
-        whole = self.drawing.placed(pose).contours
-        self.smoothed = tuple(smooth(contour, self.tolerance, corner) for contour in whole)
+        height = scalar("clearance", clearance, least=0.0)
+        whole = linked(toolpath.placed(pose).contours, height, pose[:3, 2], self.tolerance, corner)
+        self.smoothed = tuple(smoothed for _, smoothed in whole)
+        back = np.linalg.inv(pose)
+        self.drawing = Toolpath(tuple(contour.placed(back) for contour, _ in whole), toolpath.source, toolpath.unit)
         maker = ContourPaths(robot, frame, orientation, pose[:3, 2], feed, self.rapid_speed, self.acceleration)
         first = maker.start_on(_tour(toolpath, pose)) if start is None else start
-        paths, contours = zip(*maker.along(whole, self.smoothed, first), strict=True)
+        paths, contours = zip(*maker.along(whole, first), strict=True)
         self.contours: tuple[Contour, ...] = contours
         super().__init__(paths)
 

@@ -22,11 +22,16 @@ class _Group(click.Group):
         try:
             return super().invoke(ctx)
         except PathControlError as error:
-            click.echo(f"error: {error}", err=True)
+            click.echo(f"error: {_printable(str(error))}", err=True)
             sys.exit(2)
         except KeyboardInterrupt:
             click.echo("interrupted; no half-written file is left behind", err=True)
             sys.exit(130)
+
+
+def _printable(message: str) -> str:
+    """``message`` without the control characters that a file may have put into it, which a terminal would obey."""
+    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in message)
 
 
 @contextlib.contextmanager
@@ -145,6 +150,7 @@ def check(file: str, lock: tuple[str, ...], as_json: bool) -> None:
 @click.option("--layer", "layers", multiple=True, metavar="LAYER", help="A layer of a DXF file; repeat for more.")
 @click.option("--ppi", type=float, help="Pixels per inch of an SVG file.  [default: 96]")
 @click.option("--feed", type=float, metavar="M/S", help="Feed of contours for which the file gives none.")
+@click.option("--start", type=float, nargs=3, metavar="X Y Z", help="Where a G-code program finds the tool, in metres.")
 @click.option(
     "--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw it: writes this name as SVG and PNG."
 )
@@ -152,10 +158,12 @@ def check(file: str, lock: tuple[str, ...], as_json: bool) -> None:
 def toolpath(file: Path, layers: tuple[str, ...], plot: Path | None, as_json: bool, **options: Any) -> None:
     """Show what is in a toolpath FILE: CSV, G-code, SVG or DXF."""
     from pathcontrol.cli.tables import toolpath_table
-    from pathcontrol.toolpaths.read import read_toolpath
+    from pathcontrol.toolpaths.read import GCODE, read_toolpath
     from pathcontrol.toolpaths.summary import summary
 
     given = {name: value for name, value in (options | {"layers": list(layers) or None}).items() if value is not None}
+    if file.suffix.lower() in GCODE:  # which has feeds of its own, or is refused
+        given.pop("feed", None)
     read = read_toolpath(file, **given)
     content = summary(read)
     if plot is not None:

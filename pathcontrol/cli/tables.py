@@ -34,7 +34,7 @@ def toolpath_table(content: dict[str, Any]) -> list[Text | Table]:
     size = " × ".join(f"{1e3 * (b - a):.6g}" for a, b in zip(*content["bounds_m"], strict=True))
     cuts, rapids = (f"{1e3 * content[key]:.6g}" for key in ("cut_length_m", "rapid_length_m"))
     head = (
-        f"{content['source']}: {len(contours)} contours, drawn in {content['unit']}: {cuts} mm of cuts and "
+        f"{content['source']}: {_counted(len(contours), 'contour')}, drawn in {content['unit']}: {cuts} mm of cuts and "
         f"{rapids} mm of rapids, within {size} mm"
     )
     table = Table()
@@ -56,3 +56,7 @@ def _contour_row(contour: dict[str, Any]) -> list[Text | str]:
         str(contour["corners"]),
         f"{contour['sharpest_deg']:.1f}" if contour["corners"] else "",
     ]
+
+
+def _counted(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"

@@ -38,6 +38,14 @@ class Bezier(Segment):
                 raise InputError(f"weights = {weights.tolist()}, expected {len(points)} weights greater than 0")
             object.__setattr__(self, "weights", readonly(weights))
 
+    @property
+    def first(self) -> Array:
+        return self.points[0]
+
+    @property
+    def last(self) -> Array:
+        return self.points[-1]
+
     def point(self, u: Array) -> Array:
         value = self._homogeneous[0](np.asarray(u))
         return value[..., :3] / value[..., 3:]

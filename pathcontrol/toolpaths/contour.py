@@ -100,8 +100,7 @@ class Contour:
     @cached_property
     def _ends(self) -> tuple[Array, Array]:
         """Last and first points of the segments, each (k, 3)."""
-        ends = np.array([s.point(np.array(1.0)) for s in self.segments])
-        return ends, np.array([s.point(np.array(0.0)) for s in self.segments])
+        return np.array([s.last for s in self.segments]), np.array([s.first for s in self.segments])
 
 
 @dataclass(frozen=True, eq=False)

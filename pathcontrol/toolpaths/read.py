@@ -11,10 +11,11 @@ from typing import Any
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Toolpath
 
+GCODE = (".ngc", ".nc", ".gcode", ".gc", ".tap", ".cnc")
 #: readers by the end of a file's name: the module of this package, and the function in it
 READERS = {
     (".csv", ".tsv", ".txt", ".xyz"): ("points", "read_csv"),
-    (".ngc", ".nc", ".gcode", ".gc", ".tap", ".cnc"): ("gcode", "read_gcode"),
+    GCODE: ("gcode", "read_gcode"),
     (".svg",): ("svg", "read_svg"),
     (".dxf",): ("dxf", "read_dxf"),
 }

@@ -16,7 +16,7 @@ from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 from pathcontrol.toolpaths.lengths import ArcLength
 
 _SAMPLES = 1025
-_PIECES = 4  # times as many as edges
+_PIECES = 16  # times as many as edges
 _NEAREST = 4  # pieces looked at first
 _PAIRS = 1 << 20  # of points and pieces, held at once
 
@@ -39,6 +39,16 @@ class Segment(ABC):
     @abstractmethod
     def reversed(self) -> Segment:
         """The same points from the end to the start."""
+
+    @property
+    def first(self) -> Array:
+        """First point [m], (3,)."""
+        return self.point(np.array(0.0))
+
+    @property
+    def last(self) -> Array:
+        """Last point [m], (3,)."""
+        return self.point(np.array(1.0))
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
@@ -118,6 +128,14 @@ class Polyline(Segment):
     @property
     def bounds(self) -> tuple[Array, Array]:
         return self.points.min(0), self.points.max(0)
+
+    @property
+    def first(self) -> Array:
+        return self.points[0]
+
+    @property
+    def last(self) -> Array:
+        return self.points[-1]
 
     def point(self, u: Array) -> Array:
         edge, along = self._locate(u)

@@ -82,12 +82,21 @@ class Document:
         try:
             root = etree.fromstring(text.encode("utf-8", "replace"), parser)
         except etree.XMLSyntaxError as error:
-            raise ToolpathError(f"{self.path} is no well-formed SVG drawing: {error}") from error
+            raise ToolpathError(f"{self.path} {_refusal(str(error))}") from error
         if tag_of(root) != "svg":
             raise ToolpathError(f"{self.path} begins with the element {str(root.tag)[:60]!r}, expected svg")
         if any(node.target == "xml-stylesheet" for node in root.itersiblings(etree.PI, preceding=True)):
             raise ToolpathError(f"{self.path} has its style in another file, which is not fetched; write it in")
         return root
+
+
+def _refusal(message: str) -> str:
+    """What the parser of XML says, in terms of what can be changed in a drawing."""
+    if "depth" in message:
+        return "has elements nested more than 256 deep; ungroup them"
+    if "XML_PARSE_HUGE" in message:
+        return "has an attribute of more than 10 MB; split the path"
+    return f"is no well-formed SVG drawing: {message}"
 
 
 def tag_of(element: Any) -> str | None:

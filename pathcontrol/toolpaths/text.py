@@ -10,6 +10,7 @@ from pathcontrol.errors import InputError, ToolpathError
 
 #: most segments, moves or points that a file may hold
 MAX_SEGMENTS = 2_000_000
+MAX_CONTOURS = 100_000
 #: largest coordinate, radius or length [m]: what lies further is a mistake in the unit, or an attack
 MAX_COORDINATE = 1e4
 

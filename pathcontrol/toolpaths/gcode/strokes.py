@@ -8,7 +8,7 @@ from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.arc import Arc
 from pathcontrol.toolpaths.builder import ContourBuilder
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.text import MAX_SEGMENTS
+from pathcontrol.toolpaths.text import MAX_CONTOURS, MAX_SEGMENTS
 
 
 class Strokes:
@@ -39,6 +39,8 @@ class Strokes:
     def end(self) -> None:
         """The next move begins a new contour."""
         if self._builder is not None and not self._builder.empty:
+            if len(self._contours) == MAX_CONTOURS:
+                raise ToolpathError(f"more than {MAX_CONTOURS} changes between rapids and feeds; split the program")
             rapid = self._feed is None
             self._contours.append(self._builder.contour(feed=self._feed, rapid=rapid, name=self._name))
         self._builder = None
