@@ -203,7 +203,7 @@ def test_each_rollout_is_judged_alone(ideal_arm):
 
 def test_the_law_goes_on_from_the_branch_it_was_pushed_to(ideal_arm):
     path = zigzag(300)
-    law = Projection(ideal_arm, path, 100.0, 20.0)
+    law = Projection(ideal_arm, path, 100.0, 20.0, start="nearest")
     q = path.q_d(np.array(middle_of_pass(path, 20)))
     z = law.start(q, 0 * q)
     pushed, passes = q + np.array([0.0, 0.5]), []

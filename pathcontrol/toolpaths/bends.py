@@ -13,6 +13,7 @@ from pathcontrol.toolpaths.segments import Polyline, Segment
 _FIRST_PIECES = 32
 _TURN = 0.2  # rad over a piece
 _NARROWEST = 2.0**-40
+_NOTHING = 1e-9  # m, points nearer than this are one
 _TINY = np.finfo(float).tiny
 
 
@@ -31,7 +32,8 @@ def regular(segment: Segment, tolerance: float) -> tuple[Segment, float]:
         return segment, 0.0
     while (coarse := (pieces.sagitta > tolerance) & (pieces.size > tolerance)).any():
         pieces = pieces.halved(segment, coarse)
-    polyline = Polyline(_apart(segment.point(pieces.u), min(0.1 * tolerance, 0.01 * segment.length)))
+    least = max(_NOTHING, min(0.1 * tolerance, 0.01 * segment.length))
+    polyline = Polyline(_apart(segment.point(pieces.u), least))
     between = segment.point(pieces.u[:-1] + np.diff(pieces.u) * np.linspace(0.0, 1.0, 4, endpoint=False)[:, None])
     return polyline, float(polyline.distance(between).max())
 

@@ -13,12 +13,11 @@ from scipy.spatial import cKDTree
 from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.closest_point import ClosestPoint, Curve
+from pathcontrol.toolpaths.boxes import Boxes
 from pathcontrol.toolpaths.lengths import ArcLength
 
 _SAMPLES = 1025
-_PIECES = 16  # times as many as edges
-_NEAREST = 4  # pieces looked at first
-_PAIRS = 1 << 20  # of points and pieces, held at once
+_SHORTEST = 1e-10  # m, edges up to this have no direction to rely on
 
 
 class Segment(ABC):
@@ -92,7 +91,7 @@ class Polyline(Segment):
     """Straight edges through points (k + 1, 3) [m]; u runs in proportion to the arc length.
 
     Raises:
-        InputError: fewer than two points, values that are not finite, or an edge of no length.
+        InputError: fewer than two points, values that are not finite, or an edge no longer than 0.1 nm.
     """
 
     points: Array
@@ -102,7 +101,7 @@ class Polyline(Segment):
         if points.ndim != 2 or points.shape[1:] != (3,) or len(points) < 2:
             raise InputError(f"points have shape {points.shape}, expected (k, 3) with at least 2 points")
         object.__setattr__(self, "points", readonly(points))
-        if (self.edges == 0).any():
+        if (self.edges <= _SHORTEST).any():
             i = int(np.argmin(self.edges))
             raise InputError(f"points {i} and {i + 1} are the same, {points[i].tolist()}; leave one of them out")
 
@@ -154,39 +153,31 @@ class Polyline(Segment):
     def distance(self, x: ArrayLike) -> Array:
         x = as_array("x", x)
         flat = x.reshape(-1, 3)
-        best, count = np.full(len(flat), np.nan), _NEAREST
         rows = np.flatnonzero(np.isfinite(flat).all(-1))
-        while rows.size:
-            blocks = np.array_split(rows, rows.size * count // _PAIRS + 1)
-            rows = np.concatenate([self._look(best, block, flat[block], count) for block in blocks])
-            count *= 4
+        best = np.full(len(flat), np.nan)
+        near = self._tree.query(flat[rows])[1]
+        best[rows] = np.minimum(
+            self._to_edges(flat[rows], np.minimum(near, len(self.edges) - 1)),
+            self._to_edges(flat[rows], np.maximum(near - 1, 0)),
+        )
+        for row, edge in self._boxes.nearer(flat, best):
+            np.minimum.at(best, row, self._to_edges(flat[row], edge))
         return best.reshape(x.shape[:-1])
 
-    def _look(self, best: Array, rows: Array, x: Array, count: int) -> Array:
-        """Write the distance to the ``count`` nearest pieces to ``best``; the rows where another may be nearer."""
-        (start, step), (tree, half) = self._pieces, self._tree
-        count = min(count, len(start))
-        away, piece = tree.query(x, np.arange(1, count + 1))
-        offset, step = x[:, None] - start[piece], step[piece]
-        share = np.clip((offset * step).sum(-1) / (step * step).sum(-1), 0.0, 1.0)
-        best[rows] = np.linalg.norm(offset - share[..., None] * step, axis=-1).min(-1)
-        return rows[away[:, -1] < best[rows] + half] if count < len(start) else rows[:0]
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.points)
 
     @cached_property
-    def _pieces(self) -> tuple[Array, Array]:
-        """The edges cut into pieces of similar length: starts and steps."""
-        most = _PIECES * max(64, len(self.edges))
-        parts = np.ceil(self.edges * (most / self.length)).astype(int)
-        edge = np.repeat(np.arange(len(parts)), parts)
-        rank = np.arange(len(edge)) - np.repeat(np.cumsum(parts) - parts, parts)
-        step = np.diff(self.points, axis=0)[edge] / parts[edge, None]
-        return self.points[edge] + rank[:, None] * step, step
+    def _boxes(self) -> Boxes:
+        start, end = self.points[:-1], self.points[1:]
+        return Boxes(np.minimum(start, end), np.maximum(start, end))
 
-    @cached_property
-    def _tree(self) -> tuple[cKDTree, float]:
-        """The middles of the pieces, and half the length of the longest [m]."""
-        start, step = self._pieces
-        return cKDTree(start + 0.5 * step), 0.5 * float(np.linalg.norm(step, axis=-1).max())
+    def _to_edges(self, x: Array, edge: Array) -> Array:
+        """Distance from each x (N, 3) to the edge of the index ``edge`` (N,) [m]."""
+        offset, direction = x - self.points[edge], self.directions[edge]
+        along = np.clip((offset * direction).sum(-1), 0.0, self.edges[edge])
+        return np.linalg.norm(offset - along[:, None] * direction, axis=-1)
 
     def _locate(self, u: Array) -> tuple[Array, Array]:
         """The edge that u lies on, and how far along it [m]."""
