@@ -206,6 +206,21 @@ def test_a_blend_passes_a_corner_at_the_tolerance(turn, tolerance):
     assert result.corners[0].turn == pytest.approx(turn)
 
 
+@given(SEEDS, st.booleans())
+def test_a_polyline_becomes_a_curve_within_the_tolerance(seed, closed):
+    angle = np.linspace(0, 5.0, 6) + np.random.default_rng(seed).uniform(-0.3, 0.3, 6)
+    points = np.stack([np.cos(angle), np.sin(angle), 0.1 * np.sin(3 * angle)], axis=-1)
+    curve = ToolCurve.polyline(points, 1e-3, closed)
+    assert curve.closed == closed
+    assert curve.distance(points).max() <= 1.001e-3
+    assert_smooth(curve)
+
+
+def test_a_polyline_that_turns_back_is_no_curve():
+    with pytest.raises(InputError, match=r"turn back by 180° at \[1.0, 0.0, 0.0\]"):
+        ToolCurve.polyline([[0, 0, 0], [1, 0, 0], [0.5, 0, 0]])
+
+
 def test_stops_are_at_the_corners_and_curves_meet_there():
     square = Contour((Polyline([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 0]]),), closed=True)
     result = smooth(square, 1e-4, "stop")

@@ -69,7 +69,7 @@ class CartesianPath(SplinePath):
         curve: ToolCurve | ArrayLike,
         orientation: Orientation | Literal["keep"] | None = None,
         *,
-        speed: float,
+        speed: float = 0.1,
         start: ArrayLike | None = None,
         tolerance: float = 1e-5,
         angle_tolerance: float = 1e-4,

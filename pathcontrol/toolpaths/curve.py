@@ -150,6 +150,34 @@ class ToolCurve:
         return cls(s, ring, curve(s, 1), curve(s, 2), closed)
 
 
+    @classmethod
+    def polyline(cls, points: ArrayLike, tolerance: float = 1e-4, closed: bool = False) -> ToolCurve:
+        """Straight edges through points [m], (m, 3), with corners blended; see :func:`smooth`.
+
+        Args:
+            points: m ≥ 2 points, no two neighbours the same.
+            tolerance: largest distance between the edges and the curve [m].
+            closed: whether an edge leads back to the first point, which is not repeated.
+
+        Raises:
+            InputError: the edges turn back by more than 150°, where the tool would have to stop.
+        """
+        from pathcontrol.toolpaths.contour import Contour
+        from pathcontrol.toolpaths.segments import Polyline
+        from pathcontrol.toolpaths.smoothing import smooth
+
+        given = as_array("points", points)
+        edges = Polyline(np.concatenate([given, given[:1]]) if closed else given)
+        smoothed = smooth(Contour((edges,), closed=closed), tolerance)
+        if len(smoothed.curves) > 1 or smoothed.curves[0].closed != closed:
+            sharpest = max(smoothed.corners, key=lambda corner: corner.turn)
+            raise InputError(
+                f"the edges turn back by {np.rad2deg(sharpest.turn):.0f}° at {sharpest.point.tolist()}, expected 150° "
+                "at most; end a curve there and begin another"
+            )
+        return smoothed.curves[0]
+
+
 def quintic_points(length: Array, start: Array, end: Array) -> Array:
     """Bézier points (*batch, 6, 3) of quintics of a ``length`` (*batch,) with p, p' and p'' (*batch, 3, 3) given."""
     h = length[..., None]
