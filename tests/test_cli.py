@@ -156,6 +156,7 @@ def test_ctrl_c_leaves_no_half_written_file(tmp_path):
         [*COMMAND, "reproduce", "--out", str(tmp_path / "out")],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background ignore it
     )
     deadline = time.monotonic() + 60
     while not list(tmp_path.glob("out/*")) and process.poll() is None and time.monotonic() < deadline:
