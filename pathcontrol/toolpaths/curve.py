@@ -149,7 +149,6 @@ class ToolCurve:
         curve = make_interp_spline(s, ring, k=3, bc_type="periodic" if closed else "natural")
         return cls(s, ring, curve(s, 1), curve(s, 2), closed)
 
-
     @classmethod
     def polyline(cls, points: ArrayLike, tolerance: float = 1e-4, closed: bool = False) -> ToolCurve:
         """Straight edges through points [m], (m, 3), with corners blended; see :func:`smooth`.
