@@ -87,10 +87,10 @@ from .toolpaths.points import read_csv as read_csv
 from .toolpaths.read import read_toolpath as read_toolpath
 from .toolpaths.smoothing import smooth as smooth
 from .toolpaths.svg import read_svg as read_svg
-from .view.deviation_figures import deviation_figure as deviation_figure
-from .view.figures import error_figure as error_figure
-from .view.figures import path_figure as path_figure
-from .view.figures import torque_figure as torque_figure
-from .view.recorder import record as record
-from .view.style import save_figure as save_figure
-from .view.toolpath_figures import toolpath_figure as toolpath_figure
+from .view.figures.deviation import deviation_figure as deviation_figure
+from .view.figures.run import error_figure as error_figure
+from .view.figures.run import path_figure as path_figure
+from .view.figures.run import torque_figure as torque_figure
+from .view.figures.style import save_figure as save_figure
+from .view.figures.toolpath import toolpath_figure as toolpath_figure
+from .view.film.recorder import record as record

@@ -11,7 +11,7 @@ from PIL import Image
 from test_view_recorder import HOSTILE, ODD, circling, wild
 
 from pathcontrol import Circle, RobotModel, load_robot
-from pathcontrol.view.recorder import record
+from pathcontrol.view.film.recorder import record
 
 SIZE = (900, 600)
 

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pathcontrol.view.camera import HIGHEST, LOWEST, Camera, picture_axes, view_direction
-from pathcontrol.view.ground import ground_grid
-from pathcontrol.view.motion import at_times, continuous_quaternions, frame_times
-from pathcontrol.view.tube import distinct, simplified, tube
+from pathcontrol.view.film.camera import HIGHEST, LOWEST, Camera, picture_axes, view_direction
+from pathcontrol.view.film.ground import ground_grid
+from pathcontrol.view.film.motion import at_times, continuous_quaternions, frame_times
+from pathcontrol.view.film.tube import distinct, simplified, tube
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from test_view_motion import to_polyline
 
 from pathcontrol import Circle, InputError, PathTask, RobotModel, Run, UnknownNameError, load_robot
-from pathcontrol.view.recorder import Animation, default_tool, record
+from pathcontrol.view.film.recorder import Animation, default_tool, record
 
 HOSTILE = "</script><script>alert(1)</script>"
 ESCAPED = HOSTILE.replace("<", "&lt;").replace(">", "&gt;")

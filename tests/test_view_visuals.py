@@ -11,9 +11,9 @@ import pytest
 import trimesh
 
 from pathcontrol.robot.model import UrdfSource
-from pathcontrol.view.shapes import Box, Cylinder, Mesh, Sphere
-from pathcontrol.view.sticks import stick_figure
-from pathcontrol.view.visuals import leaf_links, link_visuals
+from pathcontrol.view.bodies.shapes import Box, Cylinder, Mesh, Sphere
+from pathcontrol.view.bodies.sticks import stick_figure
+from pathcontrol.view.bodies.visuals import leaf_links, link_visuals
 
 
 def visual(geometry: str, extra: str = "") -> str:

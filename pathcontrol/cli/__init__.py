@@ -52,8 +52,8 @@ def _import_all() -> None:
     with _uninterrupted():
         import pathcontrol.experiments.reproduce
         import pathcontrol.experiments.runner
-        import pathcontrol.view.figures
-        import pathcontrol.view.recorder  # noqa: F401
+        import pathcontrol.view.figures.run
+        import pathcontrol.view.film.recorder  # noqa: F401
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, nothing else.")
@@ -168,8 +168,8 @@ def toolpath(file: Path, layers: tuple[str, ...], plot: Path | None, as_json: bo
     content = summary(read)
     if plot is not None:
         with _uninterrupted():
-            from pathcontrol.view.style import save_figure
-            from pathcontrol.view.toolpath_figures import toolpath_figure
+            from pathcontrol.view.figures.style import save_figure
+            from pathcontrol.view.figures.toolpath import toolpath_figure
         content["figures"] = [str(path) for path in save_figure(toolpath_figure(read), plot)]
     if as_json:
         click.echo(json.dumps(content))

@@ -68,20 +68,20 @@ def _write_summary(numbers: dict[str, Any], path: Path) -> Path:
 
 
 def _write_figures(run: Run, setup: Setup, path: Path) -> dict[str, Path]:
-    from pathcontrol.view.figures import run_figure
+    from pathcontrol.view.figures.run import run_figure
 
     stem = path.with_suffix("").name
     figures = run_figure(run, path, setup.task)
     if isinstance(setup.task, ToolpathTask):
-        from pathcontrol.view.deviation_figures import deviation_figure
-        from pathcontrol.view.style import save_figure
+        from pathcontrol.view.figures.deviation import deviation_figure
+        from pathcontrol.view.figures.style import save_figure
 
         figures += save_figure(deviation_figure(run, setup.plant, setup.task), path.with_name(f"{stem}-deviation"))
     return {f"figure{figure.name.removeprefix(stem)}": figure for figure in figures}
 
 
 def _write_html(run: Run, setup: Setup, path: Path) -> Path:
-    from pathcontrol.view.recorder import record
+    from pathcontrol.view.film.recorder import record
 
     tool = setup.task.frame if isinstance(setup.task, ToolpathTask) else None
     record(run, setup.plant, task=setup.task, tool=tool).save(path)

@@ -102,9 +102,9 @@ def reproduce(out: str | Path) -> dict[str, Any]:
 
 def _write(experiment: Experiment, robot: RobotModel, out: Path) -> None:
     """Data, figures and animation of one experiment."""
-    from pathcontrol.view.figures import error_figure, path_figure
-    from pathcontrol.view.recorder import record
-    from pathcontrol.view.style import save_figure
+    from pathcontrol.view.figures.run import error_figure, path_figure
+    from pathcontrol.view.figures.style import save_figure
+    from pathcontrol.view.film.recorder import record
 
     run, task = experiment.run, experiment.controller.task
     run.save(out / f"{experiment.name}.nc")

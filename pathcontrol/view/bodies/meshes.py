@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol.errors import UrdfError
 from pathcontrol.robot.urdf.mesh_files import LOCAL_SCHEMES, mesh_candidates
-from pathcontrol.view.shapes import Color, Mesh
+from pathcontrol.view.bodies.shapes import Color, Mesh
 
 SHARP = np.deg2rad(40.0)  # faces that meet at more than this show an edge
 

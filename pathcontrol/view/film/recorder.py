@@ -12,12 +12,12 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError
-from pathcontrol.view.camera import Camera, view_direction
-from pathcontrol.view.page import page
-from pathcontrol.view.shapes import Color
-from pathcontrol.view.stage import Stage
-from pathcontrol.view.sticks import stick_figure
-from pathcontrol.view.visuals import leaf_links, link_visuals
+from pathcontrol.view.bodies.shapes import Color
+from pathcontrol.view.bodies.sticks import stick_figure
+from pathcontrol.view.bodies.visuals import leaf_links, link_visuals
+from pathcontrol.view.film.camera import Camera, view_direction
+from pathcontrol.view.film.stage import Stage
+from pathcontrol.view.page.html import page
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel

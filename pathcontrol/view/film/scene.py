@@ -13,8 +13,8 @@ import numpy as np
 import umsgpack
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.motion import Track
-from pathcontrol.view.shapes import Box, Color, Cylinder, Shape, Sphere
+from pathcontrol.view.bodies.shapes import Box, Color, Cylinder, Shape, Sphere
+from pathcontrol.view.film.motion import Track
 
 _SKY, _GROUND = [0.99, 0.99, 1.0], [0.86, 0.88, 0.90]
 _BACK, _BOTH = 1, 2  # three.js: which side of a triangle is drawn

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from importlib import resources
 from string import Template
 
-from pathcontrol.view.camera import Camera
-from pathcontrol.view.shapes import Color
+from pathcontrol.view.bodies.shapes import Color
+from pathcontrol.view.film.camera import Camera
 
 
 def page(title: Sequence[str], legend: Mapping[str, Color], commands: Sequence[bytes], camera: Camera) -> str:
@@ -21,10 +21,10 @@ def page(title: Sequence[str], legend: Mapping[str, Color], commands: Sequence[b
     Args:
         title: what to say in the title line; any text, it is never markup.
         legend: what each colour is.
-        commands: the commands of a :class:`pathcontrol.view.scene.Scene`.
+        commands: the commands of a :class:`pathcontrol.view.film.scene.Scene`.
         camera: where to look from.
     """
-    own = resources.files("pathcontrol.view")
+    own = resources.files("pathcontrol.view.page")
     viewer = resources.files("meshcat").joinpath("viewer", "dist", "main.min.js").read_text(encoding="utf-8")
     scripts = {"viewer": _embedded(viewer), "player": _embedded(own.joinpath("player.js").read_text("utf-8"))}
     return Template(own.joinpath("template.html").read_text("utf-8")).substitute(

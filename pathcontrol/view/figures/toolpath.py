@@ -10,7 +10,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.corners import corners
 from pathcontrol.toolpaths.segments import Polyline
-from pathcontrol.view.style import BLUE, GREY, ORANGE, style
+from pathcontrol.view.figures.style import BLUE, GREY, ORANGE, style
 
 _CURVE_SAMPLES = 64
 _MOST_POINTS = 200_000

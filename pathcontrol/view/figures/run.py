@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.view.style import BLUE, GREY, ORANGE, save_figure, style
+from pathcontrol.view.figures.style import BLUE, GREY, ORANGE, save_figure, style
 
 
 def path_figure(

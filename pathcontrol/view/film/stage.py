@@ -9,12 +9,12 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
-from pathcontrol.view.ground import ground_grid
-from pathcontrol.view.motion import Track, at_times, frame_times
-from pathcontrol.view.scene import Scene, path
-from pathcontrol.view.shapes import Color, Sphere
-from pathcontrol.view.tube import distinct, simplified, tube
-from pathcontrol.view.visuals import LinkVisual
+from pathcontrol.view.bodies.shapes import Color, Sphere
+from pathcontrol.view.bodies.visuals import LinkVisual
+from pathcontrol.view.film.ground import ground_grid
+from pathcontrol.view.film.motion import Track, at_times, frame_times
+from pathcontrol.view.film.scene import Scene, path
+from pathcontrol.view.film.tube import distinct, simplified, tube
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel

@@ -12,8 +12,8 @@ from pathcontrol.analysis.deviation import tool_deviation, tool_positions
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
-from pathcontrol.view.style import GREY, ORANGE, style
-from pathcontrol.view.toolpath_figures import outline, plan_figure
+from pathcontrol.view.figures.style import GREY, ORANGE, style
+from pathcontrol.view.figures.toolpath import outline, plan_figure
 
 _COLOURS = "viridis"
 _MOST_PIECES = 4000

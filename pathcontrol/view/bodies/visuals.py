@@ -16,8 +16,8 @@ from lxml import etree
 from pathcontrol._arrays import Array
 from pathcontrol.errors import UrdfError
 from pathcontrol.robot.urdf import parse_urdf
-from pathcontrol.view.meshes import find_mesh, read_mesh
-from pathcontrol.view.shapes import Box, Color, Cylinder, Shape, Sphere
+from pathcontrol.view.bodies.meshes import find_mesh, read_mesh
+from pathcontrol.view.bodies.shapes import Box, Color, Cylinder, Shape, Sphere
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import UrdfSource

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.shapes import Mesh
+from pathcontrol.view.bodies.shapes import Mesh
 
 
 def simplified(points: Array, tolerance: float, most: int = 400) -> Array:

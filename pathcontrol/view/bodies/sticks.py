@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from pathcontrol._arrays import Array
 from pathcontrol.robot.urdf import parse_urdf
-from pathcontrol.view.shapes import Color, Cylinder, Sphere
-from pathcontrol.view.visuals import LinkVisual
+from pathcontrol.view.bodies.shapes import Color, Cylinder, Sphere
+from pathcontrol.view.bodies.visuals import LinkVisual
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import UrdfSource
