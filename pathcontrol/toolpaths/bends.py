@@ -34,7 +34,7 @@ def regular(segment: Segment, tolerance: float) -> tuple[Segment, float]:
         pieces = pieces.halved(segment, coarse)
     least = max(_NOTHING, min(0.1 * tolerance, 0.01 * segment.length))
     polyline = Polyline(_apart(segment.point(pieces.u), least))
-    between = segment.point(pieces.u[:-1] + np.diff(pieces.u) * np.linspace(0.0, 1.0, 4, endpoint=False)[:, None])
+    between = segment.point(pieces.u[:-1] + np.diff(pieces.u) * np.linspace(0.0, 1.0, 16, endpoint=False)[:, None])
     return polyline, float(polyline.distance(between).max())
 
 

@@ -54,14 +54,10 @@ class Segment(ABC):
         """Lower and upper corner of the bounding box [m], each (3,), up to a billionth of the segment's size."""
         return self._least(1.0), -self._least(-1.0)
 
-    def speed(self, u: Array) -> Array:
-        """‖dp/du‖ [m], (*batch,)."""
-        return np.linalg.norm(self.derivative(u), axis=-1)
-
     @cached_property
     def arc_length(self) -> ArcLength:
         """Arc length as a function of u, which it is inverted from."""
-        return ArcLength(self.speed)
+        return ArcLength(self.derivative)
 
     @property
     def length(self) -> float:
