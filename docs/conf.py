@@ -1,7 +1,11 @@
 """Configuration of the documentation. Nothing is fetched while it is built."""
 
 import re
+import sys
 from importlib import metadata
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parent / "_extensions"))
 
 project = "pathcontrol"
 author = project_copyright = "The pathcontrol contributors"
@@ -13,12 +17,15 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx.ext.mathjax",
     "sphinx.ext.viewcode",
+    "gallery",
 ]
 myst_enable_extensions = ["amsmath", "colon_fence", "dollarmath"]
 myst_heading_anchors = 3
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "_extensions"]
 
 html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["gallery.css"]
 html_title = f"pathcontrol {release}"
 
 autodoc_member_order = "bysource"

@@ -27,9 +27,9 @@ actual = pc.Viscous(np.full(6, 0.6)) + pc.Coulomb([7.0, 7.0, 4.5, 1.1, 1.1, 1.1]
 model, plant = robot.with_friction(known), robot.with_friction(actual)
 laws = [pc.ExtendedMotionPlan(model, path, K_p=1600.0, K_v=80.0, k=0.5, friction="full") for path in task]
 loop = pc.SampledLoop(period=2e-3, torque_limits=True)
-run = pc.simulate_sequence(laws, task.q_d(np.array(0.0)), duration=60.0, plant=plant, loop=loop)
+run = pc.simulate_sequence(laws, task.q_d(np.array(0.0)), task=task, duration=60.0, plant=plant, loop=loop)
 
-numbers = pc.toolpath_metrics(run, plant, task)
+numbers = pc.toolpath_metrics(run)
 print(f"{len(drawing)} contours, {run.status[0]} after {numbers['path_time'][0]:.1f} s")
 print(f"largest distance from the drawing: {1e6 * numbers['tool_deviation_peak'][0]:.0f} µm")
 pc.save_figure(pc.deviation_figure(run, plant, task), out / "deburr_bracket")

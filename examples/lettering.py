@@ -21,9 +21,9 @@ task = pc.ToolpathTask(robot, "tool", drawing, board, clearance=0.0, rapid_speed
 # dry friction holds a slow arm: the laws compensate all of it, and the plan is in no hurry to wait, k = 2
 laws = [pc.ExtendedMotionPlan(robot, path, K_p=800.0, K_v=45.0, k=2.0, friction="full") for path in task]
 loop = pc.SampledLoop(encoders=True, velocity="difference", torque_limits=True)
-run = pc.simulate_sequence(laws, task.q_d(np.array(0.0)), duration=20.0, loop=loop)
+run = pc.simulate_sequence(laws, task.q_d(np.array(0.0)), task=task, duration=20.0, loop=loop)
 
-numbers = pc.toolpath_metrics(run, robot, task)
+numbers = pc.toolpath_metrics(run)
 print(f"{len(drawing)} strokes, {run.status[0]} after {numbers['path_time'][0]:.1f} s")
 print(f"largest distance from the drawing: {1e6 * numbers['tool_deviation_peak'][0]:.0f} µm")
 pc.save_figure(pc.deviation_figure(run, robot, task), out / "lettering")

@@ -27,9 +27,9 @@ plant = robot.with_payload(0.2, frame="panda_link8", com=[0.0, 0.0, 0.08]).with_
 model = robot.with_friction(friction)
 laws = [pc.ExtendedMotionPlan(model, path, K_p=1600.0, K_v=80.0, k=0.5, friction="full") for path in task]
 loop = pc.SampledLoop(period=2e-3, torque_limits=True)
-run = pc.simulate_sequence(laws, task.q_d(np.array(0.0)), duration=60.0, plant=plant, loop=loop)
+run = pc.simulate_sequence(laws, task.q_d(np.array(0.0)), task=task, duration=60.0, plant=plant, loop=loop)
 
-numbers = pc.toolpath_metrics(run, plant, task)
+numbers = pc.toolpath_metrics(run)
 print(f"{len(program)} moves, {run.status[0]} after {numbers['path_time'][0]:.1f} s")
 print(f"largest distance from the program: {1e6 * numbers['tool_deviation_peak'][0]:.0f} µm")
 pc.save_figure(pc.deviation_figure(run, plant, task), out / "mill_pocket")

@@ -25,9 +25,14 @@ controllers = {
     "projection": pc.Projection(robot, task, k_p=100.0, K_v=20.0),
 }
 
+runs = {}
 print(f"{'':22}largest contour error [deg]")
 for name, controller in controllers.items():
-    run = pc.simulate(controller, start, duration=5.0, loop=pc.SampledLoop(torque_limits=True))
+    run = runs[name] = pc.simulate(controller, start, duration=5.0, loop=pc.SampledLoop(torque_limits=True))
     contour = np.rad2deg(pc.contour_error(run, task).max())
     print(f"{name:22}{contour:8.2f}")
     pc.save_figure(pc.path_figure(run, task), out / f"motion_control-{name.replace(' ', '_')}")
+
+two = {name: runs[name] for name in ("computed torque", "extended motion plan")}
+pc.record(two).save(out / "side_by_side.html")
+pc.record(two, layout="ghosted").save(out / "ghosts.html")

@@ -1,33 +1,73 @@
-"""A headless Chromium that looks at a page from disk, with every host name cut off."""
+"""A headless Chromium that looks at pages from disk: offline, with everything noted that it says or asks for."""
 
 from __future__ import annotations
 
+import atexit
+import base64
+import io
 import os
-import re
 import shutil
-import subprocess
-import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-_FLAGS = (
-    "--headless",
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--hide-scrollbars",
-    "--host-resolver-rules=MAP * ~NOTFOUND",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-    "--enable-logging=stderr",
-    "--v=0",
-)
-_MESSAGE = re.compile(r':CONSOLE[:(]\d+\)?\] "(.*)", source:')
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "microsoft-edge")
+LOCAL = ("file:", "data:", "blob:", "about:")
+_FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+
+@dataclass(eq=False)
+class Opened:
+    """A page in the browser.
+
+    Attributes:
+        tab: playwright's page.
+        messages: what it wrote to the console.
+        errors: what it threw and nobody caught.
+        requests: addresses that it asked for and that are not on this disk; it got none of them.
+    """
+
+    tab: Any
+    messages: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    @property
+    def complaints(self) -> list[str]:
+        """All that a page which works offline and without trouble has none of."""
+        return self.messages + self.errors + self.requests
+
+    def __call__(self, script: str, argument: Any = None) -> Any:
+        """The value of an expression, or of a function of the argument, in the page."""
+        return self.tab.evaluate(script, argument)
+
+    def picture(self) -> np.ndarray:
+        """The picture as it is drawn now, without what is written over it, (height, width, 3), 0 to 255."""
+        data = self("() => { film.render(); return document.querySelector('#pane canvas').toDataURL(); }")
+        return _colors(base64.b64decode(data.partition(",")[2]))
+
+    def pixels(self, selector: str = "#stage") -> np.ndarray:
+        """What an element looks like, (height, width, 3), 0 to 255."""
+        return _colors(self.tab.locator(selector).screenshot())
+
+    def until(self, condition: str, seconds: float = 10.0) -> None:
+        """Wait until an expression is true in the page, whose policy forbids that playwright waits in it."""
+        end = time.monotonic() + seconds
+        while not self(condition):
+            assert time.monotonic() < end, f"it never came to be that {condition}"
+            self.tab.wait_for_timeout(20)
+
+
+def _colors(png: bytes) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=np.float64)
 
 
 def binary() -> str:
@@ -41,32 +81,66 @@ def binary() -> str:
     pytest.skip(reason)
 
 
-def screenshot(
+@contextmanager
+def opened(
     html: Path,
-    png: Path,
-    *,
-    size: tuple[int, int] = (1440, 900),
-    seconds: float = 2.0,
-    moment: float | None = None,
-) -> list[str]:
-    """Photograph a page after some seconds of its own time; return what it wrote to the console.
+    size: tuple[int, int] = (900, 600),
+    hash: str = "",  # noqa: A002
+    before: str = "",
+    **context: Any,
+) -> Iterator[Opened]:
+    """A page from disk, drawn once, or as far as it gets.
 
-    With a moment [s] the animation waits there, else it plays.
+    Args:
+        html: the file.
+        size: of the window [px].
+        hash: what follows the address, such as ``"#t=2.5"``.
+        before: a script that runs before the page's own.
+        context: more for playwright's ``new_context``, such as ``color_scheme="dark"``.
     """
-    address = html.resolve().as_uri() + ("" if moment is None else f"#t={moment:g}")
-    picture = [f"--screenshot={png}", f"--window-size={size[0]},{size[1]}"]
-    _, log = _run([*picture, f"--virtual-time-budget={round(1000 * seconds)}", address])
-    assert png.is_file(), log
-    return [text for text in _MESSAGE.findall(log) if "GL Driver Message" not in text]
+    settings = {"viewport": {"width": size[0], "height": size[1]}, "offline": True} | context
+    window = _browser().new_context(**settings)
+    try:
+        page = Opened(window.new_page())
+        _listen(page)
+        page.tab.add_init_script(before)
+        page.tab.goto(html.resolve().as_uri() + hash)
+        page("() => window.film?.ready?.catch(() => null)")
+        yield page
+    finally:
+        window.close()
 
 
-def dom(html: Path) -> str:
-    """The page as the browser has it after its scripts have run."""
-    return _run(["--dump-dom", "--virtual-time-budget=1000", html.resolve().as_uri()])[0]
+def _listen(page: Opened) -> None:
+    def note(message: Any) -> None:
+        if "GL Driver Message" not in message.text:  # of the software that stands in for a graphics card
+            page.messages.append(message.text)
+
+    def decide(route: Any) -> None:
+        if route.request.url.startswith(LOCAL):
+            route.continue_()
+        else:
+            page.requests.append(route.request.url)
+            route.abort()
+
+    page.tab.on("console", note)
+    page.tab.on("pageerror", lambda error: page.errors.append(str(error)))
+    page.tab.route("**/*", decide)
 
 
-def _run(arguments: list[str]) -> tuple[str, str]:
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        command = [binary(), *_FLAGS, f"--user-data-dir={profile}", *arguments]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
-    return done.stdout, done.stderr
+@cache
+def _browser() -> Any:
+    """One for all tests of this process, as it takes a second to start and playwright allows one of its own."""
+    program = binary()
+    from playwright.sync_api import sync_playwright
+
+    playwright = sync_playwright().start()
+    browser = playwright.chromium.launch(executable_path=program, args=list(_FLAGS))
+    atexit.register(_quietly, playwright.stop)
+    atexit.register(_quietly, browser.close)
+    return browser
+
+
+def _quietly(close: Callable[[], None]) -> None:
+    with suppress(Exception):  # the browser may be gone before we are
+        close()

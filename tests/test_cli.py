@@ -30,7 +30,9 @@ def results(tmp_path_factory):
     return out, json.loads(done.stdout)
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["reproduce", "--help"], ["run", "--help"], ["check", "--help"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], *([name, "--help"] for name in ("reproduce", "run", "view", "report", "check"))]
+)
 def test_help_imports_nothing_heavy(arguments):
     """What takes the time is the imports; a clock would only measure how busy the machine is."""
     code = (
@@ -171,4 +173,4 @@ def test_ctrl_c_leaves_no_half_written_file(tmp_path):
 
 def test_the_console_script_is_the_same_command():
     assert main.name == "main"
-    assert set(main.commands) == {"reproduce", "run", "check", "toolpath"}
+    assert set(main.commands) == {"reproduce", "run", "view", "report", "check", "toolpath"}

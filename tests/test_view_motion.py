@@ -1,17 +1,22 @@
-"""Laws of what is drawn: frames, quaternions, lines, the ground and the camera."""
+"""Laws of what is drawn: key frames, quaternions, lines, the ground and the camera."""
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from test_film import played
 
 from pathcontrol.view.film.camera import HIGHEST, LOWEST, Camera, picture_axes, view_direction
 from pathcontrol.view.film.ground import ground_grid
-from pathcontrol.view.film.motion import at_times, continuous_quaternions, frame_times
-from pathcontrol.view.film.tube import distinct, simplified, tube
+from pathcontrol.view.film.keys import line_keys
+from pathcontrol.view.film.motion import Track, continuous_quaternions
+from pathcontrol.view.film.trace import FRAME, MOST_RINGS, trace
+from pathcontrol.view.film.tube import SIDES, dashes, distinct, joined, simplified, tube
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -28,27 +33,70 @@ def to_polyline(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     return np.linalg.norm(offset - share[..., None] * along, axis=-1).min(axis=1)
 
 
-@given(st.floats(1e-3, 100), st.floats(1, 240))
-def test_frames_go_from_the_first_sample_to_the_last(duration: float, fps: float) -> None:
-    times = frame_times(np.array([0.0, duration]), fps)
-    steps = np.diff(times)
-    assert times[0] == 0
-    assert times[-1] == duration
-    assert (steps > 0).all()
-    np.testing.assert_allclose(steps[:-1], 1 / fps, rtol=1e-6)
-    assert steps[-1] <= 1 / fps * (1 + 1e-5)
+@st.composite
+def motions(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
+    """Sample times and poses (k, 4, 4) of something that swings, stops, jumps or wanders, sampled anyhow."""
+    rng, samples = np.random.default_rng(draw(seeds)), draw(st.integers(1, 600))
+    steps = rng.uniform(0.1, 1.9, samples) if draw(st.booleans()) else np.ones(samples)
+    time = draw(st.sampled_from([1e-5, 1e-3, 0.1])) * (np.cumsum(steps) - steps[0])
+    speed, size = draw(st.floats(0.0, 50.0)), draw(st.floats(0.0, 3.0))
+    swing = np.sin(speed * time[:, None] * rng.uniform(0.2, 2, 6) + rng.uniform(0, 6, 6)) * rng.normal(size=6)
+    kind = draw(st.sampled_from(["smooth", "kinks", "jumps", "wander", "rest"]))
+    if kind == "kinks":
+        swing = np.abs(swing)
+    elif kind == "jumps":
+        swing = np.where(rng.uniform(size=(samples, 1)).cumsum(0) % 40 < 20, swing, -swing)
+    elif kind == "wander":
+        swing = rng.normal(size=(samples, 6)).cumsum(axis=0) * 1e-3
+    elif kind == "rest":
+        swing = swing * (np.arange(samples) % 200 < 20)[:, None]
+    poses = np.tile(np.eye(4), (samples, 1, 1))
+    poses[:, :3, :3], poses[:, :3, 3] = Rotation.from_rotvec(2 * swing[:, :3]).as_matrix(), size * swing[:, 3:]
+    return time.astype(np.float32).astype(float), poses
 
 
-def test_a_run_of_one_sample_has_one_frame() -> None:
-    np.testing.assert_array_equal(frame_times(np.array([0.0]), 50), [0.0])
+@settings(max_examples=200)
+@given(motions())
+def test_a_track_is_within_its_error_at_every_sample(motion: tuple[np.ndarray, np.ndarray]) -> None:
+    time, poses = motion
+    track = Track.from_poses(time, poses).thinned()
+    single = [column.astype(np.float32).astype(float) for column in (track.times, track.positions, track.quaternions)]
+    positions, rotations = played(tuple(single), time)
+    assert np.linalg.norm(positions - poses[:, :3, 3], axis=-1).max() <= 5e-5
+    assert np.abs(rotations - poses[:, :3, :3]).max() <= 5e-5
+    assert {time[0], time[-1]} <= set(track.times) <= set(time)
+    assert (np.diff(track.times) > 0).all()
 
 
-@given(seeds)
-def test_interpolation_hits_the_samples(seed: int) -> None:
+@given(seeds, st.integers(2, 3000))
+def test_even_motion_takes_few_keys_however_densely_it_is_sampled(seed: int, samples: int) -> None:
     rng = np.random.default_rng(seed)
-    time, samples = np.sort(rng.uniform(size=20)), rng.normal(size=(20, 3))
-    np.testing.assert_array_equal(at_times(time, samples, time), samples)
-    np.testing.assert_array_equal(at_times(time, samples[:, 0], time), samples[:, 0])
+    time = np.linspace(0, 2, samples)
+    track = Track.from_positions(time, np.outer(time, rng.normal(size=3)) + rng.normal(size=3)).thinned()
+    assert len(track.times) <= 2 + np.log2(samples)
+
+
+def test_keys_are_as_many_as_a_parabola_asks_for() -> None:
+    """On x = t²/2 a chord of length h is off by h²/8."""
+    time = np.linspace(0, 10, 100_001)
+    track = Track.from_positions(time, np.outer(time**2 / 2, [1.0, 0, 0])).thinned(1e-4)
+    fewest = 10 / np.sqrt(8 * 1e-4)
+    assert fewest <= len(track.times) <= 2 * fewest + 18
+
+
+@given(seeds, st.integers(1, 500), st.floats(0.01, 10))
+def test_samples_that_are_left_out_are_near_the_lines_between_the_others(seed: int, samples: int, near: float) -> None:
+    rng = np.random.default_rng(seed)
+    time, values = np.sort(rng.uniform(size=samples)), rng.normal(size=(samples, 2)).cumsum(axis=0)
+    kept = line_keys(time, values, near)
+    lines = np.stack([np.interp(time, time[kept], column) for column in values[kept].T], axis=-1)
+    assert np.linalg.norm(lines - values, axis=-1).max() <= near * (1 + 1e-9)
+
+
+def test_what_stands_still_has_the_keys_of_its_ends() -> None:
+    track = Track.from_positions(np.linspace(0, 1, 1025), np.ones((1025, 3))).thinned()
+    np.testing.assert_array_equal(track.times, [0, 1])
+    assert not track.moves
 
 
 @given(seeds)
@@ -90,6 +138,65 @@ def test_a_tube_is_round_and_faces_outwards(seed: int, sides: int) -> None:
     a, b, c = straight.vertices[straight.faces.T]
     middle = ((a + b + c) / 3 - 0.5) @ (np.eye(3) - 1 / 3)
     assert ((np.cross(b - a, c - a) * middle).sum(-1) > 0).all()
+
+
+@given(seeds, st.integers(2, 40), st.integers(1, 40))
+def test_the_first_triangles_of_a_tube_are_the_tube_of_its_first_points(seed: int, points: int, first: int) -> None:
+    line = wandering(seed, points)
+    first = min(first + 1, points)
+    drawn = tube(line, 0.01).faces[: 2 * SIDES * (first - 1)]
+    np.testing.assert_array_equal(drawn, tube(line[:first], 0.01).faces)
+
+
+@given(seeds, st.floats(0.05, 5))
+def test_every_other_piece_of_a_line_is_a_dash(seed: int, length: float) -> None:
+    line = wandering(seed, 20)
+    pieces = dashes(line, length)
+    assert to_polyline(pieces.reshape(-1, 3), line).max() < 1e-9
+    np.testing.assert_allclose([pieces[0, 0], pieces[-1, 1]], line[[0, -1]], atol=1e-9)
+    straight = dashes(np.array([[0.0, 0, 0], [3, 4, 0]]), length)
+    lengths = np.linalg.norm(straight[:, 1] - straight[:, 0], axis=-1)
+    np.testing.assert_allclose(lengths, lengths[0])
+    np.testing.assert_allclose(np.linalg.norm(straight[1:, 0] - straight[:-1, 1], axis=-1), lengths[0])
+
+
+@given(seeds, st.integers(0, 5))
+def test_joined_meshes_are_all_there(seed: int, extra: int) -> None:
+    parts = [tube(wandering(seed + i, 5), 0.1) for i in range(extra + 1)]
+    whole = joined(parts)
+    triangles = np.concatenate([part.vertices[part.faces] for part in parts])
+    np.testing.assert_array_equal(whole.vertices[whole.faces], triangles)
+
+
+@given(motions(), st.floats(1e-3, 0.1))
+def test_a_trace_is_near_the_tool_and_grows_in_small_steps(motion, radius: float) -> None:
+    time, points = motion[0], motion[1][:, :3, 3]
+    share = np.linspace(0, 1, len(time))
+    line = trace(time, points, share, radius)
+    if line is None:
+        assert np.linalg.norm(points - points[0], axis=-1).max() <= radius
+        return
+    rings = line.mesh.vertices.reshape(-1, SIDES, 3).mean(axis=1)
+    np.testing.assert_allclose(rings, points[line.rings], atol=1e-9)
+    assert len(rings) <= MOST_RINGS
+    assert to_polyline(points, rings).max() <= radius
+    for ring, following in pairwise(line.rings.tolist()):
+        near = np.linalg.norm(points[ring:following] - points[ring], axis=-1) <= radius
+        left = ring + int(np.flatnonzero(near)[-1])  # a tool that rests may leave late
+        assert left == following - 1 or time[following] - time[left] <= FRAME * (1 + 1e-9)
+
+
+def test_a_long_trace_has_no_more_rings_than_allowed_and_few_where_the_tool_rests() -> None:
+    time = np.linspace(0, 600, 60_001)
+    angle = np.minimum(time, 300)
+    points = np.stack([np.cos(angle), np.sin(angle), 0 * time], axis=-1)
+    line = trace(time, points, np.full(len(time), np.nan), 0.01)
+    assert 1000 < len(line.rings) <= MOST_RINGS
+    assert np.count_nonzero(time[line.rings] > 300.1) < 20
+
+
+def test_a_tool_that_stays_in_one_place_draws_nothing() -> None:
+    assert trace(np.arange(5.0), np.ones((5, 3)), np.zeros(5), 0.01) is None
 
 
 def test_a_tube_survives_a_line_that_turns_back() -> None:

@@ -9,11 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from pathcontrol.robot.model import UrdfSource
+from pathcontrol.view.bodies.links import reach
 from pathcontrol.view.bodies.shapes import Box, Cylinder, Mesh, Sphere
 from pathcontrol.view.bodies.sticks import stick_figure
+from pathcontrol.view.bodies.thinning import rounded, thinned
 from pathcontrol.view.bodies.visuals import leaf_links, link_visuals
+
+seeds = st.integers(0, 2**32 - 1)
 
 
 def visual(geometry: str, extra: str = "") -> str:
@@ -140,10 +146,108 @@ def test_a_broken_visual_costs_no_other(broken: str) -> None:
     assert [v.shape for v in found] == [Sphere(1.0)]
 
 
-def test_corners_enclose_the_shape() -> None:
+def test_the_outline_of_a_box_is_its_corners() -> None:
     origin = '<origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/>'
     [box] = link_visuals(UrdfSource(urdf(visual('<box size="2 4 6"/>', origin))))
-    np.testing.assert_allclose([box.corners.min(0), box.corners.max(0)], [[-1, -1, -3], [3, 1, 3]], atol=1e-12)
+    np.testing.assert_allclose([box.outline.min(0), box.outline.max(0)], [[-1, -1, -3], [3, 1, 3]], atol=1e-12)
+
+
+@given(seeds)
+def test_outlines_reach_as_far_as_their_shapes_in_every_direction(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    direction, radius, length = rng.normal(size=3), *rng.uniform(0.1, 2, size=2)
+    direction /= np.linalg.norm(direction)
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=radius)
+    across = radius * np.hypot(*direction[:2])
+    reached = {
+        Sphere(radius): radius,
+        Cylinder(radius, length): across + length / 2 * abs(direction[2]),
+        Mesh(ball.vertices, ball.faces): radius,
+    }
+    for shape, support in reached.items():
+        assert 0.9 * support <= (shape.outline @ direction).max() <= support * (1 + 1e-9)
+        assert (np.abs(shape.outline) <= shape.bounds[1] * (1 + 1e-6)).all()
+
+
+# --- thinning -----------------------------------------------------------------------------------------------
+
+
+def away(points: np.ndarray, mesh: Mesh) -> np.ndarray:
+    """Distance of points (k, 3) from the nearest triangle of a mesh, (k,)."""
+    triangles = mesh.vertices[mesh.faces]
+    repeated = np.repeat(points, len(triangles), axis=0)
+    nearest = trimesh.triangles.closest_point(np.tile(triangles, (len(points), 1, 1)), repeated)
+    return np.linalg.norm(nearest - repeated, axis=-1).reshape(len(points), -1).min(axis=1)
+
+
+def bumpy(seed: int) -> Mesh:
+    """A closed smooth body without any symmetry."""
+    rng, ball = np.random.default_rng(seed), trimesh.creation.icosphere(subdivisions=3, radius=1.0)
+    waves = sum(rng.uniform(0, 0.06) * np.sin(ball.vertices @ rng.normal(0, 2, 3) + k) for k in range(4))
+    vertices = ball.vertices * (1 + waves)[:, None] * rng.uniform(0.1, 1, 3)
+    return Mesh(vertices, ball.faces)
+
+
+@settings(max_examples=15)
+@given(seeds, st.floats(1e-4, 2e-2))
+def test_a_thinned_surface_is_near_the_whole_one_and_the_other_way_round(seed: int, detail: float) -> None:
+    whole = bumpy(seed)
+    fewer = thinned(whole, detail)
+    assert len(fewer.faces) <= len(whole.faces)
+    assert away(fewer.vertices[:200], whole).max() <= detail
+    assert away(whole.vertices[::5], fewer).max() <= detail
+    assert trimesh.Trimesh(fewer.vertices, fewer.faces).is_watertight
+
+
+def test_flat_and_fine_parts_lose_most_of_their_triangles() -> None:
+    box = trimesh.creation.box()
+    for _ in range(4):
+        box = box.subdivide()
+    few = thinned(Mesh(box.vertices, box.faces), 1e-4)
+    assert len(few.faces) < len(box.faces) / 10
+    np.testing.assert_allclose(few.bounds, [[-0.5] * 3, [0.5] * 3], atol=1e-4)
+    ball = trimesh.creation.icosphere(subdivisions=5)
+    assert len(thinned(Mesh(ball.vertices, ball.faces), 1e-2).faces) < len(ball.faces) / 2
+
+
+def test_borders_and_what_is_small_stay() -> None:
+    x, y = np.meshgrid(np.linspace(0, 1, 11), np.linspace(0, 1, 11))
+    grid = np.arange(121).reshape(11, 11)
+    squares = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+    sheet = Mesh(
+        np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), np.concatenate([squares[:, :3], squares[:, [0, 2, 3]]])
+    )
+    fewer = thinned(sheet, 1e-2)
+    assert len(fewer.faces) < len(sheet.faces)
+    rim = {tuple(p) for p in sheet.vertices.round(6) if {0.0, 1.0} & set(p[:2])}
+    assert rim <= {tuple(p) for p in fewer.vertices.round(6)}
+    lamp = trimesh.creation.box([1e-3] * 3)
+    np.testing.assert_array_equal(thinned(Mesh(lamp.vertices, lamp.faces), 0.1).vertices, lamp.vertices)
+
+
+@given(seeds, st.floats(1e-6, 1.0))
+def test_rounding_is_far_finer_than_the_detail_and_shortens_numbers(seed: int, detail: float) -> None:
+    mesh = bumpy(seed)
+    short = rounded(mesh, detail)
+    assert np.abs(short.vertices - mesh.vertices).max() <= detail / 32
+    step = 2.0 ** np.floor(np.log2(detail / 16))
+    np.testing.assert_array_equal(np.mod(short.vertices, step), 0)
+
+
+def test_without_a_detail_a_mesh_is_left_alone() -> None:
+    mesh = bumpy(0)
+    assert thinned(mesh, 0.0) is mesh
+    assert rounded(mesh, 0.0) is mesh
+
+
+def test_visuals_are_thinned_by_a_share_of_the_reach(tmp_path: Path) -> None:
+    trimesh.creation.icosphere(subdivisions=5, radius=0.2).export(tmp_path / "ball.stl")
+    text = urdf(visual('<mesh filename="ball.stl"/>'), "", "", "")
+    assert reach(UrdfSource(text)) == pytest.approx(1.5)
+    [whole], [fewer] = (link_visuals(UrdfSource(text, tmp_path), fineness) for fineness in (0.0, 5e-4))
+    assert len(fewer.shape.faces) < len(whole.shape.faces) / 2
+    radii = np.linalg.norm(fewer.shape.vertices, axis=-1)
+    assert np.abs(radii - 0.2).max() <= 7.5e-4 * 1.1
 
 
 def test_leaves_carry_nothing() -> None:

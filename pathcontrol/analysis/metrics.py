@@ -8,6 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.analysis.gamma import distance_to_gamma
+from pathcontrol.analysis.known import known_task
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
@@ -33,7 +34,7 @@ def steady_state(run: Run, fraction: float = 0.5) -> Run:
     if fraction > 1:
         raise InputError(f"fraction = {fraction:g}, expected a number from 0 to 1")
     first, last = run.time[0], run.time[-1]
-    return Run(run.data.sel(time=run.time >= last - fraction * (last - first)), run.config)
+    return run.with_data(run.data.sel(time=run.time >= last - fraction * (last - first)))
 
 
 def peak(values: Array) -> Array:
@@ -46,15 +47,21 @@ def rms(values: Array) -> Array:
     return np.sqrt((values**2).mean(-1))
 
 
-def contour_error(run: Run, task: PathTask) -> Array:
-    """‖q_d(σ̄(q)) − q‖ [rad], (rollout, time): distance from the path itself, whatever s the controller was at."""
-    q = run.array("q")
+def contour_error(run: Run, task: PathTask | None = None) -> Array:
+    """‖q_d(σ̄(q)) − q‖ [rad], (rollout, time): distance from the path itself, whatever s the controller was at.
+
+    The path is ``run.task`` unless another is given.
+    """
+    task, q = known_task(run, task), run.array("q")
     return np.linalg.norm(task.q_d(task.sigma_bar(q)) - q, axis=-1)
 
 
-def lag_error(run: Run, task: PathTask) -> Array:
-    """Component of q_d(s) − q along the path [rad], (rollout, time): positive where the arm is behind s."""
-    s = run.array("s")
+def lag_error(run: Run, task: PathTask | None = None) -> Array:
+    """Component of q_d(s) − q along the path [rad], (rollout, time): positive where the arm is behind s.
+
+    The path is ``run.task`` unless another is given.
+    """
+    task, s = known_task(run, task), run.array("s")
     tangent = task.dq_d(s)
     along = ((task.q_d(s) - run.array("q")) * tangent).sum(-1)
     return along / np.linalg.norm(tangent, axis=-1)
@@ -68,12 +75,15 @@ def settling_time(values: Array, time: Array, band: float) -> Array:
     return np.where(outside.any(-1), after, time[0])
 
 
-def end_error(run: Run, task: PathTask) -> Array:
+def end_error(run: Run, task: PathTask | None = None) -> Array:
     """‖q_d(s_end) − q‖ [rad] when the rollout was finished, (rollout,); NaN where it was not.
+
+    The path is ``run.task`` unless another is given.
 
     Raises:
         TaskError: the path has no end.
     """
+    task = known_task(run, task)
     if not np.isfinite(task.s_end):
         raise TaskError(f"{type(task).__name__} has no end that an arm could be away from")
     finished = run.status == "finished"
@@ -82,8 +92,10 @@ def end_error(run: Run, task: PathTask) -> Array:
     return np.where(finished, np.linalg.norm(task.q_d(np.array(task.s_end)) - q, axis=-1), np.nan)
 
 
-def metrics(run: Run, task: PathTask, fraction: float = 0.5, band: float = np.deg2rad(2.0)) -> dict[str, Any]:
-    """The usual numbers of a run, each a list with one entry for each rollout.
+def metrics(
+    run: Run, task: PathTask | None = None, fraction: float = 0.5, band: float = np.deg2rad(2.0)
+) -> dict[str, Any]:
+    """The usual numbers of a run on its task, or on another, each a list with one entry for each rollout.
 
     Peaks and RMS of ‖e_p‖ [rad], ‖e_v‖ [rad/s], contour and lag error [rad] and distance to Γ over the last
     ``fraction`` of the time; there also the mean rate of s over the mean of ϑ, 1 for an arm that is as fast as it
@@ -91,7 +103,7 @@ def metrics(run: Run, task: PathTask, fraction: float = 0.5, band: float = np.de
     Contour error and distance to Γ are left out for paths that neither end nor repeat. Open paths have the time [s]
     after which they were finished, and the :func:`end_error` [rad], each NaN where they were not.
     """
-    late = steady_state(run, fraction)
+    task, late = known_task(run, task), steady_state(run, fraction)
     signals = {"e_p": late.norm("e_p"), "e_v": late.norm("e_v"), "lag_error": np.abs(lag_error(late, task))}
     try:
         signals["contour_error"] = contour_error(late, task)

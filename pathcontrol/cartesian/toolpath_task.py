@@ -96,7 +96,7 @@ class ToolpathTask(PathSequence):
 
     def describe(self) -> dict[str, Any]:
         names = ("frame", "feed", "rapid_speed", "acceleration", "tolerance", "corner", "deviation")
-        counts = {"contours": len(self.smoothed), "paths": len(self.paths)}
+        counts = {"contours": len(self.drawing), "paths": len(self.paths)}
         return {"task": "ToolpathTask"} | {name: getattr(self, name) for name in names} | counts
 
 

@@ -24,7 +24,7 @@ def check_folder(out_dir: Path, output: Output) -> None:
     Raises:
         InputError: the folder cannot be made or written to, or a folder is where a file should go.
     """
-    for name in output.model_dump(exclude_none=True).values():
+    for name in output.model_dump(exclude_none=True, exclude={"figure_joints"}).values():
         target = out_dir / name
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -68,15 +68,17 @@ def _write_summary(numbers: dict[str, Any], path: Path) -> Path:
 
 
 def _write_figures(run: Run, setup: Setup, path: Path) -> dict[str, Path]:
-    from pathcontrol.view.figures.run import run_figure
+    from pathcontrol.view.figures.run import named, run_figure
 
-    stem = path.with_suffix("").name
-    figures = run_figure(run, path, setup.task)
+    pair = setup.output.figure_joints
+    joints = None if pair is None else (pair[0], pair[1])
+    figures = run_figure(run, path, setup.task, joints=joints, limits=setup.plant.limits.effort)
     if isinstance(setup.task, ToolpathTask):
         from pathcontrol.view.figures.deviation import deviation_figure
         from pathcontrol.view.figures.style import save_figure
 
-        figures += save_figure(deviation_figure(run, setup.plant, setup.task), path.with_name(f"{stem}-deviation"))
+        figures += save_figure(deviation_figure(run, setup.plant, setup.task), named(path, "deviation"))
+    stem = path.with_suffix("").name
     return {f"figure{figure.name.removeprefix(stem)}": figure for figure in figures}
 
 

@@ -19,7 +19,7 @@ class Outcome(NamedTuple):
     """What came of an experiment.
 
     Attributes:
-        run: the run.
+        run: the run; ``run.config["experiment"]`` is the text of the file.
         metrics: its :func:`metrics`, fit for JSON: null where a number is not finite.
         written: the files, by what they are; see :func:`write_outputs`.
     """
@@ -42,9 +42,10 @@ def run_experiment(path: str | Path, out_dir: str | Path, progress: bool = True)
         InputError: ``out_dir`` cannot be written to.
         SimulationError: the simulation diverged.
     """
-    setup, out_dir = load_setup(path), Path(out_dir)
+    setup, text, out_dir = load_setup(path), Path(path).read_text(encoding="utf-8"), Path(out_dir)
     check_folder(out_dir, setup.output)
     run = _simulated(setup, progress)
+    run.config["experiment"] = text
     numbers = measured(run, setup)
     return Outcome(run, numbers, write_outputs(run, numbers, setup, out_dir))
 
@@ -52,6 +53,7 @@ def run_experiment(path: str | Path, out_dir: str | Path, progress: bool = True)
 def _simulated(setup: Setup, progress: bool) -> Run:
     options: dict[str, Any] = {"plant": setup.plant, "loop": setup.loop, "progress": progress}
     if isinstance(setup.task, PathSequence):
+        options["task"] = setup.task
         return simulate_sequence(setup.controllers, setup.q, setup.qd, duration=setup.duration, **options)
     options["laps"] = setup.laps
     return simulate(setup.controller, setup.q, setup.qd, duration=float(setup.duration), **options)

@@ -38,19 +38,29 @@ def _file(*suffixes: str) -> PlainValidator:
     return PlainValidator(check)
 
 
+def _pair(value: Any) -> list[int]:
+    """Two different joints, counted from 0."""
+    whole = isinstance(value, list | tuple) and all(type(index) is int and 0 <= index < 2**31 for index in value)
+    if not whole or len(value) != 2 or value[0] == value[1]:
+        raise expected("two different joints, counted from 0, as [0, 2]")
+    return list(value)
+
+
 class Output(Section):
     """``[output]``: the files to write, relative to the output folder; the data always, the rest on request.
 
     Attributes:
         data: the run, as netCDF; :meth:`pathcontrol.Run.load` reads it.
         html: the animation, one file for any browser.
-        figure: the beginning of the names of the figures, SVG and PNG.
+        figure: the beginning of the names of the figures, SVG and PNG, and PDF if it ends so.
+        figure_joints: the two joints in whose plane the path is drawn; by default those that move the most.
         summary: the metrics, as JSON.
     """
 
     data: Annotated[str, _file(".nc")] = "run.nc"
     html: Annotated[str, _file(".html")] | None = None
-    figure: Annotated[str, _file("", ".svg", ".png")] | None = None
+    figure: Annotated[str, _file("", ".svg", ".png", ".pdf")] | None = None
+    figure_joints: Annotated[list[int], PlainValidator(_pair)] | None = None
     summary: Annotated[str, _file(".json")] | None = None
 
 

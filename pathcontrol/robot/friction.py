@@ -11,15 +11,15 @@ the joint holds as long as it can. Laws add up with ``+``.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
-from pathcontrol.errors import InputError
+from pathcontrol.errors import InputError, UnknownNameError
 
 
 def _coefficients(name: str, value: ArrayLike) -> Array:
@@ -196,3 +196,21 @@ class FrictionSum(FrictionLaw):
 def no_friction(n: int) -> FrictionLaw:
     """The law of ``n`` joints without any friction."""
     return Viscous(np.zeros(n))
+
+
+_LAWS = {law.__name__: law for law in (Viscous, Coulomb, Stribeck)}
+
+
+def friction_of(description: Mapping[str, Any]) -> FrictionLaw:
+    """The law that :meth:`FrictionLaw.describe` described.
+
+    Raises:
+        UnknownNameError: it is no law of the library.
+    """
+    values = dict(description)
+    name = values.pop("law", None)
+    if name == "FrictionSum":
+        return FrictionSum(tuple(friction_of(term) for term in values["terms"]))
+    if name not in _LAWS:
+        raise UnknownNameError(f"friction law {name!r}, expected one of {', '.join(_LAWS)} or a FrictionSum of them")
+    return _LAWS[name](**values)

@@ -43,13 +43,21 @@ def load_robot(
     urdf = find_urdf(source, tuple(Path(d) for d in package_dirs))
     if lock is not None and not isinstance(lock, Mapping):
         raise InputError(f"lock = {lock!r}, expected angles by joint, as {{'joint name': 0.0}}")
-    lock = dict(lock or {})
-    report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=tuple(lock))
-    if not report.ok:
-        label = "this URDF" if str(source).lstrip().startswith("<") else repr(str(source))
-        raise UrdfError("\n".join([f"{label} cannot be used:", *(f"  {finding}" for finding in report.errors)]))
-    robot = _build(urdf, threads)
+    label = "this URDF" if str(source).lstrip().startswith("<") else repr(str(source))
+    robot = checked_model(urdf, label, tuple(lock or ()), threads)
     return robot.reduced(lock) if lock else robot
+
+
+def checked_model(urdf: UrdfSource, label: str, locked: Sequence[str] = (), threads: int = 1) -> RobotModel:
+    """The model of a URDF, which errors call ``label``; joints that are going to be ``locked`` may mimic others.
+
+    Raises:
+        UrdfError: it cannot be used; the message lists every reason found.
+    """
+    report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=tuple(locked))
+    if not report.ok:
+        raise UrdfError("\n".join([f"{label} cannot be used:", *(f"  {finding}" for finding in report.errors)]))
+    return _build(urdf, threads)
 
 
 def known_robots() -> dict[str, str]:
@@ -85,7 +93,7 @@ def find_urdf(source: str | Path, package_dirs: tuple[Path, ...] = ()) -> UrdfSo
 def _named(name: str, package_dirs: tuple[Path, ...]) -> UrdfSource:
     bundled = {path.stem: path for path in _bundled_dir().glob("*.urdf")}.get(name)
     if bundled is not None:
-        return UrdfSource(bundled.read_text(encoding="utf-8"), bundled.parent, package_dirs)
+        return UrdfSource(bundled.read_text(encoding="utf-8"), bundled.parent, package_dirs, name)
     try:
         loader = _example_robots().get(name)
     except MissingExtraError as missing:
@@ -93,17 +101,18 @@ def _named(name: str, package_dirs: tuple[Path, ...]) -> UrdfSource:
     if loader is None or not loader.urdf_filename or loader.free_flyer:
         reason = "has a floating base" if loader is not None and loader.free_flyer else "is unknown"
         raise UnknownNameError(f"robot {name!r} {reason}; known arms: {_names()}")
-    return _example_urdf(loader, package_dirs)
+    return _example_urdf(name, loader, package_dirs)
 
 
-def _example_urdf(loader: Any, package_dirs: tuple[Path, ...]) -> UrdfSource:
+def _example_urdf(name: str, loader: Any, package_dirs: tuple[Path, ...]) -> UrdfSource:
     # instantiating the loader would read every collision mesh; its class attributes say where the file is
     from example_robot_data.robots_loader import getModelPath
 
     relative = Path(loader.path, loader.urdf_subpath, loader.urdf_filename)
     root = Path(getModelPath(str(relative))).resolve()
     path = root / relative
-    return UrdfSource(path.read_text(encoding="utf-8"), path.parent, (*package_dirs, root, root.parent.parent))
+    folders = (*package_dirs, root, root.parent.parent)
+    return UrdfSource(path.read_text(encoding="utf-8"), path.parent, folders, name)
 
 
 def _example_robots() -> dict[str, Any]:

@@ -7,7 +7,7 @@ C-ordered ``(N, n)`` array is the ``(n, N)`` array Pinocchio's batched calls wan
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +24,12 @@ _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED  # the frame's origin, axes pa
 
 @dataclass(frozen=True)
 class UrdfSource:
-    """Where a model came from: the URDF's text, and the folders its mesh files are looked up in."""
+    """Where a model came from: the URDF's text, the folders its mesh files are looked up in, and its known name."""
 
     text: str
     base_dir: Path | None = None
     package_dirs: tuple[Path, ...] = ()
+    name: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +72,8 @@ class RobotModel:
         actuation: limits, friction law and encoders of the joints.
         source: the URDF it came from.
         threads: threads used by batched calls; results do not depend on it.
+        steps: the methods that made it from the URDF's model, each with its arguments, fit for JSON; friction is not
+            among them, as it is in ``actuation``.
         n: number of joints.
     """
 
@@ -78,6 +81,7 @@ class RobotModel:
     actuation: Actuation
     source: UrdfSource
     threads: int = 1
+    steps: tuple[tuple[str, dict[str, Any]], ...] = ()
     n: int = field(init=False)
     _data: Any = field(init=False, repr=False)
     _pool: Any = field(init=False, repr=False)
@@ -99,7 +103,7 @@ class RobotModel:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Pinocchio's pools cannot be pickled, the model they are made of can
-        return RobotModel, (self.pinocchio_model, self.actuation, self.source, self.threads)
+        return RobotModel, (self.pinocchio_model, self.actuation, self.source, self.threads, self.steps)
 
     # --- what it is -----------------------------------------------------------------------------------------
 
@@ -257,7 +261,7 @@ class RobotModel:
         if law.n != self.n:
             raise InputError(f"the friction law is for {law.n} joints, {self.name} has {self.n}")
         actuation = Actuation(self.limits, law, self.actuation.encoder_counts)
-        return RobotModel(self.pinocchio_model, actuation, self.source, self.threads)
+        return replace(self, actuation=actuation)
 
     def with_payload(
         self, mass: float, frame: str, com: ArrayLike = (0.0, 0.0, 0.0), inertia: ArrayLike | None = None
@@ -279,7 +283,8 @@ class RobotModel:
         model = pin.Model(self.pinocchio_model)
         support = model.frames[self._frame_id(frame)]
         model.appendBodyToJoint(support.parentJoint, pin.Inertia(mass, lever, tensor), support.placement)
-        return RobotModel(model, self.actuation, self.source, self.threads)
+        given = {"mass": mass, "frame": frame, "com": lever.tolist(), "inertia": tensor.tolist()}
+        return self._changed(model, "with_payload", given)
 
     def with_frame(self, name: str, parent: str, pose: ArrayLike) -> RobotModel:
         """The same arm with one frame more, such as the tip of a tool.
@@ -298,7 +303,7 @@ class RobotModel:
         support = model.frames[self._frame_id(parent)]
         frame = pin.Frame(name, support.parentJoint, support.placement * placement, pin.FrameType.OP_FRAME)
         model.addFrame(frame, False)
-        return RobotModel(model, self.actuation, self.source, self.threads)
+        return self._changed(model, "with_frame", {"name": name, "parent": parent, "pose": given.tolist()})
 
     def with_armature(self, armature: ArrayLike) -> RobotModel:
         """The same arm with rotor inertia [kg m²], shape (n,), added to the diagonal of M."""
@@ -307,24 +312,29 @@ class RobotModel:
             raise InputError(f"armature = {added.tolist()}, expected {self.n} values not below 0")
         model = pin.Model(self.pinocchio_model)
         model.armature = np.asarray(model.armature) + added
-        return RobotModel(model, self.actuation, self.source, self.threads)
+        return self._changed(model, "with_armature", {"armature": added.tolist()})
 
     def with_threads(self, threads: int) -> RobotModel:
         """The same arm whose batched calls use ``threads`` threads."""
-        return RobotModel(self.pinocchio_model, self.actuation, self.source, threads)
+        return replace(self, threads=threads)
 
     def reduced(self, lock: Mapping[str, float]) -> RobotModel:
         """The arm with some joints locked: ``{"joint name": angle [rad]}``; the others keep their order."""
-        indices = {self.joint_index(joint): scalar(f"angle of {joint}", angle) for joint, angle in lock.items()}
+        angles = {joint: scalar(f"angle of {joint}", angle) for joint, angle in lock.items()}
+        indices = {self.joint_index(joint): angle for joint, angle in angles.items()}
         if len(indices) == self.n:
             raise InputError(f"locking all {self.n} joints of {self.name} leaves nothing to control; leave one free")
         q = np.zeros(self.n)
         q[list(indices)] = list(indices.values())
         model = pin.buildReducedModel(self.pinocchio_model, [i + 1 for i in indices], q)
         free = [i for i in range(self.n) if i not in indices]
-        return RobotModel(model, self.actuation.select(free), self.source, self.threads)
+        return self._changed(model, "reduced", {"lock": angles}, actuation=self.actuation.select(free))
 
     # --- inside ---------------------------------------------------------------------------------------------
+
+    def _changed(self, model: Any, method: str, arguments: dict[str, Any], **others: Any) -> RobotModel:
+        """The arm that a method makes of this one."""
+        return replace(self, pinocchio_model=model, steps=(*self.steps, (method, arguments)), **others)
 
     def _centripetal(self, q: ArrayLike, x: ArrayLike) -> Array:
         """c(q,x) = C(q,x)x [N m], (*batch, n)."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.origin import Origin, Stored
+from pathcontrol.simulation.run_file import read_run, write_run
+from pathcontrol.tasks.base import PathTask
 
 #: every variable of a run: (dimensions, unit, meaning); sliding joints have m for rad and N for N m
 VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
@@ -43,7 +45,6 @@ OUTCOMES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "path_offset": (("path",), "1", "what s of a sequence is more than that of the path"),
     "path_finish_time": (("path",), "s", "when the path of a sequence was finished, NaN if it was not"),
 }
-_CONFIG = "pathcontrol_config"
 
 
 class Run:
@@ -55,8 +56,9 @@ class Run:
         config: everything the run was made with: robot, task, controller, plant, loop, versions.
     """
 
-    def __init__(self, data: xr.Dataset, config: Mapping[str, Any]) -> None:
+    def __init__(self, data: xr.Dataset, config: Mapping[str, Any], origin: Origin | None = None) -> None:
         self.data, self.config = data, dict(config)
+        self._origin = Origin.of(None, None) if origin is None else origin
 
     @classmethod
     def from_arrays(
@@ -66,10 +68,14 @@ class Run:
         arrays: Mapping[str, Array],
         config: Mapping[str, Any],
         outcome: Mapping[str, Array] | None = None,
+        *,
+        robot: RobotModel | None = None,
+        task: PathTask | None = None,
     ) -> Run:
         """A run from arrays laid out as :data:`VARIABLES` says, and the position unit of each joint by its name.
 
-        ``outcome`` is laid out as :data:`OUTCOMES`; a rollout without a time in ``finish_time`` is running.
+        ``outcome`` is laid out as :data:`OUTCOMES`; a rollout without a time in ``finish_time`` is running. ``robot``
+        and ``task`` are what the run is about, where they are known.
         """
         kinds = sorted(set(joints.values()), reverse=True)
         variables = {}
@@ -83,7 +89,8 @@ class Run:
             "time": ("time", time, {"units": "s"}),
             "joint": list(joints),
         }
-        return cls(xr.Dataset(variables, coords).assign_coords(_outcome(rollouts, outcome or {})), config)
+        data = xr.Dataset(variables, coords).assign_coords(_outcome(rollouts, outcome or {}))
+        return cls(data, config, Origin.of(robot, task))
 
     def __getitem__(self, name: str) -> xr.DataArray:
         """One variable by its name."""
@@ -98,6 +105,22 @@ class Run:
         if finished.all():
             return f"; finished after {self.finish_time.max():.4g} s"
         return f"; {finished.sum()} of {self.rollouts} finished" if finished.any() else ""
+
+    @property
+    def robot(self) -> RobotModel:
+        """The simulated arm: the one that was given, or the same one rebuilt from the file.
+
+        Raises:
+            InputError: the run does not know its robot.
+        """
+        if self._origin.robot is None:
+            raise InputError("the run does not know its robot, as it holds data only; give robot=load_robot(...)")
+        return self._origin.robot
+
+    @property
+    def task(self) -> PathTask | None:
+        """The path and its velocity profile, or ``None`` where the run does not know them."""
+        return self._origin.task
 
     @property
     def time(self) -> Array:
@@ -142,7 +165,7 @@ class Run:
         """One of the rollouts as a run of its own."""
         if not -self.rollouts <= index < self.rollouts:
             raise InputError(f"rollout {index} does not exist: the run has {self.rollouts}, counted from 0")
-        return Run(self.data.isel(rollout=[index]), self.config)
+        return self.with_data(self.data.isel(rollout=[index]))
 
     def path(self, index: int) -> Run:
         """One path of a sequence as a run of its own, that begins at 0 s and where the path before was finished."""
@@ -158,16 +181,21 @@ class Run:
         data = data.drop_vars(name for name in OUTCOMES if name in data.coords)
         data = data.assign_coords(time=("time", data["time"].to_numpy() - begin, data["time"].attrs))
         config = self.config | {"controller": self.config["controller"]["sequence"][index]}
-        return Run(data.assign_coords(_outcome(1, {"finish_time": finished - begin})), config)
+        data = data.assign_coords(_outcome(1, {"finish_time": finished - begin}))
+        return Run(data, config, self._origin.path(index))
+
+    def with_data(self, data: xr.Dataset) -> Run:
+        """Other ``data`` of the same robot, task and configuration, such as a part of the time."""
+        return Run(data, self.config, self._origin)
 
     def save(self, path: str | Path) -> Path:
-        """Write netCDF, whole or not at all; :meth:`load` reads it back."""
-        path = Path(path)
-        data = self.data.assign_attrs({_CONFIG: json.dumps(self.config)})
-        packed = {name: {"zlib": True, "complevel": 1} for name in data.data_vars}
-        with whole_file(path) as temporary:
-            data.to_netcdf(temporary, engine="h5netcdf", encoding=packed)
-        return path
+        """Write netCDF, whole or not at all; :meth:`load` reads it back, :attr:`robot` and :attr:`task` included.
+
+        The robot is kept as its URDF and what was done to it, without the files of its meshes; the path as what it is
+        made of where it is one of the library's, else as samples, see :class:`RecordedPath`.
+        """
+        write_run(Path(path), self.data, self.config, self._stored())
+        return Path(path)
 
     @classmethod
     def load(cls, path: str | Path) -> Run:
@@ -176,15 +204,19 @@ class Run:
         Raises:
             InputError: there is no such file, or it is not a saved run.
         """
-        path = Path(path)
-        if not path.is_file():
-            raise InputError(f"there is no file {str(path)!r}")
-        try:
-            data = xr.load_dataset(path, engine="h5netcdf")
-            config = json.loads(data.attrs.pop(_CONFIG))
-        except (OSError, KeyError, ValueError) as error:
-            raise InputError(f"{str(path)!r} is not a run saved by Run.save: {error}") from error
-        return cls(data, config)
+        data, config, stored = read_run(Path(path))
+        return cls(data, config, None if stored is None else Origin.load(stored))
+
+    def _stored(self) -> Stored:
+        return self._origin.stored(float(self.data["s"].max()) if "s" in self.data else 0.0)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # a task may hold functions that cannot be pickled, what a file holds of it always can
+        return _unpickled, (self.data, self.config, self._stored())
+
+
+def _unpickled(data: xr.Dataset, config: Mapping[str, Any], stored: Stored) -> Run:
+    return Run(data, config, Origin.load(stored))
 
 
 def _outcome(rollouts: int, outcome: Mapping[str, Array]) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:

@@ -26,6 +26,8 @@ from pathcontrol.simulation.setup import (
     simulated_arm,
 )
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.laps import Laps
+from pathcontrol.tasks.sequence import PathSequence
 
 
 class _Leg(NamedTuple):
@@ -44,6 +46,7 @@ def simulate_sequence(
     *,
     duration: ArrayLike,
     laps: int = 1,
+    task: PathSequence | None = None,
     plant: RobotModel | None = None,
     loop: SampledLoop | ContinuousTime | None = None,
     progress: bool = True,
@@ -65,6 +68,8 @@ def simulate_sequence(
         qd: initial joint velocities [rad/s], (n,); default at rest.
         duration: longest time for each path [s]: one for all, or one for each, (paths,).
         laps: how many times each closed path is gone round.
+        task: the whole that the controllers' tasks are the paths of, such as a :class:`ToolpathTask`: the run knows it
+            then, with all that it says beside the paths; default a :class:`PathSequence` of these tasks.
         plant: the arm that is really there; default the model of the first controller.
         loop: how the loop is closed, as for :func:`simulate`.
         progress: show a bar on standard error when it takes longer than two seconds.
@@ -78,6 +83,7 @@ def simulate_sequence(
     durations, loop = _durations(duration, len(laws)), checked_loop(loop)
     q0, qd0 = _one_state(q, qd, robot.n)
     period, ends = period_of(loop, durations.min()), [_finish(law, laps) for law in laws]
+    whole = _whole(laws, laps) if task is None else _checked_whole(task, laws, laps)
     for law in laws:
         check_joints(law, robot)
         check_law(law, q0, qd0)
@@ -91,7 +97,8 @@ def simulate_sequence(
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws))
     described = {"controller": f"{len(laws)} paths with {names}", "sequence": [law.describe() for law in laws]}
     config = record_of(described, robot, loop, duration=durations.tolist(), laps=laps)
-    return Run.from_arrays(period * np.arange(arrays["s"].shape[1]), joints_of(robot), arrays, config, outcome)
+    time = period * np.arange(arrays["s"].shape[1])
+    return Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=whole)
 
 
 def _joined(legs: Sequence[_Leg], paths: int, period: float) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -130,6 +137,24 @@ def _checked_controllers(controllers: Iterable[Controller]) -> list[Controller]:
         if not isinstance(law, Controller):
             raise InputError(f"controllers[{i}] = {law!r}, expected a Controller")
     return laws
+
+
+def _whole(laws: Sequence[Controller], laps: int) -> PathSequence:
+    """The tasks one after another as the run strings them; the arm goes over the gaps by itself."""
+    return PathSequence([Laps(law.task, laps) if law.task.closed else law.task for law in laws], gaps=True)
+
+
+def _checked_whole(task: PathSequence, laws: Sequence[Controller], laps: int) -> PathSequence:
+    if not isinstance(task, PathSequence) or len(task) != len(laws):
+        raise InputError(f"task = {task!r}, expected a PathSequence, such as a ToolpathTask, of {len(laws)} paths")
+    for i, (path, law) in enumerate(zip(task, laws, strict=True)):
+        length = _length(law.task, laps)
+        if path.s0 != law.task.s0 or not np.isclose(path.s_end - path.s0, length, rtol=1e-12, atol=0.0):
+            raise InputError(
+                f"the task of controllers[{i}] goes from s = {law.task.s0:g} on by {length:g}, path {i} of the whole "
+                f"from {path.s0:g} by {path.s_end - path.s0:g}; give the task whose paths the controllers follow"
+            )
+    return task
 
 
 def _finish(law: Controller, laps: int) -> Finish:

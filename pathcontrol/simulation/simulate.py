@@ -69,4 +69,4 @@ def simulate(
     if controller.task.closed:
         outcome["laps"] = whole_laps(controller.task, arrays["s"][:, 0], arrays["s"][:, -1])
     time = period * np.arange(arrays["s"].shape[1])
-    return Run.from_arrays(time, joints_of(robot), arrays, config, outcome)
+    return Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=controller.task)

@@ -137,7 +137,7 @@ class PathTask(ABC):
 
     def with_profile(self, profile: VelocityProfile) -> PathTask:
         """The same path with another velocity profile."""
-        return _Reprofiled(self, profile)
+        return Reprofiled(self, profile)
 
     def reversed(self) -> PathTask:
         """The path taken backwards: ϑ(s) is that of the mirrored parameter. A closed one begins where it did."""
@@ -215,7 +215,7 @@ class PathTask(ABC):
         return ClosestPoint(Curve(self.q_d, self.dq_d, self.ddq_d), lower, upper, self.closed, self.knots)
 
 
-class _Reprofiled(PathTask):
+class Reprofiled(PathTask):
     """A path with a velocity profile that is not its own; made by :meth:`PathTask.with_profile`."""
 
     def __init__(self, path: PathTask, profile: VelocityProfile) -> None:

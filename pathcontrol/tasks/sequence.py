@@ -24,6 +24,7 @@ class PathSequence(PathTask):
 
     Args:
         paths: open paths of one arm.
+        gaps: whether a path may begin elsewhere than where the one before it ends.
 
     Attributes:
         paths: the paths.
@@ -31,11 +32,11 @@ class PathSequence(PathTask):
 
     Raises:
         InputError: a path is closed or endless, is for another number of joints, or does not begin where the one
-            before it ends.
+            before it ends and ``gaps`` are not allowed.
     """
 
-    def __init__(self, paths: Sequence[PathTask]) -> None:
-        self.paths = tuple(paths)
+    def __init__(self, paths: Sequence[PathTask], *, gaps: bool = False) -> None:
+        self.paths, self.gaps = tuple(paths), gaps
         if not self.paths:
             raise InputError("a sequence needs at least one path")
         for i, path in enumerate(self.paths):
@@ -113,6 +114,8 @@ class PathSequence(PathTask):
         for i, (path, after) in enumerate(zip(self.paths[:-1], self.paths[1:], strict=True)):
             if path.n != after.n:
                 raise InputError(f"path {i} is for {path.n} joints, path {i + 1} for {after.n}")
+            if self.gaps:
+                continue
             end, start = path.q_d(np.array(path.s_end)), after.q_d(np.array(after.s0))
             gap = np.abs(end - start)
             if gap.max() > _MEET:

@@ -92,5 +92,6 @@ class SplinePath(JointCurve):
 def _polynomials(spline: BSpline) -> PPoly:
     """The spline in the Taylor form of its pieces: the time to find that of an s hardly grows with their number."""
     knots = np.unique(spline.t[spline.k : len(spline.t) - spline.k])
-    taylor = [spline(knots[:-1], order) / factorial(order) for order in range(spline.k, -1, -1)]
+    # extrapolate: a periodic spline would round knots into its first lap, and so to the piece before
+    taylor = [spline(knots[:-1], order, extrapolate=True) / factorial(order) for order in range(spline.k, -1, -1)]
     return PPoly(np.stack(taylor), knots)

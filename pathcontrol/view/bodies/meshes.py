@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from pathcontrol.errors import UrdfError
 from pathcontrol.robot.urdf.mesh_files import LOCAL_SCHEMES, mesh_candidates
 from pathcontrol.view.bodies.shapes import Color, Mesh
+from pathcontrol.view.bodies.thinning import rounded, thinned
 
 SHARP = np.deg2rad(40.0)  # faces that meet at more than this show an edge
 
@@ -37,12 +38,13 @@ def find_mesh(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) ->
     raise UrdfError("there is no such file; give the folder that holds it, or its package, in package_dirs")
 
 
-def read_mesh(path: Path, scale: ArrayLike = 1.0) -> list[tuple[Mesh, Color | None]]:
+def read_mesh(path: Path, scale: ArrayLike = 1.0, detail: float = 0.0) -> list[tuple[Mesh, Color | None]]:
     """The triangles of a mesh file [m], one mesh for each colour in it; the colour is None where it has none.
 
     Args:
         path: an STL, OBJ, PLY, Collada or glTF file.
         scale: factor, or one along each axis.
+        detail: how far the surface may be from that of the file [m], so that it has fewer triangles.
 
     Raises:
         UrdfError: the file cannot be read, or has no triangles.
@@ -53,7 +55,7 @@ def read_mesh(path: Path, scale: ArrayLike = 1.0) -> list[tuple[Mesh, Color | No
         parts = _by_color(part for part in scene.dump() if isinstance(part, trimesh.Trimesh))
     except Exception as error:  # the readers of a dozen formats raise whatever they like
         raise UrdfError(f"it cannot be read: {type(error).__name__}: {error}") from error
-    meshes = [(_shaded(np.concatenate(triangles) * factor), color) for color, triangles in parts.items()]
+    meshes = [(_shaded(np.concatenate(triangles) * factor, detail), color) for color, triangles in parts.items()]
     meshes = [(mesh, color) for mesh, color in meshes if len(mesh.faces)]
     if not meshes:
         raise UrdfError("it has no triangles")
@@ -79,12 +81,15 @@ def _color(visual: Any) -> Color | None:
     return float(rgba[0]), float(rgba[1]), float(rgba[2]), float(rgba[3])
 
 
-def _shaded(triangles: np.ndarray) -> Mesh:
+def _shaded(triangles: np.ndarray, detail: float) -> Mesh:
     """A mesh with vertices shared across smooth edges only, so that averaged normals keep the sharp ones."""
     soup = np.arange(3 * len(triangles)).reshape(-1, 3)
     mesh = trimesh.Trimesh(triangles.reshape(-1, 3), soup, process=True)
     mesh.update_faces(mesh.nondegenerate_faces())
     if not np.isfinite(mesh.vertices).all():
         raise UrdfError("it has vertices that are not finite")
-    smooth = trimesh.graph.smooth_shade(mesh, angle=SHARP) if len(mesh.faces) else mesh
-    return Mesh(np.asarray(smooth.vertices), np.asarray(smooth.faces))
+    coarse = thinned(Mesh(np.asarray(mesh.vertices), np.asarray(mesh.faces)), detail)
+    if not len(coarse.faces):
+        return coarse
+    smooth = trimesh.graph.smooth_shade(trimesh.Trimesh(coarse.vertices, coarse.faces, process=False), angle=SHARP)
+    return rounded(Mesh(np.asarray(smooth.vertices), np.asarray(smooth.faces)), detail)

@@ -10,6 +10,17 @@ import numpy as np
 from pathcontrol._arrays import Array
 
 
+def directions(count: int) -> Array:
+    """Unit vectors spread evenly, (count, 3), on a golden spiral."""
+    height = 1 - (2 * np.arange(count) + 1) / count
+    turn = np.pi * (1 + np.sqrt(5)) * np.arange(count)
+    circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1) * np.sqrt(1 - height**2)[:, None]
+    return np.column_stack([circle, height])
+
+
+_DIRECTIONS = directions(60)
+
+
 @dataclass(frozen=True, eq=False)
 class Box:
     """A box of edge lengths ``size`` [m], shape (3,), centred on the origin."""
@@ -20,6 +31,11 @@ class Box:
     def bounds(self) -> Array:
         """Lower and upper corner [m], (2, 3)."""
         return np.outer([-0.5, 0.5], self.size)
+
+    @property
+    def outline(self) -> Array:
+        """Its corners [m], (8, 3)."""
+        return np.stack(np.meshgrid(*self.bounds.T), axis=-1).reshape(8, 3)
 
 
 @dataclass(frozen=True)
@@ -34,6 +50,13 @@ class Cylinder:
         """Lower and upper corner [m], (2, 3)."""
         return np.outer([-1.0, 1.0], [self.radius, self.radius, self.length / 2])
 
+    @property
+    def outline(self) -> Array:
+        """Points of both rims [m], (32, 3)."""
+        angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+        rim = self.radius * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        return np.concatenate([np.insert(rim, 2, end, axis=1) for end in (-self.length / 2, self.length / 2)])
+
 
 @dataclass(frozen=True)
 class Sphere:
@@ -45,6 +68,11 @@ class Sphere:
     def bounds(self) -> Array:
         """Lower and upper corner [m], (2, 3)."""
         return np.outer([-1.0, 1.0], np.full(3, self.radius))
+
+    @property
+    def outline(self) -> Array:
+        """Points all over it [m], (k, 3)."""
+        return self.radius * _DIRECTIONS
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +86,11 @@ class Mesh:
     def bounds(self) -> Array:
         """Lower and upper corner [m], (2, 3)."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @property
+    def outline(self) -> Array:
+        """Its outermost vertices [m], (k, 3)."""
+        return self.vertices[np.unique((_DIRECTIONS @ self.vertices.T).argmax(axis=1))]
 
 
 Shape: TypeAlias = Box | Cylinder | Sphere | Mesh

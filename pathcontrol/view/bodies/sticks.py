@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pathcontrol._arrays import Array
 from pathcontrol.robot.urdf import parse_urdf
+from pathcontrol.view.bodies.links import joint_offset
 from pathcontrol.view.bodies.shapes import Color, Cylinder, Sphere
 from pathcontrol.view.bodies.visuals import LinkVisual
 
@@ -23,7 +24,7 @@ SLENDERNESS = 0.05  # radius of a stick, of the length of the longest
 def stick_figure(source: UrdfSource) -> list[LinkVisual]:
     """A stick from each link's origin to the joints it carries, and a knob at each joint."""
     joints = parse_urdf(source.text).findall("joint")
-    reach = {joint: _offset(joint) for joint in joints}
+    reach = {joint: joint_offset(joint) for joint in joints}
     radius = SLENDERNESS * max((float(np.linalg.norm(x)) for x in reach.values()), default=0.0) or 0.01
     visuals = []
     for joint, x in reach.items():
@@ -33,11 +34,6 @@ def stick_figure(source: UrdfSource) -> list[LinkVisual]:
         if joint.get("type") != "fixed":
             visuals.append(LinkVisual(child, "knob", np.eye(4), Sphere(1.6 * radius), KNOB))
     return visuals
-
-
-def _offset(joint: Any) -> Array:
-    origin = joint.find("origin")
-    return np.zeros(3) if origin is None else np.array(origin.get("xyz", "0 0 0").split(), dtype=np.float64)
 
 
 def _stick(x: Array, radius: float) -> Cylinder:

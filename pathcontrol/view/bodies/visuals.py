@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import cached_property
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from lxml import etree
 from pathcontrol._arrays import Array
 from pathcontrol.errors import UrdfError
 from pathcontrol.robot.urdf import parse_urdf
+from pathcontrol.view.bodies.links import reach
 from pathcontrol.view.bodies.meshes import find_mesh, read_mesh
 from pathcontrol.view.bodies.shapes import Box, Color, Cylinder, Shape, Sphere
 
@@ -43,26 +45,26 @@ class LinkVisual:
     shape: Shape
     color: Color
 
-    @property
-    def corners(self) -> Array:
-        """The corners of its bounding box in the frame of the link [m], (8, 3)."""
-        bounds = self.shape.bounds
-        grid = np.stack(np.meshgrid(*bounds.T), axis=-1).reshape(8, 3)
-        return grid @ self.origin[:3, :3].T + self.origin[:3, 3]
+    @cached_property
+    def outline(self) -> Array:
+        """The outermost of its points in the frame of the link [m], (k, 3)."""
+        return self.shape.outline @ self.origin[:3, :3].T + self.origin[:3, 3]
 
 
-def link_visuals(source: UrdfSource) -> list[LinkVisual]:
+def link_visuals(source: UrdfSource, fineness: float = 0.0) -> list[LinkVisual]:
     """The visuals of every link, in the order of the URDF; collision shapes are left out.
+
+    Meshes are thinned out where that moves their surface by no more than ``fineness`` times the reach of the arm.
 
     A visual that cannot be read, or whose mesh file cannot, is left out with a warning that names it. The
     colours inside a mesh file win over the URDF's, as in RViz.
     """
     root = parse_urdf(source.text)
-    palette = _palette(root)
+    palette, detail = _palette(root), fineness * reach(source)
     visuals: list[LinkVisual] = []
     for link in root.iterchildren("link"):
         for element in link.iterchildren("visual"):
-            visuals += _visuals(link.get("name", ""), element, palette, source)
+            visuals += _visuals(link.get("name", ""), element, palette, source, detail)
     return visuals
 
 
@@ -73,11 +75,13 @@ def leaf_links(source: UrdfSource) -> set[str]:
     return {link.get("name", "") for link in root.iterchildren("link")} - parents
 
 
-def _visuals(link: str, element: Any, palette: dict[str, Color], source: UrdfSource) -> Iterator[LinkVisual]:
+def _visuals(
+    link: str, element: Any, palette: dict[str, Color], source: UrdfSource, detail: float
+) -> Iterator[LinkVisual]:
     try:
         visual = _read(element)
         origin = np.eye(4) if visual.origin is None else np.asarray(visual.origin, dtype=np.float64)
-        shapes = _shapes(visual.geometry, source)
+        shapes = _shapes(visual.geometry, source, detail)
     except (UrdfError, LookupError, TypeError, ValueError) as error:
         mesh = element.find("geometry/mesh")
         what = "a visual" if mesh is None else f"mesh {mesh.get('filename')!r}"
@@ -97,10 +101,10 @@ def _read(element: Any) -> yourdfpy.urdf.Visual:
     return yourdfpy.URDF.load(file, build_scene_graph=False, load_meshes=False).robot.links[0].visuals[0]
 
 
-def _shapes(geometry: yourdfpy.urdf.Geometry, source: UrdfSource) -> list[tuple[Shape, Color | None]]:
+def _shapes(geometry: yourdfpy.urdf.Geometry, source: UrdfSource, detail: float) -> list[tuple[Shape, Color | None]]:
     if (mesh := geometry.mesh) is not None:
         path = find_mesh(mesh.filename or "", source.base_dir, source.package_dirs)
-        return [*read_mesh(path, 1.0 if mesh.scale is None else mesh.scale)]
+        return [*read_mesh(path, 1.0 if mesh.scale is None else mesh.scale, detail)]
     if (box := geometry.box) is not None:
         return [(Box(np.broadcast_to(box.size, 3)), None)]
     if (cylinder := geometry.cylinder) is not None:

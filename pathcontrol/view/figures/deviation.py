@@ -2,62 +2,91 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import tool_deviation, tool_positions
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.run import Run
-from pathcontrol.view.figures.style import GREY, ORANGE, style
+from pathcontrol.view.figures.limits import extent, from_zero, over_time
+from pathcontrol.view.figures.lines import curve, drawable, series
+from pathcontrol.view.figures.shown import Runs, Shown, shown
+from pathcontrol.view.figures.style import GREY, INK, PEAK_LOOK, SMALL, dressed, style
+from pathcontrol.view.figures.tool import coloured_way, distance_unit
 from pathcontrol.view.figures.toolpath import outline, plan_figure
-
-_COLOURS = "viridis"
-_MOST_PIECES = 4000
+from pathcontrol.view.figures.words import legend
 
 
-def deviation_figure(run: Run, robot: RobotModel, task: ToolpathTask, rollout: int = 0) -> Figure:
+def deviation_figure(
+    run: Runs, robot: RobotModel | None = None, task: ToolpathTask | None = None, rollout: int = 0
+) -> Figure:
     """The tool's way over the drawing, seen on the workpiece, coloured by its distance from it; and that over time.
 
-    Only cuts are coloured: between them the tool has no drawing to keep to.
+    Only cuts count: between them the tool has no drawing to keep to. Several runs have a colour each instead.
+
+    Args:
+        run: a run along a toolpath, or several along the same one by their names.
+        robot: the arm; by default each run's own.
+        task: the toolpath; by default the runs' own.
+        rollout: which rollout of each run.
+
+    Raises:
+        InputError: a run is along no toolpath, or it knows neither robot nor task and they are not given.
     """
-    run = run.rollout(rollout)
-    deviation = 1e6 * tool_deviation(run, robot, task.frame, task.contours)[0]
-    cutting = np.array([not contour.rapid for contour in task.contours])[run["path_index"].to_numpy()]
+    runs = shown(run, task, rollout)
+    toolpath = _toolpath(runs)
     with style():
-        figure, (plan, below), (i, j) = plan_figure(task.drawing, extra=1.6)
-        for contour in task.drawing.cuts:
+        figure, (plan, below), (i, j) = plan_figure(toolpath.drawing, extra=1.6)
+        for contour in toolpath.drawing.cuts:
             plan.plot(*(1e3 * outline(contour)[:, [i, j]].T), color=GREY, linewidth=3.0, alpha=0.4)
-        way = 1e3 * _on_workpiece(tool_positions(run, robot, task.frame)[0], task.workpiece)[:, [i, j]]
-        _coloured(figure, plan, way, deviation, cutting)
-        _over_time(below, run.time, np.where(cutting, deviation, np.nan))
+        plan.autoscale_view()
+        distances = []
+        for one in runs:
+            way, distance, cutting = _measured(one, robot)
+            way = 1e3 * way[:, [i, j]]
+            if len(runs) == 1:
+                coloured_way(figure, plan, way, distance, cutting)
+            else:
+                curve(plan, *np.where(cutting[:, None], way, np.nan).T, linewidth=0.8, **one.look)
+            distances.append(np.where(cutting, distance, np.nan))
+        _over_time(dressed(below), runs, distances)
+        legend(figure, {one.label: Line2D([], [], **one.look) for one in runs if one.name})
     return figure
 
 
-def _on_workpiece(x: Array, pose: Array) -> Array:
-    """Points (k, 3) of the base frame in the workpiece's."""
-    return (x - pose[:3, 3]) @ pose[:3, :3]
+def _toolpath(runs: Sequence[Shown]) -> ToolpathTask:
+    for one in runs:
+        if not isinstance(one.task, ToolpathTask):
+            name = f" {one.name!r}" if one.name else ""
+            raise InputError(f"the run{name} is not known to follow a toolpath; give task=ToolpathTask(...)")
+    assert isinstance(runs[0].task, ToolpathTask)
+    return runs[0].task
 
 
-def _coloured(figure: Figure, axes: Axes, way: Array, deviation: Array, cutting: Array) -> None:
-    some = np.arange(0, len(way), -(-len(way) // _MOST_PIECES))
-    way, deviation, cutting = way[some], deviation[some], cutting[some]
-    pieces = np.stack([way[:-1], way[1:]], axis=1)
-    cut = cutting[:-1] & cutting[1:]
-    axes.add_collection(LineCollection(list(pieces[~cut]), colors=GREY, linewidths=0.5))
-    lines = LineCollection(list(pieces[cut]), cmap=_COLOURS, linewidths=1.4)
-    lines.set_array(deviation[:-1][cut])
-    axes.add_collection(lines)
-    axes.autoscale_view()
-    figure.colorbar(lines, ax=axes, label="distance [µm]", fraction=0.05, pad=0.02)
+def _measured(one: Shown, robot: RobotModel | None) -> tuple[Array, Array, Array]:
+    """The tool's way (k, 3) in the workpiece's frame, its distance from the drawing (k,) [m], and whether it cuts."""
+    task, robot = one.task, one.run.robot if robot is None else robot
+    assert isinstance(task, ToolpathTask)
+    way = (tool_positions(one.run, robot, task.frame)[0] - task.workpiece[:3, 3]) @ task.workpiece[:3, :3]
+    distance = drawable(tool_deviation(one.run, robot, task.frame, task.contours)[0])
+    cutting = np.array([not contour.rapid for contour in task.contours])[one.run["path_index"].to_numpy()]
+    return way, distance, cutting
 
 
-def _over_time(axes: Axes, time: Array, deviation: Array) -> None:
-    peak = np.nanmax(deviation)
-    axes.plot(time, deviation, linewidth=0.8)
-    axes.axhline(peak, color=ORANGE, linewidth=0.9, linestyle=(0, (4, 2)))
-    axes.set_title(f"largest over the cuts {peak:.3g} µm", fontsize=8, color=ORANGE, loc="right", pad=3)
-    axes.set(xlabel="time [s]", ylabel="distance [µm]", xlim=(time[0], time[-1]), ylim=(0, 1.15 * peak))
+def _over_time(axes: Axes, runs: Sequence[Shown], distances: Sequence[Array]) -> None:
+    factor, unit = distance_unit(np.concatenate(distances))
+    values = [factor * distance for distance in distances]
+    for one, v in zip(runs, values, strict=True):
+        series(axes, one.run.time, v, linewidth=0.8, **one.look)
+        axes.axhline(extent([v])[1], color=one.colour if one.name else INK, **PEAK_LOOK)
+    peaks = ", ".join(f"{extent([v])[1]:.3g}" for v in values)
+    axes.set_title(f"largest over the cuts {peaks} {unit}", fontsize=SMALL, loc="right", pad=3)
+    axes.set(xlabel="time [s]", ylabel=f"distance [{unit}]")
+    from_zero(axes, values, 1.15)
+    over_time(axes, [one.run.time for one in runs])

@@ -1,54 +1,126 @@
-"""One style for all figures, and how they are written: SVG and PNG, whole or not at all."""
+"""One style for all figures, and how they are written: SVG, PNG and PDF, whole or not at all."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from pathcontrol._files import whole_file
+from pathcontrol.errors import InputError
+from pathcontrol.view.figures.ticks import SpacedLocator
 
-# Okabe and Ito's colours, told apart with any colour vision
-BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#8A8A8A"
+# Okabe and Ito's colours, told apart with any colour vision; their yellow is too pale on white
+BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
+#: of the first run, the second, …
+RUN_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY)
+#: what is desired, and what else a run is held against: limits, peaks, ϑ
+GREY, INK = "#9A9A9A", "#2B2B2B"
+DASHED = (0, (4, 2))
+
+#: how what is not a run looks
+Look = dict[str, Any]
+DESIRED_LOOK: Look = {"color": GREY, "linewidth": 2.4, "zorder": 1.9}
+START_LOOK: Look = {"marker": "o", "markerfacecolor": "white", "markersize": 4.5, "zorder": 3}
+LIMIT_LOOK: Look = {"color": INK, "linewidth": 0.9}
+PROFILE_LOOK: Look = {"color": INK, "linewidth": 0.8, "linestyle": DASHED}
+PEAK_LOOK: Look = {"linewidth": 0.8, "linestyle": DASHED}
+
+#: widths of figures [in]: one column of a page with two, and both
+COLUMN, PAGE = 3.5, 7.2
+FORMATS = ("svg", "png", "pdf")
+SMALL = 7.0  # pt, of numbers on axes and in insets
 
 _STYLE: Any = {
-    "font.size": 9.0,
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "legend.fontsize": 8.0,
     "axes.linewidth": 0.7,
-    "axes.grid": True,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.axisbelow": True,
-    "grid.color": "#E3E3E3",
-    "grid.linewidth": 0.6,
+    "axes.formatter.use_mathtext": True,
+    "axes.formatter.useoffset": False,
     "lines.linewidth": 1.1,
+    "lines.solid_joinstyle": "round",
     "legend.frameon": False,
-    "svg.fonttype": "none",
+    "agg.path.chunksize": 20_000,
+    "svg.fonttype": "none",  # text stays text
     "svg.hashsalt": "pathcontrol",
+    "pdf.fonttype": 42,  # TrueType, which journals ask for
     "savefig.dpi": 300,
 }
+# no dates inside, so that the same run gives the same file
+_METADATA: dict[str, Any] = {"svg": {"Date": None}, "png": None, "pdf": {"CreationDate": None}}
 
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Everything drawn inside has the package's look."""
-    with mpl.rc_context(_STYLE):
+    """Everything drawn inside has the package's look, whatever the user's own settings of Matplotlib are."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
         yield
 
 
-def save_figure(figure: Figure, path: str | Path) -> list[Path]:
-    """Write ``path`` with the suffixes .svg and .png; returns both paths."""
-    stem = Path(path)
-    stem = stem.with_suffix("") if stem.suffix in (".svg", ".png") else stem
-    written = []
-    with style():
-        for suffix in (".svg", ".png"):
-            target = stem.with_name(stem.name + suffix)
-            with whole_file(target) as temporary:
-                # no date inside, so that the same run gives the same file
-                figure.savefig(temporary, metadata={"Date": None} if suffix == ".svg" else None)
-            written.append(target)
-    return written
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure [in]."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03)  # type: ignore[union-attr, call-arg]
+    return figure
+
+
+def dressed(axes: Axes) -> Axes:
+    """``axes`` with grid and ticks in the style; said outright, as ticks are made when they are first drawn."""
+    axes.grid(True, color="#E3E3E3", linewidth=0.6)
+    axes.tick_params(labelsize=SMALL, width=0.7, length=2.5, pad=2.5)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.get_offset_text().set_fontsize(SMALL)
+    axes.xaxis.set_major_locator(SpacedLocator(SMALL))
+    return axes
+
+
+def error_colours() -> LinearSegmentedColormap:
+    """From small errors to large ones: evenly perceived, without the yellow that is lost on white."""
+    shades = mpl.colormaps["plasma"]
+    return LinearSegmentedColormap.from_list("errors", [shades(0.88 * i / 15) for i in range(16)])
+
+
+def save_figure(figure: Figure, path: str | Path, formats: Sequence[str] = ("svg", "png")) -> list[Path]:
+    """Write a figure in several formats, all of them or none.
+
+    The same run gives the same bytes. Text stays text in SVG and PDF; PNG has 300 dpi.
+
+    Args:
+        figure: what to write.
+        path: where, without a suffix. A suffix ``.svg``, ``.png`` or ``.pdf`` asks for that format besides.
+        formats: which of ``"svg"``, ``"png"`` and ``"pdf"``.
+
+    Returns:
+        The files, in the order of the formats.
+
+    Raises:
+        InputError: a format is not known, or a file cannot be written there.
+    """
+    stem, wanted = Path(path), [formats] if isinstance(formats, str) else list(formats)
+    if stem.suffix[1:] in FORMATS:
+        stem, wanted = stem.with_suffix(""), [*wanted, stem.suffix[1:]]
+    if unknown := [name for name in wanted if name not in FORMATS]:
+        raise InputError(f"formats has {unknown[0]!r}, expected some of {', '.join(map(repr, FORMATS))}")
+    targets = {name: stem.with_name(f"{stem.name}.{name}") for name in wanted}
+    with style(), ExitStack() as files:
+        for name, target in targets.items():
+            figure.savefig(files.enter_context(whole_file(target)), format=name, metadata=_METADATA[name])
+    return list(targets.values())
+
+
+def stem_of(path: str | Path) -> Path:
+    """``path`` without the suffix of a format."""
+    path = Path(path)
+    return path.with_suffix("") if path.suffix[1:] in FORMATS else path

@@ -10,7 +10,8 @@ from pathcontrol._arrays import Array
 from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.corners import corners
 from pathcontrol.toolpaths.segments import Polyline
-from pathcontrol.view.figures.style import BLUE, GREY, ORANGE, style
+from pathcontrol.view.figures.style import BLUE, GREY, ORANGE, dressed, new_figure, style
+from pathcontrol.view.figures.words import legend
 
 _CURVE_SAMPLES = 64
 _MOST_POINTS = 200_000
@@ -29,7 +30,8 @@ def toolpath_figure(toolpath: Toolpath) -> Figure:
         if 0 < len(bends) <= _MOST_POINTS:
             x, y = 1e3 * np.array(bends)[:, [i, j]].T
             axes.plot(x, y, ".", color=ORANGE, markersize=3, label=f"corner ({len(bends)})")
-        _legend(figure, axes)
+        handles, labels = axes.get_legend_handles_labels()
+        legend(figure, dict(zip(labels, handles, strict=True)))
     return figure
 
 
@@ -39,9 +41,9 @@ def plan_figure(toolpath: Toolpath, extra: float = 0.0) -> tuple[Figure, list[Ax
     i, j = plane_axes(upper - lower)
     width, height = np.maximum((upper - lower)[[i, j]], 1e-9)
     tall = float(np.clip(4.6 * height / width, 1.2, 7.0))
-    figure = Figure(figsize=(5.2, 0.7 + tall + extra), layout="constrained")
+    figure = new_figure(5.2, 0.7 + tall + extra)
     parts = figure.add_gridspec(2 if extra else 1, 1, height_ratios=[tall, extra] if extra else None)
-    plan = figure.add_subplot(parts[0], aspect="equal")
+    plan = dressed(figure.add_subplot(parts[0], aspect="equal"))
     plan.set(xlabel=f"{_AXES[i]} [mm]", ylabel=f"{_AXES[j]} [mm]")
     return figure, [plan, *([figure.add_subplot(parts[1])] if extra else [])], (i, j)
 
@@ -83,9 +85,3 @@ def _number(axes: Axes, toolpath: Toolpath, i: int, j: int) -> None:
     for start, ranks in labels.items():
         text, above = ", ".join(ranks), (4.0, 4.0)
         axes.annotate(text, (start[0], start[1]), above, textcoords="offset points", color=BLUE, fontsize=8)
-
-
-def _legend(figure: Figure, axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    once = dict(zip(labels, handles, strict=True))
-    figure.legend(once.values(), once.keys(), loc="outside upper center", ncols=4, handlelength=1.6)

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.view.bodies.shapes import directions
 
-LOWEST, HIGHEST = np.deg2rad([22.0, 60.0])
+LOWEST, HIGHEST = np.deg2rad([22.0, 42.0])
 ASIDE = np.deg2rad(20.0)
+LEGEND = 0.1  # of the height of what is seen: room below it
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -29,12 +31,15 @@ class Camera:
 
     @classmethod
     def framing(cls, points: Array, direction: Array) -> Camera:
-        """The view from ``direction`` that shows all points [m], (k, 3)."""
+        """The view from ``direction`` that shows all points [m], (k, 3), above the legend."""
         axes = picture_axes(direction)
         seen = points @ axes.T
-        middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
-        outermost = np.unique((seen @ _directions(200).T).argmax(axis=0))
-        return cls(middle @ axes, axes[2], seen[outermost] - middle)
+        lower, upper = seen.min(axis=0), seen.max(axis=0)
+        lower[1] -= LEGEND * (upper[1] - lower[1])
+        middle = (lower + upper) / 2
+        outermost = np.unique((directions(200) @ seen.T).argmax(axis=1))
+        bottom = [0.0, lower[1] - middle[1], 0.0]
+        return cls(middle @ axes, axes[2], np.vstack([seen[outermost] - middle, bottom]))
 
 
 def picture_axes(direction: Array) -> Array:
@@ -48,7 +53,7 @@ def view_direction(path: Array, scene: Array) -> Array:
     """Unit vector towards an eye that sees the tool's path well, (3,).
 
     It is normal to the plane that fits the path best (the least principal axis), on the side of the path that
-    the arm is not, then raised to an elevation from 22° to 60° and turned aside by 20°, which shows depth.
+    the arm is not, then raised to an elevation from 22° to 42° and turned aside by 20°, which shows depth.
 
     Args:
         path: points of the tool's path [m], (k, 3).
@@ -64,14 +69,6 @@ def view_direction(path: Array, scene: Array) -> Array:
     azimuth = np.arctan2(normal[1], normal[0]) + ASIDE
     elevation = np.clip(np.arctan2(normal[2], np.hypot(*normal[:2])), LOWEST, HIGHEST)
     return np.array([*(np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])), np.sin(elevation)])
-
-
-def _directions(count: int) -> Array:
-    """Unit vectors spread evenly, (count, 3), on a golden spiral."""
-    height = 1 - (2 * np.arange(count) + 1) / count
-    turn = np.pi * (1 + np.sqrt(5)) * np.arange(count)
-    circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1) * np.sqrt(1 - height**2)[:, None]
-    return np.column_stack([circle, height])
 
 
 def _normal(centred: Array) -> Array:

@@ -26,8 +26,8 @@ class Film:
         header: anything that JSON can hold, and references to blocks.
     """
 
-    header: dict[str, Any] = field(default_factory=dict)
-    _blocks: list[bytes] = field(default_factory=list)
+    header: dict[str, Any] = field(default_factory=dict, repr=False)
+    _blocks: list[bytes] = field(default_factory=list, repr=False)
     _size: int = 0
 
     def block(self, values: Any, kind: str = "f4") -> dict[str, Any]:

@@ -1,25 +1,28 @@
-"""Poses over time: the frames of a film, taken from the samples of a run."""
+"""Poses over time: key frames of what moves, taken from the samples of a run."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from pathcontrol._arrays import Array
+from pathcontrol.view.film.keys import Indices, inside, interpolated, key_samples
 
 STILL = 1e-9  # m, and the same of the quaternion: what does not move by more is at rest
+ERROR = 4.9e-5  # m, and the same of the entries of a rotation: single precision stays within 5e-5, too
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Where something is over time, in the base frame.
+    """Where something is over time, relative to what is above it.
 
     Attributes:
-        times: times of the frames from the start of the film [s], (frames,).
-        positions: [m], (frames, 3).
-        quaternions: unit quaternions (x, y, z, w) without a change of sign from frame to frame, (frames, 4).
+        times: increasing, from the start of the film [s], (keys,).
+        positions: [m], (keys, 3).
+        quaternions: unit quaternions (x, y, z, w) without a change of sign from key to key, (keys, 4).
     """
 
     times: Array
@@ -28,8 +31,13 @@ class Track:
 
     @classmethod
     def from_poses(cls, times: Array, poses: Array) -> Track:
-        """A track from homogeneous poses, (frames, 4, 4)."""
+        """A track from homogeneous poses, (keys, 4, 4)."""
         return cls(times, poses[:, :3, 3], continuous_quaternions(poses[:, :3, :3]))
+
+    @classmethod
+    def from_positions(cls, times: Array, positions: Array) -> Track:
+        """A track of what does not turn, through positions (keys, 3)."""
+        return cls(times, positions, np.tile([0.0, 0.0, 0.0, 1.0], (len(times), 1)))
 
     @property
     def moves(self) -> bool:
@@ -39,22 +47,32 @@ class Track:
             or np.abs(self.quaternions - self.quaternions[0]).max() > STILL
         )
 
+    @property
+    def first_rotation(self) -> Array:
+        """How it is turned at first, (3, 3)."""
+        return Rotation.from_quat(self.quaternions[0]).as_matrix()
 
-def frame_times(time: Array, fps: float) -> Array:
-    """Times of the frames [s], (frames,): ``fps`` a second from the first sample on, and the last sample."""
-    whole = np.ceil((time[-1] - time[0]) * fps - 1e-6)
-    return np.append(time[0] + np.arange(whole) / fps, time[-1])
+    def thinned(self, error: float = ERROR) -> Track:
+        """The track with as few of its keys as give every other within ``error`` [m; entries of the rotation].
 
+        Between keys the position is linear in time and the quaternion too, normalised. The entries of a rotation
+        change by no more than 2‖Δ‖ for a change Δ of its unit quaternion: that is what is measured.
+        """
 
-def at_times(time: Array, samples: Array, times: Array) -> Array:
-    """Samples (time,) or (time, n) at other times, by linear interpolation."""
-    if samples.ndim == 1:
-        return np.interp(times, time, samples)
-    return np.stack([np.interp(times, time, column) for column in samples.T], axis=-1)
+        def holds(first: Indices, length: int) -> NDArray[np.bool_]:
+            rows = inside(first, length)
+            near = interpolated(self.times, self.positions, first, length)
+            off = np.linalg.norm(self.positions[rows] - near, axis=-1).max(-1)
+            turned = interpolated(self.times, self.quaternions, first, length)
+            turned /= np.linalg.norm(turned, axis=-1, keepdims=True)
+            return (off <= error) & (2 * np.linalg.norm(self.quaternions[rows] - turned, axis=-1).max(-1) <= error)
+
+        kept = key_samples(len(self.times), holds)
+        return Track(self.times[kept], self.positions[kept], self.quaternions[kept])
 
 
 def continuous_quaternions(rotations: Array) -> Array:
-    """Unit quaternions (x, y, z, w) of rotations (frames, 3, 3), without changes of sign on the way."""
+    """Unit quaternions (x, y, z, w) of rotations (k, 3, 3), without changes of sign on the way."""
     quaternions = Rotation.from_matrix(rotations).as_quat()
     turned = (quaternions[1:] * quaternions[:-1]).sum(-1) < 0
     signs = np.cumprod(np.where(turned, -1.0, 1.0))

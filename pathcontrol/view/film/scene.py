@@ -2,40 +2,40 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from typing import Any
+import hashlib
+from typing import Any, TypeAlias
 
 import meshcat
-import meshcat.animation as animation
 import meshcat.geometry as meshes
 import numpy as np
 import umsgpack
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.bodies.shapes import Box, Color, Cylinder, Shape, Sphere
-from pathcontrol.view.film.motion import Track
+from pathcontrol.view.bodies.shapes import Box, Color, Cylinder, Mesh, Shape, Sphere
 
-_SKY, _GROUND = [0.99, 0.99, 1.0], [0.86, 0.88, 0.90]
 _BACK, _BOTH = 1, 2  # three.js: which side of a triangle is drawn
 # three.js has cylinders along y, URDF along z
 _Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
+#: a command of Meshcat's in MessagePack, or a copy of an object that is there already
+Command: TypeAlias = bytes | dict[str, Any]
+
 
 class Scene:
-    """Objects in the base frame, z up [m], and how they move.
+    """Objects in the base frame, z up [m].
 
-    Objects are named by ``"group/name"`` paths; a pose belongs to a name, and what is below moves with it.
+    Objects are named by ``"group/name"`` paths; a pose belongs to a name, and what is below moves with it. A mesh that
+    comes again is not sent again, but copied by the page.
 
     Attributes:
-        commands: what Meshcat is told, in order, each a MessagePack map.
+        commands: what the page is told, in order.
     """
 
     def __init__(self) -> None:
-        self.commands: list[bytes] = []
+        self.commands: list[Command] = []
         self._root = meshcat.Visualizer(window=self)
-        self._root["/Background"].set_property("top_color", _SKY)
-        self._root["/Background"].set_property("bottom_color", _GROUND)
+        self._sent: dict[bytes, tuple[str, Color]] = {}
+        self._elements = 0
         for furniture in ("/Grid", "/Axes"):
             self._root[furniture].set_property("visible", False)
 
@@ -43,30 +43,60 @@ class Scene:
         """Take a command of Meshcat's in place of its window; WebGL draws in single precision anyway."""
         self.commands.append(umsgpack.packb(command.lower(), force_float_precision="single"))
 
-    def add(self, name: str, shape: Shape, color: Color, pose: Array | None = None, *, lining: bool = False) -> None:
-        """Put a shape at a pose in the frame of what is above it, (4, 4).
+    def add(self, name: str, shape: Shape, color: Color, pose: Array | None = None) -> None:
+        """Put a lit shape at a pose in the frame of what is above it, (4, 4)."""
+        if not (isinstance(shape, Mesh) and self._copied(name, shape, color)):
+            material = meshes.MeshPhongMaterial(color=_rgb(color), opacity=color[3], side=_BOTH)
+            self._put(name, meshes.Mesh(_geometry(shape), material))
+        place = np.eye(4) if pose is None else pose
+        self.place(name, place @ _Y_TO_Z if isinstance(shape, Cylinder) else place)
+
+    def add_line(self, name: str, line: Mesh, color: Color, *, lining: bool = False) -> None:
+        """Draw a line as thick as the tube that it is, in one colour that light does not change.
 
         Of a ``lining`` only the far side is seen, so that it hides nothing that is inside it.
         """
-        node = self._root[name]
         side = _BACK if lining else _BOTH
-        node.set_object(_geometry(shape), meshes.MeshPhongMaterial(color=_rgb(color), opacity=color[3], side=side))
-        place = np.eye(4) if pose is None else pose
-        node.set_transform(place @ _Y_TO_Z if isinstance(shape, Cylinder) else place)
+        material = meshes.MeshBasicMaterial(color=_rgb(color), opacity=color[3], side=side)
+        self._put(name, meshes.Mesh(_geometry(line), material))
+
+    def add_colored_line(self, name: str, line: Mesh, colors: Array) -> None:
+        """Draw a tube in the colours (k, 3) of its vertices, as they are in the legend: light does not change them."""
+        geometry = meshes.TriangularMeshGeometry(line.vertices, line.faces, colors)
+        self._put(name, meshes.Mesh(geometry, meshes.MeshBasicMaterial(vertexColors=True, side=_BOTH)))
 
     def add_segments(self, name: str, segments: Array, color: Color) -> None:
         """Draw line segments [m], (k, 2, 3), one pixel wide."""
         ends = meshes.PointsGeometry(segments.reshape(-1, 3).T.astype(np.float32))
-        self._root[name].set_object(meshes.LineSegments(ends, meshes.LineBasicMaterial(color=_rgb(color))))
+        material = meshes.LineBasicMaterial(color=_rgb(color), opacity=color[3])
+        self._put(name, meshes.LineSegments(ends, material))
 
     def place(self, name: str, pose: Array) -> None:
         """Put a name, and all below it, at a pose (4, 4)."""
         self._root[name].set_transform(pose)
 
-    def animate(self, tracks: Mapping[str, Track], fps: float) -> None:
-        """Move names along tracks, at real speed, over and over."""
-        clips = {self._root[name].path: _clip(track, fps) for name, track in tracks.items()}
-        self._root.set_animation(animation.Animation(clips, fps), repetitions=math.inf)
+    def _put(self, name: str, thing: meshes.Object) -> None:
+        """Send an object under names of its parts that are the same whenever the same scene is made."""
+        for part in (thing, thing.geometry, thing.material):
+            self._elements += 1
+            part.uuid = str(self._elements)
+        self._root[name].set_object(thing)
+
+    def _copied(self, name: str, mesh: Mesh, color: Color) -> bool:
+        """Whether the mesh has been sent before and is copied now."""
+        digest = hashlib.sha256(mesh.vertices.tobytes() + mesh.faces.tobytes()).digest()
+        if digest not in self._sent:
+            self._sent[digest] = (name, color)
+            return False
+        original, painted = self._sent[digest]
+        copy: dict[str, Any] = {"copy": absolute(original), "to": absolute(name)}
+        self.commands.append(copy if color == painted else copy | {"color": list(color)})
+        return True
+
+
+def absolute(name: str) -> str:
+    """The path of a name of the scene, as the page knows it."""
+    return f"/meshcat/{name}"
 
 
 def path(group: str, index: int, name: str) -> str:
@@ -87,12 +117,3 @@ def _geometry(shape: Shape) -> meshes.Geometry:
 def _rgb(color: Color) -> int:
     red, green, blue = (round(255 * channel) for channel in color[:3])
     return red << 16 | green << 8 | blue
-
-
-def _clip(track: Track, fps: float) -> animation.AnimationClip:
-    frames = (track.times * fps).tolist()
-    moving = {
-        "position": animation.AnimationTrack("position", "vector3", frames, track.positions.tolist()),
-        "quaternion": animation.AnimationTrack("quaternion", "quaternion", frames, track.quaternions.tolist()),
-    }
-    return animation.AnimationClip(moving, fps)

@@ -1,109 +1,121 @@
-"""One rollout being filmed: the arm, the lines and the moving point, put into a scene one after the other."""
+"""What is put into a film's scene: arms, lines and markers, each with how it moves."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import TaskError
 from pathcontrol.view.bodies.shapes import Color, Sphere
-from pathcontrol.view.bodies.visuals import LinkVisual
+from pathcontrol.view.film.drawing import Line
+from pathcontrol.view.film.film import Film
 from pathcontrol.view.film.ground import ground_grid
-from pathcontrol.view.film.motion import Track, at_times, frame_times
-from pathcontrol.view.film.scene import Scene, path
-from pathcontrol.view.film.tube import distinct, simplified, tube
+from pathcontrol.view.film.motion import Track
+from pathcontrol.view.film.palette import DESIRED, GRID, RAPID
+from pathcontrol.view.film.scene import Scene, absolute, path
+from pathcontrol.view.film.take import Take
+from pathcontrol.view.film.trace import Trace
+from pathcontrol.view.film.tube import dashes, joined, simplified, tube
 
-if TYPE_CHECKING:
-    from pathcontrol.robot.model import RobotModel
-    from pathcontrol.simulation.run import Run
-    from pathcontrol.tasks.base import PathTask
-
-GRID: Color = (0.76, 0.79, 0.82, 1.0)
-
-_PATH_SAMPLES = 2001
-_TRACE_SAMPLES = 5001
+GHOST = 0.35  # opacity of an arm that stands in another
 _FRAMED_POSES = 50
+_MOST_RINGS = 20_000  # of all cuts of a drawing
+_MOST_TUBES = 2000  # more cuts are drawn as lines of a pixel
+_MOST_DASHES = 10_000
 
 
 class Stage:
-    """The scene so far, and what moves in it.
+    """A scene, and what moves and grows in it.
 
     Attributes:
-        times: times of the frames from the start of the rollout [s], (frames,).
+        film: keeps the numbers.
         scene: the objects.
-        tracks: how those that move do.
+        tracks, growing, on_top: as the header of a film has them.
     """
 
-    def __init__(self, run: Run, robot: RobotModel, tool: str, fps: float) -> None:
-        self.robot, self.tool, self.fps = robot, tool, fps
-        self.time = run.time - run.time[0]
-        self.q, self.s = run.array("q")[0], run.array("s")[0]
-        self.times = frame_times(self.time, fps)
-        self.scene, self.tracks = Scene(), dict[str, Track]()
+    def __init__(self, film: Film) -> None:
+        self.film, self.scene = film, Scene()
+        self.tracks: list[dict[str, Any]] = []
+        self.growing: list[dict[str, Any]] = []
+        self.on_top: list[str] = []
 
-    def tool_path(self) -> Array:
-        """Where the tool has been [m], (k, 3), at samples of the run."""
-        return distinct(self._tool_positions(self.q[:: -(-len(self.q) // _TRACE_SAMPLES)]))
-
-    def desired_path(self, task: PathTask) -> Array:
-        """Where the tool should have been [m], (k, 3): once along the path, or over the run's s."""
-        try:
-            first, last = task.one_traverse
-        except TaskError:
-            first, last = self.s.min(), self.s.max()
-        return distinct(self._tool_positions(task.q_d(np.linspace(first, last, _PATH_SAMPLES))))
-
-    def add_arm(self, visuals: Sequence[LinkVisual]) -> Array:
-        """Put the links on stage; return where the corners of their boxes get to [m], (k, 3), tool first."""
-        links = list(dict.fromkeys(visual.link for visual in visuals))
-        names = {link: path("arm", i, link) for i, link in enumerate(links)}
-        stacked = self.robot.frame_poses(at_times(self.time, self.q, self.times), links)
-        poses = {link: stacked[:, i] for i, link in enumerate(links)}
-        for i, visual in enumerate(visuals):
-            name = path(names[visual.link], i, visual.name)
-            self.scene.add(name, visual.shape, visual.color, visual.origin)
+    def add_arm(self, index: int, take: Take, shift: Array, *, ghost: bool = False) -> None:
+        """Put the links of an arm on stage, moved by ``shift`` [m], (3,), or its ghost in the colour of its run."""
+        group = f"arms/{index}"
+        self.scene.place(group, _moved(shift))
+        links = list(dict.fromkeys(visual.link for visual in take.visuals))
+        names = {link: path(group, i, link) for i, link in enumerate(links)}
+        for i, visual in enumerate(take.visuals):
+            color = (*take.color[:3], GHOST) if ghost else visual.color
+            self.scene.add(path(names[visual.link], i, visual.name), visual.shape, color, visual.origin)
         for link in links:
-            self._move(names[link], poses[link])
-        some = slice(None, None, -(-len(self.times) // _FRAMED_POSES))
-        corners = [_moved(poses[visual.link][some], visual.corners) for visual in visuals]
-        return np.concatenate([self._tool_positions(self.q[:1]), *corners])
+            self._move(names[link], Track.from_poses(take.time, take.poses[link]))
 
-    def add_line(self, name: str, points: Array, color: Color, radius: float, *, lining: bool = False) -> None:
-        """Draw a line [m], (k, 3), as a tube."""
-        shape = tube(simplified(points, radius / 12), radius)
-        self.scene.add(f"lines/{name}", shape, color, lining=lining)
+    def add_desired(self, index: int, lines: Sequence[Line], radius: float, shift: Array) -> None:
+        """Draw what is asked for: cuts as tubes of a ``radius`` [m], rapids as thin dashes."""
+        cuts = [line.points + shift for line in lines if not line.rapid]
+        if len(cuts) > _MOST_TUBES:
+            segments = np.concatenate([np.stack([points[:-1], points[1:]], axis=1) for points in cuts])
+            self.scene.add_segments(path("lines", index, "desired path"), segments, DESIRED)
+        elif cuts:
+            tubes = [tube(simplified(points, radius / 24, _MOST_RINGS // len(cuts)), radius) for points in cuts]
+            self.scene.add_line(path("lines", index, "desired path"), joined(tubes), DESIRED, lining=True)
+        rapids = [line.points + shift for line in lines if line.rapid]
+        if rapids:
+            whole = sum(float(np.linalg.norm(np.diff(points, axis=0), axis=-1).sum()) for points in rapids)
+            dash = max(4 * radius, whole / (2 * _MOST_DASHES))
+            pieces = np.concatenate([dashes(points, dash) for points in rapids])
+            self.scene.add_segments(path("lines", index, "rapids"), pieces, RAPID)
 
-    def add_desired_point(self, task: PathTask, color: Color, radius: float) -> None:
-        """Show where the tool should be: at q_d(s(t))."""
-        s = np.clip(at_times(self.time, self.s, self.times), task.s0, task.s_end)
-        poses = np.tile(np.eye(4), (len(s), 1, 1))
-        poses[:, :3, 3] = self._tool_positions(task.q_d(s))
-        self.scene.add("desired point/ball", Sphere(radius), color)
-        self._move("desired point", poses)
+    def add_trace(self, index: int, line: Trace, times: Array, colors: Array) -> None:
+        """Draw what the tool draws by and by, at ``times`` (k,) [s] in ``colors`` (k, 3) of all samples."""
+        name = path("lines", index, "path taken")
+        self.scene.add_colored_line(name, line.mesh, line.on_vertices(colors))
+        rings = self.film.block(times[line.rings])
+        self.growing.append({"path": absolute(name), "times": rings, "indices": line.indices})
+
+    def add_marker(self, name: str, times: Array, positions: Array, color: Color, radius: float) -> None:
+        """A dot that goes through positions (k, 3) and that nothing hides."""
+        self.scene.add(f"{name}/ball", Sphere(radius), color)
+        self._move(name, Track.from_positions(times, positions))
+        self.on_top.append(absolute(name))
 
     def add_ground(self, points: Array) -> None:
         """Draw the ground under points [m], (k, 3)."""
         self.scene.add_segments("ground", ground_grid(points), GRID)
 
-    def finish(self) -> tuple[bytes, ...]:
-        """The commands of the whole film."""
-        if self.tracks:
-            self.scene.animate(self.tracks, self.fps)
-        return tuple(self.scene.commands)
+    def header(self) -> dict[str, Any]:
+        """The scene and what moves in it, as the header of a film has them."""
+        scene = [self.film.block(c, "u1") if isinstance(c, bytes) else c for c in self.scene.commands]
+        return {"scene": scene, "tracks": self.tracks, "growing": self.growing, "on_top": self.on_top}
 
-    def _move(self, name: str, poses: Array) -> None:
-        track = Track.from_poses(self.times, poses)
-        self.scene.place(name, poses[0])
-        if track.moves:
-            self.tracks[name] = track
+    def _move(self, name: str, whole: Track) -> None:
+        """Place a name where its track begins, and keep the track if it leads anywhere."""
+        start = np.eye(4)
+        start[:3, :3], start[:3, 3] = whole.first_rotation, whole.positions[0]
+        self.scene.place(name, start)
+        if not whole.moves:
+            return
+        track = whole.thinned()
+        columns = {name: self.film.block(getattr(track, name)) for name in ("times", "positions", "quaternions")}
+        self.tracks.append({"path": absolute(name), **columns})
 
-    def _tool_positions(self, q: Array) -> Array:
-        return self.robot.frame_pose(q, self.tool)[..., :3, 3]
+
+def swept(take: Take) -> Array:
+    """Where the outermost points of an arm's links get to [m], (k, 3)."""
+    some = slice(None, None, -(-len(take.time) // _FRAMED_POSES))
+    outlines = [_posed(take.poses[visual.link][some], visual.outline) for visual in take.visuals]
+    return np.concatenate([take.tool_positions[:1], *outlines])
 
 
-def _moved(poses: Array, points: Array) -> Array:
+def _moved(shift: Array) -> Array:
+    pose = np.eye(4)
+    pose[:3, 3] = shift
+    return pose
+
+
+def _posed(poses: Array, points: Array) -> Array:
     """Points (k, 3) at poses (m, 4, 4): (m k, 3)."""
     return (points @ poses[:, :3, :3].swapaxes(-1, -2) + poses[:, None, :3, 3]).reshape(-1, 3)

@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
+import heapq
+import math
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.view.bodies.shapes import Mesh
+
+SIDES = 6
 
 
 def simplified(points: Array, tolerance: float, most: int = 400) -> Array:
     """A polyline through fewer of the points [m], (k, 3), at most ``most`` segments.
 
-    Ramer, Douglas and Peucker's algorithm: no point is farther than ``tolerance`` [m] from the result. The
-    tolerance grows if that is what it takes to stay within ``most``.
+    Ramer, Douglas and Peucker's algorithm, the farthest point first: no point is farther than ``tolerance`` [m]
+    from the result, if that is within ``most``.
     """
-    while np.count_nonzero(kept := _outline(points, tolerance)) > most + 1:
-        tolerance *= 1.5
-    return points[kept]
+    kept, spans = {0, len(points) - 1}, [_farthest(points, 0, len(points) - 1)]
+    while len(kept) <= most:
+        away, first, middle, last = heapq.heappop(spans)
+        if -away <= tolerance:
+            break
+        kept.add(middle)
+        for span in ((first, middle), (middle, last)):
+            heapq.heappush(spans, _farthest(points, *span))
+    return points[sorted(kept)]
 
 
-def tube(points: Array, radius: float, sides: int = 6) -> Mesh:
+def tube(points: Array, radius: float, sides: int = SIDES) -> Mesh:
     """An open tube of ``radius`` [m] around a polyline of two or more distinct points [m], (k, 3)."""
     normals = _transported(_tangents(points))
     angles = 2 * np.pi * np.arange(sides) / sides
@@ -30,26 +43,37 @@ def tube(points: Array, radius: float, sides: int = 6) -> Mesh:
 
 def distinct(points: Array) -> Array:
     """The points without those that repeat their predecessor."""
-    moved = np.linalg.norm(np.diff(points, axis=0), axis=-1) > 1e-9
-    return points[np.concatenate([[True], moved])]
+    return points[distinct_rows(points)]
 
 
-def _outline(points: Array, tolerance: float) -> np.ndarray:
-    """Which points stay, (k,) bool."""
-    kept = np.zeros(len(points), dtype=bool)
-    kept[[0, -1]] = True
-    spans = [(0, len(points) - 1)]
-    while spans:
-        first, last = spans.pop()
-        if last - first < 2:
-            continue
-        away = _distance(points[first + 1 : last], points[first], points[last])
-        farthest = int(away.argmax())
-        if away[farthest] > tolerance:
-            middle = first + 1 + farthest
-            kept[middle] = True
-            spans += [(first, middle), (middle, last)]
-    return kept
+def distinct_rows(points: Array) -> NDArray[np.bool_]:
+    """Which of the points are not where their predecessor is, (k,)."""
+    return np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=-1) > 1e-9])
+
+
+def joined(parts: Sequence[Mesh]) -> Mesh:
+    """Several meshes as one."""
+    offsets = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = [part.faces + offset for part, offset in zip(parts, offsets[:-1], strict=True)]
+    return Mesh(np.concatenate([part.vertices for part in parts]), np.concatenate(faces))
+
+
+def dashes(points: Array, length: float) -> Array:
+    """Every other piece of ``length`` [m] of a polyline, (k, 2, 3), from its first point on."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=-1))])
+    count = max(int(np.round((along[-1] / length - 1) / 2)), 0)
+    ends = along[-1] / (2 * count + 1) * np.arange(2 * count + 2)  # that begin and end with a dash
+    at = np.stack([np.interp(ends, along, axis) for axis in points.T], axis=-1)
+    return at.reshape(-1, 2, 3)
+
+
+def _farthest(points: Array, first: int, last: int) -> tuple[float, int, int, int]:
+    """The point of a span that is farthest from its chord: its distance, negative, and (first, farthest, last)."""
+    if last - first < 2:
+        return 0.0, first, first, last
+    away = _distance(points[first + 1 : last], points[first], points[last])
+    farthest = int(away.argmax())
+    return -float(away[farthest]), first, first + 1 + farthest, last
 
 
 def _distance(points: Array, start: Array, end: Array) -> Array:
@@ -71,19 +95,22 @@ def _tangents(points: Array) -> Array:
 
 def _transported(tangents: Array) -> Array:
     """Two normals at each point, (k, 2, 3), that turn as little as they can along the line."""
-    normals = np.empty((len(tangents), 2, 3))
-    normal = np.eye(3)[np.abs(tangents[0]).argmin()]
-    for i, tangent in enumerate(tangents):
-        flat = normal - (normal @ tangent) * tangent
-        if flat @ flat < 1e-12:  # the line turned by a right angle into the last normal
-            flat = np.cross(tangent, np.eye(3)[np.abs(tangent).argmin()])
-        normal = flat / np.linalg.norm(flat)
-        normals[i] = normal, np.cross(tangent, normal)
-    return normals
+    normals, (x, y, z) = [], np.eye(3)[np.abs(tangents[0]).argmin()].tolist()
+    for a, b, c in tangents.tolist():  # numbers one by one: each depends on the one before, and arrays are slow at that
+        along = x * a + y * b + z * c
+        x, y, z = x - along * a, y - along * b, z - along * c
+        length = math.hypot(x, y, z)
+        if length < 1e-6:  # the line turned by a right angle into the last normal
+            x, y, z = np.cross([a, b, c], np.eye(3)[np.abs([a, b, c]).argmin()]).tolist()
+            length = math.hypot(x, y, z)
+        x, y, z = x / length, y / length, z / length
+        normals.append((x, y, z))
+    return np.stack([normals, np.cross(tangents, normals)], axis=1)
 
 
 def _tube_faces(rings: int, sides: int) -> np.ndarray:
+    """Triangles from ring to ring, those of the first two rings first, so that a tube can be drawn by and by."""
     ring, side = np.meshgrid(np.arange(rings - 1), np.arange(sides), indexing="ij")
     here, beside = ring * sides + side, ring * sides + (side + 1) % sides
     pairs = [[here, beside, beside + sides], [here, beside + sides, here + sides]]
-    return np.concatenate([np.stack(corners, axis=-1).reshape(-1, 3) for corners in pairs])
+    return np.stack([np.stack(corners, axis=-1) for corners in pairs], axis=2).reshape(-1, 3)

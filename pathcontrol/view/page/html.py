@@ -1,40 +1,109 @@
-"""One HTML file with everything in it: Meshcat's viewer, the scene, and nothing to fetch."""
+"""One HTML file with everything in it: Meshcat's viewer, the film, the charts, and nothing to fetch."""
 
 from __future__ import annotations
 
 import base64
+import gzip
 import hashlib
-import html
-import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import cache
 from importlib import resources
-from string import Template
+from typing import NamedTuple
 
-from pathcontrol.view.bodies.shapes import Color
-from pathcontrol.view.film.camera import Camera
+import jinja2
+from markupsafe import Markup
+
+from pathcontrol.view.film.film import Film
+
+#: the page's script in the order in which it is put together; each part says what it is for
+PARTS = (
+    "film.js",
+    "numbers.js",
+    "theme.js",
+    "camera.js",
+    "scene.js",
+    "tracks.js",
+    "growing.js",
+    "labels.js",
+    "picture.js",
+    "clock.js",
+    "loop.js",
+    "colors.js",
+    "scrubbing.js",
+    "tables.js",
+    "caption.js",
+    "axes.js",
+    "ranges.js",
+    "charts.js",
+    "plane_map.js",
+    "plane.js",
+    "controls.js",
+    "keyboard.js",
+    "printing.js",
+    "player.js",
+)
+STYLES = ("vendor/uPlot.min.css", "page.css", "player.css", "charts.css")
 
 
-def page(title: Sequence[str], legend: Mapping[str, Color], commands: Sequence[bytes], camera: Camera) -> str:
-    """The page that plays a scene.
+class Section(NamedTuple):
+    """What a page says below its player.
+
+    Attributes:
+        title: heading; any text, it is never markup.
+        body: HTML that is safe: made by a Jinja template with autoescape.
+    """
+
+    title: str
+    body: Markup
+
+
+def page(film: Film, title: Sequence[str], sections: Sequence[Section] = ()) -> str:
+    """The page that plays a film.
+
+    It works from ``file://`` in any browser with WebGL, and its content security policy allows no connection and no
+    script but its own.
 
     Args:
+        film: what is to be seen, its charts and its tables.
         title: what to say in the title line; any text, it is never markup.
-        legend: what each colour is.
-        commands: the commands of a :class:`pathcontrol.view.film.scene.Scene`.
-        camera: where to look from.
+        sections: what to say below; with three or more there is a table of contents.
     """
-    own = resources.files("pathcontrol.view.page")
-    viewer = resources.files("meshcat").joinpath("viewer", "dist", "main.min.js").read_text(encoding="utf-8")
-    scripts = {"viewer": _embedded(viewer), "player": _embedded(own.joinpath("player.js").read_text("utf-8"))}
-    return Template(own.joinpath("template.html").read_text("utf-8")).substitute(
-        scripts,
-        policy=_policy(list(scripts.values())),
-        title=html.escape(" - ".join(title)),
-        words="".join(f"<span>{html.escape(word)}</span>" for word in title),
-        legend="".join(_entry(name, color) for name, color in legend.items()),
-        scene=_scene(commands, camera),
+    player, (viewer, viewer_digest) = _player(), _viewer()
+    return _template().render(
+        policy=_policy([_digest(player), viewer_digest]),
+        title=list(title),
+        sections=sections,
+        styles=Markup("\n".join(_own(name) for name in STYLES)),
+        player=Markup(player),
+        viewer=viewer,
+        film=film.text(),
     )
+
+
+def _own(name: str) -> str:
+    return resources.files("pathcontrol.view.page").joinpath(*name.split("/")).read_text("utf-8")
+
+
+@cache
+def _template() -> jinja2.Template:
+    return jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(_own("template.html"))
+
+
+@cache
+def _player() -> str:
+    """The charts' library with its licence, and our own parts, which share one scope and leave no trace outside it."""
+    own = "\n".join(_own(name) for name in PARTS)
+    licence = f"/*! uPlot: {_own('vendor/LICENSE')}*/"
+    return _embedded(f'{licence}\n"use strict";\n(() => {{\n{_own("vendor/uPlot.iife.min.js")}\n{own}\n}})();\n')
+
+
+@cache
+def _viewer() -> tuple[str, str]:
+    """Meshcat's viewer, zipped and in base64 as it is four times as long, and the digest that lets it run."""
+    script = resources.files("meshcat").joinpath("viewer", "dist", "main.min.js").read_text("utf-8")
+    zipped = gzip.compress(script.encode(), compresslevel=9, mtime=0)
+    return base64.b64encode(zipped).decode(), _digest(script)
 
 
 def _embedded(script: str) -> str:
@@ -42,22 +111,14 @@ def _embedded(script: str) -> str:
     return re.sub(r"<(?=/script|!--)", r"\\x3c", script, flags=re.IGNORECASE)
 
 
-def _policy(scripts: Sequence[str]) -> str:
+def _digest(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+
+
+def _policy(digests: Sequence[str]) -> str:
     """A content security policy: these scripts and no others, and nothing from the network."""
-    digests = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
     allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
     return (
         f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:; "
         "worker-src blob:; base-uri 'none'; form-action 'none'"
     )
-
-
-def _scene(commands: Sequence[bytes], camera: Camera) -> str:
-    """The scene as JSON of numbers and base64, in which no markup can be."""
-    view = {name: getattr(camera, name).tolist() for name in ("target", "direction", "outline")}
-    return json.dumps({"camera": view, "commands": [base64.b64encode(c).decode() for c in commands]})
-
-
-def _entry(name: str, color: Color) -> str:
-    rgb = ", ".join(str(round(255 * channel)) for channel in color[:3])
-    return f'<span><i style="background: rgba({rgb}, {color[3]:g})"></i>{html.escape(name)}</span>'

@@ -1,74 +1,97 @@
-"use strict";
-// Plays the scene of this page in Meshcat's viewer. "#t=2.5" behind the address shows that moment and waits there.
-(() => {
-  const FIELD_OF_VIEW = 35; // degrees, vertical: wide angles distort an arm
-  const MARGIN = 1.08;
+// Puts the page together when its text is there, and offers the film to scripts as `window.film`.
+// "#t=2.5" behind the address shows that moment and waits there; "#t=2.5&bare" shows the picture only.
 
-  function bytes(text) {
-    return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  }
+function missing() {
+  if (!("DecompressionStream" in window)) return "This browser is too old for this page; one from 2023 or later shows it.";
+  const canvas = document.createElement("canvas");
+  if (!canvas.getContext("webgl2") && !canvas.getContext("webgl")) return "The picture needs WebGL, which this browser does not offer here.";
+  return "";
+}
 
-  // z is up in the scene and y in the viewer
-  function viewerAxes([x, y, z]) {
-    return [x, z, -y];
-  }
+function say(text) {
+  const message = document.getElementById("message");
+  message.textContent = text;
+  message.hidden = !text;
+}
 
-  function fillPane(viewer, pane) {
-    const resize = viewer.set_3d_pane_size.bind(viewer);
-    viewer.set_3d_pane_size = () => resize(pane.clientWidth, pane.clientHeight);
-    viewer.set_3d_pane_size();
-  }
+// what the address asks for: a moment [s] or null, and whether the picture stands alone
+function asked() {
+  const moment = /^#t=(\d+(?:\.\d+)?)(?:&|$)/.exec(location.hash);
+  return { moment: moment && Number(moment[1]), bare: /[#&]bare(&|$)/.test(location.hash) };
+}
 
-  function look(viewer, pane, { target, direction, outline }) {
-    const slope = Math.tan((FIELD_OF_VIEW / 2) * (Math.PI / 180));
-    const aspect = pane.clientWidth / pane.clientHeight;
-    const needed = ([right, up, near]) => near + (MARGIN * Math.max(Math.abs(up), Math.abs(right) / aspect)) / slope;
-    const distance = Math.max(...outline.map(needed));
-    const eye = target.map((coordinate, i) => coordinate + distance * direction[i]);
-    viewer.camera.fov = FIELD_OF_VIEW;
-    viewer.camera.position.set(...viewerAxes(eye));
-    viewer.controls.target.set(...viewerAxes(target));
-    viewer.set_dirty();
-  }
+function obey(clock) {
+  const { moment, bare } = asked();
+  document.documentElement.classList.toggle("bare", bare);
+  if (moment === null) return false;
+  clock.play(false);
+  clock.seek(moment);
+  return true;
+}
 
-  function showControls(viewer) {
-    viewer.gui.open();
-    viewer.gui.__folders["Scene"].close();
-  }
+function offer(clock, loop, picture) {
+  const settled = (read) => (path) => {
+    loop.settle();
+    return read(path);
+  };
+  Object.assign(window.film, {
+    duration: clock.duration,
+    seek: (time) => clock.seek(time),
+    play: () => clock.play(true),
+    pause: () => clock.play(false),
+    render: () => loop.render(),
+    transform: settled((path) => picture.transform(path)),
+    drawn: settled((path) => picture.drawn(path)),
+  });
+  const property = (name, get, set) => Object.defineProperty(window.film, name, { get, set, enumerable: true });
+  property("time", () => clock.time);
+  property("playing", () => clock.playing);
+  property("speed", () => clock.speed, (rate) => (clock.speed = rate));
+  property("theme", theme, setTheme);
+}
 
-  // the first picture takes long enough that the beginning would be missed
-  function playOnceDrawn(animator) {
-    requestAnimationFrame(() =>
-      requestAnimationFrame(() => {
-        animator.reset();
-        animator.play();
-      })
-    );
-  }
+async function start() {
+  const lack = missing();
+  if (lack) throw new Error(lack);
+  const [film] = await Promise.all([readFilm(), loadViewer()]);
+  document.documentElement.classList.toggle("charted", (film.header.charts || []).length > 0);
+  document.documentElement.classList.toggle("bare", asked().bare);
+  let loop = null;
+  let controls = null;
+  const clock = new Clock(film.header.duration, () => {
+    controls?.update();
+    loop?.refresh();
+  });
+  loop = new Loop(clock);
+  const planes = plane(film, clock);
+  const picture = new Picture(film, () => loop.wake());
+  controls = new Controls(clock, picture);
+  loop.picture = picture;
+  loop.followers = [picture, controls, ...planes, ...charts(film, clock)];
+  showLegend(film);
+  tables(film);
+  keyboard(clock, controls, picture);
+  printable(picture);
+  offer(clock, loop, picture);
+  begin(clock, loop);
+}
 
-  function start(animator, hash) {
-    const moment = /^#t=(\d+(?:\.\d+)?)$/.exec(hash);
-    if (moment) {
-      animator.pause();
-      animator.seek(Number(moment[1]));
-      animator.display_progress(Number(moment[1]));
-    } else {
-      playOnceDrawn(animator);
-    }
-  }
+// the first picture takes long: it is drawn before time runs, or the beginning would be missed
+function begin(clock, loop) {
+  const waits = obey(clock);
+  addEventListener("hashchange", () => obey(clock));
+  loop.render();
+  say("");
+  if (!waits && !matchMedia("(prefers-reduced-motion: reduce)").matches) clock.play(true);
+  clock.changed();
+}
 
-  const scene = JSON.parse(document.getElementById("scene").textContent);
-  const pane = document.getElementById("meshcat-pane");
-  try {
-    const viewer = new MeshCat.Viewer(pane);
-    fillPane(viewer, pane);
-    scene.commands.forEach((command) => viewer.handle_command_bytearray(bytes(command)));
-    look(viewer, pane, scene.camera);
-    showControls(viewer);
-    start(viewer.animator, window.location.hash);
-  } catch (error) {
-    pane.className = "message";
-    pane.textContent = "The scene cannot be drawn; a browser with WebGL is needed. (" + error + ")";
-    throw error;
-  }
-})();
+window.film = {
+  ready: new Promise((resolve, reject) => {
+    document.addEventListener("DOMContentLoaded", () => start().then(resolve, reject));
+  }),
+};
+window.film.ready.catch((error) => {
+  say(`The film cannot be shown. ${error.message}`);
+  console.error(error);
+});

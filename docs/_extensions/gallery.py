@@ -1,0 +1,58 @@
+"""Runs the scripts of ``examples/`` while the documentation is built, and puts the animations they write beside the pages.
+
+A page of the gallery says which script is its own by including it. A script runs again when it, or the library, is newer than what
+it wrote. Without the extra ``robots`` its scripts are left out, with a warning.
+"""
+
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+from sphinx.util import logging
+
+ROOT = Path(__file__).parents[2]
+WRITTEN = ROOT / "docs" / "_build" / "extra" / "gallery"
+OF_THE_EXTRA = {"six_joints", "mill_pocket", "deburr_bracket"}
+
+_log = logging.getLogger(__name__)
+
+
+def run_examples(app):
+    """Run what is not up to date; an example that fails is an error of the documentation."""
+    if app.builder.format != "html":
+        return
+    newest = max(file.stat().st_mtime for file in (ROOT / "pathcontrol").rglob("*") if file.suffix != ".pyc")
+    for page in sorted(Path(app.srcdir, "gallery").glob("*.md")):
+        script = ROOT / "examples" / f"{page.stem}.py"
+        if page.stem in OF_THE_EXTRA and find_spec("example_robot_data") is None:
+            _log.warning("%s is left out of the gallery: it needs the extra robots", script.name)
+        elif not _current(WRITTEN / page.stem, max(newest, script.stat().st_mtime)):
+            _run(script, WRITTEN / page.stem)
+
+
+def _current(folder, newest):
+    pages = list(folder.glob("*.html"))
+    return bool(pages) and min(page.stat().st_mtime for page in pages) > newest
+
+
+def _run(script, folder):
+    """Run a script and keep the pages it writes."""
+    _log.info("running %s for the gallery", script.name)
+    everything = folder.with_name(f"{folder.name}-all")
+    done = subprocess.run([sys.executable, script, everything], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{script} failed:\n{done.stderr}")
+    folder.mkdir(parents=True, exist_ok=True)
+    for page in everything.glob("*.html"):
+        page.replace(folder / page.name)
+    shutil.rmtree(everything)
+
+
+def setup(app):
+    """Called by Sphinx."""
+    WRITTEN.mkdir(parents=True, exist_ok=True)
+    app.config.html_extra_path.append(str(WRITTEN.parent))
+    app.connect("builder-inited", run_examples)
+    return {"parallel_read_safe": True}

@@ -1,0 +1,70 @@
+"""The task of a toolpath without the arm it was made for, as a saved run keeps it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.sequence import PathSequence
+from pathcontrol.toolpaths.contour import Contour, Toolpath, rigid
+from pathcontrol.toolpaths.smoothing import Corners, Smoothed, smooth
+
+
+class RecordedToolpath(ToolpathTask):
+    """A :class:`ToolpathTask` from its paths and contours; no posture is searched.
+
+    Args:
+        paths: the paths, each from where the one before it ends.
+        placed: the contours of the drawing in the base frame, rapids included.
+        followed: for each path the index of the contour that it follows, (len(paths),).
+        frame: the frame that follows the contours.
+        workpiece: pose of the workpiece in the base frame, (4, 4).
+        feed: speed of cuts for which the file gave none [m/s], or None.
+        rapid_speed: speed of rapids [m/s].
+        acceleration: largest acceleration of the tool [m/s²].
+        tolerance: largest distance between contours and smooth curves that was allowed [m].
+        corner: ``"blend"`` or ``"stop"``.
+        deviation: the largest distance that there is [m].
+        source: the file that the contours come from.
+        unit: that file's unit of length.
+    """
+
+    def __init__(
+        self,
+        paths: Sequence[PathTask],
+        placed: Sequence[Contour],
+        followed: Sequence[int],
+        *,
+        frame: str,
+        workpiece: Array,
+        feed: float | None,
+        rapid_speed: float,
+        acceleration: float,
+        tolerance: float,
+        corner: Corners,
+        deviation: float,
+        source: str,
+        unit: str,
+    ) -> None:
+        PathSequence.__init__(self, paths)
+        self.frame, self.workpiece, self.feed = frame, rigid("workpiece", workpiece), feed
+        self.rapid_speed, self.acceleration = rapid_speed, acceleration
+        self.tolerance, self.corner = tolerance, corner
+        self._placed, self._deviation = tuple(placed), deviation
+        back = np.linalg.inv(self.workpiece)
+        self.drawing = Toolpath(tuple(contour.placed(back) for contour in placed), source, unit)
+        self.contours = tuple(placed[i] for i in followed)
+
+    @property
+    def deviation(self) -> float:
+        return self._deviation
+
+    @cached_property
+    def smoothed(self) -> tuple[Smoothed, ...]:  # type: ignore[override]
+        """For each contour how it is smoothed."""
+        return tuple(smooth(contour, self.tolerance, self.corner) for contour in self._placed)

@@ -1,0 +1,67 @@
+"""What all commands share: errors as one message, Ctrl-C at any time, and options that mean the same everywhere."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+
+from pathcontrol.errors import PathControlError
+
+
+class Group(click.Group):
+    """Turns the library's errors into one message and exit code 2, and Ctrl-C into exit code 130."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except PathControlError as error:
+            click.echo(f"error: {_printable(str(error))}", err=True)
+            sys.exit(2)
+        except KeyboardInterrupt:
+            click.echo("interrupted; no half-written file is left behind", err=True)
+            sys.exit(130)
+
+
+def _printable(message: str) -> str:
+    """``message`` without the control characters that a file may have put into it, which a terminal would obey."""
+    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in message)
+
+
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Holds Ctrl-C back until the block is over: compiled modules do not survive it while they are imported."""
+    pressed: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if pressed:
+        raise KeyboardInterrupt
+
+
+def import_all() -> None:
+    """Everything that a command which simulates or draws will need."""
+    with uninterrupted():
+        import pathcontrol.experiments.reproduce
+        import pathcontrol.experiments.runner
+        import pathcontrol.view.figures.run
+        import pathcontrol.view.film.recorder  # noqa: F401
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, nothing else.")
+open_option = click.option("--open", "opened", is_flag=True, help="Show the page in the default browser at the end.")
+
+
+def open_page(path: Path) -> None:
+    """Show a page in the default browser; where there is none, say which file to open."""
+    import webbrowser
+
+    if not webbrowser.open(path.resolve().as_uri()):
+        click.echo(f"no browser could be started; open {path} in one", err=True)

@@ -1,0 +1,54 @@
+"""``pathcontrol report``."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import click
+
+from pathcontrol.cli.group import import_all, json_option, open_option, open_page
+from pathcontrol.cli.saved import load_runs, robot_option, runs_argument
+from pathcontrol.cli.view import layout_option, one_or_all, tell
+
+
+@click.command("report")
+@runs_argument
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default=Path("report.html"),
+    show_default=True,
+    help="The page to write.",
+)
+@click.option("--title", help="Heads the page.  [default: robot, controller and duration]")
+@layout_option
+@robot_option
+@open_option
+@json_option
+def command(
+    runs: tuple[Path, ...],
+    out: Path,
+    title: str | None,
+    layout: str,
+    robot: str | None,
+    opened: bool,
+    as_json: bool,
+) -> None:
+    """Write a report on saved runs: one HTML page.
+
+    A RUN is a file that Run.save or `pathcontrol run` has written (.nc), or the folder of one. Several are compared.
+    The page has the animation, the metrics, the figures, the whole configuration and how to make the runs again; it
+    needs no network, so that it can be kept and sent.
+    """
+    import_all()
+    from pathcontrol.view.report.report import report
+
+    loaded = load_runs(runs, robot)
+    words = ["pathcontrol", "report", *map(str, runs), "--out", str(out)]
+    for option, value in (("--title", title), ("--layout", layout if layout != "beside" else None), ("--robot", robot)):
+        words += [option, value] if value is not None else []
+    page = report(one_or_all(loaded), out, title=title, layout=layout, command=shlex.join(words))  # type: ignore[arg-type]
+    tell(loaded, {"report": page}, as_json)
+    if opened:
+        open_page(page)

@@ -1,0 +1,61 @@
+"""``pathcontrol run``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from pathcontrol.cli.group import import_all, json_option, open_option, open_page
+
+if TYPE_CHECKING:
+    from pathcontrol.experiments.runner import Outcome
+
+
+@click.command("run")
+@click.argument("file", type=click.Path(exists=False, path_type=Path), required=False)
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Default: results/ and the file's name.")
+@click.option("--example", is_flag=True, help="Print a commented experiment file and stop.")
+@open_option
+@json_option
+def command(file: Path | None, out: Path | None, example: bool, opened: bool, as_json: bool) -> None:
+    """Run the experiment that FILE.toml describes."""
+    if example:
+        from pathcontrol.experiments.template import example_text
+
+        click.echo(example_text(), nl=False)
+        return
+    if file is None:
+        raise click.UsageError("give an experiment file; --example prints one to start from")
+    import_all()
+    from pathcontrol.experiments.runner import run_experiment
+
+    out = Path("results") / file.stem if out is None else out
+    done = run_experiment(file, out)
+    if opened and "html" not in done.written:  # not asked for by the file, but now
+        done.written["html"] = _animation(done, out)
+    _tell(done, as_json)
+    if opened:
+        open_page(done.written["html"])
+
+
+def _animation(done: Outcome, out: Path) -> Path:
+    from pathcontrol.view.film.recorder import record
+
+    return record(done.run).save(out / "run.html")
+
+
+def _tell(done: Outcome, as_json: bool) -> None:
+    from pathcontrol.analysis.metrics import UNITS
+
+    written = {name: str(path) for name, path in done.written.items()}
+    if as_json:
+        click.echo(json.dumps({"run": repr(done.run), "metrics": done.metrics, "written": written}))
+        return
+    click.echo(repr(done.run))
+    for name, values in done.metrics.items():
+        click.echo(f"  {name:22} {', '.join('never' if v is None else f'{v:.4g}' for v in values)} {UNITS[name]}")
+    for name, path in written.items():
+        click.echo(f"  {name}: {path}")

@@ -1,0 +1,93 @@
+"""The runs that a command line names: files or folders, and what to call them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from pathcontrol.errors import InputError
+
+if TYPE_CHECKING:
+    from pathcontrol.robot.model import RobotModel
+    from pathcontrol.simulation.run import Run
+
+_DEFAULT = "run.nc"  # as experiments call it unless told
+
+runs_argument = click.argument(
+    "runs", nargs=-1, required=True, type=click.Path(exists=False, path_type=Path), metavar="RUN..."
+)
+robot_option = click.option(
+    "--robot", metavar="FILE", help="The URDF file or known name of the arm, for runs that do not know theirs."
+)
+
+
+def load_runs(paths: Sequence[Path], robot: str | None) -> dict[str, Run]:
+    """The runs by the shortest names that tell them apart: of their files, or of the folders of files ``run.nc``.
+
+    Raises:
+        InputError: a file is missing, is no run, or is named twice, or a run does not know its robot.
+    """
+    from pathcontrol.robot.loading import load_robot
+    from pathcontrol.simulation.run import Run
+
+    files = [run_file(path) for path in paths]
+    twice = [path for path, file in zip(paths, files, strict=True) if files.count(file) > 1]
+    if twice:
+        raise InputError(f"{', '.join(repr(str(path)) for path in twice)} are one run; name each run once")
+    arm = None if robot is None else load_robot(robot)
+    return {name: _with_robot(Run.load(file), file, arm) for name, file in zip(names(files), files, strict=True)}
+
+
+def run_file(path: Path) -> Path:
+    """The file of a run, which may be named by its folder.
+
+    Raises:
+        InputError: the folder holds no run, or several and none of them is called ``run.nc``.
+    """
+    if not path.is_dir():
+        return path
+    found = [path / _DEFAULT] if (path / _DEFAULT).is_file() else sorted(path.glob("*.nc"))
+    if not found:
+        raise InputError(f"the folder {str(path)!r} holds no run; expected a file run.nc, as `pathcontrol run` writes")
+    if len(found) > 1:
+        raise InputError(f"the folder {str(path)!r} holds several runs; name those you mean: {_listed(found)}")
+    return found[0]
+
+
+def names(files: Sequence[Path]) -> list[str]:
+    """What to call each run: the name of its file, with as many folders before it as tell it from the others."""
+    parts = [_parts(file.resolve()) for file in files]
+    depths = [1] * len(files)
+    while True:
+        called = ["/".join(part[-depth:]) for part, depth in zip(parts, depths, strict=True)]
+        count = Counter(called)
+        longer = [min(d + (count[c] > 1), len(p)) for d, c, p in zip(depths, called, parts, strict=True)]
+        if longer == depths:
+            return called
+        depths = longer
+
+
+def _parts(file: Path) -> tuple[str, ...]:
+    folders = file.parent.parts[1:]
+    return folders if file.name == _DEFAULT and folders else (*folders, file.stem)
+
+
+def _with_robot(run: Run, file: Path, robot: RobotModel | None) -> Run:
+    from pathcontrol.simulation.origin import Origin
+    from pathcontrol.simulation.run import Run
+
+    try:
+        _ = run.robot
+    except InputError as error:
+        if robot is None:
+            raise InputError(f"{str(file)!r}: {error}; on the command line with --robot FILE") from error
+        return Run(run.data, run.config, Origin(lambda: robot, lambda: run.task))
+    return run
+
+
+def _listed(files: Sequence[Path]) -> str:
+    return ", ".join(str(file) for file in files)

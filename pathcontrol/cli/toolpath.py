@@ -1,0 +1,51 @@
+"""``pathcontrol toolpath``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from pathcontrol.cli.group import json_option, uninterrupted
+
+
+@click.command("toolpath")
+@click.argument("file", type=click.Path(exists=False, path_type=Path))
+@click.option("--unit", metavar="UNIT", help="Unit of length of a file that does not say: mm, in, …")
+@click.option("--layer", "layers", multiple=True, metavar="LAYER", help="A layer of a DXF file; repeat for more.")
+@click.option("--ppi", type=float, help="Pixels per inch of an SVG file.  [default: 96]")
+@click.option("--feed", type=float, metavar="M/S", help="Feed of contours for which the file gives none.")
+@click.option("--start", type=float, nargs=3, metavar="X Y Z", help="Where a G-code program finds the tool, in metres.")
+@click.option(
+    "--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw it: writes this name as SVG and PNG."
+)
+@json_option
+def command(file: Path, layers: tuple[str, ...], plot: Path | None, as_json: bool, **options: Any) -> None:
+    """Show what is in a toolpath FILE: CSV, G-code, SVG or DXF."""
+    from pathcontrol.cli.tables import toolpath_table
+    from pathcontrol.toolpaths.read import GCODE, read_toolpath
+    from pathcontrol.toolpaths.summary import summary
+
+    given = {name: value for name, value in (options | {"layers": list(layers) or None}).items() if value is not None}
+    if file.suffix.lower() in GCODE:  # which has feeds of its own, or is refused
+        given.pop("feed", None)
+    read = read_toolpath(file, **given)
+    content = summary(read)
+    if plot is not None:
+        with uninterrupted():
+            from pathcontrol.view.figures.style import save_figure
+            from pathcontrol.view.figures.toolpath import toolpath_figure
+        content["figures"] = [str(path) for path in save_figure(toolpath_figure(read), plot)]
+    if as_json:
+        click.echo(json.dumps(content))
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console()
+    for part in toolpath_table(content):
+        console.print(part)
+    for name in content.get("figures", []):
+        console.print(Text(f"  figure: {name}"))

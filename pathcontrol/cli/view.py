@@ -1,0 +1,95 @@
+"""``pathcontrol view``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from pathcontrol.cli.group import import_all, json_option, open_option, open_page
+from pathcontrol.cli.saved import load_runs, robot_option, run_file, runs_argument
+
+if TYPE_CHECKING:
+    from pathcontrol.simulation.run import Run
+
+layout_option = click.option(
+    "--layout",
+    type=click.Choice(["beside", "ghosted"]),
+    default="beside",
+    show_default=True,
+    help="Arms of several runs next to one another, or in one place, all but the first see-through.",
+)
+
+
+@click.command("view")
+@runs_argument
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE.html",
+    help="The page to write. Default: the run's name with .html, of several runs comparison.html, beside the first.",
+)
+@click.option("--mp4", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE.mp4", help="Write a video.")
+@layout_option
+@click.option("--rollout", type=int, default=0, show_default=True, help="Which rollout of each run, from 0.")
+@click.option("--tool", metavar="FRAME", help="The frame whose path is drawn. Default: that of the task, or the last.")
+@robot_option
+@open_option
+@json_option
+def command(
+    runs: tuple[Path, ...],
+    out: Path | None,
+    mp4: Path | None,
+    layout: str,
+    rollout: int,
+    tool: str | None,
+    robot: str | None,
+    opened: bool,
+    as_json: bool,
+) -> None:
+    """Write the animation of saved runs: one HTML page.
+
+    The page plays in any browser and needs no network. A RUN is a file that Run.save or `pathcontrol run` has written
+    (.nc), or the folder of one. Several move side by side. With --mp4 a video is written, which needs the extra `video`
+    and a Chromium, Chrome or Edge on this machine; the page is then written only if --out or --open asks for it.
+    """
+    import_all()
+    from pathcontrol.view.film.recorder import record
+
+    loaded = load_runs(runs, robot)
+    animation = record(one_or_all(loaded), rollout=rollout, layout=layout, tool=tool)  # type: ignore[arg-type]
+    written = {}
+    if out is not None or opened or mp4 is None:
+        written["html"] = animation.save(_default(runs) if out is None else out)
+    if mp4 is not None:
+        from pathcontrol.view.video import save_video
+
+        written["video"] = save_video(animation, mp4)
+    tell(loaded, written, as_json)
+    if opened:
+        open_page(written["html"])
+
+
+def one_or_all(runs: Mapping[str, Run]) -> Run | Mapping[str, Run]:
+    """The only run as itself: it needs no name."""
+    return next(iter(runs.values())) if len(runs) == 1 else runs
+
+
+def _default(runs: tuple[Path, ...]) -> Path:
+    first = run_file(runs[0])
+    return first.with_suffix(".html") if len(runs) == 1 else first.with_name("comparison.html")
+
+
+def tell(runs: Mapping[str, Run], written: Mapping[str, Path], as_json: bool) -> None:
+    """Say which runs were shown and which files were written."""
+    if as_json:
+        files = {kind: str(path) for kind, path in written.items()}
+        click.echo(json.dumps({"runs": {name: repr(run) for name, run in runs.items()}, "written": files}))
+        return
+    for name, run in runs.items():
+        click.echo(f"{name}: {run!r}")
+    for kind, path in written.items():
+        click.echo(f"  {kind}: {path} ({path.stat().st_size / 1e6:.1f} MB)")

@@ -1,0 +1,108 @@
+"""What a model is made of, as plain values for JSON, and the model made of that again."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array, readonly
+from pathcontrol.errors import InputError, MissingExtraError, PathControlError, UnknownNameError
+from pathcontrol.robot.friction import FrictionLaw, friction_of, no_friction
+from pathcontrol.robot.loading import checked_model, find_urdf
+from pathcontrol.robot.model import Actuation, Limits, RobotModel, UrdfSource
+
+_METHODS = ("reduced", "with_payload", "with_frame", "with_armature")
+_LIMITS = {"lower": -np.inf, "upper": np.inf, "velocity": np.inf, "effort": np.inf}  # null stands for these
+
+
+def recipe_of(robot: RobotModel) -> dict[str, Any]:
+    """The URDF's text, where its meshes are, what was done to its model, limits, friction and encoders.
+
+    Numbers are kept to the last bit. The text is that of the robot, not of its meshes; a robot with a name that
+    :func:`load_robot` knows is found again by it, and so are its meshes.
+    """
+    source, actuation = robot.source, robot.actuation
+    counts = actuation.encoder_counts
+    return {
+        "urdf": source.text,
+        "name": source.name,
+        "base_dir": None if source.base_dir is None else str(source.base_dir),
+        "package_dirs": [str(folder) for folder in source.package_dirs],
+        "steps": [list(step) for step in robot.steps],
+        "limits": {name: _values(getattr(robot.limits, name)) for name in _LIMITS},
+        "friction": robot.friction.describe(),
+        "encoder_counts": None if counts is None else counts.tolist(),
+    }
+
+
+def robot_of(recipe: Mapping[str, Any]) -> RobotModel:
+    """The model of a :func:`recipe_of`, with the same kinematics and dynamics; its meshes may be missing.
+
+    A friction law that is not of the library is left out with a warning.
+
+    Raises:
+        InputError: it is no recipe, or its parts do not fit together.
+        UrdfError: the URDF cannot be used.
+    """
+    try:
+        return _made(recipe)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        if isinstance(error, PathControlError):
+            raise
+        raise InputError(f"this is no recipe of a robot ({type(error).__name__}: {error})") from error
+
+
+def _made(recipe: Mapping[str, Any]) -> RobotModel:
+    steps = [(method, arguments) for method, arguments in recipe["steps"]]
+    locked = [joint for method, arguments in steps if method == "reduced" for joint in arguments["lock"]]
+    robot = checked_model(_source(recipe), "the recorded URDF", locked)
+    for method, arguments in steps:
+        if method not in _METHODS:
+            raise InputError(f"step {method!r} of the robot, expected one of {', '.join(_METHODS)}")
+        robot = getattr(robot, method)(**arguments)
+    limits = Limits(*(_array(recipe["limits"][name], robot.n, missing) for name, missing in _LIMITS.items()))
+    counts = recipe["encoder_counts"]
+    encoders = None if counts is None else _array(counts, robot.n, np.nan)
+    return replace(robot, actuation=Actuation(limits, _friction(recipe["friction"], robot.n), encoders))
+
+
+def _source(recipe: Mapping[str, Any]) -> UrdfSource:
+    """The recorded text; meshes of a known robot are where this machine has them."""
+    text, name = str(recipe["urdf"]), recipe["name"]
+    base_dir = None if recipe["base_dir"] is None else Path(recipe["base_dir"])
+    folders = tuple(Path(folder) for folder in recipe["package_dirs"])
+    if name is None or not str(name).isidentifier():  # anything else would be looked for as a file
+        return UrdfSource(text, base_dir, folders)
+    try:
+        here = find_urdf(name, folders)
+    except (UnknownNameError, MissingExtraError):
+        return UrdfSource(text, base_dir, folders, name)
+    return replace(here, text=text, package_dirs=tuple(dict.fromkeys(here.package_dirs)))
+
+
+def _friction(description: Mapping[str, Any], n: int) -> FrictionLaw:
+    try:
+        law = friction_of(description)
+    except UnknownNameError as error:
+        warnings.warn(f"the robot is rebuilt without its friction: {error}", stacklevel=2)
+        return no_friction(n)
+    if law.n != n:
+        raise InputError(f"the recorded friction law is for {law.n} joints, the robot has {n}")
+    return law
+
+
+def _values(array: Array) -> list[float | None]:
+    """Numbers as JSON has them: none for what is not finite."""
+    return [float(value) if np.isfinite(value) else None for value in array]
+
+
+def _array(values: Sequence[float | None], n: int, missing: float) -> Array:
+    array = readonly(np.array([missing if value is None else value for value in values], dtype=np.float64))
+    if array.shape != (n,):
+        raise InputError(f"{array.shape} values are recorded of the joints, expected ({n},)")
+    return array

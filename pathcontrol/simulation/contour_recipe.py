@@ -1,0 +1,64 @@
+"""Contours as plain values and arrays, and back: lines, arcs and Bézier curves to the last bit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import InputError
+from pathcontrol.simulation.shelf import Shelf
+from pathcontrol.toolpaths.arc import Arc
+from pathcontrol.toolpaths.bezier import Bezier
+from pathcontrol.toolpaths.contour import Contour
+from pathcontrol.toolpaths.segments import Polyline, Segment
+
+_NEAR = 1e-7  # m, from segments of any other kind to the polylines that are kept of them
+_FINEST = 1 << 20
+
+
+def contour_recipe(contour: Contour, shelf: Shelf) -> dict[str, Any]:
+    """What :func:`contour_of` makes the contour of."""
+    recipe: dict[str, Any] = {"segments": [_segment_recipe(segment, shelf) for segment in contour.segments]}
+    recipe |= {"closed": contour.closed, "feed": contour.feed, "rapid": contour.rapid, "name": contour.name}
+    return recipe if contour.normals is None else recipe | {"normals": shelf.put(contour.normals)}
+
+
+def contour_of(recipe: dict[str, Any], shelf: Shelf) -> Contour:
+    """The contour of a recipe."""
+    segments = tuple(_segment_of(segment, shelf) for segment in recipe["segments"])
+    normals = shelf.get(recipe["normals"]) if "normals" in recipe else None
+    return Contour(segments, recipe["closed"], recipe["feed"], recipe["rapid"], recipe["name"], normals)
+
+
+def _segment_recipe(segment: Segment, shelf: Shelf) -> dict[str, Any]:
+    if type(segment) is Arc:
+        vectors = [segment.center, segment.x, segment.y, segment.rise]
+        return {"arc": shelf.put(np.concatenate([*vectors, [segment.start, segment.sweep]]))}
+    if type(segment) is Bezier:
+        weights = None if segment.weights is None else shelf.put(segment.weights)
+        return {"bezier": shelf.put(segment.points), "weights": weights}
+    return {"line": shelf.put(segment.points if type(segment) is Polyline else _polyline(segment))}
+
+
+def _segment_of(recipe: dict[str, Any], shelf: Shelf) -> Segment:
+    if "line" in recipe:
+        return Polyline(shelf.get(recipe["line"]))
+    if "arc" in recipe:
+        center, x, y, rise, (start, sweep) = np.split(shelf.get(recipe["arc"]), [3, 6, 9, 12])
+        return Arc(center, x, y, float(start), float(sweep), rise)
+    if "bezier" in recipe:
+        return Bezier(shelf.get(recipe["bezier"]), None if recipe["weights"] is None else shelf.get(recipe["weights"]))
+    raise InputError(f"a segment is said to be {', '.join(recipe)}, expected a line, an arc or a Bézier curve")
+
+
+def _polyline(segment: Segment) -> Array:
+    """Points (k, 3) on a segment of any kind, whose edges are within 0.1 µm of it."""
+    edges = 64
+    while True:
+        points = segment.point(np.linspace(0.0, 1.0, 2 * edges + 1))
+        sag = np.linalg.norm(points[1::2] - (points[:-2:2] + points[2::2]) / 2, axis=-1).max()
+        if sag <= _NEAR / 2 or edges >= _FINEST:
+            return points
+        edges *= 2

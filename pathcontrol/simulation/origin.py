@@ -1,0 +1,117 @@
+"""What a run is about: the simulated arm, and the path it was asked to follow."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.shelf import Shelf
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.laps import Laps
+from pathcontrol.tasks.sequence import PathSequence
+
+
+class Stored(NamedTuple):
+    """Robot and task as a file holds them: JSON, and the numbers (k,) that it refers to."""
+
+    text: str
+    numbers: Array
+
+
+class Origin:
+    """The robot and the task of a run, each made when it is first asked for; ``None`` where it is not known.
+
+    Args:
+        robot: gives the simulated arm.
+        task: gives the path and its velocity profile.
+        stored: what both are made from, if they come from a file.
+    """
+
+    def __init__(
+        self,
+        robot: Callable[[], RobotModel | None],
+        task: Callable[[], PathTask | None],
+        stored: Stored | None = None,
+    ) -> None:
+        self._robot, self._task, self._stored = robot, task, stored
+
+    @classmethod
+    def of(cls, robot: RobotModel | None, task: PathTask | None) -> Origin:
+        """That of a run whose robot and task are at hand."""
+        return cls(lambda: robot, lambda: task)
+
+    @classmethod
+    def load(cls, stored: Stored) -> Origin:
+        """What was stored; it is looked at when it is asked for."""
+        return cls(lambda: _robot(stored), lambda: _task(stored), stored)
+
+    @cached_property
+    def robot(self) -> RobotModel | None:
+        """The simulated arm."""
+        return self._robot()
+
+    @cached_property
+    def task(self) -> PathTask | None:
+        """The path and its velocity profile."""
+        return self._task()
+
+    def path(self, index: int) -> Origin:
+        """That of one path of a sequence."""
+        return Origin(lambda: self.robot, lambda: _path(self.task, index))
+
+    def stored(self, upto: float) -> Stored:
+        """Robot and task for a file; of an endless path what is needed ``upto`` this s."""
+        if self._stored is not None:
+            return self._stored
+        from pathcontrol.robot.recipe import recipe_of
+
+        shelf, robot = Shelf(), self.robot
+        recipes = {"robot": None if robot is None else recipe_of(robot), "task": _recipe(self.task, shelf, upto)}
+        return Stored(json.dumps(recipes), shelf.numbers)
+
+
+def _recipe(task: PathTask | None, shelf: Shelf, upto: float) -> dict[str, Any] | None:
+    """That of the task, or a warning: no run is lost because its path is odd."""
+    from pathcontrol.simulation.task_recipe import task_recipe  # knows every kind of task: only files need that
+
+    if task is None:
+        return None
+    try:
+        return task_recipe(task, shelf, upto)
+    except Exception as error:  # whatever the user's own code raises
+        warnings.warn(f"the {type(task).__name__} is not kept with its run: {error}", stacklevel=3)
+        return None
+
+
+def _robot(stored: Stored) -> RobotModel | None:
+    from pathcontrol.robot.recipe import robot_of
+
+    recipe = _part_of(stored, "robot")
+    return None if recipe is None else robot_of(recipe)
+
+
+def _task(stored: Stored) -> PathTask | None:
+    from pathcontrol.simulation.task_recipe import task_of
+
+    recipe = _part_of(stored, "task")
+    return None if recipe is None else task_of(recipe, Shelf(stored.numbers))
+
+
+def _part_of(stored: Stored, name: str) -> Any:
+    try:
+        return json.loads(stored.text)[name]
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise InputError(f"the {name} of the run cannot be read: {error}") from error
+
+
+def _path(task: PathTask | None, index: int) -> PathTask | None:
+    if not isinstance(task, PathSequence):
+        return None
+    path = task.paths[index]
+    return path.path if isinstance(path, Laps) else path

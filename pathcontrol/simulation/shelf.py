@@ -1,0 +1,58 @@
+"""Arrays put away one after another in a single one, so that a file holds two variables and not thousands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from hashlib import blake2b
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import InputError
+
+_INLINE = 8  # numbers that are written where they belong
+
+
+class Shelf:
+    """Takes arrays of floats and gives what to write in their place, fit for JSON; the same array is kept once.
+
+    Args:
+        numbers: what another shelf held, (k,), to get its arrays from.
+    """
+
+    def __init__(self, numbers: Array | None = None) -> None:
+        self._parts = [] if numbers is None else [numbers]
+        self._size = 0 if numbers is None else len(numbers)
+        self._places: dict[bytes, dict[str, Any]] = {}
+
+    @property
+    def numbers(self) -> Array:
+        """All that was put away, (k,)."""
+        return np.concatenate([np.empty(0), *self._parts])
+
+    def put(self, array: Array) -> dict[str, Any]:
+        """Put an array away: ``{"shape": …, "at": …}``, or ``{"values": …}`` for a few numbers."""
+        array = np.asarray(array, dtype=np.float64)
+        if array.size <= _INLINE:
+            return {"values": array.tolist()}
+        key = blake2b(array.tobytes() + repr(array.shape).encode()).digest()
+        if key not in self._places:
+            self._places[key] = {"shape": list(array.shape), "at": self._size}
+            self._parts.append(array.reshape(-1))
+            self._size += array.size
+        return self._places[key]
+
+    def get(self, place: Mapping[str, Any]) -> Array:
+        """The array that :meth:`put` put at a place.
+
+        Raises:
+            InputError: there is no such place.
+        """
+        if "values" in place:
+            return np.array(place["values"], dtype=np.float64)
+        (numbers,), shape, at = self._parts, place["shape"], place["at"]
+        size = int(np.prod(shape))
+        if min(shape) < 0 or at < 0 or at + size > len(numbers):
+            raise InputError(f"an array of shape {shape} is said to be at {at} of {len(numbers)} numbers")
+        return numbers[at : at + size].reshape(shape)

@@ -1,0 +1,148 @@
+"""A task as plain values and arrays, and back.
+
+Curves of the library, what is made from them and tables of ϑ are kept as what they are made of, and are the same again
+to the last bit. Any other path is kept as samples, a :class:`RecordedPath`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from pathcontrol.cartesian.recorded_toolpath import RecordedToolpath
+from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.errors import InputError
+from pathcontrol.profiles.table import TabulatedProfile
+from pathcontrol.simulation.contour_recipe import contour_of, contour_recipe
+from pathcontrol.simulation.shelf import Shelf
+from pathcontrol.tasks.base import PathTask, Reprofiled
+from pathcontrol.tasks.curves import Circle, Ellipse, Line, Lissajous
+from pathcontrol.tasks.laps import Laps
+from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, VelocityProfile
+from pathcontrol.tasks.recorded import RecordedPath, RecordedProfile, recorded_profile
+from pathcontrol.tasks.sequence import PathSequence
+from pathcontrol.tasks.transforms import PathSection, ReversedPath, ScaledPath, ShiftedPath
+
+#: what is made again from its constructor's arguments, which are attributes of the same names
+_MADE: dict[type, tuple[str, ...]] = {
+    Circle: ("radius", "speed", "center", "joints", "clockwise"),
+    Ellipse: ("semi_axes", "speed", "center", "joints", "clockwise"),
+    Lissajous: ("amplitudes", "frequencies", "speed", "phases", "center"),
+    Line: ("start", "end", "speed"),
+    ReversedPath: ("path",),
+    ShiftedPath: ("path", "offset"),
+    ScaledPath: ("path", "factor", "about"),
+    PathSection: ("path", "s0", "s_end"),
+    Laps: ("path", "laps"),
+    Reprofiled: ("path", "profile"),
+    PathSequence: ("paths", "gaps"),
+    RecordedPath: ("samples", "jets", "profile", "period", "endless", "projects", "knots", "original"),
+    ConstantRate: ("rate",),
+    ConstantSpeed: ("speed",),
+    TabulatedProfile: ("s", "squared", "period"),
+    RecordedProfile: ("s", "jets", "period"),
+}
+_CLASSES = {cls.__name__: cls for cls in _MADE}
+_TOOLPATH = ("frame", "workpiece", "feed", "rapid_speed", "acceleration", "tolerance", "corner", "deviation")
+
+
+def task_recipe(task: PathTask, shelf: Shelf, upto: float | None = None, rated: bool = True) -> dict[str, Any]:
+    """What :func:`task_of` makes the task of.
+
+    Args:
+        task: any task.
+        shelf: where its arrays are put.
+        upto: the largest s that was used of an endless path.
+        rated: whether its ϑ matters.
+    """
+    if isinstance(task, ToolpathTask):
+        return _toolpath_recipe(task, shelf)
+    if isinstance(task, PathSequence):
+        return _recipe(PathSequence, task, shelf, upto, rated)
+    if isinstance(task, Reprofiled):
+        path = task_recipe(task.path, shelf, upto, rated=False)
+        if not rated:
+            return path
+        return {"class": "Reprofiled", "path": path, "profile": _profile_recipe(task, shelf, upto)}
+    if type(task) in _MADE and _unchanged(task):
+        return _recipe(type(task), task, shelf, task.s_end if isinstance(task, PathSection) else upto, rated)
+    recorded = RecordedPath.of(task, None if rated else ConstantRate(1.0), upto)
+    return _recipe(RecordedPath, recorded, shelf, upto, rated)
+
+
+def task_of(recipe: Any, shelf: Shelf) -> PathTask:
+    """The task of a recipe, with its arrays from ``shelf``.
+
+    Raises:
+        InputError: it is no recipe of a task.
+    """
+    try:
+        task = _made(recipe, shelf)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError) as error:
+        raise InputError(f"this is no recipe of a task ({type(error).__name__}: {error})") from error
+    if not isinstance(task, PathTask):
+        raise InputError(f"this is a recipe of {task!r}, expected one of a task")
+    return task
+
+
+def _recipe(cls: type, made: Any, shelf: Shelf, upto: float | None, rated: bool = True) -> dict[str, Any]:
+    values = {name: _value(getattr(made, name), shelf, upto, rated) for name in _MADE[cls]}
+    return {"class": cls.__name__} | values
+
+
+def _value(value: Any, shelf: Shelf, upto: float | None, rated: bool) -> Any:
+    if isinstance(value, PathTask):
+        return task_recipe(value, shelf, upto, rated)
+    if isinstance(value, VelocityProfile):
+        return _recipe(type(value), value, shelf, upto)
+    if isinstance(value, tuple):
+        return [_value(item, shelf, upto, rated) for item in value]
+    return shelf.put(value) if isinstance(value, np.ndarray) else value
+
+
+def _profile_recipe(task: Reprofiled, shelf: Shelf, upto: float | None) -> dict[str, Any]:
+    """The profile of a task if it is one of the library that needs nothing else, or else samples of ϑ."""
+    profile = task.profile
+    if isinstance(profile, TabulatedProfile):  # or one that knows more, as TimeOptimal
+        return _recipe(TabulatedProfile, profile, shelf, upto)
+    known = profile if type(profile) in _MADE else recorded_profile(task, upto)
+    return _recipe(type(known), known, shelf, upto)
+
+
+def _unchanged(task: PathTask) -> bool:
+    """Whether a task has the domain that its constructor gave it."""
+    twin = type(task)(**{name: getattr(task, name) for name in _MADE[type(task)]})
+    return (twin.s0, twin.s_end, twin.period) == (task.s0, task.s_end, task.period)
+
+
+def _toolpath_recipe(task: ToolpathTask, shelf: Shelf) -> dict[str, Any]:
+    placed = list(dict.fromkeys(task.contours))
+    rank = {contour: i for i, contour in enumerate(placed)}
+    return {
+        "class": "RecordedToolpath",
+        "paths": [task_recipe(path, shelf) for path in task.paths],
+        "placed": [contour_recipe(contour, shelf) for contour in placed],
+        "followed": [rank[contour] for contour in task.contours],
+        **{name: _value(getattr(task, name), shelf, None, True) for name in _TOOLPATH},
+        "source": task.drawing.source,
+        "unit": task.drawing.unit,
+    }
+
+
+def _made(recipe: Any, shelf: Shelf) -> Any:
+    """A value of a recipe: an object, an array, a list, or what JSON says."""
+    if isinstance(recipe, list):
+        return [_made(item, shelf) for item in recipe]
+    if not isinstance(recipe, Mapping):
+        return recipe
+    if "class" not in recipe:
+        return shelf.get(recipe)
+    values = {name: value for name, value in recipe.items() if name != "class"}
+    if recipe["class"] == "RecordedToolpath":
+        contours = [contour_of(contour, shelf) for contour in values.pop("placed")]
+        return RecordedToolpath(placed=contours, **{name: _made(value, shelf) for name, value in values.items()})
+    if recipe["class"] not in _CLASSES:
+        raise InputError(f"class {recipe['class']!r} of a task, expected one of {', '.join(_CLASSES)}")
+    return _CLASSES[recipe["class"]](**{name: _made(value, shelf) for name, value in values.items()})

@@ -1,0 +1,25 @@
+"""A closed path gone round a number of times, as an open path."""
+
+from __future__ import annotations
+
+from pathcontrol.errors import InputError
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.transforms import PathSection
+
+
+class Laps(PathSection):
+    """So many laps of a closed path from its s0 on, as an open path with the same parameter.
+
+    Args:
+        path: a closed path.
+        laps: how often it is gone round, a whole number from 1.
+
+    Raises:
+        InputError: the path is not closed.
+    """
+
+    def __init__(self, path: PathTask, laps: int) -> None:
+        if path.period is None:
+            raise InputError(f"laps = {laps}, but {type(path).__name__} is no closed path; expected one with a period")
+        self.laps = laps
+        super().__init__(path, path.s0, path.s0 + laps * path.period)

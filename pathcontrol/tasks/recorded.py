@@ -1,0 +1,215 @@
+"""A path and a velocity profile known by samples, as those that a saved run keeps of its task."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import PPoly
+
+from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol.errors import InputError, TaskError
+from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.closest_point import ClosestPoint, Curve
+from pathcontrol.tasks.hermite import piecewise, sampled
+from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, Path, VelocityProfile
+
+_CELLS = 256  # of a path that is all of one piece, at first
+_CONSTANT = 1e-13  # by how much what is called constant may vary
+_MARGIN = 0.1  # of the part that was used of an endless path
+
+
+class RecordedProfile(VelocityProfile):
+    """ϑ(s) by cubics between samples of ϑ and ϑ'; beyond them that of the nearest, or of the lap before.
+
+    Args:
+        s: increasing parameters, (m,); of a closed path from s0 to s0 + period.
+        jets: ϑ and ϑ' there, (2, m).
+        period: the period of a closed path, else ``None``.
+    """
+
+    def __init__(self, s: ArrayLike, jets: ArrayLike, period: float | None = None) -> None:
+        self.s, self.jets = _checked(s, jets, 2)
+        self.period = period
+        self._rate = piecewise(self.s, self.jets[..., None])
+
+    def theta(self, path: Path, s: Array) -> Array:
+        return self._rate(self._within(s))[..., 0]
+
+    def dtheta(self, path: Path, s: Array) -> Array:
+        return self._rate(self._within(s), 1)[..., 0]
+
+    def describe(self) -> dict[str, Any]:
+        return {"profile": "RecordedProfile", "samples": len(self.s)}
+
+    def _within(self, s: Array) -> Array:
+        return _within(np.asarray(s, dtype=np.float64), self.s, self.period)
+
+
+def recorded_profile(task: PathTask, upto: float | None = None) -> VelocityProfile:
+    """ϑ(s) of a task: a constant rate or path speed as such, others by samples within 1e-9 of their range.
+
+    ``upto`` is the largest s that was used of an endless path.
+    """
+
+    def jet(s: Array) -> Array:
+        return np.stack([task.theta(s) + 0.0 * s, task.dtheta(s) + 0.0 * s])[..., None]
+
+    s = _first_cells(task, upto, _CELLS)
+    probes = np.concatenate([s, 0.63 * s[:-1] + 0.37 * s[1:]])
+    theta = task.theta(probes) + 0.0 * probes
+    speed = theta * np.linalg.norm(task.dq_d(probes), axis=-1)
+    if np.ptp(theta) <= _CONSTANT * theta.max():
+        return ConstantRate(float(theta[0]))
+    if np.ptp(speed) <= _CONSTANT * speed.max():
+        return ConstantSpeed(float(np.median(speed)))
+    s, jets = sampled(jet, s)
+    return RecordedProfile(s, jets[..., 0], task.period)
+
+
+class RecordedPath(PathTask):
+    """A path by quintics between samples of q_d, q_d' and q_d''; a spline of up to that degree is the same again.
+
+    What :meth:`of` makes of a smooth path differs from it by 1e-11 of its extent, and its q_d' by 1e-9 of the largest;
+    the projection is the nearest point on it, whatever formula the original has. An endless path is known as far as
+    it was used.
+
+    Args:
+        samples: increasing parameters [rad or -], (m,), from s0 on; of a closed path up to s0 + period.
+        jets: q_d, q_d' and q_d'' there [rad], (3, m, n).
+        profile: ϑ(s).
+        period: the period of a closed path.
+        endless: whether the path goes on beyond the last sample, where nothing is known of it.
+        projects: whether an endless path has a projection.
+        knots: where the pieces of a path made of pieces meet, (K,).
+        original: the name of the class it was.
+
+    Raises:
+        InputError: wrong shapes, values that are not finite, parameters that do not increase.
+    """
+
+    def __init__(
+        self,
+        samples: ArrayLike,
+        jets: ArrayLike,
+        profile: VelocityProfile,
+        *,
+        period: float | None = None,
+        endless: bool = False,
+        projects: bool = True,
+        knots: ArrayLike | None = None,
+        original: str = "",
+    ) -> None:
+        self.samples, self.jets = _checked(samples, jets, 3)
+        self.profile, self.endless, self.projects, self.original = profile, endless, projects, original
+        self.s0, self._last, self.period = float(self.samples[0]), float(self.samples[-1]), period
+        self.s_end = np.inf if endless or period is not None else self._last
+        self._knots = None if knots is None else readonly(finite("knots", as_array("knots", knots)))
+
+    @classmethod
+    def of(cls, task: PathTask, profile: VelocityProfile | None = None, upto: float | None = None) -> RecordedPath:
+        """A task as samples.
+
+        Args:
+            task: any path.
+            profile: its ϑ(s); by default samples of it.
+            upto: the largest s that was used of an endless path; it is recorded a tenth further, or up to s0 + 2π.
+        """
+
+        def jet(s: Array) -> Array:
+            return np.stack([task.q_d(s), task.dq_d(s), task.ddq_d(s)])
+
+        endless = task.period is None and not np.isfinite(task.s_end)
+        s, jets = sampled(jet, _first_cells(task, upto, _CELLS if task.knots is None else 1))
+        return cls(
+            s,
+            jets,
+            recorded_profile(task, upto) if profile is None else profile,
+            period=task.period,
+            endless=endless,
+            projects=not endless or type(task).sigma_bar is not PathTask.sigma_bar,
+            knots=task.knots,
+            original=type(task).__name__,
+        )
+
+    @property
+    def n(self) -> int:
+        return self.jets.shape[-1]
+
+    @property
+    def knots(self) -> Array | None:
+        return self._knots
+
+    def q_d(self, s: Array) -> Array:
+        return self._curves[0](self._within(s))
+
+    def dq_d(self, s: Array) -> Array:
+        return self._curves[1](self._within(s))
+
+    def ddq_d(self, s: Array) -> Array:
+        return self._curves[2](self._within(s))
+
+    def theta(self, s: Array) -> Array:
+        return self.profile.theta(self, s)
+
+    def dtheta(self, s: Array) -> Array:
+        return self.profile.dtheta(self, s)
+
+    def at(self, s: Array) -> PathPoint:
+        q_d, dq_d, ddq_d = (curve(self._within(s)) for curve in self._curves)
+        return PathPoint(q_d, dq_d, ddq_d, *self.profile.at(dq_d, ddq_d, self, s))
+
+    def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
+        return self._recorded_point(q, near) if self.endless and self.projects else super().sigma_bar(q, near)
+
+    def describe(self) -> dict[str, Any]:
+        described = {"task": "RecordedPath", "original": self.original, "samples": len(self.samples)}
+        return described | self.profile.describe()
+
+    @cached_property
+    def _curves(self) -> list[PPoly]:
+        curve = piecewise(self.samples, self.jets)
+        return [curve, curve.derivative(1), curve.derivative(2)]
+
+    @cached_property
+    def _recorded_point(self) -> ClosestPoint:
+        return ClosestPoint(Curve(self.q_d, self.dq_d, self.ddq_d), self.s0, self._last, False, self.knots)
+
+    def _within(self, s: Array) -> Array:
+        s = np.asarray(s, dtype=np.float64)
+        if self.endless and (s > self._last).any():
+            raise TaskError(
+                f"the endless {self.original or 'path'} is known up to s = {self._last:g}, a little further than its "
+                f"run went, not at s = {s.max():g}; make the task anew to go on"
+            )
+        return s if self.period is None else _within(s, self.samples, self.period)
+
+
+def _first_cells(task: PathTask, upto: float | None, cells: int) -> Array:
+    """The ends of so many cells or a few more, each within one piece of the path."""
+    lower, upper = task.sampled_interval
+    if upto is not None and task.period is None and not np.isfinite(task.s_end):
+        upper = max(upper, upto + _MARGIN * (upto - lower))
+    knots, margin = np.empty(0) if task.knots is None else task.knots, 1e-12 * (upper - lower)
+    inside = knots[(knots > lower + margin) & (knots < upper - margin)]
+    pieces = np.unique(np.concatenate([[lower], inside, [upper]]))
+    counts = np.ceil(np.diff(pieces) * cells / (upper - lower) - 1e-6).clip(1)
+    return np.interp(np.arange(counts.sum() + 1), np.append(0, np.cumsum(counts)), pieces)
+
+
+def _within(s: Array, knots: Array, period: float | None) -> Array:
+    """``s`` in the first lap of a closed path, or between the ends of an open one."""
+    if period is None:
+        return np.clip(s, knots[0], knots[-1])
+    return knots[0] + np.mod(s - knots[0], period)
+
+
+def _checked(s: ArrayLike, jets: ArrayLike, order: int) -> tuple[Array, Array]:
+    knots, values = finite("s", as_array("s", s)), finite("jets", as_array("jets", jets))
+    if knots.ndim != 1 or len(knots) < 2 or not (np.diff(knots) > 0).all():
+        raise InputError(f"s has shape {knots.shape}, expected two or more increasing parameters")
+    if values.ndim != order or values.shape[:2] != (order, len(knots)):
+        raise InputError(f"jets have shape {values.shape}, expected ({order}, {len(knots)}{', n' * (order == 3)})")
+    return readonly(knots), readonly(values)

@@ -1,0 +1,59 @@
+"""Limits of axes that hold what is drawn, whatever it is: one point, a line, a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from pathcontrol._arrays import Array
+
+_MARGIN = 0.05
+_STILL = 1e-4  # of a value: motion that is not looked at
+_FLATTEST = 0.45  # height of an equal plane over its width, and the other way round
+
+
+def over_time(axes: Axes, times: Sequence[Array]) -> None:
+    """From the first moment to the last."""
+    first, last = min(time[0] for time in times), max(time[-1] for time in times)
+    if last > first:
+        axes.set_xlim(first, last)
+
+
+def from_zero(axes: Axes, values: Sequence[Array], room: float = 1.08) -> None:
+    """From zero to a little more than the largest of values that are not negative."""
+    top = extent(values)[1]
+    axes.set_ylim(0, room * top if top > 0 else 1.0)
+
+
+def extent(values: Sequence[Array]) -> tuple[float, float]:
+    """The least and the largest of what is a number; 0 where nothing is."""
+    numbers = [v[~np.isnan(v)] for v in values]
+    some = [n for n in numbers if n.size]
+    return (float(min(n.min() for n in some)), float(max(n.max() for n in some))) if some else (0.0, 0.0)
+
+
+def span(values: Sequence[Array]) -> tuple[float, float]:
+    """From the least number to the largest with a margin; what stands still is a line, not the noise of its digits."""
+    low, high = extent(values)
+    half = max(0.5 * (high - low) * (1 + 2 * _MARGIN), _STILL * max(abs(low), abs(high)))
+    middle, half = 0.5 * (low + high), half if half > 0 else 1.0
+    return middle - half, middle + half
+
+
+def equal_plane(x: Sequence[Array], y: Sequence[Array]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Limits of both axes of a plane with equal scales that is neither flat nor narrow."""
+    (x0, x1), (y0, y1) = span(x), span(y)
+    wide, high = max(x1 - x0, _FLATTEST * (y1 - y0)), max(y1 - y0, _FLATTEST * (x1 - x0))
+    return _about(x0, x1, wide), _about(y0, y1, high)
+
+
+def aspect(limits: tuple[tuple[float, float], tuple[float, float]]) -> float:
+    """Height of a plane with equal scales over its width."""
+    (x0, x1), (y0, y1) = limits
+    return (y1 - y0) / (x1 - x0)
+
+
+def _about(low: float, high: float, width: float) -> tuple[float, float]:
+    return 0.5 * (low + high - width), 0.5 * (low + high + width)

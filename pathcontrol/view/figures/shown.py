@@ -1,0 +1,148 @@
+"""What figures show: one run, or several by their names, each with a colour of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import InputError, TaskError
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.sequence import PathSequence
+from pathcontrol.view.figures.lines import drawable
+from pathcontrol.view.figures.style import RUN_COLOURS
+from pathcontrol.view.figures.words import plain
+
+#: one run, or several by the names they have in the legend
+Runs = Run | Mapping[str, Run]
+
+_DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (5, 1, 1.5, 1)))
+_SAMPLES = 2881  # of a path, at least
+_MOST_KNOTS = 100_000
+
+
+class Shown(NamedTuple):
+    """A run in a figure.
+
+    Attributes:
+        name: its name; empty for a run on its own.
+        run: the run, of one rollout unless all are shown.
+        task: the path it should have followed, or ``None``.
+        colour: of its lines.
+        dashes: line style; solid until the colours are used up.
+    """
+
+    name: str
+    run: Run
+    task: PathTask | None
+    colour: str
+    dashes: Any
+
+    @property
+    def label(self) -> str:
+        """Its name as Matplotlib draws it letter for letter."""
+        return plain(self.name)
+
+    @property
+    def look(self) -> dict[str, Any]:
+        """Keyword arguments of its lines."""
+        return {"color": self.colour, "linestyle": self.dashes}
+
+    @property
+    def joints(self) -> list[str]:
+        """Names of the joints."""
+        return [str(name) for name in self.run["joint"].to_numpy()]
+
+
+def shown(run: Runs, task: PathTask | None = None, rollout: int | None = None) -> list[Shown]:
+    """The runs of a figure in their order, each with its colour; ``task`` is by default each run's own.
+
+    Raises:
+        InputError: there is no run, there is no such rollout, or the task is for another number of joints.
+    """
+    named = run if isinstance(run, Mapping) else {"": run}
+    if not named or not all(isinstance(one, Run) for one in named.values()):
+        raise InputError(f"run = {run!r:.80}, expected a Run, or some by their names, as {{'path control': run}}")
+    several = isinstance(run, Mapping)
+    return [
+        Shown(
+            str(name) if several else "",
+            one if rollout is None else one.rollout(rollout),
+            _fitting(one, task),
+            RUN_COLOURS[i % len(RUN_COLOURS)],
+            _DASHES[i // len(RUN_COLOURS) % len(_DASHES)],
+        )
+        for i, (name, one) in enumerate(named.items())
+    ]
+
+
+def of_one_arm(runs: Sequence[Shown]) -> list[str]:
+    """The names of the joints that all the runs have.
+
+    Raises:
+        InputError: the runs are of different joints.
+    """
+    first = runs[0]
+    for one in runs:
+        if one.joints != first.joints:
+            raise InputError(f"the runs are of different joints: {', '.join(first.joints)}; {', '.join(one.joints)}")
+    return first.joints
+
+
+def own_robot(run: Run) -> RobotModel | None:
+    """The robot of a run, where it knows it."""
+    try:
+        return run.robot
+    except InputError:
+        return None
+
+
+def path_parameters(one: Shown) -> Array:
+    """Parameters s (k,) that show the whole path, or what the run used of one that neither ends nor repeats."""
+    assert one.task is not None
+    try:
+        lower, upper = one.task.one_traverse
+    except TaskError:
+        used = one.run.array("s")
+        used = used[np.isfinite(used)]
+        lower, upper = (used.min(), used.max()) if len(used) else one.task.sampled_interval
+    knots = one.task.starts if isinstance(one.task, PathSequence) else one.task.knots
+    inside = [] if knots is None or len(knots) > _MOST_KNOTS else [knots[(knots > lower) & (knots < upper)]]
+    return np.unique(np.concatenate([np.linspace(lower, upper, _SAMPLES), *inside]))
+
+
+def readable(run: Run, name: str, joint: int | None = None) -> tuple[Array, str]:
+    """A variable (rollout, time, joint), or of one joint (rollout, time), in the unit a person reads, and the unit.
+
+    Degrees for angles; sliding joints stay in metres, and so does all of an arm that has both.
+    """
+    values, unit = run.array(name), str(run[name].attrs.get("units", "1"))
+    if joint is not None:
+        values, unit = values[..., joint], _unit_of_joint(run, unit, joint)
+    if unit.split("/")[0] != "rad" or " or " in unit:
+        return drawable(values), unit
+    return np.rad2deg(drawable(values)), unit.replace("rad", "deg")
+
+
+def readable_like(values: Array, unit: str) -> Array:
+    """``values`` in SI units, in the ``unit`` that :func:`readable` gave."""
+    return np.rad2deg(drawable(values)) if unit.startswith("deg") else drawable(values)
+
+
+def _unit_of_joint(run: Run, unit: str, joint: int) -> str:
+    """Which of the units of an arm with turning and sliding joints is that of one of them, where that is known."""
+    robot = own_robot(run) if " or " in unit else None
+    if robot is None or robot.n != run.data.sizes["joint"]:
+        return unit
+    return unit.split(" or ")[0 if robot.position_units[joint] == "rad" else 1]
+
+
+def _fitting(run: Run, task: PathTask | None) -> PathTask | None:
+    task = run.task if task is None else task
+    if task is not None and task.n != run.data.sizes["joint"]:
+        raise InputError(f"the task is for {task.n} joints, the run has {run.data.sizes['joint']}")
+    return task

@@ -1,0 +1,71 @@
+"""How fast the path is taken, beside how fast it should be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from pathcontrol._arrays import Array
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.view.figures.inset import magnified
+from pathcontrol.view.figures.limits import extent, over_time, span
+from pathcontrol.view.figures.lines import drawable, series
+from pathcontrol.view.figures.shown import Runs, Shown, shown
+from pathcontrol.view.figures.style import COLUMN, PROFILE_LOOK, dressed, new_figure, style
+from pathcontrol.view.figures.words import legend
+
+RATE, PROFILE = r"$\dot{\sigma}$", r"$\vartheta(\sigma)$"
+SPEED_LABEL = f"{RATE}, {PROFILE} [1/s]"
+
+
+def speed_figure(run: Runs, task: PathTask | None = None, rollout: int = 0) -> Figure:
+    """The rate σ̇ of the path parameter beside the velocity profile ϑ(σ) [1/s], over time.
+
+    Args:
+        run: a run, or several by their names.
+        task: the path and its profile; by default each run's own, where it knows it.
+        rollout: which rollout of each run.
+
+    Raises:
+        InputError: there is no such rollout, or runs and task do not belong together.
+    """
+    runs = shown(run, task, rollout)
+    with style():
+        figure = new_figure(COLUMN, 2.3)
+        axes = dressed(figure.add_subplot())
+        drawn, times = [draw_speed(axes, one) for one in runs], [one.run.time for one in runs]
+        axes.set(xlabel="time [s]", ylabel=SPEED_LABEL, ylim=speed_limits(drawn))
+        over_time(axes, times)
+        magnified(axes, times, drawn, lambda inset: [draw_speed(inset, one) for one in runs])
+        names = {one.label or RATE: Line2D([], [], **one.look) for one in runs}
+        profile = {PROFILE: Line2D([], [], **PROFILE_LOOK)} if any(one.task is not None for one in runs) else {}
+        legend(figure, names | profile)
+    return figure
+
+
+def draw_speed(axes: Axes, one: Shown) -> Array:
+    """σ̇ and, where the path is known, ϑ(σ), of the first rollout; what is drawn, (1 or 2, time)."""
+    drawn = [drawable(one.run.array("sdot")[0])]
+    series(axes, one.run.time, drawn[0], **one.look)
+    if one.task is not None:
+        drawn.append(_profile(one.task, drawable(one.run.array("s")[0])))
+        series(axes, one.run.time, drawn[1], zorder=2.5, **PROFILE_LOOK)
+    return np.array(drawn)
+
+
+def speed_limits(drawn: Sequence[Array]) -> tuple[float, float]:
+    """Limits that hold everything drawn, and zero: a share of the speed is to be seen."""
+    low, high = span([*drawn, np.zeros(1)])
+    return (0.0, high) if extent(drawn)[0] >= 0 else (low, high)
+
+
+def _profile(task: PathTask, s: Array) -> Array:
+    """ϑ(s) (time,), NaN where s is."""
+    known = ~np.isnan(s)
+    values = np.full(s.shape, np.nan)
+    values[known] = task.theta(s[known])
+    return drawable(values)

@@ -1,0 +1,47 @@
+"""Numbers along an axis that stand apart, however many figures they have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.ticker import AutoLocator
+
+_DIGIT = 0.64  # width of a digit in the default font, of its size
+_GAP = 1.2  # digits between numbers
+
+
+class SpacedLocator(AutoLocator):
+    """Round numbers along a horizontal axis, fewer of them where they have many figures.
+
+    Args:
+        size: of the numbers [pt].
+    """
+
+    def __init__(self, size: float) -> None:
+        super().__init__()
+        self._size = size
+
+    def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+        for intervals in ("auto", 5, 4, 3, 2, 1):
+            self.set_params(nbins=intervals)
+            ticks = super().tick_values(vmin, vmax)
+            if len(ticks) < 3 or self._apart(np.asarray(ticks), abs(vmax - vmin)):
+                break
+        return ticks
+
+    def _apart(self, ticks: np.ndarray, span: float) -> bool:
+        step = float(ticks[1] - ticks[0])
+        assert self.axis is not None
+        length = self.axis.get_tick_space() * 3 * self._size  # pt, which Matplotlib divides by three sizes
+        return (_figures(ticks, step) + _GAP) * _DIGIT * self._size <= length * step / max(span, step)
+
+
+def _figures(ticks: np.ndarray, step: float) -> int:
+    """Characters of the longest of the numbers; those far from one share a power of ten."""
+    largest = float(np.abs(ticks).max())
+    if not 1e-4 <= largest < 1e5:
+        ticks, step = ticks / largest, step / largest
+    decimals = next((d for d in range(12) if math.isclose(round(step, d), step, rel_tol=1e-6)), 12)
+    return max(len(f"{tick:.{decimals}f}") for tick in ticks)

@@ -1,0 +1,58 @@
+"""Which arm, path and tool belong to the runs that are filmed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from pathcontrol.errors import InputError
+from pathcontrol.simulation.run import Run
+from pathcontrol.view.bodies.sticks import stick_figure
+from pathcontrol.view.bodies.visuals import LinkVisual, link_visuals
+from pathcontrol.view.film.palette import run_color
+from pathcontrol.view.film.take import Take, default_tool
+
+if TYPE_CHECKING:
+    from pathcontrol.robot.model import RobotModel, UrdfSource
+    from pathcontrol.tasks.base import PathTask
+
+FINENESS = 1.5e-4  # of the arm's reach: where a picture shows it whole, a small part of a pixel
+
+
+def cast_takes(
+    run: Run | Mapping[str, Run],
+    robot: RobotModel | None,
+    task: PathTask | None,
+    rollout: int,
+    tool: str | None,
+) -> list[Take]:
+    """One rollout of each run, with the robot, task and tool that are given, or else its own.
+
+    Raises:
+        InputError: there is no run, or run, robot and task do not belong together.
+    """
+    runs = {controller_name(run): run} if isinstance(run, Run) else dict(run)
+    if not runs:
+        raise InputError("there is no run to be filmed; give a run, or several by name: {'name': run, …}")
+    looks: dict[UrdfSource, list[LinkVisual]] = {}
+    takes = []
+    for i, (name, one) in enumerate(runs.items()):
+        arm, path = one.robot if robot is None else robot, one.task if task is None else task
+        if arm.source not in looks:
+            looks[arm.source] = link_visuals(arm.source, FINENESS) or stick_figure(arm.source)
+        frame = default_tool(arm, path) if tool is None else tool
+        part, visuals = one.rollout(rollout), looks[arm.source]
+        takes.append(Take(str(name), part, arm, path, frame, visuals, run_color(i), one.rollouts))
+    return takes
+
+
+def controller_name(run: Run) -> str:
+    """What a run is called that has no other name: its controller."""
+    return str(run.config.get("controller", {}).get("controller", "unknown controller"))
+
+
+def film_title(takes: Sequence[Take], rollout: int) -> list[str]:
+    """Robots, controllers or the names of the runs, and the duration, in words."""
+    robots = ", ".join(dict.fromkeys(take.robot.name for take in takes))
+    words = [robots, ", ".join(take.name for take in takes), f"{max(take.duration for take in takes):.4g} s"]
+    return [*words, f"rollout {rollout}"] if any(take.rollouts > 1 for take in takes) else words

@@ -1,0 +1,94 @@
+"""How far the arm was from its path: what the tool's line is coloured by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.analysis.deviation import tool_deviation
+from pathcontrol.analysis.metrics import contour_error
+from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.errors import TaskError
+from pathcontrol.view.film.take import Take
+
+MILLIMETRE, MICROMETRE = 1e3, 1e6
+_LITTLE_MORE = 1.25
+
+
+@dataclass(frozen=True, eq=False)
+class PathError:
+    """An error over time in the unit that a person reads.
+
+    Attributes:
+        label: what it is.
+        unit: of the values.
+        values: (k,), NaN where there is nothing to be measured against.
+    """
+
+    label: str
+    unit: str
+    values: Array
+
+    @property
+    def largest(self) -> float:
+        """The largest of the known values, 0 without any."""
+        return float(self.values[np.isfinite(self.values)].max(initial=0.0))
+
+    @property
+    def top(self) -> float:
+        """A top of the scale that the start, from off the path, does not spoil.
+
+        The largest of the second half, or what nine tenths of the time stay below if that is more; the largest of all
+        if that is only a little more.
+        """
+        known = np.isfinite(self.values)
+        late = self.values[len(known) // 2 :][known[len(known) // 2 :]]
+        usual = np.quantile(self.values[known], 0.9) if known.any() else 0.0
+        top = float(max(late.max(initial=0.0), usual))
+        return self.largest if self.largest <= _LITTLE_MORE * top else top
+
+
+def path_error(take: Take) -> PathError | None:
+    """The error that a take is judged by, or None without a path that it could be measured against.
+
+    On a toolpath the distance of the tool from the drawing, of cuts only; else the contour error, the distance
+    from the path in joint space.
+    """
+    if take.task is None:
+        return None
+    if take.toolpath is not None:
+        return PathError("distance from the drawing", "mm", MILLIMETRE * _deviation(take, take.toolpath))
+    try:
+        error = contour_error(take.run, take.task)[0]
+    except TaskError:  # an endless path has no nearest point
+        return None
+    values, unit = readable(error, str(take.run["q"].attrs["units"]))
+    return PathError("contour error", unit, values)
+
+
+def in_fitting_units(errors: Sequence[PathError | None]) -> list[PathError | None]:
+    """The same errors, those in millimetres all in micrometres if none of them reaches one."""
+    lengths = [error for error in errors if error is not None and error.unit == "mm"]
+    if not lengths or max(error.top for error in lengths) >= 1.0:
+        return list(errors)
+    scale = MICROMETRE / MILLIMETRE
+    return [replace(e, unit="µm", values=scale * e.values) if e in lengths else e for e in errors]
+
+
+def readable(values: Array, unit: str) -> tuple[Array, str]:
+    """Values in the unit a person reads, and that unit: degrees for angles; unchanged where joints slide, too."""
+    if unit.split("/")[0] != "rad" or " or " in unit:
+        return values, unit
+    return np.rad2deg(values), unit.replace("rad", "deg")
+
+
+def _deviation(take: Take, task: ToolpathTask) -> Array:
+    """Distance of the tool from the contour it should be on [m], (k,); NaN on rapids."""
+    cutting = np.array([not contour.rapid for contour in task.contours])[take.run["path_index"].to_numpy()]
+    deviation = np.full(len(cutting), np.nan)
+    if cutting.any():
+        deviation[cutting] = tool_deviation(take.run, take.robot, task.frame, task.contours)[0, cutting]
+    return deviation

@@ -1,0 +1,93 @@
+"""What is charted over time: errors, rates along the path, and torques beside their limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.view.film.charts import Chart, Curve
+from pathcontrol.view.film.error import readable
+from pathcontrol.view.film.shot import Shot
+from pathcontrol.view.film.take import Take
+
+#: title, unit and lines of one run
+_Entry: TypeAlias = tuple[str, str, list[Curve]]
+
+_NO_LIMIT = 1e6  # N m: files that know no limit say some huge number, or zero
+
+
+def charts(shots: Sequence[Shot]) -> list[Chart]:
+    """The charts of some runs; lines of the same quantity in the same unit share one."""
+    found: dict[tuple[str, str], list[Curve]] = {}
+    several = len(shots) > 1
+    makers: tuple[Callable[[Shot, int, bool], list[_Entry]], ...] = (_norms, _error, _rates, _torques)
+    for maker in makers:
+        for i, shot in enumerate(shots):
+            for title, unit, curves in maker(shot, i, several):
+                lines = found.setdefault((title, unit), [])
+                lines += [curve for curve in curves if not any(curve.repeats(line) for line in lines)]
+    return [Chart(title, unit, curves) for (title, unit), curves in found.items()]
+
+
+def _norms(shot: Shot, index: int, several: bool) -> list[_Entry]:
+    take, entries = shot.take, []
+    for name, symbol, words in (("e_p", "‖e_p‖", "position error"), ("e_v", "‖e_v‖", "velocity error")):
+        if name in take.run.data:
+            values, unit = readable(take.run.norm(name)[0], take.run[name].attrs["units"])
+            curve = Curve(take.name if several else symbol, take.time, values, index)
+            entries.append((f"{words} {symbol}", unit, [curve]))
+    return entries
+
+
+def _error(shot: Shot, index: int, several: bool) -> list[_Entry]:
+    if shot.error is None:
+        return []
+    label = shot.take.name if several else shot.error.label
+    return [(shot.error.label, shot.error.unit, [Curve(label, shot.take.time, shot.error.values, index)])]
+
+
+def _rates(shot: Shot, index: int, several: bool) -> list[_Entry]:
+    """The rate of the path parameter, beside the one that the task asks for there."""
+    take = shot.take
+    if "sdot" not in take.run.data:
+        return []
+    curves = [Curve(take.name if several else "σ̇", take.time, take.run.array("sdot")[0], index)]
+    if take.task is not None:
+        theta = np.broadcast_to(take.task.theta(take.s), take.s.shape)
+        curves.append(Curve("ϑ(s)", take.time, theta, index, "reference"))
+    return [("rate along the path σ̇", "1/s", curves)]
+
+
+def _torques(shot: Shot, index: int, several: bool) -> list[_Entry]:
+    """Torques in percent of their limits: of each joint, or of several runs the largest; in N m without limits."""
+    take = shot.take
+    if "tau" not in take.run.data:
+        return []
+    tau, limits, joints = take.run.array("tau")[0], torque_limits(take), take.robot.joint_names
+    limited = np.flatnonzero(np.isfinite(limits))
+    if not len(limited):
+        lines = np.abs(tau).max(-1)[:, None] if several else tau
+        return [("torque", take.run["tau"].attrs["units"], _curves(take, index, several, lines, joints))]
+    share = 100 * tau[:, limited] / limits[limited]
+    share = np.abs(share).max(-1)[:, None] if several else share
+    curves = _curves(take, index, several, share, [joints[j] for j in limited])
+    ends, signs = take.time[[0, -1]], (1.0,) if several else (1.0, -1.0)
+    curves += [Curve("limit", ends, np.full(2, 100.0 * sign), index, "limit") for sign in signs]
+    return [("largest torque / limit" if several else "torque / limit", "%", curves)]
+
+
+def torque_limits(take: Take) -> Array:
+    """Limits of the torques [N m], (n,): those that were clamped to, else the robot's; inf without one."""
+    clamped = take.run.config.get("loop", {}).get("torque_limits")
+    limits = np.asarray(clamped if isinstance(clamped, list) else take.robot.limits.effort, dtype=np.float64)
+    return np.where((limits > 0) & (limits < _NO_LIMIT), limits, np.inf)
+
+
+def _curves(take: Take, index: int, several: bool, values: Array, joints: Sequence[str]) -> list[Curve]:
+    """A line for each column (k, m), called as the joints are, or as the run if there is only one."""
+    if several:
+        return [Curve(take.name, take.time, values[:, 0], index)]
+    return [Curve(joint, take.time, values[:, j], index, shade=j) for j, joint in enumerate(joints)]

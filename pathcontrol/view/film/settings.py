@@ -1,0 +1,67 @@
+"""What a run was made with, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pathcontrol.view.film.take import Take
+
+_NAMES = {
+    "friction": "friction compensation",
+    "start": "s starts at",
+    "encoders": "encoders",
+    "velocity": "measured velocity",
+    "filter_hz": "velocity filter [Hz]",
+    "torque_limits": "torque limits [N m]",
+    "period": "control period [s]",
+    "output_period": "time between samples [s]",
+    "delay": "delay [s]",
+}
+_ELSEWHERE = {"controller", "robot", "task", "sequence"}
+
+
+def settings(take: Take) -> dict[str, str]:
+    """Robot, controller, gains, plant, loop, duration and versions of a run, by their names."""
+    config = take.run.config
+    controller = _mapping(config.get("controller"))
+    law = controller.get("sequence", [controller])[0]
+    chosen = {name: value for name, value in law.items() if name not in _ELSEWHERE}
+    versions = ", ".join(f"{name} {number}" for name, number in _mapping(config.get("versions")).items())
+    found: dict[str, Any] = {
+        "robot": take.robot.name,
+        "controller": controller.get("controller"),
+        "task": None if take.task is None else _mapping(take.task.describe()).get("task"),
+        **{_NAMES.get(name, name): value for name, value in chosen.items()},
+        "friction of the plant": _friction(_mapping(config.get("plant")).get("friction")),
+        **{_NAMES.get(name, name): value for name, value in _mapping(config.get("loop")).items()},
+        "duration": f"{take.duration:g} s, {len(take.time)} samples",
+        "rollout": f"{_rollout(take)} of {take.rollouts}" if take.rollouts > 1 else None,
+        "versions": versions or None,
+    }
+    return {name: _words(value) for name, value in found.items() if value is not None}
+
+
+def _mapping(value: Any) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}
+
+
+def _rollout(take: Take) -> int:
+    return int(take.run.data["rollout"].to_numpy()[0])
+
+
+def _friction(law: Any) -> str | None:
+    """Names of the laws that a friction law is made of."""
+    terms = _mapping(law).get("terms", [law])
+    names = [str(_mapping(term).get("law", "")) for term in terms]
+    return " + ".join(name for name in names if name) or None
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_words, value))
+    return str(value)

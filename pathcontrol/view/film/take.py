@@ -1,0 +1,115 @@
+"""One rollout to be filmed: what happened, to which arm, on which path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.errors import InputError
+from pathcontrol.view.bodies.shapes import Color
+from pathcontrol.view.bodies.visuals import LinkVisual, leaf_links
+
+if TYPE_CHECKING:
+    from pathcontrol.robot.model import RobotModel
+    from pathcontrol.simulation.run import Run
+    from pathcontrol.tasks.base import PathTask
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """A rollout with its arm, path and tool, and the poses that follow from them.
+
+    Attributes:
+        name: what it is called.
+        run: the rollout, as a run of its own.
+        robot: the arm.
+        task: the path it should follow, or None.
+        tool: the frame whose path is drawn.
+        visuals: what the arm looks like.
+        color: the colour that stands for it.
+        rollouts: how many rollouts there are of it.
+    """
+
+    name: str
+    run: Run
+    robot: RobotModel
+    task: PathTask | None
+    tool: str
+    visuals: list[LinkVisual]
+    color: Color
+    rollouts: int = 1
+
+    def __post_init__(self) -> None:
+        run, robot, task = self.run, self.robot, self.task
+        joints = tuple(str(name) for name in run.data["joint"].to_numpy())
+        if joints != robot.joint_names:
+            raise InputError(f"the run is of the joints {joints}, {robot.name} has {robot.joint_names}")
+        if task is not None and task.n != robot.n:
+            raise InputError(f"the task is for {task.n} joints, {robot.name} has {robot.n}")
+        if not np.isfinite(run.array("q")).all():
+            raise InputError("the run has joint positions that are not finite")
+
+    @cached_property
+    def time(self) -> Array:
+        """Times of the samples from the start of the film [s], (k,), as a film counts them: in single precision."""
+        return (self.run.time - self.run.time[0]).astype(np.float32).astype(np.float64)
+
+    @property
+    def duration(self) -> float:
+        """How long it lasts [s]."""
+        return float(self.run.time[-1] - self.run.time[0])
+
+    @property
+    def q(self) -> Array:
+        """Joint positions [rad], (k, n)."""
+        return self.run.array("q")[0]
+
+    @cached_property
+    def s(self) -> Array:
+        """Path parameter within the path, (k,)."""
+        s = self.run.array("s")[0]
+        return s if self.task is None else np.clip(s, *self._domain(self.task))
+
+    @property
+    def toolpath(self) -> ToolpathTask | None:
+        """The task if it is a drawing that the tool follows, contour by contour."""
+        followed = "path_index" in self.run.data.coords
+        return self.task if isinstance(self.task, ToolpathTask) and followed else None
+
+    @cached_property
+    def poses(self) -> dict[str, Array]:
+        """Poses of the links that are seen, and of the tool, at all samples [m], (k, 4, 4) each."""
+        frames = list(dict.fromkeys([*(visual.link for visual in self.visuals), self.tool]))
+        stacked = self.robot.frame_poses(self.q, frames)
+        return {frame: stacked[:, i] for i, frame in enumerate(frames)}
+
+    @property
+    def tool_positions(self) -> Array:
+        """Where the tool was [m], (k, 3)."""
+        return self.poses[self.tool][:, :3, 3]
+
+    @cached_property
+    def desired_positions(self) -> Array | None:
+        """Where the tool should have been, at q_d(s(t)) [m], (k, 3); None without a path."""
+        return None if self.task is None else self.tool_at(self.task.q_d(self.s))
+
+    def tool_at(self, q: Array) -> Array:
+        """Positions of the tool [m], (k, 3), at joint positions (k, n)."""
+        return self.robot.frame_pose(q, self.tool)[..., :3, 3]
+
+    @staticmethod
+    def _domain(task: PathTask) -> tuple[float, float]:
+        return (-np.inf, np.inf) if task.closed else (task.s0, task.s_end)
+
+
+def default_tool(robot: RobotModel, task: PathTask | None = None) -> str:
+    """The frame that follows the drawing, or else the last of the robot's frames that is a link carrying no other."""
+    if isinstance(task, ToolpathTask) and task.frame in robot.frame_names:
+        return task.frame
+    leaves = leaf_links(robot.source)
+    return [name for name in robot.frame_names if name in leaves][-1]

@@ -1,0 +1,66 @@
+"""The line that the tool draws: a tube that grows with time, coloured by the error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pathcontrol._arrays import Array
+from pathcontrol.view.bodies.shapes import Mesh
+from pathcontrol.view.film.keys import Indices, inside, interpolated, key_samples
+from pathcontrol.view.film.tube import SIDES, distinct_rows, tube
+
+MOST_RINGS = 2500
+FRAME = 1 / 60  # s between rings while the tool moves, so that the line grows in steps too small to see
+_BEND = 0.25  # of the radius: how far the tool may have been from the middle of the tube
+_SHADE = 1 / 32  # of the scale: how far the colour may be from that of the error
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A tube by and by.
+
+    Attributes:
+        mesh: the whole tube, ring after ring.
+        rings: the samples at which its rings are, increasing, (rings,).
+    """
+
+    mesh: Mesh
+    rings: Indices
+
+    #: indices of triangles' corners from one ring to the next
+    indices = 6 * SIDES
+
+    def on_vertices(self, values: Array) -> Array:
+        """Values at the samples (k, …) for each vertex of the tube."""
+        return np.repeat(values[self.rings], SIDES, axis=0)
+
+
+def trace(time: Array, points: Array, share: Array, radius: float) -> Trace | None:
+    """The tube of ``radius`` [m] through points (k, 3) [m], or None if they are all in one place.
+
+    Rings are where the line or the colour, a ``share`` of its scale (k,), bend, and at least every :data:`FRAME` of the
+    ``time`` (k,) [s] while the tool moves; where it stands there are few. If they are more than
+    :data:`MOST_RINGS`, everything is taken less strictly until they are not.
+    """
+    looseness = 1.0
+    while len(rings := _rings(time, points, share, radius, looseness)) > MOST_RINGS:
+        looseness *= 1.4
+    rings = rings[distinct_rows(points[rings])]
+    return Trace(tube(points[rings], radius), rings) if len(rings) > 1 else None
+
+
+def _rings(time: Array, points: Array, share: Array, radius: float, looseness: float) -> Indices:
+    """Samples from which the others follow by linear interpolation."""
+    known = np.nan_to_num(np.clip(share, 0.0, 1.0), nan=-1.0)
+    values = np.column_stack([points / (_BEND * radius), known / _SHADE]) / looseness
+
+    def holds(first: Indices, length: int) -> NDArray[np.bool_]:
+        short = time[first + length] - time[first] <= looseness * FRAME
+        still = np.linalg.norm(points[first + length] - points[first], axis=-1) <= looseness * _BEND * radius
+        off = values[inside(first, length)] - interpolated(time, values, first, length)
+        return (short | still) & ((off**2).sum(-1).max(-1) <= 1.0)
+
+    return key_samples(len(time), holds)

@@ -1,0 +1,91 @@
+"""The figures of runs, as images inside a page."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.simulation.run import Run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_PIXELS = 96  # CSS pixels in an inch
+_LARGEST, _PNG_DPI = 1_000_000, 200  # bytes, dots in an inch
+_COMPARED = {"e_p", "e_v", "s", "sdot", "tau"}
+_WIDE = 5.0  # inches, from which a figure has a row of its own
+
+
+class Picture(NamedTuple):
+    """A figure: the address of its image, its width [px], whether it is a wide one, and what it shows."""
+
+    href: str
+    width: int
+    wide: bool
+    caption: str
+
+
+def pictures(runs: Mapping[str, Run]) -> list[Picture]:
+    """The figures of the runs; SVG in images, so that no name in them can be markup of the page.
+
+    Runs of the same joints share figures, others have figures of their own.
+    """
+    joints = {tuple(run["joint"].to_numpy()) for run in runs.values()}
+    if len(joints) == 1:
+        return [_picture(figure, caption) for caption, figure in _figures(runs)]
+    own = {name: _figures({name: run}) for name, run in runs.items()}
+    return [_picture(figure, f"{name}: {caption}") for name, figures in own.items() for caption, figure in figures]
+
+
+def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
+    """Figures of runs of the same joints, with what they show."""
+    from pathcontrol.view.figures.comparison import comparison_figure
+    from pathcontrol.view.figures.deviation import deviation_figure
+    from pathcontrol.view.figures.errors import error_bands_figure, error_figure
+    from pathcontrol.view.figures.path import path_figure, phase_figure
+    from pathcontrol.view.figures.speed import speed_figure
+    from pathcontrol.view.figures.tool import tool_figure
+    from pathcontrol.view.figures.torque import torque_figure
+
+    one = next(iter(runs.values()))
+    shown = runs if len(runs) > 1 else one
+    recorded = set.intersection(*(set(run.data.data_vars) for run in runs.values()))
+    if len(runs) > 1 and recorded >= _COMPARED:
+        yield "Comparison", comparison_figure(runs)
+    if one.data.sizes["joint"] > 1:
+        yield "Path of the joints", path_figure(shown)
+    yield "Path of the tool", tool_figure(shown)
+    if {"e_p", "e_v"} <= recorded:
+        yield "Errors", error_figure(shown)
+        if any(run.rollouts > 1 for run in runs.values()):
+            yield "Errors of all rollouts", error_bands_figure(shown)
+    if {"s", "sdot"} <= recorded:
+        yield "Speed along the path", speed_figure(shown)
+    if "tau" in recorded:
+        yield "Torques", torque_figure(shown)
+    if "qd" in recorded:
+        yield "Velocities over positions", phase_figure(shown)
+    for name, run in runs.items():
+        if isinstance(run.task, ToolpathTask) and "path_index" in run.data.coords:
+            of = f" of {name}" if len(runs) > 1 else ""
+            yield f"Distance of the tool from the drawing{of}", deviation_figure(run, run.robot, run.task)
+
+
+def _picture(figure: Figure, caption: str) -> Picture:
+    """A figure as SVG, or as PNG where the SVG would be too large to be sent around."""
+    width, drawn = figure.get_figwidth(), _drawn(figure, "svg")
+    kind = "svg+xml" if len(drawn) <= _LARGEST else "png"
+    text = base64.b64encode(drawn if kind == "svg+xml" else _drawn(figure, "png")).decode()
+    return Picture(f"data:image/{kind};base64,{text}", round(_PIXELS * width), width > _WIDE, caption)
+
+
+def _drawn(figure: Figure, kind: str) -> bytes:
+    from pathcontrol.view.figures.style import style
+
+    drawn = io.BytesIO()
+    with style():
+        figure.savefig(drawn, format=kind, dpi=_PNG_DPI, metadata={"Date": None} if kind == "svg" else None)
+    return drawn.getvalue()

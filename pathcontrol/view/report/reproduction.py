@@ -1,0 +1,124 @@
+"""How to make a run again: the experiment file it came from, or else Python that does the same."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from pathcontrol.simulation.run import Run
+from pathcontrol.view.report.downloads import Download, file_name, text_file
+from pathcontrol.view.report.settings import Setting
+
+_LOOPS = {"sampled": "SampledLoop", "continuous": "ContinuousTime"}
+#: the laws of this package; of another one only its user knows where it is
+_LAWS = ("ExtendedMotionPlan", "Projection", "ComputedTorque", "PDPlus", "SlotineLi")
+_NOT_ARGUMENTS = ("controller", "robot", "task")
+_LONGEST_LINE = 100
+
+
+class Recipe(NamedTuple):
+    """How to make one run again.
+
+    Attributes:
+        name: the run.
+        kind: ``"experiment"``, ``"python"``, or ``"none"`` where the run does not know enough of itself.
+        text: the experiment file or the script.
+        file: it as a file.
+    """
+
+    name: str
+    kind: str
+    text: str = ""
+    file: Download | None = None
+
+
+def recipe(name: str, run: Run) -> Recipe:
+    """How to make the run called ``name`` again."""
+    experiment = run.config.get("experiment")
+    if isinstance(experiment, str):
+        return Recipe(name, "experiment", experiment, text_file(f"{file_name(name)}.toml", experiment))
+    text = script(name, run)
+    return Recipe(name, "python", text, text_file(f"{file_name(name)}.py", text)) if text else Recipe(name, "none")
+
+
+def versions(configs: Sequence[Mapping[str, Any]]) -> list[Setting]:
+    """The versions of the packages that each run was made with."""
+    said = [config.get("versions", {}) for config in configs]
+    names = dict.fromkeys(name for one in said for name in one)
+    return [Setting(str(name), tuple(str(one.get(name, "–")) for one in said)) for name in names]
+
+
+def script(name: str, run: Run) -> str:
+    """Python that simulates a run again from its file, with the law, gains and loop of its configuration.
+
+    Empty where the configuration is not one that :func:`simulate` or :func:`simulate_sequence` has written.
+    """
+    law, loop = run.config.get("controller"), run.config.get("loop")
+    if run.task is None or not isinstance(law, Mapping) or not isinstance(loop, Mapping):
+        return ""
+    laws = law.get("sequence", [law])
+    if not _known(laws, loop):
+        return ""
+    closed = _call(f"pc.{_LOOPS[loop['loop']]}", [], _without(loop, ["loop"]))
+    lines = [
+        "import pathcontrol as pc\n",
+        f'saved = pc.Run.load("{file_name(name)}.nc")  # knows its robot and its path',
+        f"loop = {closed}",
+        'q, qd = saved.array("q")[:, 0], saved.array("qd")[:, 0]',
+        *(_of_sequence if "sequence" in law else _of_one)(laws[0], run.config),
+    ]
+    text = "\n".join(lines) + "\n"
+    return f"from math import inf\n\n{text}" if re.search(r"\binf\b", text) else text
+
+
+def _of_one(law: Mapping[str, Any], config: Mapping[str, Any]) -> list[str]:
+    made = _call(f"pc.{law['controller']}", ["saved.robot", "saved.task"], _without(law, _NOT_ARGUMENTS))
+    settings = {key: config[key] for key in ("duration", "laps", "until")} | {"loop": _Name("loop")}
+    return [f"law = {made}", f"run = {_call('pc.simulate', ['law', 'q', 'qd'], settings)}"]
+
+
+def _of_sequence(law: Mapping[str, Any], config: Mapping[str, Any]) -> list[str]:
+    made = _call(f"pc.{law['controller']}", ["saved.robot", "path"], _without(law, _NOT_ARGUMENTS))
+    times = config["duration"]
+    duration = times[0] if len(set(times)) == 1 else times
+    settings = {"duration": duration, "laps": config["laps"], "task": _Name("saved.task"), "loop": _Name("loop")}
+    run = _call("pc.simulate_sequence", ["laws", "q", "qd"], settings)
+    return [f"laws = [{made} for path in saved.task]", f"run = {run}"]
+
+
+def _known(laws: Sequence[Mapping[str, Any]], loop: Mapping[str, Any]) -> bool:
+    """Whether the laws are one of this package with the same gains, and the loop is one of this package."""
+    alike = all(_without(law, ["robot", "task"]) == _without(laws[0], ["robot", "task"]) for law in laws)
+    names = [*laws[0], *loop]  # of arguments: from a file, and soon in a script
+    return (
+        alike
+        and laws[0].get("controller") in _LAWS
+        and loop.get("loop") in _LOOPS
+        and all(name.isidentifier() for name in names)
+    )
+
+
+def _without(table: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+    return {key: value for key, value in table.items() if key not in keys}
+
+
+class _Name(str):
+    """The name of a variable in a script."""
+
+
+def _literal(value: Any) -> str:
+    """A value as Python writes it, texts between double quotes."""
+    if isinstance(value, _Name):
+        return value
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+
+
+def _call(function: str, positional: Sequence[str], named: Mapping[str, Any]) -> str:
+    """A call in Python, on one line if it is short."""
+    arguments = [*positional, *(f"{key}={_literal(value)}" for key, value in named.items())]
+    line = f"{function}({', '.join(arguments)})"
+    if len(line) <= _LONGEST_LINE:
+        return line
+    return f"{function}(\n" + "".join(f"    {argument},\n" for argument in arguments) + ")"

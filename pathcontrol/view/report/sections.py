@@ -1,0 +1,87 @@
+"""The sections of a report, made of templates in which every name is text and never markup."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import jinja2
+from markupsafe import Markup, escape
+
+from pathcontrol.analysis.metrics import UNITS
+from pathcontrol.simulation.run import Run
+from pathcontrol.view.page.html import Section
+from pathcontrol.view.report.downloads import Download, json_file, signals_file
+from pathcontrol.view.report.pictures import pictures
+from pathcontrol.view.report.reproduction import recipe, versions
+from pathcontrol.view.report.settings import settings
+from pathcontrol.view.report.summary import facts, measured, plain, rows
+
+
+def sections(runs: Mapping[str, Run], made_by: str) -> list[Section]:
+    """What stands below the animation: summary, figures, configuration, and how to make it again.
+
+    Args:
+        runs: the runs by their names.
+        made_by: the call or the command that makes this page.
+    """
+    numbers = {name: measured(run) for name, run in runs.items()}
+    configs = [run.config for run in runs.values()]
+    configuration = configs[0] if len(runs) == 1 else {name: run.config for name, run in runs.items()}
+    return [
+        _section(
+            "Summary",
+            runs=runs,
+            facts=facts(runs),
+            rows=rows(runs, numbers),
+            files=[_metrics_file(numbers), json_file("configuration.json", configuration), *_signals(runs)],
+        ),
+        _section("Figures", pictures=pictures(runs)),
+        _section("Configuration", runs=runs, groups=settings(configs), json=_json(configuration)),
+        _section(
+            "How to reproduce",
+            runs=runs,
+            recipes=[recipe(name, run) for name, run in runs.items()],
+            versions=versions(configs),
+            made_by=made_by,
+        ),
+    ]
+
+
+def _section(title: str, **content: Any) -> Section:
+    template = _templates().get_template(f"{title.lower().replace(' ', '_')}.html")
+    return Section(title, Markup(template.render(content)))
+
+
+@cache
+def _templates() -> jinja2.Environment:
+    templates = jinja2.Environment(
+        loader=jinja2.PackageLoader("pathcontrol.view.report"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    templates.filters["symbols"] = _symbols
+    return templates
+
+
+def _symbols(text: str) -> Markup:
+    """``text`` with the letters after underscores as indices, as in e_p."""
+    return Markup(re.sub(r"_(\w)", r"<sub>\1</sub>", str(escape(text))))
+
+
+def _metrics_file(numbers: Mapping[str, Mapping[str, Any]]) -> Download:
+    units = {key: UNITS[key] for values in numbers.values() for key in values}
+    return json_file("metrics.json", plain({"metrics": numbers, "units": units}))
+
+
+def _signals(runs: Mapping[str, Run]) -> list[Download]:
+    return [signals_file(f"{name}-signals.csv" if len(runs) > 1 else "signals.csv", run) for name, run in runs.items()]
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, indent=2, ensure_ascii=False)

@@ -1,0 +1,184 @@
+"""What came of each run, in words and in numbers, side by side. Degrees and millimetres, where a person reads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.analysis.deviation import toolpath_metrics
+from pathcontrol.analysis.metrics import UNITS, metrics, peak, rms, steady_state
+from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.sequence import PathSequence
+
+#: what each metric is called, in the order in which they are shown
+LABELS = {
+    "tool_deviation_peak": "tool from the drawing, peak",
+    "tool_deviation_rms": "tool from the drawing, RMS",
+    "smoothing_deviation": "smooth curves from the drawing",
+    "e_p_peak": "‖e_p‖ peak",
+    "e_p_rms": "‖e_p‖ RMS",
+    "e_v_peak": "‖e_v‖ peak",
+    "e_v_rms": "‖e_v‖ RMS",
+    "contour_error_peak": "contour error, peak",
+    "contour_error_rms": "contour error, RMS",
+    "lag_error_peak": "lag error, peak",
+    "lag_error_rms": "lag error, RMS",
+    "gamma_distance_peak": "distance to Γ, peak",
+    "gamma_distance_rms": "distance to Γ, RMS",
+    "speed_ratio": "speed, mean σ̇ over mean ϑ",
+    "settling_time": "settling time of ‖e_p‖",
+    "path_time": "time for the path",
+    "end_error": "‖e_p‖ at the end",
+    "tau_demand_peak": "torque demand, peak",
+}
+#: how far from good a value is, where that is not the value itself; None where none is better than another
+_BADNESS: dict[str, Callable[[float], float] | None] = {
+    "speed_ratio": lambda value: abs(value - 1),
+    "smoothing_deviation": None,
+}
+_ENDLESS = {"settling_time": "never", "path_time": "not finished", "end_error": "not finished"}
+
+
+_NEEDED = {"q", "qd", "s", "sdot", "e_p", "e_v", "tau_demand"}
+
+
+class Cell(NamedTuple):
+    """What a table says of one run, and whether it is the best of its row."""
+
+    text: str
+    best: bool = False
+
+
+class Row(NamedTuple):
+    """One quantity of all runs."""
+
+    label: str
+    unit: str
+    cells: tuple[Cell, ...]
+
+
+def measured(run: Run) -> dict[str, list[float]]:
+    """The metrics of a run by name, in SI units, each with one entry for each rollout."""
+    task = run.task
+    if task is None or not set(run.data.data_vars) >= _NEEDED:
+        return _without_path(run)
+    return toolpath_metrics(run, run.robot, task) if isinstance(task, ToolpathTask) else metrics(run, task)
+
+
+def _without_path(run: Run) -> dict[str, list[float]]:
+    """What can be said of a run that does not know its path, or has not recorded everything."""
+    late = steady_state(run)
+    errors = [name for name in ("e_p", "e_v") if name in run.data]
+    values = {f"{name}_{kind.__name__}": kind(late.norm(name)) for name in errors for kind in (peak, rms)}
+    if "tau_demand" in run.data:
+        values["tau_demand_peak"] = np.abs(run.array("tau_demand")).max((1, 2))
+    return {name: value.tolist() for name, value in values.items()}
+
+
+def facts(runs: Mapping[str, Run]) -> list[Row]:
+    """What each run is, in words."""
+    said: dict[str, Callable[[Run], str]] = {
+        "robot": lambda run: run.robot.name,
+        "controller": lambda run: str(_law(run).get("controller", "not known")),
+        "path": _path,
+        "time simulated": lambda run: f"{run.time[-1] - run.time[0]:.4g} s",
+        "outcome": _outcome,
+    }
+    return [Row(label, "", tuple(Cell(say(run)) for run in runs.values())) for label, say in said.items()]
+
+
+def _path(run: Run) -> str:
+    task = run.task
+    if isinstance(task, ToolpathTask):
+        return f"{Path(task.drawing.source).name}, {len(task)} paths"
+    if isinstance(task, PathSequence):
+        return f"{len(task)} paths"
+    # what was sampled for a file has its own name still in the configuration
+    described = _law(run).get("task")
+    name = described.get("task") if isinstance(described, Mapping) else None
+    return str(name or ("not known" if task is None else type(task).__name__))
+
+
+def _law(run: Run) -> Mapping[str, Any]:
+    """What the configuration, which may be anyone's, says of the law."""
+    law = run.config.get("controller")
+    return law if isinstance(law, Mapping) else {}
+
+
+def _outcome(run: Run) -> str:
+    finished = run.status == "finished"
+    if run.rollouts > 1:
+        endless = "laps" in run.data.coords and not finished.any()
+        return f"{run.rollouts} rollouts" if endless else f"{finished.sum()} of {run.rollouts} rollouts finished"
+    if finished[0]:
+        return f"finished after {run.finish_time[0]:.4g} s"
+    return f"{run.laps[0]} whole laps" if "laps" in run.data.coords else "not finished when the time was up"
+
+
+def rows(runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]]]) -> list[Row]:
+    """A row for each metric that one of the runs has, the best of each marked where there are several."""
+    wanted = [(key, unit) for key in LABELS for unit in _units(key, runs, numbers)]
+    return [_row(key, unit, runs, numbers) for key, unit in wanted]
+
+
+def _units(key: str, runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]]]) -> Iterable[str]:
+    """The units in which runs have a metric, one unless angles of some are compared with lengths of others."""
+    return dict.fromkeys(_unit_of(key, run) for name, run in runs.items() if key in numbers[name])
+
+
+def _unit_of(key: str, run: Run) -> str:
+    unit = UNITS[key]
+    if unit == "N m":
+        return run["tau_demand"].attrs["units"]
+    return run["e_v" if unit == "rad/s" else "e_p"].attrs["units"] if unit.startswith("rad") else unit
+
+
+def _row(key: str, unit: str, runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]]]) -> Row:
+    values = {n: np.asarray(numbers[n][key]) for n, r in runs.items() if key in numbers[n] and _unit_of(key, r) == unit}
+    scale, shown = readable(unit, np.concatenate(list(values.values())))
+    texts = {name: _text(scale * value, _ENDLESS.get(key, "–")) for name, value in values.items()}
+    best = _best(_BADNESS.get(key, abs), {name: float(np.median(value)) for name, value in values.items()}, texts)
+    return Row(LABELS[key], shown, tuple(Cell(texts.get(name, "–"), name in best) for name in runs))
+
+
+def readable(unit: str, values: Array) -> tuple[float, str]:
+    """The factor to, and the name of, the unit in which a person reads values of a unit."""
+    if unit in ("rad", "rad/s"):
+        return 180 / np.pi, unit.replace("rad", "deg")
+    if unit == "m":
+        return (1e3, "mm") if np.abs(values[np.isfinite(values)]).max(initial=0.0) >= 1e-3 else (1e6, "µm")
+    return 1.0, unit
+
+
+def _text(values: Array, endless: str) -> str:
+    """One number, or of many rollouts the median, the least and the largest."""
+    one = [_number(float(v), endless) for v in (np.median(values), values.min(), values.max())]
+    return one[0] if len(values) == 1 else f"{one[0]} ({one[1]} … {one[2]})"
+
+
+def _number(value: float, endless: str) -> str:
+    return f"{value:#.4g}".rstrip(".") if math.isfinite(value) else endless
+
+
+def _best(badness: Callable[[float], float] | None, values: Mapping[str, float], texts: Mapping[str, str]) -> set[str]:
+    """The runs with the best value, those that read the same among them; none if all do."""
+    finite = {name: value for name, value in values.items() if math.isfinite(value)}
+    if badness is None or not finite or len(set(texts.values())) < 2:
+        return set()
+    least = min(finite, key=lambda name: badness(finite[name]))
+    return {name for name, text in texts.items() if text == texts[least]}
+
+
+def plain(value: Any) -> Any:
+    """``value`` as JSON can hold it: what is not finite is null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

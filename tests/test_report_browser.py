@@ -1,0 +1,105 @@
+"""A report in a real browser, from disk and without a network."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import browser
+import pytest
+from lxml import html
+from test_report import HOSTILE, followed, hostile_run
+
+from pathcontrol import Circle, RobotModel, Run, metrics
+from pathcontrol.view.report.report import report
+
+
+@pytest.fixture(scope="module")
+def runs(arm: RobotModel, circle: Circle) -> dict[str, Run]:
+    browser.binary()
+    return {law: followed(arm, circle, law) for law in ("plan", "projection")}
+
+
+@pytest.fixture(scope="module")
+def file(runs: dict[str, Run], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return report(runs, tmp_path_factory.mktemp("report") / "two.html")
+
+
+def test_it_opens_without_a_complaint_and_plays(file):
+    with browser.opened(file) as page:
+        began = page("film.time")
+        page.until(f"film.time > {began} + 0.2")
+        assert page("film.runs ?? document.querySelectorAll('#summary thead th').length") == 2
+        assert page.complaints == []
+
+
+@pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_is_wider_than_the_window(file, size, scheme):
+    with browser.opened(file, size, "#t=1", color_scheme=scheme) as page:
+        assert page("document.documentElement.scrollWidth <= innerWidth")
+        # figures are drawn for white paper, so they lie on some in the dark, too
+        assert (
+            page("getComputedStyle(document.querySelector('.figures figure')).backgroundColor") == "rgb(255, 255, 255)"
+        )
+        broken = "[...document.images].filter(image => !image.complete || image.naturalWidth === 0).length"
+        assert page(broken) == 0
+        assert page.complaints == []
+
+
+def test_the_files_can_be_saved(file, runs):
+    with browser.opened(file, hash="#t=1") as page:
+        saved = {}
+        for link in page.tab.locator(".files a").all():
+            with page.tab.expect_download() as waiting:
+                link.click()
+            saved[waiting.value.suggested_filename] = Path(waiting.value.path()).read_text(encoding="utf-8")
+        assert page.complaints == []
+    assert json.loads(saved["configuration.json"]) == {name: run.config for name, run in runs.items()}
+    peaks = json.loads(saved["metrics.json"])["metrics"]["plan"]["e_p_peak"]
+    assert peaks == metrics(runs["plan"], runs["plan"].task)["e_p_peak"]
+    assert {"plan-signals.csv", "projection-signals.csv"} < set(saved)
+
+
+def test_the_contents_lead_to_the_sections(file):
+    with browser.opened(file, hash="#t=1") as page:
+        for link in page.tab.locator("#contents a").all():
+            link.click()
+            title = link.inner_text()
+            heading = page.tab.get_by_role("heading", name=title, exact=True)
+            assert heading.bounding_box()["y"] < 600
+        assert page.complaints == []
+
+
+def test_hostile_names_do_nothing(runs, tmp_path):
+    run = hostile_run(runs["plan"], HOSTILE)
+    run = Run.from_arrays(
+        run.time,
+        {"joint_1": "rad", "joint_2": "rad"},
+        {n: run.array(n) for n in run.data.data_vars},
+        run.config,
+        robot=runs["plan"].robot,
+        task=runs["plan"].task,
+    )
+    path = report({HOSTILE: run, "b": run}, tmp_path / "r.html", title=HOSTILE, command=HOSTILE)
+    with browser.opened(path, hash="#t=1") as page:
+        assert page.complaints == []
+        document = html.document_fromstring(page("document.documentElement.outerHTML"))
+    assert not document.xpath("//*[@onerror]")
+    assert not document.xpath("//img[not(starts-with(@src, 'data:image/'))]")
+    assert HOSTILE in document.xpath("//pre[@id='made-by']")[0].text
+    assert HOSTILE in document.findtext(".//title")
+
+
+# what the edge of the paper would cut off
+CUT = """[...document.querySelectorAll(".section *")].filter(
+    (e) => e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).overflowX !== "visible").length"""
+
+
+def test_it_prints(file, tmp_path):
+    with browser.opened(file, (720, 1000), "#t=1") as page:
+        page.tab.pdf(path=tmp_path / "r.pdf", format="A4")
+        page.tab.emulate_media(media="print")
+        assert page(CUT) == 0
+        assert page.complaints == []
+    assert (tmp_path / "r.pdf").read_bytes().startswith(b"%PDF")

@@ -1,0 +1,213 @@
+"""Figures of any run can be read: nothing is cut off, nothing lies over something else, no name is markup."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from lxml import etree
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from pathcontrol import (
+    Ellipse,
+    PathTask,
+    Run,
+    comparison_figure,
+    error_bands_figure,
+    error_figure,
+    path_figure,
+    phase_figure,
+    speed_figure,
+    torque_figure,
+)
+from pathcontrol.view.figures.style import style
+
+SVG = "{http://www.w3.org/2000/svg}"
+NAMES = [
+    "arm",
+    "<b>&amp;</b>",
+    "$x_1$",
+    "_hidden",
+    "a$b",
+    "100 %",
+    "a\\$b\\",
+    "tab\tline\nend\x00",
+    "W" * 90,
+    "関節 ü",
+    " ",
+]
+
+
+class Swing(PathTask):
+    period = 2 * np.pi
+
+    def __init__(self, joints, scale):
+        self.joints, self.scale = joints, scale
+
+    def q_d(self, s):
+        return self.scale * np.sin(np.asarray(s)[..., None] * np.arange(1, self.joints + 1) + 0.3)
+
+    def theta(self, s):
+        return 1.0 + 0.0 * s
+
+
+def made(n=2, samples=60, rollouts=1, seed=0, scale=1.0, unit="rad", joints=None, task=True) -> Run:
+    """A run of ``n`` joints that swing."""
+    rng = np.random.default_rng(seed)
+    time = 0.01 * np.arange(samples)
+    names = [f"joint_{k}" for k in range(n)] if joints is None else joints
+    swing = scale * np.sin(time[:, None] * np.arange(1, n + 1) + rng.normal(size=(rollouts, 1, n)))
+    arrays = dict.fromkeys(("q", "qd", "q_measured", "qd_measured", "tau_demand", "tau", "e_p", "e_v"), swing + 0.0)
+    arrays |= dict.fromkeys(("s", "sdot", "regular"), swing[..., 0] + 0.0)
+    return Run.from_arrays(time, dict.fromkeys(names, unit), arrays, {}, task=Swing(n, scale) if task else None)
+
+
+def makers(run, limits=None) -> dict[str, Callable[[], Figure]]:
+    """All figures of a run, or of several by their names, that need no robot."""
+    several = run if isinstance(run, dict) else {"run": run}
+    found = {
+        "phase": lambda: phase_figure(run),
+        "errors": lambda: error_figure(run),
+        "bands": lambda: error_bands_figure(run),
+        "torque": lambda: torque_figure(run, limits),
+        "speed": lambda: speed_figure(run),
+        "comparison": lambda: comparison_figure(several, limits=limits),
+    }
+    if next(iter(several.values())).data.sizes["joint"] > 1:
+        found["path"] = lambda: path_figure(run)
+    return found
+
+
+def figures(run, limits=None) -> dict[str, Figure]:
+    return {name: make() for name, make in makers(run, limits).items()}
+
+
+def drawn(figure: Figure) -> list[Text]:
+    """The words of a figure as they stand on the page."""
+    canvas = FigureCanvasAgg(figure)
+    with style():
+        canvas.draw()
+    beyond = _beyond_limits(figure)
+    words = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
+    return [text for text in words if id(text) not in beyond and text.get_window_extent().width > 0]
+
+
+def _beyond_limits(figure: Figure) -> set[int]:
+    """Numbers of ticks outside the limits, which are kept but not drawn."""
+    found = set()
+    for axis in figure.findobj(Axis):
+        shown = {id(tick) for tick in axis._update_ticks()}
+        found |= {id(t) for k in axis.get_major_ticks() if id(k) not in shown for t in (k.label1, k.label2)}
+    return found
+
+
+def assert_readable(figure: Figure, name: str) -> None:
+    """Words are inside the figure and apart from each other."""
+    page, words = figure.bbox, drawn(figure)
+    boxes = [(text.get_text(), text.get_window_extent()) for text in words]
+    for text, box in boxes:
+        assert min(box.x0, box.y0, page.x1 - box.x1, page.y1 - box.y1) > -1, f"{name}: {text} is cut off"
+    for k, (text, box) in enumerate(boxes):
+        for other, there in boxes[k + 1 :]:
+            across = min(box.x1, there.x1) - max(box.x0, there.x0)
+            along = min(box.y1, there.y1) - max(box.y0, there.y0)
+            assert across < 1 or along < 1, f"{name}: {text!r} lies over {other!r}"
+
+
+def assert_units(figure: Figure, name: str) -> None:
+    """Every axis that has numbers has a unit, itself or in the panel it shares its axis with."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            numbers = axis.get_tick_params()[f"label{'bottom' if axis is axes.xaxis else 'left'}"]
+            assert not numbers or axis.get_label_text().endswith("]"), f"{name}: {axis.get_label_text()!r} has no unit"
+
+
+@pytest.mark.parametrize(("n", "count"), [(1, 2), (2, 0), (2, 5), (7, 0)])
+def test_words_stand_apart_and_axes_have_units(n, count):
+    runs = {f"controller number {k}": made(n, seed=k, rollouts=3) for k in range(count)} or made(n)
+    for name, figure in figures(runs, np.linspace(2.0, 200.0, n)).items():
+        assert_readable(figure, name)
+        assert_units(figure, name)
+
+
+@pytest.mark.parametrize("offset", [0.0, 123.456])
+@pytest.mark.parametrize("size", [1e-7, 1e-2, 30.0])
+def test_numbers_stand_apart(offset, size):
+    run = made(3, scale=size)
+    run.data["q"] += offset
+    for name, figure in {"phase": phase_figure(run), "path": path_figure(run)}.items():
+        assert_readable(figure, name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_are_words(name):
+    runs = {name: made(3, joints=[name, "b", "c"]), "other": made(3, joints=[name, "b", "c"], seed=1)}
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph")  # a font without the letter, no matter of ours
+        for kind, figure in {"path": path_figure(runs), "torque": torque_figure(runs)}.items():
+            assert_readable(figure, kind)
+            file = io.BytesIO()
+            with style():
+                figure.savefig(file, format="svg")
+            words = ["".join(node.itertext()) for node in etree.fromstring(file.getvalue()).iter(f"{SVG}text")]
+            letters = "".join(c if c.isprintable() else " " for c in name).strip()
+            if len(letters) < 20:
+                assert any(letters.split() == word.split() for word in words) or not letters, f"{kind}: {words}"
+
+
+@pytest.mark.parametrize("unit", ["rad", "m", "mixed"])
+def test_units_are_those_of_the_joints(unit):
+    run = made(3, unit="rad" if unit == "mixed" else unit)
+    if unit == "mixed":
+        kinds = {"a": "rad", "b": "m", "c": "rad"}
+        run = Run.from_arrays(run.time, kinds, {name: run.array(name) for name in run.data.data_vars}, {})
+    expected = {"rad": "[deg]", "m": "[m]", "mixed": "[rad or m]"}[unit]
+    assert path_figure(run).axes[0].get_xlabel().endswith(expected)
+    assert error_figure(run).axes[0].get_ylabel().endswith(expected)
+    torque = {"rad": "[N m]", "m": "[N]", "mixed": "[N m or N]"}[unit]
+    assert torque_figure(run).axes[0].get_ylabel().endswith(torque)
+
+
+ODD = [0.0, -1.0, 1e-300, 1e5, -1e9, 1e40, 1e200, 1.7e308, np.nan, np.inf, -np.inf]
+
+
+@settings(max_examples=20, phases=(Phase.explicit, Phase.generate))  # to shrink pictures takes minutes
+@given(st.integers(0, 10**6), st.integers(1, 3), st.sampled_from([1, 2, 3, 40]), st.integers(1, 3))
+def test_odd_runs_are_drawn(seed, n, samples, rollouts):
+    """One sample, no number anywhere, numbers that no axis holds: a figure all the same."""
+    run, rng = made(n, samples, rollouts), np.random.default_rng(seed)
+    few = rng.choice(ODD, rng.integers(1, len(ODD) + 1))
+    for name in ("q", "qd", "tau", "e_p", "e_v", "s", "sdot"):
+        run.data[name] = run.data[name].copy(data=rng.choice(few, run.array(name).shape))
+    limits = [None, np.full(n, 1e3), np.full(n, np.inf)][seed % 3]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = makers(run, limits)
+        drawn(found[sorted(found)[seed % len(found)]]())
+
+
+def test_what_does_not_move_is_drawn():
+    run = made(2)
+    for name in run.data.data_vars:
+        run.data[name] *= 0.0
+    for name, figure in figures(run).items():
+        assert_readable(figure, name)
+
+
+def test_an_ellipse_that_is_nearly_a_line_keeps_its_shape():
+    """Scales are equal, so the panel grows instead."""
+    s = np.linspace(0, 6, 300)
+    task = Ellipse((1.0, 0.01), 1.0)
+    run = made(2, samples=300)
+    run.data["q"] = run.data["q"].copy(data=task.q_d(s)[None])
+    axes = path_figure(run, task).axes[0]
+    assert axes.get_aspect() == 1.0
+    assert np.ptp(axes.get_ylim()) > 0.4 * np.ptp(axes.get_xlim())
