@@ -24,8 +24,10 @@ from pathcontrol import (
     tool_figure,
     torque_figure,
 )
+from pathcontrol.experiments.schema import Output
 from pathcontrol.view.figures.errors import quantiles
 from pathcontrol.view.figures.lines import cells_kept, columns_kept
+from pathcontrol.view.figures.run import run_figure
 from pathcontrol.view.figures.style import RUN_COLOURS
 
 START = np.deg2rad([40.0, 70.0])
@@ -207,3 +209,17 @@ def test_what_does_not_belong_together_is_refused(runs, circle):
     one = runs["plan"].with_data(runs["plan"].data.assign_coords(joint=["a", "b"]))
     with pytest.raises(InputError, match="different joints: joint_1, joint_2; a, b"):
         comparison_figure({**runs, "other": one})
+
+
+def test_the_figures_of_an_experiment(runs, tmp_path):
+    written = run_figure(runs["plan"], tmp_path / "a.pdf", joints=(1, 0))
+    kinds = [f"a-{kind}.{suffix}" for kind in ("errors", "path", "torque", "speed") for suffix in ("svg", "png", "pdf")]
+    assert [path.name for path in written] == kinds
+    assert {path.name for path in tmp_path.iterdir()} == set(kinds)
+
+
+@pytest.mark.parametrize("joints", [[0], [0, 0], [0, -1], [0, 1, 2], [0.0, 1.0], [True, False], "01", 1])
+def test_the_joints_of_an_experiment_are_two(joints):
+    assert Output(figure_joints=[2, 0]).figure_joints == [2, 0]
+    with pytest.raises(ValueError, match="two different joints, counted from 0"):
+        Output(figure_joints=joints)

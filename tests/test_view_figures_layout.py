@@ -130,7 +130,7 @@ def assert_units(figure: Figure, name: str) -> None:
             assert not numbers or axis.get_label_text().endswith("]"), f"{name}: {axis.get_label_text()!r} has no unit"
 
 
-@pytest.mark.parametrize(("n", "count"), [(1, 2), (2, 0), (2, 5), (7, 0)])
+@pytest.mark.parametrize(("n", "count"), [(1, 2), (2, 2), (7, 0)])
 def test_words_stand_apart_and_axes_have_units(n, count):
     runs = {f"controller number {k}": made(n, seed=k, rollouts=3) for k in range(count)} or made(n)
     for name, figure in figures(runs, np.linspace(2.0, 200.0, n)).items():
@@ -139,7 +139,7 @@ def test_words_stand_apart_and_axes_have_units(n, count):
 
 
 @pytest.mark.parametrize("offset", [0.0, 123.456])
-@pytest.mark.parametrize("size", [1e-7, 1e-2, 30.0])
+@pytest.mark.parametrize("size", [1e-7, 30.0])
 def test_numbers_stand_apart(offset, size):
     run = made(3, scale=size)
     run.data["q"] += offset
@@ -179,7 +179,7 @@ def test_units_are_those_of_the_joints(unit):
 ODD = [0.0, -1.0, 1e-300, 1e5, -1e9, 1e40, 1e200, 1.7e308, np.nan, np.inf, -np.inf]
 
 
-@settings(max_examples=20, phases=(Phase.explicit, Phase.generate))  # to shrink pictures takes minutes
+@settings(max_examples=10, phases=(Phase.explicit, Phase.generate))  # to shrink pictures takes minutes
 @given(st.integers(0, 10**6), st.integers(1, 3), st.sampled_from([1, 2, 3, 40]), st.integers(1, 3))
 def test_odd_runs_are_drawn(seed, n, samples, rollouts):
     """One sample, no number anywhere, numbers that no axis holds: a figure all the same."""

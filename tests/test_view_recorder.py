@@ -302,8 +302,9 @@ def test_what_does_not_belong_together_is_refused(arm: RobotModel, odd: RobotMod
         record(wild(arm), arm, rollout=3)
     with pytest.raises(UnknownNameError, match=r"'behind'.*'beside'"):
         record(wild(arm), arm, layout="behind")
-    with pytest.raises(InputError, match="no run"):
-        record({})
+    for nothing in ({}, [wild(arm)], {"name": 1}):
+        with pytest.raises(InputError, match="expected a Run"):
+            record(nothing)
     with pytest.raises(InputError, match="robot="):
         record(Run(wild(arm).data, {}))
     with pytest.raises(UnknownNameError, match="nozzle"):

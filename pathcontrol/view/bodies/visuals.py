@@ -85,7 +85,7 @@ def _visuals(
     except (UrdfError, LookupError, TypeError, ValueError) as error:
         mesh = element.find("geometry/mesh")
         what = "a visual" if mesh is None else f"mesh {mesh.get('filename')!r}"
-        warnings.warn(f"{what} of link {link!r} is left out of the picture: {error}", stacklevel=4)
+        warnings.warn(f"{what} of link {link!r} is left out of the picture: {error}", stacklevel=5)
         return
     color = _color(visual.material, palette)
     for shape, own_color in shapes:

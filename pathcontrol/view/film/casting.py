@@ -31,9 +31,9 @@ def cast_takes(
     Raises:
         InputError: there is no run, or run, robot and task do not belong together.
     """
-    runs = {controller_name(run): run} if isinstance(run, Run) else dict(run)
-    if not runs:
-        raise InputError("there is no run to be filmed; give a run, or several by name: {'name': run, …}")
+    runs = {controller_name(run): run} if isinstance(run, Run) else run
+    if not isinstance(runs, Mapping) or not runs or not all(isinstance(one, Run) for one in runs.values()):
+        raise InputError(f"run = {runs!r}, expected a Run, or several by name: {{'name': run, …}}")
     looks: dict[UrdfSource, list[LinkVisual]] = {}
     takes = []
     for i, (name, one) in enumerate(runs.items()):

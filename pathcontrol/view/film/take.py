@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from pathcontrol.simulation.run import Run
     from pathcontrol.tasks.base import PathTask
 
+_AT_ONCE = 20_000  # samples, so that memory for long runs is not needed twice
+
 
 @dataclass(frozen=True, eq=False)
 class Take:
@@ -85,7 +87,8 @@ class Take:
     def poses(self) -> dict[str, Array]:
         """Poses of the links that are seen, and of the tool, at all samples [m], (k, 4, 4) each."""
         frames = list(dict.fromkeys([*(visual.link for visual in self.visuals), self.tool]))
-        stacked = self.robot.frame_poses(self.q, frames)
+        parts = np.array_split(self.q, -(-len(self.q) // _AT_ONCE))
+        stacked = np.concatenate([self.robot.frame_poses(part, frames) for part in parts])
         return {frame: stacked[:, i] for i, frame in enumerate(frames)}
 
     @property

@@ -7,7 +7,7 @@ class Plane {
     Object.assign(this, { film, clock, plane, time: 0 });
     const read = ({ times, x, y, ...rest }) => ({ ...rest, times: times && film.block(times), x: film.block(x), y: film.block(y) });
     this.desired = plane.desired.map(read);
-    this.traces = plane.traces.map((trace) => ({ ...read(trace), upTo: 0, guess: 0 }));
+    this.traces = plane.traces.map((trace) => ({ ...read(trace), upTo: 0, guess: 0, drawnTo: null }));
     this.points = plane.points.map((point) => ({ ...read(point), guess: 0 }));
     this.moving = [...this.points, ...this.traces];
     this.box = boxOf([...this.desired, ...this.traces, ...this.points]);
@@ -54,7 +54,7 @@ class Plane {
     }
     drawAxes(this.ground.getContext("2d"), this.map, this.plane);
     this.drawDesired(this.ground.getContext("2d"));
-    for (const trace of this.traces) trace.upTo = 0;
+    this.clear();
     this.show(this.time);
   }
 
@@ -77,35 +77,35 @@ class Plane {
   }
 
   show(time) {
+    if (time < this.time) this.clear();
     this.time = time;
     if (!this.map) return;
-    let back = false;
     for (const moving of this.moving) {
       moving.guess = indexAt(moving.times, time, moving.guess);
-      if (moving.guess < moving.upTo) back = true;
-      this.move(moving, time);
+      moving.tip = [this.map.x(valueAt(moving.times, moving.x, time, moving.guess)), this.map.y(valueAt(moving.times, moving.y, time, moving.guess))];
+      moving.dot.style.transform = `translate(${moving.tip[0].toFixed(1)}px, ${moving.tip[1].toFixed(1)}px)`;
     }
-    if (back) this.clear();
-    for (const trace of this.traces) this.extend(trace, trace.guess);
+    for (const trace of this.traces) this.extend(trace);
   }
 
-  // time went back: what was drawn of the future goes
+  // time went back, or the size is another: what was drawn goes
   clear() {
     this.drawn.getContext("2d").clearRect(0, 0, this.plot.clientWidth, this.plot.clientHeight);
-    for (const trace of this.traces) trace.upTo = 0;
+    for (const trace of this.traces) Object.assign(trace, { upTo: 0, drawnTo: null });
   }
 
-  extend(trace, to) {
-    if (to <= trace.upTo) return;
+  // on from where the line ends, to where the dot is
+  extend(trace) {
+    const { x, y, guess, upTo, tip, drawnTo } = trace;
+    if (guess < 0) return;
     const context = this.drawn.getContext("2d");
     Object.assign(context, { strokeStyle: inked(this.film.header.runs[trace.run].color), lineWidth: 1.5, lineJoin: "round" });
-    this.line(context, trace.x, trace.y, trace.upTo, to);
-    trace.upTo = to;
-  }
-
-  move({ dot, times, x, y, guess }, time) {
-    const [left, top] = [this.map.x(valueAt(times, x, time, guess)), this.map.y(valueAt(times, y, time, guess))];
-    dot.style.transform = `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
+    context.beginPath();
+    context.moveTo(...(drawnTo ?? [this.map.x(x[0]), this.map.y(y[0])]));
+    for (let i = upTo + 1; i <= guess; i += 1) context.lineTo(this.map.x(x[i]), this.map.y(y[i]));
+    context.lineTo(...tip);
+    context.stroke();
+    Object.assign(trace, { upTo: guess, drawnTo: tip });
   }
 
   // the moment at which the tool was nearest to the pointer; of several laps the one nearest to now

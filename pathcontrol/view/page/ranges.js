@@ -31,14 +31,14 @@ function widened([low, high]) {
   return [low >= 0 ? 0 : low - more, high <= 0 ? 0 : high + more];
 }
 
-// a little more than the values take, 0 included if it is not far, and limits that values come near to
+// a little more than the values take, 0 included, so that what is small looks small, and limits that values come near to
 function padded([low, high], [floor, ceiling]) {
   if (!(low <= high)) [low, high] = floor <= ceiling ? [floor, ceiling] : [0, 1];
   const near = (limit) => Number.isFinite(limit) && Math.abs(limit) <= NEAR * largest([low, high]);
   if (near(floor)) low = Math.min(low, floor);
   if (near(ceiling)) high = Math.max(high, ceiling);
-  if (low > 0 && low < 0.5 * high) low = 0;
-  if (high < 0 && high > 0.5 * low) high = 0;
+  low = Math.min(low, 0);
+  high = Math.max(high, 0);
   const more = 0.05 * (high - low) || Math.abs(high) / 10 || 1;
   return [low === 0 ? 0 : low - more, high === 0 ? 0 : high + more];
 }
