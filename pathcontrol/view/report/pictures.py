@@ -37,7 +37,8 @@ def pictures(runs: Mapping[str, Run]) -> list[Picture]:
     if len(joints) == 1:
         return [_picture(figure, caption) for caption, figure in _figures(runs)]
     own = {name: _figures({name: run}) for name, run in runs.items()}
-    return [_picture(figure, f"{name}: {caption}") for name, figures in own.items() for caption, figure in figures]
+    found = [_picture(figure, f"{name}: {caption}") for name, figures in own.items() for caption, figure in figures]
+    return sorted(found, key=lambda picture: picture.wide)  # which end a row of those beside one another
 
 
 def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
