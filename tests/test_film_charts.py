@@ -14,6 +14,7 @@ from pathcontrol import Circle, ContinuousTime, ExtendedMotionPlan, Projection, 
 from pathcontrol.analysis.metrics import contour_error, metrics
 from pathcontrol.view.film.charts import MOST_POINTS, Chart, Curve, extremes
 from pathcontrol.view.film.film import Film
+from pathcontrol.view.film.quantities import short_names
 from pathcontrol.view.film.recorder import record
 from pathcontrol.view.film.tables import readable_number
 
@@ -123,6 +124,21 @@ def test_torques_of_one_run_are_shares_of_their_limits(film: Reel, runs: dict[st
         assert chart["lines"][j]["shade"] == j
     limits = [film.block(line["values"]) for line in chart["lines"] if line["role"] == "limit"]
     assert [set(values) for values in limits] == [{100}, {-100}]
+
+
+@pytest.mark.parametrize(
+    ("names", "short"),
+    [
+        (["panda_joint1", "panda_joint2"], ["joint1", "joint2"]),
+        (["shoulder_pan_joint", "wrist_1_joint"], ["shoulder_pan", "wrist_1"]),
+        (["joint_1", "joint_2"], ["joint_1", "joint_2"]),
+        (["a_b"], ["a_b"]),
+        (["_", "__"], ["_", "__"]),
+        (["same", "same"], ["same", "same"]),
+    ],
+)
+def test_joints_are_called_by_what_tells_them_apart(names: list[str], short: list[str]) -> None:
+    assert short_names(names) == short
 
 
 def test_several_runs_show_the_largest_share_of_each(both: Reel, runs: dict[str, Run], arm: RobotModel) -> None:

@@ -273,7 +273,8 @@ def test_a_telephone(file: Path) -> None:
     with opened(file, hash="#t=0", **PHONE) as film:
         assert film("document.documentElement.scrollWidth <= innerWidth")
         for control in film.tab.locator("header button, #stage button, #panel button, select, #scrubber").all():
-            assert control.bounding_box()["height"] >= 44
+            if control.is_visible():
+                assert control.bounding_box()["height"] >= 44
         lefts = {round(chart.bounding_box()["x"]) for chart in film.tab.locator("#charts .chart").all()}
         assert len(lefts) == 1  # one below another
         over = film.tab.locator("#charts .u-over").first
@@ -295,3 +296,26 @@ def test_a_transient_is_shown_on_request(film: Opened, animation: Animation) -> 
     settle(film)
     assert np.abs(film.pixels("#charts .plot >> nth=0") - before).max() > 60
     peak.click()
+
+
+def test_a_small_path_is_seen_from_near(arm: RobotModel, tmp_path: Path) -> None:
+    small = Circle(0.03, 0.06, center=[0.3, 0.9])
+    page_file = record(short_run(arm, small), arm, small).save(tmp_path / "small.html")
+    with opened(page_file, hash=f"#t={DURATION}") as film:
+        button = film.tab.locator("#near")
+        assert button.get_attribute("aria-pressed") == "false"
+        shown = []
+        for view in ("whole", "near", "whole"):
+            settle(film)
+            shown.append(film.pixels("#pane canvas >> nth=0"))
+            button.click()
+            assert button.get_attribute("aria-pressed") == ("true" if view == "whole" else "false")
+        reddish = [((s[..., 0] > s[..., 1] + 60) & (s[..., 2] > s[..., 1])).sum() for s in shown]  # what the tool drew
+        assert reddish[1] > 3 * max(reddish[0], 1)
+        np.testing.assert_array_equal(shown[0], shown[2])
+        assert film.complaints == []
+
+
+def test_a_path_that_fills_the_picture_needs_no_view_from_near(film: Opened) -> None:
+    assert not film.tab.locator("#near").is_visible()
+    press(film, "c")

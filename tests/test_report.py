@@ -14,12 +14,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lxml import etree, html
+from PIL import Image
 from strategies import floats
 
 import pathcontrol as pc
 from pathcontrol import Circle, InputError, RobotModel, Run, metrics
 from pathcontrol.analysis.metrics import UNITS
 from pathcontrol.simulation.origin import Origin
+from pathcontrol.view.report.pictures import pictures
 from pathcontrol.view.report.report import report
 from pathcontrol.view.report.settings import settings as groups_of
 from pathcontrol.view.report.summary import LABELS, measured, readable, rows
@@ -188,6 +190,15 @@ def test_figures_are_images_that_parse(page):
         assert root.tag.endswith("svg")
         assert picture.get("alt")
         assert float(root.get("width").removesuffix("pt")) / 72 * 96 == pytest.approx(int(picture.get("width")), abs=1)
+
+
+def test_a_figure_too_large_as_svg_is_a_png(runs, monkeypatch):
+    monkeypatch.setattr("pathcontrol.view.report.pictures._LARGEST", 0)
+    for picture in pictures({"one": runs["plan"]}):
+        kind, _, data = picture.href.partition(";base64,")
+        assert kind == "data:image/png"
+        image = Image.open(io.BytesIO(base64.b64decode(data)))
+        assert image.width == pytest.approx(picture.width / 96 * 200, abs=2)  # as wide on the page, 200 dots an inch
 
 
 # --- settings ----------------------------------------------------------------------------------------------

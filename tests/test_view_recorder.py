@@ -32,7 +32,7 @@ from pathcontrol import (
 from pathcontrol.view.film.animation import Animation
 from pathcontrol.view.film.camera import picture_axes
 from pathcontrol.view.film.recorder import record
-from pathcontrol.view.film.take import default_tool
+from pathcontrol.view.tool import default_tool
 
 HOSTILE = "</script><script>alert(1)</script>"
 ESCAPED = HOSTILE.replace("<", "&lt;").replace(">", "&gt;")

@@ -17,7 +17,6 @@ from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.sequence import PathSequence
 from pathcontrol.toolpaths.segments import Polyline
-from pathcontrol.view.bodies.visuals import leaf_links
 from pathcontrol.view.figures.limits import aspect, equal_plane, extent
 from pathcontrol.view.figures.lines import curve, drawable
 from pathcontrol.view.figures.shown import Runs, Shown, path_parameters, shown
@@ -34,6 +33,7 @@ from pathcontrol.view.figures.style import (
     style,
 )
 from pathcontrol.view.figures.words import legend
+from pathcontrol.view.tool import default_tool
 
 _AXES = "xyz"
 _MOST_POSES = 50_000
@@ -151,17 +151,10 @@ def wide_axes(points: Sequence[Array]) -> tuple[int, int]:
 
 def _way(one: Shown, robot: RobotModel | None, tool: str | None) -> Way:
     robot = one.run.robot if robot is None else robot
-    frame = _frame(robot, one.task) if tool is None else tool
+    frame = default_tool(robot, one.task) if tool is None else tool
     q = drawable(one.run.array("q")[0])
     some = slice(None, None, -(-len(q) // _MOST_POSES))
     return Way(_positions(robot, q[some], frame), _cutting(one)[some], _desired(one, robot, frame))
-
-
-def _frame(robot: RobotModel, task: PathTask | None) -> str:
-    if isinstance(task, ToolpathTask):
-        return task.frame
-    leaves = leaf_links(robot.source)
-    return [name for name in robot.frame_names if name in leaves][-1]
 
 
 def _positions(robot: RobotModel, q: Array, frame: str) -> Array:

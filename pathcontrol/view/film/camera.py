@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from pathcontrol.view.bodies.shapes import directions
 LOWEST, HIGHEST = np.deg2rad([22.0, 42.0])
 ASIDE = np.deg2rad(20.0)
 LEGEND = 0.1  # of the height of what is seen: room below it
+SMALLEST, SMALL = 1e-4, 0.4  # of the size of the picture: a point, and what deserves a view from near
+LINE_WIDTH = 0.003  # radius of lines in the view from near, of the size of its picture
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -40,6 +43,21 @@ class Camera:
         outermost = np.unique((directions(200) @ seen.T).argmax(axis=1))
         bottom = [0.0, lower[1] - middle[1], 0.0]
         return cls(middle @ axes, axes[2], np.vstack([seen[outermost] - middle, bottom]))
+
+    @property
+    def size(self) -> float:
+        """The larger of width and height of what is seen [m]."""
+        return float(np.ptp(self.outline[:, :2], axis=0).max())
+
+    def header(self) -> dict[str, Any]:
+        """The view as the header of a film has it."""
+        return {name: getattr(self, name).tolist() for name in ("target", "direction", "outline")}
+
+    def seen_from_near(self, near: Camera, width: float) -> dict[str, Any]:
+        """The view and one from near, if that shows what is small here, with lines of a ``width`` [m] made as thin."""
+        if not SMALLEST < near.size / self.size < SMALL:
+            return self.header()
+        return self.header() | {"near": near.header() | {"thickness": min(LINE_WIDTH * near.size / width, 1.0)}}
 
 
 def picture_axes(direction: Array) -> Array:

@@ -10,7 +10,8 @@ from pathcontrol.simulation.run import Run
 from pathcontrol.view.bodies.sticks import stick_figure
 from pathcontrol.view.bodies.visuals import LinkVisual, link_visuals
 from pathcontrol.view.film.palette import run_color
-from pathcontrol.view.film.take import Take, default_tool
+from pathcontrol.view.film.take import Take
+from pathcontrol.view.tool import default_tool
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel, UrdfSource

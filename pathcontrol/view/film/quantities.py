@@ -90,4 +90,20 @@ def _curves(take: Take, index: int, several: bool, values: Array, joints: Sequen
     """A line for each column (k, m), called as the joints are, or as the run if there is only one."""
     if several:
         return [Curve(take.name, take.time, values[:, 0], index)]
-    return [Curve(joint, take.time, values[:, j], index, shade=j) for j, joint in enumerate(joints)]
+    names = short_names(joints)
+    return [Curve(name, take.time, values[:, j], index, shade=j) for j, name in enumerate(names)]
+
+
+def short_names(names: Sequence[str]) -> list[str]:
+    """Names without the words that all of them begin or end with: panda_joint1 is joint1; joint_1 is not 1."""
+    words = [name.split("_") for name in names]
+    if len(names) < 2:
+        return list(names)
+    for drop, tested in ((slice(1, None), 0), (slice(-1), -1)):
+        while len({word[tested] for word in words}) == 1 and all(_says_enough(word[drop]) for word in words):
+            words = [word[drop] for word in words]
+    return ["_".join(word) for word in words]
+
+
+def _says_enough(words: Sequence[str]) -> bool:
+    return any(word and not word.isdigit() for word in words)

@@ -91,10 +91,8 @@ def _picture(film: Film, shots: Sequence[Shot], layout: Layout, ghosted: bool) -
     names = labels(shots, ghosted) if len(shots) > 1 else []
     above = [shift + name["offset"] for shift, name in zip(moved, names, strict=False)]
     camera = Camera.framing(np.concatenate([whole, *np.reshape(above, (-1, 1, 3))]), direction)
-    return stage.header() | {
-        "camera": {name: getattr(camera, name).tolist() for name in ("target", "direction", "outline")},
-        "labels": names,
-    }
+    near = Camera.framing(_all(shot.sight + shift for shot, shift in zip(shots, moved, strict=True)), direction)
+    return stage.header() | {"camera": camera.seen_from_near(near, width), "labels": names}
 
 
 def _all(parts: Iterable[Array]) -> Array:

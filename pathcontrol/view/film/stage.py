@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.bodies.shapes import Color, Sphere
+from pathcontrol.view.bodies.shapes import Color, Mesh, Sphere
 from pathcontrol.view.film.drawing import Line
 from pathcontrol.view.film.film import Film
 from pathcontrol.view.film.ground import ground_grid
@@ -17,7 +17,7 @@ from pathcontrol.view.film.palette import DESIRED, GRID, RAPID
 from pathcontrol.view.film.scene import Scene, absolute, path
 from pathcontrol.view.film.take import Take
 from pathcontrol.view.film.trace import Trace
-from pathcontrol.view.film.tube import dashes, joined, simplified, tube
+from pathcontrol.view.film.tube import SIDES, dashes, joined, simplified, tube
 
 GHOST = 0.35  # opacity of an arm that stands in another
 _FRAMED_POSES = 50
@@ -32,7 +32,7 @@ class Stage:
     Attributes:
         film: keeps the numbers.
         scene: the objects.
-        tracks, growing, on_top: as the header of a film has them.
+        tracks, growing, on_top, tubes: as the header of a film has them.
     """
 
     def __init__(self, film: Film) -> None:
@@ -40,6 +40,7 @@ class Stage:
         self.tracks: list[dict[str, Any]] = []
         self.growing: list[dict[str, Any]] = []
         self.on_top: list[str] = []
+        self.tubes: list[dict[str, Any]] = []
 
     def add_arm(self, index: int, take: Take, shift: Array, *, ghost: bool = False) -> None:
         """Put the links of an arm on stage, moved by ``shift`` [m], (3,), or its ghost in the colour of its run."""
@@ -61,7 +62,7 @@ class Stage:
             self.scene.add_segments(path("lines", index, "desired path"), segments, DESIRED)
         elif cuts:
             tubes = [tube(simplified(points, radius / 24, _MOST_RINGS // len(cuts)), radius) for points in cuts]
-            self.scene.add_line(path("lines", index, "desired path"), joined(tubes), DESIRED, lining=True)
+            self._add_tube(path("lines", index, "desired path"), joined(tubes))
         rapids = [line.points + shift for line in lines if line.rapid]
         if rapids:
             whole = sum(float(np.linalg.norm(np.diff(points, axis=0), axis=-1).sum()) for points in rapids)
@@ -69,11 +70,16 @@ class Stage:
             pieces = np.concatenate([dashes(points, dash) for points in rapids])
             self.scene.add_segments(path("lines", index, "rapids"), pieces, RAPID)
 
+    def _add_tube(self, name: str, mesh: Mesh) -> None:
+        self.scene.add_line(name, mesh, DESIRED, lining=True)
+        self.tubes.append({"path": absolute(name), "sides": SIDES})
+
     def add_trace(self, index: int, line: Trace, times: Array, colors: Array) -> None:
         """Draw what the tool draws by and by, at ``times`` (k,) [s] in ``colors`` (k, 3) of all samples."""
         name = path("lines", index, "path taken")
         self.scene.add_colored_line(name, line.mesh, line.on_vertices(colors))
         rings = self.film.block(times[line.rings])
+        self.tubes.append({"path": absolute(name), "sides": SIDES})
         self.growing.append({"path": absolute(name), "times": rings, "indices": line.indices})
 
     def add_marker(self, name: str, times: Array, positions: Array, color: Color, radius: float) -> None:
@@ -89,7 +95,8 @@ class Stage:
     def header(self) -> dict[str, Any]:
         """The scene and what moves in it, as the header of a film has them."""
         scene = [self.film.block(c, "u1") if isinstance(c, bytes) else c for c in self.scene.commands]
-        return {"scene": scene, "tracks": self.tracks, "growing": self.growing, "on_top": self.on_top}
+        lines = {"growing": self.growing, "tubes": self.tubes}
+        return {"scene": scene, "tracks": self.tracks, "on_top": self.on_top, **lines}
 
     def _move(self, name: str, whole: Track) -> None:
         """Place a name where its track begins, and keep the track if it leads anywhere."""

@@ -12,7 +12,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.view.bodies.shapes import Color
-from pathcontrol.view.bodies.visuals import LinkVisual, leaf_links
+from pathcontrol.view.bodies.visuals import LinkVisual
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel
@@ -108,11 +108,3 @@ class Take:
     @staticmethod
     def _domain(task: PathTask) -> tuple[float, float]:
         return (-np.inf, np.inf) if task.closed else (task.s0, task.s_end)
-
-
-def default_tool(robot: RobotModel, task: PathTask | None = None) -> str:
-    """The frame that follows the drawing, or else the last of the robot's frames that is a link carrying no other."""
-    if isinstance(task, ToolpathTask) and task.frame in robot.frame_names:
-        return task.frame
-    leaves = leaf_links(robot.source)
-    return [name for name in robot.frame_names if name in leaves][-1]

@@ -25,6 +25,7 @@ PARTS = (
     "scene.js",
     "tracks.js",
     "growing.js",
+    "thickness.js",
     "labels.js",
     "picture.js",
     "clock.js",
@@ -43,7 +44,7 @@ PARTS = (
     "printing.js",
     "player.js",
 )
-STYLES = ("vendor/uPlot.min.css", "page.css", "player.css", "charts.css")
+STYLES = ("vendor/uPlot.min.css", "css/page.css", "css/player.css", "css/charts.css")
 
 
 class Section(NamedTuple):
@@ -93,7 +94,7 @@ def _template() -> jinja2.Template:
 @cache
 def _player() -> str:
     """The charts' library with its licence, and our own parts, which share one scope and leave no trace outside it."""
-    own = "\n".join(_own(name) for name in PARTS)
+    own = "\n".join(_own(f"js/{name}") for name in PARTS)
     licence = f"/*! uPlot: {_own('vendor/LICENSE')}*/"
     return _embedded(f'{licence}\n"use strict";\n(() => {{\n{_own("vendor/uPlot.iife.min.js")}\n{own}\n}})();\n')
 

@@ -20,7 +20,7 @@ function keyboard(clock, controls, picture) {
     "-": () => clock.shift(false),
     "−": () => clock.shift(false),
   };
-  const always = { r: () => picture.reset(), t: () => controls.otherTheme(), "?": () => controls.keys.showModal() };
+  const always = { r: () => picture.reset(), c: () => controls.approach(), t: () => controls.otherTheme(), "?": () => controls.keys.showModal() };
   const actions = new Map(Object.entries(clock.duration > 0 ? { ...timed, ...always } : always));
   document.addEventListener("keydown", (event) => {
     const action = actions.get(event.key.length === 1 ? event.key.toLowerCase() : event.key);

@@ -8,6 +8,7 @@ class Caption {
     this.outputs = entries.map((entry) => entry.lastChild);
     this.peak = this.button(onPress);
     this.element.append(heading({ title, unit }), ...entries.filter((_, k) => shown.includes(lines[k])), this.peak);
+    this.element.classList.toggle("many", shown.length > 4);
     this.mark();
   }
 

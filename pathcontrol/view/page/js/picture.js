@@ -8,10 +8,12 @@ class Picture {
       this.viewer.needs_render = true;
       onDirty();
     };
-    this.camera = film.header.camera;
+    this.views = [film.header.camera, film.header.camera.near].filter(Boolean);
+    this.view = 0;
     buildScene(this.viewer, film);
     this.growing = growingLines(this.viewer, film);
     this.moving = [...tracks(this.viewer, film), ...this.growing.values()];
+    this.thickness = new Thickness(this.viewer, film);
     this.labels = labels(this.viewer, film);
     paint(this.viewer);
     themed.push(() => paint(this.viewer));
@@ -38,7 +40,15 @@ class Picture {
 
   reset() {
     this.turned = false;
-    look(this.viewer, this.pane, this.camera);
+    look(this.viewer, this.pane, this.views[this.view]);
+    this.thickness.set(this.views[this.view].thickness ?? 1);
+  }
+
+  // the whole scene, or the path from near
+  approach() {
+    this.view = (this.view + 1) % this.views.length;
+    this.reset();
+    return this.view > 0;
   }
 
   show(time) {

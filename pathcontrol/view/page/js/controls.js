@@ -3,7 +3,7 @@
 class Controls {
   constructor(clock, picture) {
     Object.assign(this, { clock, picture, said: -1 });
-    for (const id of ["play", "scrubber", "time", "speed", "camera", "theme", "help", "keys"]) {
+    for (const id of ["play", "scrubber", "time", "speed", "camera", "near", "theme", "help", "keys"]) {
       this[id] = document.getElementById(id);
     }
     this.digits = clock.duration >= 100 ? 1 : 2 - Math.min(Math.floor(Math.log10(clock.duration || 1)), 0);
@@ -15,6 +15,9 @@ class Controls {
   connect() {
     this.camera.hidden = this.theme.disabled = this.help.disabled = false;
     this.camera.addEventListener("click", () => this.picture.reset());
+    this.near.hidden = this.picture.views.length < 2;
+    this.keys.querySelectorAll(".near").forEach((line) => (line.hidden = this.near.hidden));
+    this.near.addEventListener("click", () => this.approach());
     this.theme.addEventListener("click", () => this.otherTheme());
     this.help.addEventListener("click", () => this.keys.showModal());
     document.getElementById("close-keys").addEventListener("click", () => this.keys.close());
@@ -31,6 +34,10 @@ class Controls {
     for (const rate of SPEEDS) speed.add(new Option(`${rate}×`, rate));
     speed.addEventListener("change", () => (clock.speed = Number(speed.value)));
     this.time.append(textElement("span", ""), textElement("small", ` / ${this.seconds(clock.duration)} s`));
+  }
+
+  approach() {
+    this.near.setAttribute("aria-pressed", this.picture.approach());
   }
 
   otherTheme() {
