@@ -231,7 +231,7 @@ def test_metrics_are_those_of_each_run_in_degrees(both: Reel, runs: dict[str, Ru
         numbers = metrics(run)
         assert rows["‖e_p‖ peak"][i] == f"{np.rad2deg(numbers['e_p_peak'][0]):.4g} deg"
         assert rows["‖e_v‖ RMS"][i] == f"{np.rad2deg(numbers['e_v_rms'][0]):.4g} deg/s"
-        assert rows["torque demand peak"][i] == f"{numbers['tau_demand_peak'][0]:.4g} N m"
+        assert rows["torque demand, peak"][i] == f"{numbers['tau_demand_peak'][0]:.4g} N m"
         assert len(rows) == len(numbers)
 
 

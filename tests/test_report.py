@@ -19,12 +19,12 @@ from strategies import floats
 
 import pathcontrol as pc
 from pathcontrol import Circle, InputError, RobotModel, Run, metrics
-from pathcontrol.analysis.metrics import UNITS
+from pathcontrol.analysis.metrics import LABELS, UNITS
 from pathcontrol.simulation.origin import Origin
 from pathcontrol.view.report.pictures import pictures
 from pathcontrol.view.report.report import report
 from pathcontrol.view.report.settings import settings as groups_of
-from pathcontrol.view.report.summary import LABELS, measured, readable, rows
+from pathcontrol.view.report.summary import measured, readable, rows
 
 HOSTILE = "</script><img src=x onerror=alert(1)>&amp;\"'<b>"
 SI = {"deg": np.pi / 180, "deg/s": np.pi / 180, "s": 1.0, "N m": 1.0, "": 1.0, "mm": 1e-3, "µm": 1e-6}

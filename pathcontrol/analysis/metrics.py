@@ -26,6 +26,27 @@ UNITS = {
     "path_time": "s",
     "end_error": "rad",
 }
+#: what each metric is called where a person reads, in the order in which they are shown
+LABELS = {
+    "tool_deviation_peak": "tool from the drawing, peak",
+    "tool_deviation_rms": "tool from the drawing, RMS",
+    "smoothing_deviation": "smooth curves from the drawing",
+    "e_p_peak": "‖e_p‖ peak",
+    "e_p_rms": "‖e_p‖ RMS",
+    "e_v_peak": "‖e_v‖ peak",
+    "e_v_rms": "‖e_v‖ RMS",
+    "contour_error_peak": "contour error, peak",
+    "contour_error_rms": "contour error, RMS",
+    "lag_error_peak": "lag error, peak",
+    "lag_error_rms": "lag error, RMS",
+    "gamma_distance_peak": "distance to Γ, peak",
+    "gamma_distance_rms": "distance to Γ, RMS",
+    "speed_ratio": "speed, mean σ̇ over mean ϑ",
+    "settling_time": "settling time of ‖e_p‖",
+    "path_time": "time for the path",
+    "end_error": "‖e_p‖ at the end",
+    "tau_demand_peak": "torque demand, peak",
+}
 
 
 def steady_state(run: Run, fraction: float = 0.5) -> Run:

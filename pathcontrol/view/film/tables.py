@@ -8,26 +8,11 @@ from typing import Any
 import numpy as np
 
 from pathcontrol.analysis.deviation import toolpath_metrics
-from pathcontrol.analysis.metrics import UNITS, metrics
+from pathcontrol.analysis.metrics import LABELS, UNITS, metrics
 from pathcontrol.view.film.settings import settings
 from pathcontrol.view.film.take import Take
 
 _NEEDED = {"e_p", "e_v", "sdot", "tau_demand"}
-_NAMES = {
-    "e_p": "‖e_p‖",
-    "e_v": "‖e_v‖",
-    "lag_error": "lag error",
-    "contour_error": "contour error",
-    "gamma_distance": "distance to Γ",
-    "tool_deviation": "distance from the drawing",
-    "smoothing_deviation": "smooth curves from the drawing",
-    "speed_ratio": "mean rate of s over that of ϑ",
-    "settling_time": "settling time",
-    "tau_demand": "torque demand",
-    "path_time": "time for the path",
-    "end_error": "error at the end",
-}
-_KINDS = {"_peak": " peak", "_rms": " RMS"}
 
 
 def tables(takes: Sequence[Take]) -> list[dict[str, Any]]:
@@ -59,7 +44,7 @@ def _measured(take: Take) -> dict[str, str]:
     if take.task is None or not set(take.run.data.data_vars) >= _NEEDED or _idle(take):
         return {}
     numbers = _numbers(take)
-    return {_name(name): readable_number(values[0], _unit(take, name)) for name, values in numbers.items()}
+    return {LABELS[name]: readable_number(numbers[name][0], _unit(take, name)) for name in LABELS if name in numbers}
 
 
 def _idle(take: Take) -> bool:
@@ -74,13 +59,6 @@ def _numbers(take: Take) -> dict[str, Any]:
     if take.toolpath is not None:
         return toolpath_metrics(take.run, take.robot, take.toolpath)
     return metrics(take.run, take.task)
-
-
-def _name(metric: str) -> str:
-    for suffix, words in _KINDS.items():
-        if metric.endswith(suffix):
-            return _NAMES.get(metric.removesuffix(suffix), metric) + words
-    return _NAMES.get(metric, metric)
 
 
 def _unit(take: Take, metric: str) -> str:
