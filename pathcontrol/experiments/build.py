@@ -79,6 +79,7 @@ def build(experiment: Experiment, base_dir: str | Path = ".") -> Setup:
     with np.errstate(all="ignore"):  # absurd numbers overflow in the checks, which find that themselves
         model, plant = build_arms(experiment, base_dir)
         task = build_task(experiment.task, model, base_dir, experiment.to_radians)
+        _refuse_joints(experiment.output, model)
         controllers = _controllers(experiment, model, task)
         duration, laps = build_duration(experiment, task)
         loop = _loop(experiment, plant, float(np.max(duration)))
@@ -91,6 +92,15 @@ def _controllers(experiment: Experiment, model: RobotModel, task: PathTask) -> t
     law, made = experiment.controller.arguments(experiment.to_radians), _LAWS[experiment.controller.type]
     with keyed("controller", law):
         return tuple(made(model, path, **law) for path in (task.paths if isinstance(task, PathSequence) else [task]))
+
+
+def _refuse_joints(output: Output, robot: RobotModel) -> None:
+    """What a figure shows has to be there: better refused now than after the simulation."""
+    if output.figure_joints is not None and max(output.figure_joints) >= robot.n:
+        raise ExperimentError(
+            f"output.figure_joints = {list(output.figure_joints)}, expected indices from 0 to {robot.n - 1}: "
+            f"{', '.join(robot.joint_names)}"
+        )
 
 
 def _loop(experiment: Experiment, plant: RobotModel, duration: float) -> SampledLoop | ContinuousTime:
