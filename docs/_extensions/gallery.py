@@ -1,7 +1,7 @@
-"""Runs the scripts of ``examples/`` while the documentation is built, and puts the animations they write beside the pages.
+"""Runs the scripts of ``examples/`` while the documentation is built, and keeps the animations that they write.
 
-A page of the gallery says which script is its own by including it. A script runs again when it, or the library, is newer than what
-it wrote. Without the extra ``robots`` its scripts are left out, with a warning.
+A page of the gallery belongs to the script of its name. A script runs again when it, or the library, is newer than
+what it wrote. Without the extra ``robots`` its scripts are left out, with a warning.
 """
 
 import shutil
