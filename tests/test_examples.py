@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 EXAMPLES = {
     "paper_experiments": 10,
-    "motion_control": 10,
+    "motion_control": 12,
     "custom_task": 3,
     "six_joints": 3,
     "lettering": 3,
