@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pathcontrol.cli import main
@@ -125,6 +127,8 @@ def test_run_prints_metrics_and_writes_beside_its_name(tmp_path):
     assert (tmp_path / report["written"]["data"]).parent == tmp_path / "results" / "mine"
     again = call("run", "mine.toml", cwd=tmp_path)
     assert "settling_time" in again.stdout
+    peak = re.search(r"e_p_peak +([\d.]+) deg", again.stdout)[1]
+    assert float(peak) == pytest.approx(np.rad2deg(report["metrics"]["e_p_peak"][0]), rel=1e-3)
     assert "speed_ratio" in again.stdout
 
 

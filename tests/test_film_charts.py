@@ -12,11 +12,11 @@ from test_film import Reel, made_up_run, reel
 
 from pathcontrol import Circle, ContinuousTime, ExtendedMotionPlan, Projection, RobotModel, Run, load_robot, simulate
 from pathcontrol.analysis.metrics import contour_error, metrics
+from pathcontrol.analysis.readable import readable_number
 from pathcontrol.view.film.charts import MOST_POINTS, Chart, Curve, extremes
 from pathcontrol.view.film.film import Film
 from pathcontrol.view.film.quantities import short_names
 from pathcontrol.view.film.recorder import record
-from pathcontrol.view.film.tables import readable_number
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -226,7 +226,7 @@ def table(film: Reel, title: str) -> tuple[list[str], dict[str, list[str]]]:
 
 def test_metrics_are_those_of_each_run_in_degrees(both: Reel, runs: dict[str, Run]) -> None:
     columns, rows = table(both, "Metrics")
-    assert columns == ["", "path", "motion"]
+    assert columns == ["peaks and RMS of the second half of the time", "path", "motion"]
     for i, run in enumerate(runs.values()):
         numbers = metrics(run)
         assert rows["‖e_p‖ peak"][i] == f"{np.rad2deg(numbers['e_p_peak'][0]):.4g} deg"

@@ -23,8 +23,9 @@ from pathcontrol.analysis.metrics import LABELS, UNITS
 from pathcontrol.simulation.origin import Origin
 from pathcontrol.view.report.pictures import pictures
 from pathcontrol.view.report.report import report
+from pathcontrol.view.report.sections import _section
 from pathcontrol.view.report.settings import settings as groups_of
-from pathcontrol.view.report.summary import measured, readable, rows
+from pathcontrol.view.report.summary import Row, measured, readable, rows
 
 HOSTILE = "</script><img src=x onerror=alert(1)>&amp;\"'<b>"
 SI = {"deg": np.pi / 180, "deg/s": np.pi / 180, "s": 1.0, "N m": 1.0, "": 1.0, "mm": 1e-3, "µm": 1e-6}
@@ -101,6 +102,16 @@ def test_every_metric_stands_in_the_page_as_it_was_measured(page, runs):
 
 def test_every_metric_has_a_name():
     assert set(LABELS) == set(UNITS)
+
+
+def test_every_metric_is_explained(page, runs):
+    every = [Row(label, "", ()) for label in LABELS.values()]
+    summary = _section("Summary", runs=runs, facts=[], rows=every, files=[]).body
+    explained = [words(term) for term in html.fromstring(f"<div>{summary}</div>").xpath("//dt")]
+    labels = [label.replace("_", "") for label in LABELS.values()]
+    assert [label for label in labels if not any(word in label for word in explained)] == []
+    told = [words(term) for term in page.xpath("//dl[@class='words']//dt")]
+    assert {"contour error", "lag error"} < set(told) < set(explained)  # no toolpath, none of its words
 
 
 def test_facts(page):

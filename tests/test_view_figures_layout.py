@@ -26,6 +26,7 @@ from pathcontrol import (
     path_figure,
     phase_figure,
     speed_figure,
+    tool_figure,
     torque_figure,
 )
 from pathcontrol.view.figures.style import style
@@ -200,6 +201,17 @@ def test_what_does_not_move_is_drawn():
         run.data[name] *= 0.0
     for name, figure in figures(run).items():
         assert_readable(figure, name)
+
+
+def test_the_first_drawing_is_as_good_as_the_third(arm):
+    """Whatever is written first, SVG or PNG, has its labels where they belong."""
+    several = {name: made(2, samples=300, scale=scale) for name, scale in (("a name that is long", 1.0), ("b", 1.6))}
+    for name, figure in (figures(several) | {"tool": tool_figure(several, arm)}).items():
+        places = []
+        for _ in range(3):
+            drawn(figure)
+            places.append([axes.get_position(original=True).bounds for axes in figure.axes])
+        np.testing.assert_allclose(places[0], places[2], rtol=0, atol=1e-3, err_msg=name)
 
 
 def test_an_ellipse_that_is_nearly_a_line_keeps_its_shape():

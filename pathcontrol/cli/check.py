@@ -16,7 +16,10 @@ from pathcontrol.errors import UnknownNameError
 @click.option("--lock", multiple=True, metavar="JOINT", help="A joint that will be locked; repeat for more.")
 @json_option
 def command(file: str, lock: tuple[str, ...], as_json: bool) -> None:
-    """Report what is wrong or odd in a URDF: a FILE.urdf, or the name of a known robot. Exits with 1 on errors."""
+    """Report what is wrong or odd in a URDF.
+
+    FILE is a URDF file or the name of a known robot. Exits with 1 on errors.
+    """
     from pathcontrol.robot.loading import find_urdf
     from pathcontrol.robot.urdf import check_urdf
 

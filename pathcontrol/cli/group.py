@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import signal
 import sys
 from collections.abc import Iterator
@@ -21,14 +22,19 @@ class Group(click.Group):
         try:
             return super().invoke(ctx)
         except PathControlError as error:
-            click.echo(f"error: {_printable(str(error))}", err=True)
+            click.echo(f"error: {printable(str(error))}", err=True)
+            sys.exit(2)
+        except OSError as error:  # a full disk, a folder that nobody may write to
+            if error.errno == errno.EPIPE:  # whom we tell has gone; click ends quietly
+                raise
+            click.echo(f"error: {printable(str(error))}; no half-written file is left behind", err=True)
             sys.exit(2)
         except KeyboardInterrupt:
             click.echo("interrupted; no half-written file is left behind", err=True)
             sys.exit(130)
 
 
-def _printable(message: str) -> str:
+def printable(message: str) -> str:
     """``message`` without the control characters that a file may have put into it, which a terminal would obey."""
     return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in message)
 

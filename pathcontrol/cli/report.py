@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from pathcontrol.cli.group import import_all, json_option, open_option, open_page
-from pathcontrol.cli.saved import load_runs, robot_option, runs_argument
+from pathcontrol.cli.saved import check_out, load_runs, robot_option, runs_argument
 from pathcontrol.cli.view import layout_option, one_or_all, tell
 
 
@@ -44,6 +44,7 @@ def command(
     import_all()
     from pathcontrol.view.report.report import report
 
+    check_out(out, runs)
     loaded = load_runs(runs, robot)
     words = ["pathcontrol", "report", *map(str, runs), "--out", str(out)]
     for option, value in (("--title", title), ("--layout", layout if layout != "beside" else None), ("--robot", robot)):

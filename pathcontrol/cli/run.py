@@ -48,14 +48,14 @@ def _animation(done: Outcome, out: Path) -> Path:
 
 
 def _tell(done: Outcome, as_json: bool) -> None:
-    from pathcontrol.analysis.metrics import UNITS
+    from pathcontrol.cli.tables import metric_lines
 
     written = {name: str(path) for name, path in done.written.items()}
     if as_json:
         click.echo(json.dumps({"run": repr(done.run), "metrics": done.metrics, "written": written}))
         return
     click.echo(repr(done.run))
-    for name, values in done.metrics.items():
-        click.echo(f"  {name:22} {', '.join('never' if v is None else f'{v:.4g}' for v in values)} {UNITS[name]}")
+    for line in metric_lines(done.metrics, done.run):
+        click.echo(f"  {line}")
     for name, path in written.items():
         click.echo(f"  {name}: {path}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pathcontrol.errors import InputError
+from pathcontrol.errors import InputError, PathControlError
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel
@@ -40,6 +40,16 @@ def load_runs(paths: Sequence[Path], robot: str | None) -> dict[str, Run]:
         raise InputError(f"{', '.join(repr(str(path)) for path in twice)} are one run; name each run once")
     arm = None if robot is None else load_robot(robot)
     return {name: _with_robot(Run.load(file), file, arm) for name, file in zip(names(files), files, strict=True)}
+
+
+def check_out(out: Path | None, paths: Sequence[Path]) -> None:
+    """What is written is not what is read.
+
+    Raises:
+        InputError: ``out`` is the file of one of the runs.
+    """
+    if out is not None and out.resolve() in [run_file(path).resolve() for path in paths]:
+        raise InputError(f"{str(out)!r} is the run itself, which would be lost; name another file to write")
 
 
 def run_file(path: Path) -> Path:
@@ -77,15 +87,22 @@ def _parts(file: Path) -> tuple[str, ...]:
 
 
 def _with_robot(run: Run, file: Path, robot: RobotModel | None) -> Run:
+    """The run, with ``robot`` if it does not know its own; errors name its file."""
     from pathcontrol.simulation.origin import Origin
     from pathcontrol.simulation.run import Run
+    from pathcontrol.view.film.take import check_filmed
 
     try:
         _ = run.robot
-    except InputError as error:
+    except PathControlError as error:
         if robot is None:
             raise InputError(f"{str(file)!r}: {error}; on the command line with --robot FILE") from error
-        return Run(run.data, run.config, Origin(lambda: robot, lambda: run.task))
+        known = run
+        run = Run(known.data, known.config, Origin(lambda: robot, lambda: known.task))
+    try:
+        check_filmed(run, run.robot, run.task)
+    except PathControlError as error:
+        raise InputError(f"{str(file)!r}: {error}") from error
     return run
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 from rich.text import Text
+
+if TYPE_CHECKING:
+    from pathcontrol.simulation.run import Run
 
 _MOST_ROWS = 50
 
@@ -26,6 +30,19 @@ def peaks_table(summary: dict[str, Any]) -> Table:
             ]
         table.add_row(*row)
     return table
+
+
+def metric_lines(metrics: dict[str, Any], run: Run) -> list[str]:
+    """A line for each metric, with a value for each rollout; null, of what is not finite, is a dash."""
+    from pathcontrol.analysis.readable import readable_number, unit_of
+
+    lines = []
+    for name, values in metrics.items():
+        unit = unit_of(name, run)
+        absent = math.inf if name == "settling_time" else math.nan
+        words = (readable_number(absent if value is None else value, unit) for value in values)
+        lines.append(f"{name:22} {', '.join(words)}")
+    return lines
 
 
 def toolpath_table(content: dict[str, Any]) -> list[Text | Table]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pathcontrol.cli.group import import_all, json_option, open_option, open_page
-from pathcontrol.cli.saved import load_runs, robot_option, run_file, runs_argument
+from pathcontrol.cli.group import import_all, json_option, open_option, open_page, printable
+from pathcontrol.cli.saved import check_out, load_runs, robot_option, run_file, runs_argument
 
 if TYPE_CHECKING:
     from pathcontrol.simulation.run import Run
@@ -59,6 +59,7 @@ def command(
     import_all()
     from pathcontrol.view.film.recorder import record
 
+    check_out(out, runs)
     loaded = load_runs(runs, robot)
     animation = record(one_or_all(loaded), rollout=rollout, layout=layout, tool=tool)  # type: ignore[arg-type]
     written = {}
@@ -90,6 +91,6 @@ def tell(runs: Mapping[str, Run], written: Mapping[str, Path], as_json: bool) ->
         click.echo(json.dumps({"runs": {name: repr(run) for name, run in runs.items()}, "written": files}))
         return
     for name, run in runs.items():
-        click.echo(f"{name}: {run!r}")
+        click.echo(printable(f"{name}: {run!r}"))
     for kind, path in written.items():
         click.echo(f"  {kind}: {path} ({path.stat().st_size / 1e6:.1f} MB)")

@@ -14,37 +14,10 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.origin import Origin, Stored
+from pathcontrol.simulation.record import table
 from pathcontrol.simulation.run_file import read_run, write_run
+from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 from pathcontrol.tasks.base import PathTask
-
-#: every variable of a run: (dimensions, unit, meaning); sliding joints have m for rad and N for N m
-VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "q": (("rollout", "time", "joint"), "rad", "joint position"),
-    "qd": (("rollout", "time", "joint"), "rad/s", "joint velocity"),
-    "q_measured": (("rollout", "time", "joint"), "rad", "joint position as the controller sees it"),
-    "qd_measured": (("rollout", "time", "joint"), "rad/s", "joint velocity as the controller sees it"),
-    "tau_demand": (("rollout", "time", "joint"), "N m", "torque the control law asks for"),
-    "tau": (("rollout", "time", "joint"), "N m", "torque that acts from this moment on"),
-    "s": (("rollout", "time"), "1", "path parameter"),
-    "sdot": (("rollout", "time"), "1/s", "rate of the path parameter"),
-    "e_p": (("rollout", "time", "joint"), "rad", "position error q_d(s) - q as the controller sees it"),
-    "e_v": (
-        ("rollout", "time", "joint"),
-        "rad/s",
-        "velocity error q_d'(s) theta(s) - qd as the controller sees it",
-    ),
-    "regular": (("rollout", "time"), "1", "0 where the path parameter was undefined and the last one kept"),
-}
-#: what a run says about how it went: (dimensions, unit, meaning); coordinates of its data
-OUTCOMES: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "status": (("rollout",), "", "finished, or running when the time was up"),
-    "finish_time": (("rollout",), "s", "when the rollout was finished, NaN while it is running"),
-    "laps": (("rollout",), "1", "whole laps of a closed path"),
-    "path_index": (("time",), "1", "which path of a sequence is followed"),
-    "path_status": (("path",), "", "finished, running when its time was up, or waiting for its turn"),
-    "path_offset": (("path",), "1", "what s of a sequence is more than that of the path"),
-    "path_finish_time": (("path",), "s", "when the path of a sequence was finished, NaN if it was not"),
-}
 
 
 class Run:
@@ -98,7 +71,7 @@ class Run:
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{name}: {size}" for name, size in self.data.sizes.items())
-        return f"Run({self.config.get('controller', {}).get('controller', '?')}; {sizes}{self._ended()})"
+        return f"Run({table(self.config, 'controller').get('controller', '?')}; {sizes}{self._ended()})"
 
     def _ended(self) -> str:
         finished = self.status == "finished"

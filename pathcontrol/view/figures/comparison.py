@@ -64,7 +64,7 @@ def comparison_figure(
         run: runs of one arm by their names.
         task: the path; by default each run's own, where it knows it.
         joints: the two joints of the plane; by default the two that move the most. An arm of one joint has no plane.
-        limits: largest torques (n,); by default those of each run's own robot. Where there are none, nor is the row.
+        limits: largest torques (n,); by default those clamped to, else the robot's. Without any there is no row.
         rollout: which rollout of each run.
 
     Raises:

@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError
@@ -36,6 +38,7 @@ PEAK_LOOK: Look = {"linewidth": 0.8, "linestyle": DASHED}
 COLUMN, PAGE = 3.5, 7.2
 FORMATS = ("svg", "png", "pdf")
 SMALL = 7.0  # pt, of numbers on axes and in insets
+_LAYOUTS, _SETTLED = 6, 5e-4  # at most so many, shares of the figure
 
 _STYLE: Any = {
     "font.size": 8.0,
@@ -71,9 +74,31 @@ def style() -> Iterator[None]:
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure [in]."""
-    figure = Figure(figsize=(width, height), layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03)  # type: ignore[union-attr, call-arg]
-    return figure
+    return Figure(figsize=(width, height), layout=_SettledLayout(w_pad=0.03, h_pad=0.03))
+
+
+class _SettledLayout(ConstrainedLayoutEngine):
+    """Repeated until nothing moves: with equal scales on both axes, labels are off the page after the first time."""
+
+    def execute(self, fig: Any) -> None:
+        before = _places(fig)
+        for _ in range(_LAYOUTS):
+            super().execute(fig)
+            places = _places(fig)
+            if np.allclose(places, before, rtol=0.0, atol=_SETTLED):
+                break
+            before = places
+        _round_places(fig)
+
+
+def _places(figure: Figure) -> list[tuple[float, ...]]:
+    return [axes.get_position(original=True).bounds for axes in figure.axes]
+
+
+def _round_places(figure: Figure) -> None:
+    """The solver differs in the last bit from draw to draw, and names inside SVG files come from these numbers."""
+    for axes in figure.axes:
+        axes._set_position(np.round(axes.get_position(original=True).bounds, 9).tolist())  # type: ignore[attr-defined]
 
 
 def dressed(axes: Axes) -> Axes:

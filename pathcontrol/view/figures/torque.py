@@ -16,6 +16,7 @@ from pathcontrol.view.figures.lines import drawable, series
 from pathcontrol.view.figures.shown import Runs, Shown, of_one_arm, own_robot, readable, shown
 from pathcontrol.view.figures.style import COLUMN, LIMIT_LOOK, PAGE, SMALL, dressed, new_figure, style
 from pathcontrol.view.figures.words import joint_label, legend
+from pathcontrol.view.torque_limits import torque_limits as clamped_limits
 
 _BEYOND = "#ECECEC"  # what lies beyond a limit
 _TALL_COLUMN = 3  # panels
@@ -28,7 +29,7 @@ def torque_figure(run: Runs, limits: ArrayLike | None = None, rollout: int = 0) 
 
     Args:
         run: a run, or several of one arm by their names.
-        limits: largest torques (n,); by default those of the runs' own robot. Infinite ones are not drawn.
+        limits: largest torques (n,); by default those it was clamped to, else its robot's. Infinite ones are not drawn.
         rollout: which rollout of each run.
 
     Raises:
@@ -56,12 +57,10 @@ def torque_figure(run: Runs, limits: ArrayLike | None = None, rollout: int = 0) 
 
 
 def torque_limits(one: Shown, limits: ArrayLike | None = None) -> Array:
-    """Largest torques (n,), as given or of the run's own robot; infinite where there is none, or none is known."""
-    n = len(one.joints)
+    """Largest torques (n,): given, clamped to, or of the run's own robot; infinite where none is known."""
     if limits is None:
-        robot = own_robot(one.run)
-        limits = np.full(n, np.inf) if robot is None or robot.n != n else robot.limits.effort
-    given = np.abs(joint_array("limits", limits, n))
+        return clamped_limits(one.run, own_robot(one.run))
+    given = np.abs(joint_array("limits", limits, len(one.joints)))
     return np.where(drawable(given) > 0, given, np.inf)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from pathcontrol.errors import InputError
+from pathcontrol.simulation.record import table
 from pathcontrol.simulation.run import Run
 from pathcontrol.view.bodies.sticks import stick_figure
 from pathcontrol.view.bodies.visuals import LinkVisual, link_visuals
@@ -41,6 +42,7 @@ def cast_takes(
         arm, path = one.robot if robot is None else robot, one.task if task is None else task
         if arm.source not in looks:
             looks[arm.source] = link_visuals(arm.source, FINENESS) or stick_figure(arm.source)
+        path = path if "s" in one.data else None  # where on it the arm should be is not known
         frame = default_tool(arm, path) if tool is None else tool
         part, visuals = one.rollout(rollout), looks[arm.source]
         takes.append(Take(str(name), part, arm, path, frame, visuals, run_color(i), one.rollouts))
@@ -49,7 +51,7 @@ def cast_takes(
 
 def controller_name(run: Run) -> str:
     """What a run is called that has no other name: its controller."""
-    return str(run.config.get("controller", {}).get("controller", "unknown controller"))
+    return str(table(run.config, "controller").get("controller", "unknown controller"))
 
 
 def film_title(takes: Sequence[Take], rollout: int) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,16 @@ class Line:
 
     points: Array
     rapid: bool = False
+
+
+def alike(lines: Sequence[Line], others: Sequence[Line]) -> bool:
+    """Whether lines are the same to the eye, whatever objects they come from."""
+    return len(lines) == len(others) and all(
+        one.rapid == other.rapid
+        and one.points.shape == other.points.shape
+        and np.allclose(one.points, other.points, rtol=1e-6, atol=1e-9)
+        for one, other in zip(lines, others, strict=True)
+    )
 
 
 def desired_lines(take: Take) -> list[Line]:

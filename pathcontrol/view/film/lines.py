@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.view.film.drawing import alike
 from pathcontrol.view.film.legend import tops
 from pathcontrol.view.film.palette import DESIRED_POINT, PLAIN, scale_colors
 from pathcontrol.view.film.shot import Shot
@@ -23,7 +24,7 @@ def add_lines(stage: Stage, shots: Sequence[Shot], shifts: Array, width: float, 
     """
     ends = tops([shot.error for shot in shots])
     for i, (shot, shift) in enumerate(zip(shots, shifts, strict=True)):
-        if not (ghosted and any(shot.take.task is other.take.task for other in shots[:i])):
+        if not (ghosted and any(alike(shot.lines, other.lines) for other in shots[:i])):
             stage.add_desired(i, shot.lines, 2 * width, shift)
         share, colors = _painted(shot, ends, ghosted)
         line = trace(shot.take.time, shot.take.tool_positions + shift, share, width)

@@ -10,7 +10,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
-from pathcontrol.view.film.drawing import Line, desired_joints
+from pathcontrol.view.film.drawing import Line, alike, desired_joints
 from pathcontrol.view.film.error import readable
 from pathcontrol.view.film.film import Film
 from pathcontrol.view.film.keys import line_keys
@@ -51,7 +51,7 @@ class Plane:
             "x_label": self.labels[0],
             "y_label": self.labels[1],
             "unit": self.unit,
-            "desired": [_still(film, line, fine) for lines in _once(self.desired, shots) for line in lines],
+            "desired": [_still(film, line, fine) for lines in _once(self.desired) for line in lines],
             "traces": [_moving(film, i, shot.take, taken, fine) for i, (shot, taken, _) in moving],
             "points": [_moving(film, i, shot.take, p, fine) for i, (shot, _, p) in moving if p is not None],
         }
@@ -106,10 +106,9 @@ def _placed(x: Array, pose: Array) -> Array:
     return (x - pose[:3, 3]) @ pose[:3, :3]
 
 
-def _once(desired: list[list[Line]], shots: Sequence[Shot]) -> list[list[Line]]:
-    """The lines of each task, which several runs may share, once."""
-    first = {id(shot.take.task): i for i, shot in reversed(list(enumerate(shots)))}
-    return [desired[i] for i in first.values()]
+def _once(desired: list[list[Line]]) -> list[list[Line]]:
+    """The lines of each path, which several runs may share, once."""
+    return [lines for i, lines in enumerate(desired) if not any(alike(lines, other) for other in desired[:i])]
 
 
 def _still(film: Film, line: Line, fine: float) -> dict[str, Any]:

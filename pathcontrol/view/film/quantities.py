@@ -12,11 +12,10 @@ from pathcontrol.view.film.charts import Chart, Curve
 from pathcontrol.view.film.error import readable
 from pathcontrol.view.film.shot import Shot
 from pathcontrol.view.film.take import Take
+from pathcontrol.view.torque_limits import torque_limits
 
 #: title, unit and lines of one run
 _Entry: TypeAlias = tuple[str, str, list[Curve]]
-
-_NO_LIMIT = 1e6  # N m: files that know no limit say some huge number, or zero
 
 
 def charts(shots: Sequence[Shot]) -> list[Chart]:
@@ -66,7 +65,8 @@ def _torques(shot: Shot, index: int, several: bool) -> list[_Entry]:
     take = shot.take
     if "tau" not in take.run.data:
         return []
-    tau, limits, joints = take.run.array("tau")[0], torque_limits(take), take.robot.joint_names
+    tau, joints = take.run.array("tau")[0], take.robot.joint_names
+    limits = torque_limits(take.run, take.robot)
     limited = np.flatnonzero(np.isfinite(limits))
     if not len(limited):
         lines = np.abs(tau).max(-1)[:, None] if several else tau
@@ -77,13 +77,6 @@ def _torques(shot: Shot, index: int, several: bool) -> list[_Entry]:
     ends, signs = take.time[[0, -1]], (1.0,) if several else (1.0, -1.0)
     curves += [Curve("limit", ends, np.full(2, 100.0 * sign), index, "limit") for sign in signs]
     return [("largest torque / limit" if several else "torque / limit", "%", curves)]
-
-
-def torque_limits(take: Take) -> Array:
-    """Limits of the torques [N m], (n,): those that were clamped to, else the robot's; inf without one."""
-    clamped = take.run.config.get("loop", {}).get("torque_limits")
-    limits = np.asarray(clamped if isinstance(clamped, list) else take.robot.limits.effort, dtype=np.float64)
-    return np.where((limits > 0) & (limits < _NO_LIMIT), limits, np.inf)
 
 
 def _curves(take: Take, index: int, several: bool, values: Array, joints: Sequence[str]) -> list[Curve]:

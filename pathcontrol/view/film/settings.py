@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from pathcontrol.simulation.record import laws, table
 from pathcontrol.view.film.take import Take
 
 _NAMES = {
@@ -24,17 +25,15 @@ _ELSEWHERE = {"controller", "robot", "task", "sequence"}
 def settings(take: Take) -> dict[str, str]:
     """Robot, controller, gains, plant, loop, duration and versions of a run, by their names."""
     config = take.run.config
-    controller = _mapping(config.get("controller"))
-    law = controller.get("sequence", [controller])[0]
-    chosen = {name: value for name, value in law.items() if name not in _ELSEWHERE}
-    versions = ", ".join(f"{name} {number}" for name, number in _mapping(config.get("versions")).items())
+    chosen = {name: value for name, value in laws(config)[0].items() if name not in _ELSEWHERE}
+    versions = ", ".join(f"{name} {number}" for name, number in table(config, "versions").items())
     found: dict[str, Any] = {
         "robot": take.robot.name,
-        "controller": controller.get("controller"),
-        "task": None if take.task is None else _mapping(take.task.describe()).get("task"),
+        "controller": table(config, "controller").get("controller"),
+        "task": None if take.task is None else table({"of": take.task.describe()}, "of").get("task"),
         **{_NAMES.get(name, name): value for name, value in chosen.items()},
-        "friction of the plant": _friction(_mapping(config.get("plant")).get("friction")),
-        **{_NAMES.get(name, name): value for name, value in _mapping(config.get("loop")).items()},
+        "friction of the plant": _friction(table(config, "plant")),
+        **{_NAMES.get(name, name): value for name, value in table(config, "loop").items()},
         "duration": f"{take.duration:g} s, {len(take.time)} samples",
         "rollout": f"{_rollout(take)} of {take.rollouts}" if take.rollouts > 1 else None,
         "versions": versions or None,
@@ -42,18 +41,15 @@ def settings(take: Take) -> dict[str, str]:
     return {name: _words(value) for name, value in found.items() if value is not None}
 
 
-def _mapping(value: Any) -> Mapping[str, Any]:
-    return value if isinstance(value, Mapping) else {}
-
-
 def _rollout(take: Take) -> int:
     return int(take.run.data["rollout"].to_numpy()[0])
 
 
-def _friction(law: Any) -> str | None:
-    """Names of the laws that a friction law is made of."""
-    terms = _mapping(law).get("terms", [law])
-    names = [str(_mapping(term).get("law", "")) for term in terms]
+def _friction(plant: Mapping[str, Any]) -> str | None:
+    """Names of the laws that the friction law of the plant is made of."""
+    law = table(plant, "friction")
+    terms = law["terms"] if isinstance(law.get("terms"), list) else [law]
+    names = [str(term.get("law", "")) for term in terms if isinstance(term, Mapping)]
     return " + ".join(name for name in names if name) or None
 
 

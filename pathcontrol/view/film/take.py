@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pathcontrol.simulation.run import Run
     from pathcontrol.tasks.base import PathTask
 
+_ABSURD = 1e6  # rad, or m: beyond any arm
 _AT_ONCE = 20_000  # samples, so that memory for long runs is not needed twice
 
 
@@ -47,14 +48,7 @@ class Take:
     rollouts: int = 1
 
     def __post_init__(self) -> None:
-        run, robot, task = self.run, self.robot, self.task
-        joints = tuple(str(name) for name in run.data["joint"].to_numpy())
-        if joints != robot.joint_names:
-            raise InputError(f"the run is of the joints {joints}, {robot.name} has {robot.joint_names}")
-        if task is not None and task.n != robot.n:
-            raise InputError(f"the task is for {task.n} joints, {robot.name} has {robot.n}")
-        if not np.isfinite(run.array("q")).all():
-            raise InputError("the run has joint positions that are not finite")
+        check_filmed(self.run, self.robot, self.task)
 
     @cached_property
     def time(self) -> Array:
@@ -108,3 +102,26 @@ class Take:
     @staticmethod
     def _domain(task: PathTask) -> tuple[float, float]:
         return (-np.inf, np.inf) if task.closed else (task.s0, task.s_end)
+
+
+def check_filmed(run: Run, robot: RobotModel, task: PathTask | None) -> None:
+    """Run, robot and task belong together, and the run can be shown.
+
+    Raises:
+        InputError: they do not, or the times or the joint positions of the run make no film.
+    """
+    joints = tuple(str(name) for name in run.data["joint"].to_numpy())
+    if joints != robot.joint_names:
+        raise InputError(f"the run is of the joints {joints}, {robot.name} has {robot.joint_names}")
+    if task is not None and task.n != robot.n:
+        raise InputError(f"the task is for {task.n} joints, {robot.name} has {robot.n}")
+    if not len(run.time):
+        raise InputError("the run has no samples")
+    if not (np.isfinite(run.time).all() and (np.diff(run.time) > 0).all()):
+        raise InputError("the times of the run do not increase")
+    if not (np.abs(run.array("q")) <= _ABSURD).all():
+        first = run.time[int(np.argmax(~(np.abs(run.array("q")) <= _ABSURD).all((0, 2))))]
+        raise InputError(
+            f"the run has joint positions that are not finite, or beyond {_ABSURD:g} rad, at {first:.4g} s; to show "
+            "what was before, cut the data: run.with_data(run.data.sel(time=slice(0, …)))"
+        )

@@ -71,7 +71,7 @@ def page(film: Film, title: Sequence[str], sections: Sequence[Section] = ()) -> 
         sections: what to say below; with three or more there is a table of contents.
     """
     player, (viewer, viewer_digest) = _player(), _viewer()
-    return _template().render(
+    text = _template().render(
         policy=_policy([_digest(player), viewer_digest]),
         title=list(title),
         sections=sections,
@@ -80,6 +80,7 @@ def page(film: Film, title: Sequence[str], sections: Sequence[Section] = ()) -> 
         viewer=viewer,
         film=film.text(),
     )
+    return text.encode(errors="backslashreplace").decode()  # halves of characters cannot be written to a file
 
 
 def _own(name: str) -> str:

@@ -6,7 +6,9 @@ import base64
 import csv
 import io
 import json
+import math
 import re
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +16,7 @@ import numpy as np
 from pathcontrol.simulation.run import Run
 
 _MOST_ROWS = 501
+_LONGEST = 100  # letters of the name of a file
 _SIGNALS = ("q", "qd", "e_p", "e_v", "tau", "s", "sdot")
 
 
@@ -26,12 +29,23 @@ class Download(NamedTuple):
 
 def json_file(name: str, value: Any) -> Download:
     """A file with a value as JSON."""
-    return text_file(name, json.dumps(value, indent=2, ensure_ascii=False) + "\n", "application/json")
+    return text_file(name, json.dumps(plain(value), indent=2, ensure_ascii=False) + "\n", "application/json")
+
+
+def plain(value: Any) -> Any:
+    """``value`` as JSON can hold it: what is not finite is null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def text_file(name: str, text: str, kind: str = "text/plain") -> Download:
     """A file with a text."""
-    return Download(file_name(name), f"data:{kind};charset=utf-8;base64,{base64.b64encode(text.encode()).decode()}")
+    # half a character becomes \\ud800, as JSON writes it
+    encoded = base64.b64encode(text.encode(errors="backslashreplace")).decode()
+    return Download(file_name(name), f"data:{kind};charset=utf-8;base64,{encoded}")
 
 
 def signals_file(name: str, run: Run) -> Download:
@@ -51,4 +65,5 @@ def signals_file(name: str, run: Run) -> Download:
 
 def file_name(name: str) -> str:
     """``name`` without what file systems do not take."""
-    return re.sub(r"[^\w.+-]+", "_", name).strip("._") or "file"
+    found = re.sub(r"[^\w.+-]+", "_", name).strip("._")
+    return found[: _LONGEST // 2] + found[-_LONGEST // 2 :] if len(found) > _LONGEST else found or "file"

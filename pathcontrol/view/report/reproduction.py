@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from pathcontrol.simulation.record import laws, table
 from pathcontrol.simulation.run import Run
 from pathcontrol.view.report.downloads import Download, file_name, text_file
 from pathcontrol.view.report.settings import Setting
@@ -45,7 +46,7 @@ def recipe(name: str, run: Run) -> Recipe:
 
 def versions(configs: Sequence[Mapping[str, Any]]) -> list[Setting]:
     """The versions of the packages that each run was made with."""
-    said = [config.get("versions", {}) for config in configs]
+    said = [table(config, "versions") for config in configs]
     names = dict.fromkeys(name for one in said for name in one)
     return [Setting(str(name), tuple(str(one.get(name, "–")) for one in said)) for name in names]
 
@@ -55,11 +56,9 @@ def script(name: str, run: Run) -> str:
 
     Empty where the configuration is not one that :func:`simulate` or :func:`simulate_sequence` has written.
     """
-    law, loop = run.config.get("controller"), run.config.get("loop")
-    if run.task is None or not isinstance(law, Mapping) or not isinstance(loop, Mapping):
-        return ""
-    laws = law.get("sequence", [law])
-    if not _known(laws, loop):
+    loop, several = table(run.config, "loop"), laws(run.config)
+    sequence = isinstance(run.config.get("duration"), list)
+    if run.task is None or not _known(several, loop) or not _ended(run.config, sequence):
         return ""
     closed = _call(f"pc.{_LOOPS[loop['loop']]}", [], _without(loop, ["loop"]))
     lines = [
@@ -67,7 +66,7 @@ def script(name: str, run: Run) -> str:
         f'saved = pc.Run.load("{file_name(name)}.nc")  # knows its robot and its path',
         f"loop = {closed}",
         'q, qd = saved.array("q")[:, 0], saved.array("qd")[:, 0]',
-        *(_of_sequence if "sequence" in law else _of_one)(laws[0], run.config),
+        *(_of_sequence if sequence else _of_one)(several[0], run.config),
     ]
     text = "\n".join(lines) + "\n"
     return f"from math import inf\n\n{text}" if re.search(r"\binf\b", text) else text
@@ -82,26 +81,35 @@ def _of_one(law: Mapping[str, Any], config: Mapping[str, Any]) -> list[str]:
 def _of_sequence(law: Mapping[str, Any], config: Mapping[str, Any]) -> list[str]:
     made = _call(f"pc.{law['controller']}", ["saved.robot", "path"], _without(law, _NOT_ARGUMENTS))
     times = config["duration"]
-    duration = times[0] if len(set(times)) == 1 else times
+    duration = times[0] if all(each == times[0] for each in times) else times
     settings = {"duration": duration, "laps": config["laps"], "task": _Name("saved.task"), "loop": _Name("loop")}
     run = _call("pc.simulate_sequence", ["laws", "q", "qd"], settings)
     return [f"laws = [{made} for path in saved.task]", f"run = {run}"]
 
 
-def _known(laws: Sequence[Mapping[str, Any]], loop: Mapping[str, Any]) -> bool:
+def _known(several: Sequence[Mapping[str, Any]], loop: Mapping[str, Any]) -> bool:
     """Whether the laws are one of this package with the same gains, and the loop is one of this package."""
-    alike = all(_without(law, ["robot", "task"]) == _without(laws[0], ["robot", "task"]) for law in laws)
-    names = [*laws[0], *loop]  # of arguments: from a file, and soon in a script
+    first = several[0]
+    alike = all(_without(law, ["robot", "task"]) == _without(first, ["robot", "task"]) for law in several)
+    names = [*first, *loop]  # of arguments: from a file, and soon in a script
     return (
         alike
-        and laws[0].get("controller") in _LAWS
-        and loop.get("loop") in _LOOPS
+        and first.get("controller") in _LAWS
+        and loop.get("loop") in list(_LOOPS)
         and all(name.isidentifier() for name in names)
     )
 
 
-def _without(table: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    return {key: value for key, value in table.items() if key not in keys}
+def _ended(config: Mapping[str, Any], sequence: bool) -> bool:
+    """Whether the configuration says when a simulation ends, of one path or of a sequence of them."""
+    law, times = table(config, "controller"), config.get("duration")
+    if sequence:  # one path of it, taken out, has no configuration of its own
+        return "sequence" in law and bool(times) and "laps" in config
+    return "sequence" not in law and isinstance(times, int | float) and {"laps", "until"} <= config.keys()
+
+
+def _without(entries: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+    return {key: value for key, value in entries.items() if key not in keys}
 
 
 class _Name(str):

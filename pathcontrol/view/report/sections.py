@@ -18,7 +18,7 @@ from pathcontrol.view.report.downloads import Download, json_file, signals_file
 from pathcontrol.view.report.pictures import pictures
 from pathcontrol.view.report.reproduction import recipe, versions
 from pathcontrol.view.report.settings import settings
-from pathcontrol.view.report.summary import facts, measured, plain, rows
+from pathcontrol.view.report.summary import facts, measured, rows
 
 
 def sections(runs: Mapping[str, Run], made_by: str) -> list[Section]:
@@ -76,7 +76,7 @@ def _symbols(text: str) -> Markup:
 
 def _metrics_file(numbers: Mapping[str, Mapping[str, Any]]) -> Download:
     units = {key: UNITS[key] for values in numbers.values() for key in values}
-    return json_file("metrics.json", plain({"metrics": numbers, "units": units}))
+    return json_file("metrics.json", {"metrics": numbers, "units": units})
 
 
 def _signals(runs: Mapping[str, Run]) -> list[Download]:

@@ -13,6 +13,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.metrics import LABELS, UNITS, metrics, peak, rms, steady_state
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.simulation.record import table
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.sequence import PathSequence
 
@@ -86,8 +87,7 @@ def _path(run: Run) -> str:
 
 def _law(run: Run) -> Mapping[str, Any]:
     """What the configuration, which may be anyone's, says of the law."""
-    law = run.config.get("controller")
-    return law if isinstance(law, Mapping) else {}
+    return table(run.config, "controller")
 
 
 def _outcome(run: Run) -> str:
@@ -152,12 +152,3 @@ def _best(badness: Callable[[float], float] | None, values: Mapping[str, float],
         return set()
     least = min(finite, key=lambda name: badness(finite[name]))
     return {name for name, text in texts.items() if text == texts[least]}
-
-
-def plain(value: Any) -> Any:
-    """``value`` as JSON can hold it: what is not finite is null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -12,14 +12,29 @@ class Label {
     this.half = [this.element.offsetWidth / 2 + RIM, this.element.offsetHeight / 2 + RIM];
   }
 
-  place(width, height) {
+  // others: the labels that have their places
+  place(width, height, others) {
     const { point, element, half } = this;
     point.fromArray(this.offset).applyMatrix4(this.node.matrixWorld).project(this.viewer.camera);
-    const x = within(((1 + point.x) / 2) * width, half[0], width);
-    const y = within(((1 - point.y) / 2) * height, half[1], height);
-    element.style.visibility = point.z < 1 ? "" : "hidden"; // behind the eye
-    element.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -50%)`;
+    this.seen = point.z < 1; // not behind the eye
+    this.x = within(((1 + point.x) / 2) * width, half[0], width);
+    this.y = beside(this, within(((1 - point.y) / 2) * height, half[1], height), others);
+    element.style.visibility = this.seen ? "" : "hidden";
+    element.style.transform = `translate(${this.x.toFixed(1)}px, ${this.y.toFixed(1)}px) translate(-50%, -50%)`;
   }
+}
+
+function placeLabels(labels, width, height) {
+  labels.forEach((label, i) => label.place(width, height, labels.slice(0, i).filter((other) => other.seen)));
+}
+
+// the height y if no other label is there, else above or below the others
+function beside({ x, half }, y, others) {
+  const apart = (other, k) => half[k] + other.half[k] - RIM;
+  const free = (at) => others.every((o) => Math.abs(o.x - x) >= apart(o, 0) || Math.abs(o.y - at) >= apart(o, 1) - 0.1);
+  const above = others.map((other) => other.y - apart(other, 1)).filter((at) => at >= half[1]);
+  const below = others.map((other) => other.y + apart(other, 1));
+  return [y, ...above, ...below].find(free) ?? y;
 }
 
 // not cut off at the rim of the picture

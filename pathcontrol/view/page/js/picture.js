@@ -62,7 +62,7 @@ class Picture {
 
   render() {
     this.viewer.render();
-    for (const label of this.labels) label.place(this.width, this.height);
+    placeLabels(this.labels, this.width, this.height);
   }
 
   // column-major, in the base frame with z up
