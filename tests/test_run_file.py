@@ -39,9 +39,9 @@ from pathcontrol.analysis.deviation import tool_positions
 from pathcontrol.experiments.runner import run_experiment
 from pathcontrol.experiments.template import example_text
 from pathcontrol.robot.recipe import recipe_of
-from pathcontrol.simulation.contour_recipe import contour_of, contour_recipe
-from pathcontrol.simulation.run_file import read_run, write_run
-from pathcontrol.simulation.shelf import Shelf
+from pathcontrol.simulation.saved.contours import contour_of, contour_recipe
+from pathcontrol.simulation.saved.netcdf import read_run, write_run
+from pathcontrol.simulation.saved.shelf import Shelf
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.toolpaths.arc import Arc
 from pathcontrol.toolpaths.bezier import Bezier

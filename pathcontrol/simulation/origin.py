@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.shelf import Shelf
+from pathcontrol.simulation.saved.shelf import Shelf
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.sequence import PathSequence
@@ -78,7 +78,7 @@ class Origin:
 
 def _recipe(task: PathTask | None, shelf: Shelf, upto: float) -> dict[str, Any] | None:
     """That of the task, or a warning: no run is lost because its path is odd."""
-    from pathcontrol.simulation.task_recipe import task_recipe  # knows every kind of task: only files need that
+    from pathcontrol.simulation.saved.tasks import task_recipe  # knows every kind of task: only files need that
 
     if task is None:
         return None
@@ -97,7 +97,7 @@ def _robot(stored: Stored) -> RobotModel | None:
 
 
 def _task(stored: Stored) -> PathTask | None:
-    from pathcontrol.simulation.task_recipe import task_of
+    from pathcontrol.simulation.saved.tasks import task_of
 
     recipe = _part_of(stored, "task")
     return None if recipe is None else task_of(recipe, Shelf(stored.numbers))

@@ -15,7 +15,7 @@ from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.origin import Origin, Stored
 from pathcontrol.simulation.record import table
-from pathcontrol.simulation.run_file import read_run, write_run
+from pathcontrol.simulation.saved.netcdf import read_run, write_run
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 from pathcontrol.tasks.base import PathTask
 

@@ -6,6 +6,8 @@ from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.transforms import PathSection
 
+MOST_LAPS = 10_000  # each is a piece of the path in which the nearest point is looked for
+
 
 class Laps(PathSection):
     """So many laps of a closed path from its s0 on, as an open path with the same parameter.
@@ -15,11 +17,13 @@ class Laps(PathSection):
         laps: how often it is gone round, a whole number from 1.
 
     Raises:
-        InputError: the path is not closed.
+        InputError: the path is not closed, or there are too many laps.
     """
 
     def __init__(self, path: PathTask, laps: int) -> None:
         if path.period is None:
             raise InputError(f"laps = {laps}, but {type(path).__name__} is no closed path; expected one with a period")
+        if not 1 <= laps <= MOST_LAPS:
+            raise InputError(f"laps = {laps}, expected a whole number from 1 to {MOST_LAPS}")
         self.laps = laps
         super().__init__(path, path.s0, path.s0 + laps * path.period)

@@ -112,10 +112,6 @@ def _rows(runs: Sequence[Shown], limits: ArrayLike | None) -> list[_Row]:
     ]
 
 
-def _share_limits(drawn: Sequence[Array]) -> tuple[float, float]:
-    return 0.0, max(110.0, 1.1 * extent(drawn)[1])
-
-
 def _norm_row(one: Shown, name: str) -> _Row:
     return _Row(
         norm_label(name, norms(one, name)[1]),

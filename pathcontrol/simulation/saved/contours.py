@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
-from pathcontrol.simulation.shelf import Shelf
+from pathcontrol.simulation.saved.shelf import Shelf
 from pathcontrol.toolpaths.arc import Arc
 from pathcontrol.toolpaths.bezier import Bezier
 from pathcontrol.toolpaths.contour import Contour

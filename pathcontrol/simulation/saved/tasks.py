@@ -15,8 +15,8 @@ from pathcontrol.cartesian.recorded_toolpath import RecordedToolpath
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.table import TabulatedProfile
-from pathcontrol.simulation.contour_recipe import contour_of, contour_recipe
-from pathcontrol.simulation.shelf import Shelf
+from pathcontrol.simulation.saved.contours import contour_of, contour_recipe
+from pathcontrol.simulation.saved.shelf import Shelf
 from pathcontrol.tasks.base import PathTask, Reprofiled
 from pathcontrol.tasks.curves import Circle, Ellipse, Line, Lissajous
 from pathcontrol.tasks.laps import Laps
