@@ -17,7 +17,7 @@ from test_film import Reel, made_up_run, played, reel
 from pathcontrol import Circle, RobotModel, Run, load_robot
 from pathcontrol.view.film.camera import picture_axes
 from pathcontrol.view.film.layout import shifts
-from pathcontrol.view.film.recorder import record
+from pathcontrol.view.film.recorder import MOST_GHOSTS, record
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -158,6 +158,14 @@ def test_ghosts_stand_in_the_first_arm_see_through_and_in_the_colours_of_their_r
     assert [e["label"] for e in film.header["legend"] if e["kind"] == "line"] == ["desired path", "first", "second"]
     heights = [label["offset"][2] for label in film.header["labels"]]
     assert heights[1] > heights[0]
+
+
+def test_a_crowd_of_ghosts_is_named_by_the_legend_only(arm: RobotModel, circle: Circle) -> None:
+    runs = {f"run {i}": swinging(arm) for i in range(MOST_GHOSTS + 1)}
+    crowd, few = (record(some, task=circle, layout="ghosted").film.header for some in (runs, dict([*runs.items()][1:])))
+    assert crowd["labels"] == []
+    assert [label["text"] for label in few["labels"]] == [*runs][1:]
+    assert {entry["label"] for entry in crowd["legend"]} >= runs.keys()
 
 
 def test_a_lone_run_is_no_ghost(arm: RobotModel, circle: Circle) -> None:

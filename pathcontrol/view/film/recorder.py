@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from pathcontrol.simulation.run import Run
     from pathcontrol.tasks.base import PathTask
 
+MOST_GHOSTS = 6  # with a label each: those of more would hide the arm, and the legend names them anyway
+
 
 def record(
     run: Run | Mapping[str, Run],
@@ -88,7 +90,8 @@ def _picture(film: Film, shots: Sequence[Shot], layout: Layout, ghosted: bool) -
         stage.add_arm(i, shot.take, shift, ghost=ghosted and i > 0)
     add_lines(stage, shots, moved, width, ghosted)
     add_markers(stage, shots, moved, width)
-    names = labels(shots, ghosted) if len(shots) > 1 else []
+    labelled = 1 < len(shots) <= (MOST_GHOSTS if ghosted else len(shots))
+    names = labels(shots, ghosted) if labelled else []
     above = [shift + name["offset"] for shift, name in zip(moved, names, strict=False)]
     camera = Camera.framing(np.concatenate([whole, *np.reshape(above, (-1, 1, 3))]), direction)
     near = Camera.framing(_all(shot.sight + shift for shot, shift in zip(shots, moved, strict=True)), direction)

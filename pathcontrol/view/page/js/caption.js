@@ -9,6 +9,7 @@ class Caption {
     this.peak = this.button(onPress);
     this.element.append(heading({ title, unit }), ...entries.filter((_, k) => shown.includes(lines[k])), this.peak);
     this.element.classList.toggle("many", shown.length > 4);
+    this.element.classList.toggle("crowd", shown.length > 10); // the legend of the picture names them
     this.mark();
   }
 

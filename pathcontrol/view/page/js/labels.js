@@ -49,6 +49,7 @@ function labels(viewer, film) {
 // what each colour of the picture is
 function showLegend(film) {
   const list = document.getElementById("legend");
+  list.classList.toggle("many", (film.header.legend || []).length > 10); // more than there is room for
   for (const entry of film.header.legend || []) {
     const item = document.createElement("li");
     if (entry.kind === "scale") item.append(...scaleOf(entry));
