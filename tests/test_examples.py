@@ -65,6 +65,7 @@ def test_the_readmes_example_runs(tmp_path, monkeypatch):
         "triangle.png",
         "triangle.html",
         "triangle.nc",
+        "triangle-report.html",
     }
 
 
