@@ -5,6 +5,8 @@ Every message names the value, what was expected and what to try.
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class PathControlError(Exception):
     """Root of all errors raised on purpose by :mod:`pathcontrol`."""
@@ -44,4 +46,12 @@ class ExperimentError(PathControlError, ValueError):
 
 
 class SimulationError(PathControlError, RuntimeError):
-    """A simulation cannot go on; the message says at which time and why."""
+    """A simulation cannot go on; the message says at which time and why.
+
+    Attributes:
+        run: the :class:`Run` up to there, where all rollouts diverged; else ``None``.
+    """
+
+    def __init__(self, message: str, run: Any = None) -> None:
+        super().__init__(message)
+        self.run = run

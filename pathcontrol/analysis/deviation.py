@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.known import known_toolpath
+from pathcontrol.analysis.known import known_toolpath, where_known
 from pathcontrol.analysis.metrics import peak, rms
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.robot.model import RobotModel
@@ -21,9 +21,9 @@ def tool_positions(run: Run, robot: RobotModel | None = None, frame: str | None 
 
     By default of the run's own robot, and of the frame that follows its toolpath.
     """
-    robot = run.robot if robot is None else robot
-    frame = known_toolpath(run, None).frame if frame is None else frame
-    return robot.frame_pose(run.array("q"), frame)[..., :3, 3]
+    arm = run.robot if robot is None else robot
+    name = known_toolpath(run, None).frame if frame is None else frame
+    return where_known(lambda q: arm.frame_pose(q, name)[..., :3, 3], run.array("q"))
 
 
 def tool_deviation(
@@ -47,10 +47,10 @@ def tool_deviation(
     contours = known_toolpath(run, None).contours if contours is None else contours
     x = tool_positions(run, robot, frame)
     if len(contours) == 1 or "path_index" not in run.data.coords:
-        return np.min([contour.distance(x) for contour in contours], axis=0)
+        return np.min([where_known(contour.distance, x) for contour in contours], axis=0)
     which, deviation = run["path_index"].to_numpy(), np.empty(x.shape[:-1])
     for i in np.unique(which):
-        deviation[:, which == i] = contours[i].distance(x[:, which == i])
+        deviation[:, which == i] = where_known(contours[i].distance, x[:, which == i])
     return deviation
 
 

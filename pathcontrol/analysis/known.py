@@ -1,7 +1,12 @@
-"""What a run knows of its path, where the caller does not say."""
+"""What a run knows: its path, where the caller does not say, and numbers, where its rollouts have not diverged."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import numpy as np
+
+from pathcontrol._arrays import Array
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
@@ -33,3 +38,18 @@ def known_toolpath(run: Run, task: ToolpathTask | None) -> ToolpathTask:
             "it to simulate_sequence(…, task=…)"
         )
     return found
+
+
+def where_known(function: Callable[..., Array], *arrays: Array) -> Array:
+    """``function`` (k,) or (k, n) of arrays (rollout, time, …), one moment a row, where all are numbers; else NaN.
+
+    So no path is asked where it is at a NaN, which a rollout that diverged leaves behind.
+    """
+    moments = arrays[0].shape[:2]
+    known = np.all([np.isfinite(a).reshape(*moments, -1).all(-1) for a in arrays], axis=0)
+    if known.all():
+        return function(*arrays)
+    found = function(*(a[known] for a in arrays)) if known.any() else np.empty(0)
+    values = np.full(moments + found.shape[1:], np.nan)
+    values[known] = found
+    return values

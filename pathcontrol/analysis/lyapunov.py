@@ -55,8 +55,10 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     e_p, e_v = run.array("e_p"), run.array("e_v")
     if isinstance(controller, ExtendedMotionPlan):
         s, K_p, K_v = run.array("s"), _over_time(controller.K_p), _over_time(controller.K_v)
+        # where a rollout has diverged its errors are NaN, whatever the path does
+        tangent = controller.point(np.where(np.isfinite(s), s, controller.task.s0)).dq_d
         k = np.where(controller.timed(s), 0.0, controller.k[..., None])
-        return _extended(K_p, K_v, k, e_p, e_v, controller.point(s).dq_d)
+        return _extended(K_p, K_v, k, e_p, e_v, tangent)
     if isinstance(controller, Projection):
         return _projected(_over_time(controller.k_p), _over_time(controller.K_v), e_p, e_v)
     raise InputError(

@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.analysis.gamma import distance_to_gamma
-from pathcontrol.analysis.known import known_task
+from pathcontrol.analysis.known import known_task, where_known
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
@@ -73,8 +73,8 @@ def contour_error(run: Run, task: PathTask | None = None) -> Array:
 
     The path is ``run.task`` unless another is given.
     """
-    task, q = known_task(run, task), run.array("q")
-    return np.linalg.norm(task.q_d(task.sigma_bar(q)) - q, axis=-1)
+    task = known_task(run, task)
+    return where_known(lambda q: np.linalg.norm(task.q_d(task.sigma_bar(q)) - q, axis=-1), run.array("q"))
 
 
 def lag_error(run: Run, task: PathTask | None = None) -> Array:
@@ -82,18 +82,24 @@ def lag_error(run: Run, task: PathTask | None = None) -> Array:
 
     The path is ``run.task`` unless another is given.
     """
-    task, s = known_task(run, task), run.array("s")
-    tangent = task.dq_d(s)
-    along = ((task.q_d(s) - run.array("q")) * tangent).sum(-1)
-    return along / np.linalg.norm(tangent, axis=-1)
+    task = known_task(run, task)
+
+    def lag(s: Array, q: Array) -> Array:
+        tangent = task.dq_d(s)
+        return ((task.q_d(s) - q) * tangent).sum(-1) / np.linalg.norm(tangent, axis=-1)
+
+    return where_known(lag, run.array("s"), run.array("q"))
 
 
 def settling_time(values: Array, time: Array, band: float) -> Array:
-    """The time [s] from which ``values`` (rollout, time) stay within ``band``, (rollout,); inf where they never do."""
+    """The time [s] from which ``values`` (rollout, time) stay within ``band``, (rollout,).
+
+    It is inf where they never do, and NaN where some are no numbers.
+    """
     outside = np.abs(values) > scalar("band", band, positive=True)
     last = values.shape[-1] - 1 - np.argmax(outside[:, ::-1], axis=-1)
     after = np.append(time, np.inf)[last + 1]
-    return np.where(outside.any(-1), after, time[0])
+    return np.where(np.isnan(values).any(-1), np.nan, np.where(outside.any(-1), after, time[0]))
 
 
 def end_error(run: Run, task: PathTask | None = None) -> Array:
@@ -122,20 +128,25 @@ def metrics(
     ``fraction`` of the time; there also the mean rate of s over the mean of ϑ, 1 for an arm that is as fast as it
     should be and 0 for one that is stuck; settling time [s] of ‖e_p‖ into ``band`` [rad]; largest torque demand [N m].
     Contour error and distance to Γ are left out for paths that neither end nor repeat. Open paths have the time [s]
-    after which they were finished, and the :func:`end_error` [rad], each NaN where they were not.
+    after which they were finished, and the :func:`end_error` [rad], each NaN where they were not. All numbers of a
+    rollout that diverged are NaN.
     """
     task, late = known_task(run, task), steady_state(run, fraction)
     signals = {"e_p": late.norm("e_p"), "e_v": late.norm("e_v"), "lag_error": np.abs(lag_error(late, task))}
     try:
         signals["contour_error"] = contour_error(late, task)
-        signals["gamma_distance"] = np.asarray(distance_to_gamma(task, late.array("q"), late.array("qd")))
+        signals["gamma_distance"] = where_known(
+            lambda q, qd: np.asarray(distance_to_gamma(task, q, qd)), late.array("q"), late.array("qd")
+        )
     except TaskError:
         pass  # no nearest point on an endless path
     values = {f"{name}_peak": peak(v) for name, v in signals.items()}
     values |= {f"{name}_rms": rms(v) for name, v in signals.items()}
-    values["speed_ratio"] = late.array("sdot").mean(-1) / task.at(late.array("s")).theta.mean(-1)
+    theta = where_known(lambda s: task.at(s).theta, late.array("s"))
+    values["speed_ratio"] = late.array("sdot").mean(-1) / theta.mean(-1)
     values["settling_time"] = settling_time(run.norm("e_p"), run.time, band)
     values["tau_demand_peak"] = np.abs(run.array("tau_demand")).max((1, 2))
     if np.isfinite(task.s_end):
         values |= {"path_time": run.finish_time, "end_error": end_error(run, task)}
-    return {name: value.tolist() for name, value in values.items()}
+    sound = run.status != "diverged"
+    return {name: np.where(sound, value, np.nan).tolist() for name, value in values.items()}

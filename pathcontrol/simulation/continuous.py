@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.integrate import LSODA
 
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller, ControlOutput
-from pathcontrol.errors import SimulationError
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.divergence import NO_NUMBERS, STOPPED, Divergence, sound
 from pathcontrol.simulation.finish import Finish
 from pathcontrol.simulation.modes import ContinuousTime, torque_limits
 from pathcontrol.simulation.recorder import Recorder
@@ -51,46 +52,94 @@ class ContinuousArm:
         robot: the arm.
         q: joint positions it starts at [rad], (N, n).
         qd: joint velocities it starts with [rad/s], (N, n).
+
+    Attributes:
+        divergence: which rollouts have diverged, at the time since the present controller took over.
     """
 
     def __init__(self, mode: ContinuousTime, robot: RobotModel, q: Array, qd: Array) -> None:
         torque_limits(mode, robot)
         self.q, self.qd = q, qd
         self._mode, self._robot, self._period = mode, robot, mode.output_period
+        self.divergence = Divergence(q, qd)
 
     def run(self, controller: Controller, duration: float, finish: Finish | None, progress: bool) -> dict[str, Array]:
         """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
         loop, recorder = ClosedLoop(controller, self._robot, self._mode), Recorder()
+        lost = self.divergence = Divergence(self.q, self.qd)
         start = np.concatenate([self.q, self.qd, controller.start(self.q, self.qd)], axis=-1)
         time = self._period * np.arange(max(1, round(duration / self._period)) + 1)
         with progress_bar("integrating", duration, progress) as update:
-            for t, y in zip(time, _solution(loop, start, time, update), strict=False):
+            for t, y in zip(time, _Solution(loop, start, lost).at(time, update), strict=False):
                 self.q, self.qd, _ = loop.split(y)
                 out, tau = loop.control(t, y)
                 recorder.write(self.q, self.qd, Reading(self.q, self.qd), out, tau)
-                if finish is not None and finish(t, out.s, self.qd):
+                lost.look_at_torque(t, out.tau)
+                if lost.all or (finish is not None and finish(t, out.s, self.qd, lost.lost)):
                     break
-        return recorder.arrays()
+        arrays = recorder.arrays()
+        lost.erase(arrays, time)
+        return arrays
 
 
-def _solution(loop: ClosedLoop, start: Array, time: Array, update: Callable[[float], None]) -> Iterator[Array]:
-    """States (N, 2n + m) at each of ``time``, no further integrated than they are asked for."""
+class _Solution:
+    """The states of a batch over time; rollouts that diverge are taken out of it, and the others go on from there.
 
-    def rate(t: float, y: Array) -> Array:
+    Args:
+        loop: the vector field.
+        start: the state it starts from, (N, 2n + m).
+        lost: which rollouts have diverged.
+    """
+
+    def __init__(self, loop: ClosedLoop, start: Array, lost: Divergence) -> None:
+        self._loop, self._start, self._lost = loop, start, lost
+        self._odd = lost.lost  # rows whose rate was no number in the last step
+        # the integrator's norm averages over rollouts: tighten it so that each one alone keeps the tolerance
+        share, band = np.sqrt(max(1, len(start))), start.shape[1] - 1
+        rtol, atol = max(loop.mode.rtol / share, 1e-13), loop.mode.atol / share
+        self._settings = {"rtol": rtol, "atol": atol, "lband": band, "uband": band}
+
+    def at(self, time: Array, update: Callable[[float], None]) -> Iterator[Array]:
+        """States (N, 2n + m) at each of ``time``, no further integrated than they are asked for."""
+        t, y, given = 0.0, self._start, 1
+        yield self._start
+        while given < len(time) and not self._lost.all:
+            solver = LSODA(lambda t, y: self._rate(t, y, update), t, y.reshape(-1), time[-1], **self._settings)
+            while given < len(time):
+                t, y, self._odd = solver.t, solver.y.copy(), self._lost.lost
+                solver.step()
+                if self._in_trouble(solver):
+                    self._take_out(t, solver.y, y)
+                    y = self._lost.replaced(y.reshape(self._start.shape), self._start)
+                    break
+                known = int(np.searchsorted(time, solver.t, side="right"))
+                if known > given:
+                    yield from solver.dense_output()(time[given:known]).T.reshape(-1, *self._start.shape)
+                    given = known
+
+    def _rate(self, t: float, y: Array, update: Callable[[float], None]) -> Array:
         update(t)
-        return loop.rate(t, y.reshape(start.shape)).reshape(-1)
+        rate = self._loop.rate(t, y.reshape(self._start.shape))
+        if not np.isfinite(np.vdot(rate, rate)):
+            self._odd = self._odd | ~np.isfinite(rate).all(-1)
+        return (self._lost.replaced(rate, 0.0) if self._lost.any else rate).reshape(-1)
 
-    # the integrator's norm averages over rollouts: tighten it so that each one alone keeps the tolerance
-    share, band = np.sqrt(max(1, len(start))), start.shape[1] - 1
-    rtol, atol = max(loop.mode.rtol / share, 1e-13), loop.mode.atol / share
-    solver = LSODA(rate, 0.0, start.reshape(-1), time[-1], rtol=rtol, atol=atol, lband=band, uband=band)
-    yield start
-    given = 1
-    while given < len(time):
-        message = solver.step()
-        if solver.status == "failed" or not np.isfinite(solver.y).all():
-            raise SimulationError(f"the integrator gave up at t = {solver.t:.3g} s: {message}")
-        known = int(np.searchsorted(time, solver.t, side="right"))
-        if known > given:
-            yield from solver.dense_output()(time[given:known]).T.reshape(-1, *start.shape)
-            given = known
+    def _in_trouble(self, solver: LSODA) -> bool:
+        return solver.status == "failed" or not np.isfinite(solver.t) or bool(self._beyond(solver.y).any())
+
+    def _beyond(self, y: Array) -> NDArray[np.bool_]:
+        """Rows whose state is lost."""
+        q, qd, z = self._loop.split(y.reshape(self._start.shape))
+        return ~(sound(q, qd) & np.isfinite(z).all(-1))
+
+    def _take_out(self, t: float, reached: Array, y: Array) -> None:
+        """Mark whoever is to blame that the integrator did not get from y at t [s] to a state that can be."""
+        odd, beyond = self._odd & ~self._lost.lost, self._beyond(reached) & ~self._lost.lost
+        if odd.any():
+            self._lost.mark(t, odd, NO_NUMBERS)
+        elif beyond.any():
+            self._lost.mark(t, beyond)
+        else:
+            fastest = np.abs(self._loop.rate(t, y.reshape(self._start.shape))).max(-1)
+            blamed = np.argmax(np.where(self._lost.lost, -np.inf, fastest))
+            self._lost.mark(t, np.arange(len(fastest)) == blamed, STOPPED)

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError, UnknownNameError
@@ -33,13 +34,16 @@ class Finish(ABC):
     def finished(self, t: float, s: Array, qd: Array) -> Array | None:
         """The times at which rollouts were finished, as known at t [s], NaN for others, (N,); None for no news."""
 
-    def __call__(self, t: float, s: Array, qd: Array) -> bool:
-        """Whether the run ends at t [s], with the path parameters s (N,) and the joint velocities q̇ [rad/s], (N, n)."""
+    def __call__(self, t: float, s: Array, qd: Array, lost: NDArray[np.bool_]) -> bool:
+        """Whether the run ends at t [s]: all rollouts are finished, or ``lost`` (N,), as those that diverged.
+
+        With the path parameters s (N,) and the joint velocities q̇ [rad/s], (N, n).
+        """
         news = self.finished(t, s, qd)
         if news is None:
             return False
-        self.time = np.where(np.isnan(self.time), news, self.time)
-        return self.ends_run and not np.isnan(self.time).any()
+        self.time = np.where(np.isnan(self.time) & ~lost, news, self.time)
+        return self.ends_run and not (np.isnan(self.time) & ~lost).any()
 
 
 class AtEnd(Finish):
@@ -80,6 +84,14 @@ class AfterLaps(Finish):
 def whole_laps(task: PathTask, start: Array, s: Array) -> Array:
     """How many times the path was gone round from ``start`` to ``s``, negative backwards, integers (*batch,)."""
     return np.trunc((s - start) / task.period).astype(np.int64)
+
+
+def first_and_last(s: Array) -> tuple[Array, Array]:
+    """The first and the last s that is a number of each rollout, (N,) each, of (N, time); 0 where there is none."""
+    known = np.isfinite(s)
+    last = s.shape[1] - 1 - np.argmax(known[:, ::-1], axis=1)
+    rows, some = np.arange(len(s)), known.any(1)
+    return np.where(some, s[:, 0], 0.0), np.where(some, s[rows, last], 0.0)
 
 
 def finish_of(task: PathTask, laps: int | None, until: Until, rollouts: int) -> Finish | None:

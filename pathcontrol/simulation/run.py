@@ -47,8 +47,9 @@ class Run:
     ) -> Run:
         """A run from arrays laid out as :data:`VARIABLES` says, and the position unit of each joint by its name.
 
-        ``outcome`` is laid out as :data:`OUTCOMES`; a rollout without a time in ``finish_time`` is running. ``robot``
-        and ``task`` are what the run is about, where they are known.
+        ``outcome`` is laid out as :data:`OUTCOMES`; a rollout with a time in ``diverged_time`` has diverged, one with
+        a time in ``finish_time`` is finished, and any other is running. ``robot`` and ``task`` are what the run is
+        about, where they are known.
         """
         kinds = sorted(set(joints.values()), reverse=True)
         variables = {}
@@ -74,10 +75,12 @@ class Run:
         return f"Run({table(self.config, 'controller').get('controller', '?')}; {sizes}{self._ended()})"
 
     def _ended(self) -> str:
-        finished = self.status == "finished"
+        finished, diverged = self.status == "finished", self.status == "diverged"
         if finished.all():
             return f"; finished after {self.finish_time.max():.4g} s"
-        return f"; {finished.sum()} of {self.rollouts} finished" if finished.any() else ""
+        counts = {"finished": finished.sum(), "diverged": diverged.sum()}
+        said = [f"{count} of {self.rollouts} {word}" for word, count in counts.items() if count]
+        return f"; {', '.join(said)}" if said else ""
 
     @property
     def robot(self) -> RobotModel:
@@ -107,7 +110,7 @@ class Run:
 
     @property
     def status(self) -> NDArray[np.str_]:
-        """``"finished"``, or ``"running"`` when the time was up, (rollout,)."""
+        """``"finished"``, ``"diverged"``, or ``"running"`` when the time was up, (rollout,)."""
         return self.data["status"].to_numpy()
 
     @property
@@ -116,8 +119,21 @@ class Run:
         return self.data["finish_time"].to_numpy()
 
     @property
+    def diverged_time(self) -> Array:
+        """When each rollout diverged [s], NaN where it did not, (rollout,); from then on it is NaN in all variables."""
+        known = "diverged_time" in self.data.coords  # not in a file from elsewhere
+        return self.data["diverged_time"].to_numpy() if known else np.full(self.rollouts, np.nan)
+
+    @property
+    def reason(self) -> NDArray[np.str_]:
+        """Why each rollout diverged and what to try, empty where it did not, (rollout,)."""
+        return self.data["reason"].to_numpy() if "reason" in self.data.coords else np.full(self.rollouts, "")
+
+    @property
     def laps(self) -> NDArray[np.int64]:
         """Whole laps of a closed path from the first sample to the last, (rollout,); backwards they are negative.
+
+        Of a rollout that diverged, to the last sample before.
 
         Raises:
             InputError: the path is not closed.
@@ -154,7 +170,10 @@ class Run:
         data = data.drop_vars(name for name in OUTCOMES if name in data.coords)
         data = data.assign_coords(time=("time", data["time"].to_numpy() - begin, data["time"].attrs))
         config = self.config | {"controller": self.config["controller"]["sequence"][index]}
-        data = data.assign_coords(_outcome(1, {"finish_time": finished - begin}))
+        outcome = {"finish_time": finished - begin}
+        if status[index] == "diverged":
+            outcome |= {"diverged_time": self.diverged_time - begin, "reason": self.reason}
+        data = data.assign_coords(_outcome(1, outcome))
         return Run(data, config, self._origin.path(index))
 
     def with_data(self, data: xr.Dataset) -> Run:
@@ -194,8 +213,10 @@ def _unpickled(data: xr.Dataset, config: Mapping[str, Any], stored: Stored) -> R
 
 def _outcome(rollouts: int, outcome: Mapping[str, Array]) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:
     """Coordinates that say how each rollout went."""
-    values = {"finish_time": np.full(rollouts, np.nan)} | dict(outcome)
-    values = {"status": np.where(np.isnan(values["finish_time"]), "running", "finished")} | values
+    never = np.full(rollouts, np.nan)
+    values = {"finish_time": never, "diverged_time": never, "reason": np.full(rollouts, "")} | dict(outcome)
+    status = np.where(np.isnan(values["finish_time"]), "running", "finished")
+    values = {"status": np.where(np.isnan(values["diverged_time"]), status, "diverged")} | values
     labels = {}
     for name, value in values.items():
         dims, unit, meaning = OUTCOMES[name]

@@ -12,6 +12,7 @@ from pathcontrol._arrays import Array, as_array, finite
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.divergence import Divergence
 from pathcontrol.simulation.finish import Finish, finish_of
 from pathcontrol.simulation.modes import ContinuousTime, SampledLoop
 from pathcontrol.simulation.run import Run
@@ -76,7 +77,7 @@ def simulate_sequence(
 
     Raises:
         InputError: an argument has the wrong shape or value, or a path neither ends nor repeats.
-        SimulationError: the arm diverged, or the integrator gave up.
+        SimulationError: the arm diverged; ``run`` of the error holds what happened until then.
     """
     laws = _checked_controllers(controllers)
     robot = laws[0].robot if plant is None else plant
@@ -91,17 +92,21 @@ def simulate_sequence(
     for law, longest, finish in zip(laws, durations, ends, strict=True):
         arrays = arm.run(law, longest, finish, progress)
         legs.append(_Leg(arrays, float(finish.time[0]), law.task.s0, _length(law.task, laps)))
-        if np.isnan(legs[-1].finish_time):
+        if arm.divergence.any or np.isnan(legs[-1].finish_time):
             break
-    arrays, outcome = _joined(legs, len(laws), period)
+    arrays, outcome = _joined(legs, len(laws), period, arm.divergence)
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws))
     described = {"controller": f"{len(laws)} paths with {names}", "sequence": [law.describe() for law in laws]}
     config = record_of(described, robot, loop, duration=durations.tolist(), laps=laps)
     time = period * np.arange(arrays["s"].shape[1])
-    return Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=whole)
+    run = Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=whole)
+    arm.divergence.check(run)
+    return run
 
 
-def _joined(legs: Sequence[_Leg], paths: int, period: float) -> tuple[dict[str, Array], dict[str, Array]]:
+def _joined(
+    legs: Sequence[_Leg], paths: int, period: float, lost: Divergence
+) -> tuple[dict[str, Array], dict[str, Array]]:
     """One series of samples, (1, time, …), and what happened when; the last of a path is the first of the next one."""
     kept = [leg.arrays["s"].shape[1] - 1 for leg in legs]
     kept[-1] += 1
@@ -115,7 +120,10 @@ def _joined(legs: Sequence[_Leg], paths: int, period: float) -> tuple[dict[str, 
     times, status = np.full(paths, np.nan), np.full(paths, "waiting", dtype="<U8")
     times[: len(legs)] = begins + [leg.finish_time for leg in legs]
     status[: len(legs)] = np.where(np.isnan(times[: len(legs)]), "running", "finished")
-    return arrays, {
+    lost.time += begins[-1]
+    if lost.any:
+        status[len(legs) - 1] = "diverged"
+    return arrays, lost.outcome() | {
         "finish_time": times[-1:],
         "path_index": np.repeat(np.arange(len(legs)), kept),
         "path_status": status,

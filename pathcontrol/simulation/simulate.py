@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import scalar
 from pathcontrol.control.base import Controller
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.finish import Until, finish_of, whole_laps
+from pathcontrol.simulation.finish import Until, finish_of, first_and_last, whole_laps
 from pathcontrol.simulation.modes import ContinuousTime, SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.setup import (
@@ -41,6 +41,11 @@ def simulate(
     plan has 0.1 mrad of the path left at most and the arm is at rest, ‖q̇‖ ≤ 0.01 rad/s, for 50 ms; it is held there
     while others go on. On a closed path it is finished after ``laps``, and goes on moving; without ``laps`` never.
 
+    A rollout diverges when its state is no number or beyond 10⁶ rad or rad/s, or its law asks for torques that are no
+    numbers. It has the status ``"diverged"``, a ``diverged_time`` and a ``reason``; from that time on all that is
+    recorded of it is NaN (and ``regular`` False). In a sampled loop the others are to the last bit what they would be
+    without it; in continuous time they share the steps of one integrator, and agree within its tolerance.
+
     Args:
         controller: the law, with its own model of the arm.
         q: initial joint positions [rad], (n,) or a batch (*batch, n); the run counts batches as rollouts.
@@ -54,7 +59,7 @@ def simulate(
 
     Raises:
         InputError: an argument has the wrong shape or value.
-        SimulationError: a rollout diverged, or the integrator gave up.
+        SimulationError: all rollouts diverged, as a single one does; its ``run`` holds what happened until then.
     """
     duration = scalar("duration", duration, positive=True)
     robot = controller.robot if plant is None else plant
@@ -64,9 +69,12 @@ def simulate(
     period, finish = period_of(loop, duration), finish_of(controller.task, laps, until, len(q0))
     check_law(controller, q0, qd0)
     config = record_of(controller.describe(), robot, loop, duration=duration, laps=laps, until=until)
-    arrays = simulated_arm(loop, robot, q0, qd0).run(controller, duration, finish, progress)
-    outcome = {} if finish is None else {"finish_time": finish.time}
+    arm = simulated_arm(loop, robot, q0, qd0)
+    arrays = arm.run(controller, duration, finish, progress)
+    outcome = arm.divergence.outcome() | ({} if finish is None else {"finish_time": finish.time})
     if controller.task.closed:
-        outcome["laps"] = whole_laps(controller.task, arrays["s"][:, 0], arrays["s"][:, -1])
+        outcome["laps"] = whole_laps(controller.task, *first_and_last(arrays["s"]))
     time = period * np.arange(arrays["s"].shape[1])
-    return Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=controller.task)
+    run = Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=controller.task)
+    arm.divergence.check(run)
+    return run

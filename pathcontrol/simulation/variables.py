@@ -22,11 +22,13 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
 }
 #: what a run says about how it went: (dimensions, unit, meaning); coordinates of its data
 OUTCOMES: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "status": (("rollout",), "", "finished, or running when the time was up"),
+    "status": (("rollout",), "", "finished, diverged, or running when the time was up"),
     "finish_time": (("rollout",), "s", "when the rollout was finished, NaN while it is running"),
+    "diverged_time": (("rollout",), "s", "when the rollout diverged, NaN if it did not"),
+    "reason": (("rollout",), "", "why the rollout diverged, empty if it did not"),
     "laps": (("rollout",), "1", "whole laps of a closed path"),
     "path_index": (("time",), "1", "which path of a sequence is followed"),
-    "path_status": (("path",), "", "finished, running when its time was up, or waiting for its turn"),
+    "path_status": (("path",), "", "finished, diverged, running when its time was up, or waiting"),
     "path_offset": (("path",), "1", "what s of a sequence is more than that of the path"),
     "path_finish_time": (("path",), "s", "when the path of a sequence was finished, NaN if it was not"),
 }

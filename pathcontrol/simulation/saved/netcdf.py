@@ -59,7 +59,7 @@ def _check(data: xr.Dataset, config: Any) -> None:
     for name, (dims, *_) in (VARIABLES | OUTCOMES | {"time": (("time",),)}).items():
         if name not in data.variables:
             continue
-        variable, words = data[name], name in ("status", "path_status")
+        variable, words = data[name], name in ("status", "reason", "path_status")
         if variable.dims != dims or (variable.dtype.kind in "bfiu") == words:
             raise InputError(f"{name} is {variable.dtype} over {variable.dims}, expected other values over {dims}")
         if name in VARIABLES and not isinstance(variable.attrs.get("units"), str):

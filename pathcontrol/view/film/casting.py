@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.record import table
 from pathcontrol.simulation.run import Run
@@ -44,9 +46,15 @@ def cast_takes(
             looks[arm.source] = link_visuals(arm.source, FINENESS) or stick_figure(arm.source)
         path = path if "s" in one.data else None  # where on it the arm should be is not known
         frame = default_tool(arm, path) if tool is None else tool
-        part, visuals = one.rollout(rollout), looks[arm.source]
+        part, visuals = _until_it_diverged(one.rollout(rollout)), looks[arm.source]
         takes.append(Take(str(name), part, arm, path, frame, visuals, run_color(i), one.rollouts))
     return takes
+
+
+def _until_it_diverged(run: Run) -> Run:
+    """All of a rollout, or what there is of it."""
+    known = np.isfinite(run.array("q")).all((0, 2))
+    return run.with_data(run.data.isel(time=known)) if run.status[0] == "diverged" and known.any() else run
 
 
 def controller_name(run: Run) -> str:

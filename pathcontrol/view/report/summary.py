@@ -92,9 +92,13 @@ def _law(run: Run) -> Mapping[str, Any]:
 
 def _outcome(run: Run) -> str:
     finished = run.status == "finished"
+    diverged = run.status == "diverged"
     if run.rollouts > 1:
         endless = "laps" in run.data.coords and not finished.any()
-        return f"{run.rollouts} rollouts" if endless else f"{finished.sum()} of {run.rollouts} rollouts finished"
+        said = f"{run.rollouts} rollouts" if endless else f"{finished.sum()} of {run.rollouts} rollouts finished"
+        return f"{said}, {diverged.sum()} diverged" if diverged.any() else said
+    if diverged[0]:
+        return f"diverged at {run.diverged_time[0]:.4g} s"
     if finished[0]:
         return f"finished after {run.finish_time[0]:.4g} s"
     return f"{run.laps[0]} whole laps" if "laps" in run.data.coords else "not finished when the time was up"
