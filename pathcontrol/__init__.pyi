@@ -44,6 +44,7 @@ from .profiles.table import TabulatedProfile as TabulatedProfile
 from .profiles.time_optimal import TimeOptimal as TimeOptimal
 from .profiles.time_optimal import time_optimal as time_optimal
 from .profiles.tool_speed import ToolSpeed as ToolSpeed
+from .robot.batch import RobotBatch as RobotBatch
 from .robot.friction import Coulomb as Coulomb
 from .robot.friction import FrictionLaw as FrictionLaw
 from .robot.friction import Stribeck as Stribeck

@@ -193,6 +193,72 @@ class FrictionSum(FrictionLaw):
         return {"law": "FrictionSum", "terms": [term.describe() for term in self.terms]}
 
 
+@dataclass(frozen=True, eq=False)
+class FrictionOfGroups(FrictionLaw):
+    """Laws of different kinds, each for some rows of a batch: ``parts`` of a law and its rows, (k,)."""
+
+    parts: tuple[tuple[FrictionLaw, Array], ...]
+    rows: int
+
+    @property
+    def n(self) -> int:
+        return self.parts[0][0].n
+
+    @property
+    def varies(self) -> bool:  # type: ignore[override]
+        return any(law.varies for law, _ in self.parts)
+
+    @property
+    def viscous(self) -> Array:
+        together = np.empty((self.rows, self.n))
+        for law, rows in self.parts:
+            together[rows] = law.viscous
+        return together
+
+    def levels(self, qd: Array) -> tuple[Array, Array]:
+        qd = np.broadcast_to(qd, (self.rows, self.n))
+        found = [law.levels(qd[rows]) for law, rows in self.parts]
+        plus, minus = np.empty((2, self.rows, self.n))
+        for (_, rows), (p, m) in zip(self.parts, found, strict=True):
+            plus[rows], minus[rows] = p, m
+        return plus, minus
+
+    def describe(self) -> dict[str, object]:
+        parts = [law.describe() | {"rollouts": len(rows)} for law, rows in self.parts]
+        return {"law": "FrictionOfGroups", "parts": parts}
+
+
+def friction_of_each(laws: Sequence[FrictionLaw]) -> FrictionLaw:
+    """The laws of many rollouts, each (n,), as one for all of them together; row i is that of ``laws[i]``."""
+    if all(law is laws[0] for law in laws):
+        return laws[0]
+    kinds: dict[Any, list[int]] = {}
+    for i, law in enumerate(laws):
+        kinds.setdefault(_kind(law), []).append(i)
+    if len(kinds) == 1:
+        return _stacked(laws)
+    parts = ((_stacked([laws[i] for i in rows]), np.array(rows)) for rows in kinds.values())
+    return FrictionOfGroups(tuple(parts), len(laws))
+
+
+def _kind(law: FrictionLaw) -> Any:
+    """The same for laws that differ in their coefficients only; of a law of one's own nothing is known."""
+    if type(law) is FrictionSum:
+        return tuple(_kind(term) for term in law.terms)
+    return type(law) if type(law) in _LAWS.values() else id(law)
+
+
+def _stacked(laws: Sequence[FrictionLaw]) -> FrictionLaw:
+    """Laws of one kind as one with coefficients (N, n)."""
+    first = laws[0]
+    if all(law is first for law in laws):
+        return first
+    if isinstance(first, FrictionSum):
+        terms = zip(*(law.terms for law in laws if isinstance(law, FrictionSum)), strict=True)
+        return FrictionSum(tuple(_stacked(term) for term in terms))
+    return type(first)(*(np.stack([getattr(law, f.name) for law in laws]) for f in fields(first)))
+
+
 def no_friction(n: int) -> FrictionLaw:
     """The law of ``n`` joints without any friction."""
     return Viscous(np.zeros(n))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -83,20 +84,11 @@ class RobotModel:
     threads: int = 1
     steps: tuple[tuple[str, dict[str, Any]], ...] = ()
     n: int = field(init=False)
-    _data: Any = field(init=False, repr=False)
-    _pool: Any = field(init=False, repr=False)
-    _weightless_pool: Any = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.threads < 1:
             raise InputError(f"threads = {self.threads}, expected 1 or more")
-        model = self.pinocchio_model
-        weightless = pin.Model(model)
-        weightless.gravity = pin.Motion.Zero()
-        object.__setattr__(self, "n", model.nv)
-        object.__setattr__(self, "_data", model.createData())
-        object.__setattr__(self, "_pool", pin.ModelPool(model, self.threads))
-        object.__setattr__(self, "_weightless_pool", pin.ModelPool(weightless, self.threads))
+        object.__setattr__(self, "n", self.pinocchio_model.nv)
 
     def __repr__(self) -> str:
         return f"RobotModel({self.name}; {self.n} joints: {', '.join(self.joint_names)})"
@@ -143,6 +135,11 @@ class RobotModel:
         i = self.joint_index(joint)
         return {key: float(getattr(self.limits, key)[i]) for key in ("lower", "upper", "velocity", "effort")}
 
+    @property
+    def armature(self) -> Array:
+        """Rotor inertia [kg m²] on the diagonal of M, (n,)."""
+        return np.array(self.pinocchio_model.armature)
+
     def joint_index(self, joint: str) -> int:
         """The position of a joint in ``joint_names``."""
         if joint not in self.joint_names:
@@ -165,6 +162,24 @@ class RobotModel:
     def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
         """q̈ = M(q)⁻¹(τ − C(q,q̇)q̇ − g(q)) [rad/s²], (*batch, n), by the articulated-body algorithm."""
         return self._batched(pin.abaInParallel, self._pool, q=q, qd=qd, tau=tau)
+
+    def forward_dynamics_row(self, q: Array, qd: Array, tau: Array, armature: Array) -> Array:
+        """q̈ (n,) of one configuration, each argument (n,), with another rotor inertia ``armature`` [kg m²].
+
+        To the last bit what :meth:`forward_dynamics` of that arm gives, without making it.
+        """
+        model, data = self._scratch
+        model.armature = armature
+        return pin.aba(model, data, q, qd, tau, pin.Convention.WORLD)  # the convention of the batched call
+
+    def mass_matrix_row(self, q: Array, armature: Array) -> Array:
+        """M(q) [kg m²], (n, n), of one configuration (n,), with another rotor inertia, to the last bit."""
+        model, data = self._scratch
+        gravity, still = model.gravity.copy(), np.zeros(self.n)
+        model.armature, model.gravity = armature, pin.Motion.Zero()
+        columns = np.array([pin.rnea(model, data, q, still, unit) for unit in np.eye(self.n)])
+        model.gravity = gravity
+        return 0.5 * (columns + columns.T)
 
     def nonlinear_effects(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """C(q,q̇)q̇ + g(q) [N m], (*batch, n)."""
@@ -314,6 +329,21 @@ class RobotModel:
         model.armature = np.asarray(model.armature) + added
         return self._changed(model, "with_armature", {"armature": added.tolist()})
 
+    def with_masses(self, scale: Mapping[str, float]) -> RobotModel:
+        """The same arm with heavier or lighter bodies.
+
+        Args:
+            scale: factors on mass and inertia of what moves with a joint, up to the next joint, by the joint's name:
+                ``{"joint_2": 1.1}`` for 10 % more, with the same centre of mass.
+        """
+        model, factors = pin.Model(self.pinocchio_model), dict(scale)
+        for joint, value in factors.items():
+            factor, i = scalar(f"scale of {joint}", value, positive=True), self.joint_index(joint) + 1
+            body = model.inertias[i]
+            model.inertias[i] = pin.Inertia(factor * body.mass, body.lever, factor * body.inertia)
+            factors[joint] = factor
+        return self._changed(model, "with_masses", {"scale": factors})
+
     def with_threads(self, threads: int) -> RobotModel:
         """The same arm whose batched calls use ``threads`` threads."""
         return replace(self, threads=threads)
@@ -331,6 +361,26 @@ class RobotModel:
         return self._changed(model, "reduced", {"lock": angles}, actuation=self.actuation.select(free))
 
     # --- inside ---------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _data(self) -> Any:
+        return self.pinocchio_model.createData()
+
+    @cached_property
+    def _pool(self) -> Any:
+        return pin.ModelPool(self.pinocchio_model, self.threads)
+
+    @cached_property
+    def _weightless_pool(self) -> Any:
+        weightless = pin.Model(self.pinocchio_model)
+        weightless.gravity = pin.Motion.Zero()
+        return pin.ModelPool(weightless, self.threads)
+
+    @cached_property
+    def _scratch(self) -> tuple[Any, Any]:
+        """A model that may be changed, and its data."""
+        model = pin.Model(self.pinocchio_model)
+        return model, model.createData()
 
     def _changed(self, model: Any, method: str, arguments: dict[str, Any], **others: Any) -> RobotModel:
         """The arm that a method makes of this one."""

@@ -11,10 +11,9 @@ from scipy.integrate import LSODA
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller, ControlOutput
-from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.divergence import NO_NUMBERS, STOPPED, Divergence, sound
 from pathcontrol.simulation.finish import Finish
-from pathcontrol.simulation.modes import ContinuousTime, torque_limits
+from pathcontrol.simulation.modes import Arm, ContinuousTime, check_rows, torque_limits
 from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sensors import Reading
 
@@ -22,7 +21,7 @@ from pathcontrol.simulation.sensors import Reading
 class ClosedLoop:
     """The vector field of arm and controller; a state is (q, q̇, z), flat, one rollout after the other."""
 
-    def __init__(self, controller: Controller, plant_robot: RobotModel, mode: ContinuousTime) -> None:
+    def __init__(self, controller: Controller, plant_robot: Arm, mode: ContinuousTime) -> None:
         self.controller, self.robot, self.mode = controller, plant_robot, mode
         self._limits = torque_limits(mode, plant_robot)
 
@@ -49,7 +48,7 @@ class ContinuousArm:
 
     Args:
         mode: how it is integrated.
-        robot: the arm.
+        robot: the arm, or one for each rollout.
         q: joint positions it starts at [rad], (N, n).
         qd: joint velocities it starts with [rad/s], (N, n).
 
@@ -57,8 +56,8 @@ class ContinuousArm:
         divergence: which rollouts have diverged, at the time since the present controller took over.
     """
 
-    def __init__(self, mode: ContinuousTime, robot: RobotModel, q: Array, qd: Array) -> None:
-        torque_limits(mode, robot)
+    def __init__(self, mode: ContinuousTime, robot: Arm, q: Array, qd: Array) -> None:
+        check_rows(torque_limits(mode, robot), "torque_limits", len(q))
         self.q, self.qd = q, qd
         self._mode, self._robot, self._period = mode, robot, mode.output_period
         self.divergence = Divergence(q, qd)

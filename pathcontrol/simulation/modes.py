@@ -10,8 +10,12 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, scalar
 from pathcontrol.errors import InputError
+from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.sensors import Sensors
+
+#: the simulated arm: one for all rollouts, or one for each
+Arm = RobotModel | RobotBatch
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,10 +25,12 @@ class SampledLoop:
     Attributes:
         period: control period [s].
         substeps: steps of the plant in a period; one is accurate, see :class:`Plant`.
-        encoders: False for exact positions, True for the resolution of the robot, or counts per revolution (n,).
+        encoders: False for exact positions, True for the resolution of the robot, or counts per
+            revolution, (n,), or for each rollout, (N, n).
         velocity: ``"exact"``, or ``"difference"`` of two measured positions over the period.
         filter_hz: corner frequency of a first-order low-pass filter on the velocity [Hz], or None.
-        torque_limits: False for none, True for the effort limits of the robot, or limits [N m], (n,).
+        torque_limits: False for none, True for the effort limits of the robot, or limits [N m], (n,), or for each
+            rollout, (N, n).
         delay: time from measuring to applying the torque [s]; no torque acts before the first one.
     """
 
@@ -46,11 +52,11 @@ class SampledLoop:
         if self.filter_hz is not None:
             scalar("filter_hz", self.filter_hz, positive=True)
 
-    def sensors(self, robot: RobotModel) -> Sensors:
+    def sensors(self, robot: Arm) -> Sensors:
         """The measuring chain for ``robot``."""
         return Sensors(self.period, self._resolution(robot), self.velocity == "difference", self.filter_hz)
 
-    def _resolution(self, robot: RobotModel) -> Array | None:
+    def _resolution(self, robot: Arm) -> Array | None:
         counts = _per_joint("encoders", self.encoders, robot.actuation.encoder_counts, robot)
         if counts is None:
             return None
@@ -93,19 +99,25 @@ class ContinuousTime:
         return {"loop": "continuous"} | _plain(asdict(self))
 
 
-def torque_limits(mode: SampledLoop | ContinuousTime, robot: RobotModel) -> Array | None:
-    """The limits [N m], (n,), that ``mode`` clamps torques to, or None."""
+def torque_limits(mode: SampledLoop | ContinuousTime, robot: Arm) -> Array | None:
+    """The limits [N m], (n,) or (N, n), that ``mode`` clamps torques to, or None."""
     limits = _per_joint("torque_limits", mode.torque_limits, robot.limits.effort, robot, infinite=True)
     if limits is not None and (limits <= 0).any():
-        dead = [name for name, limit in zip(robot.joint_names, limits, strict=True) if limit <= 0]
+        dead = [name for name, limit in zip(robot.joint_names, limits.T, strict=True) if (limit <= 0).any()]
         raise InputError(
             f"the torque limit of {', '.join(dead)} is 0, which kills all torque; give torque_limits = [...] in N m"
         )
     return limits
 
 
+def check_rows(values: Array | None, name: str, rollouts: int) -> None:
+    """What a loop says of each rollout fits their number."""
+    if values is not None and values.ndim == 2 and len(values) not in (1, rollouts):
+        raise InputError(f"{name} has rows for {len(values)} rollouts, expected 1 or {rollouts}")
+
+
 def _per_joint(
-    name: str, value: bool | ArrayLike, own: Array | None, robot: RobotModel, infinite: bool = False
+    name: str, value: bool | ArrayLike, own: Array | None, robot: Arm, infinite: bool = False
 ) -> Array | None:
     """False: None; True: the robot's own values; else one value for each joint."""
     if isinstance(value, bool | np.bool_) and not value:
@@ -115,8 +127,11 @@ def _per_joint(
             raise InputError(f"{name} = True, but {robot.name} says nothing about them; give one value per joint")
         return own
     array = as_array(name, value)
-    if array.shape != (robot.n,):
-        raise InputError(f"{name} has shape {array.shape}, expected ({robot.n},): one value for each joint")
+    if array.shape[-1:] != (robot.n,) or array.ndim > 2:
+        raise InputError(
+            f"{name} has shape {array.shape}, expected ({robot.n},): one value for each joint, or a row of "
+            "them for each rollout"
+        )
     if infinite and not np.isnan(array).any():
         return array
     return finite(name, array)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
+from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.saved.shelf import Shelf
 from pathcontrol.tasks.base import PathTask
@@ -31,6 +32,7 @@ class Origin:
         robot: gives the simulated arm.
         task: gives the path and its velocity profile.
         stored: what both are made from, if they come from a file.
+        robots: the arm of each rollout, where they differ.
     """
 
     def __init__(
@@ -38,12 +40,15 @@ class Origin:
         robot: Callable[[], RobotModel | None],
         task: Callable[[], PathTask | None],
         stored: Stored | None = None,
+        robots: Sequence[RobotModel] = (),
     ) -> None:
-        self._robot, self._task, self._stored = robot, task, stored
+        self._robot, self._task, self._stored, self._robots = robot, task, stored, robots
 
     @classmethod
-    def of(cls, robot: RobotModel | None, task: PathTask | None) -> Origin:
+    def of(cls, robot: RobotModel | RobotBatch | None, task: PathTask | None) -> Origin:
         """That of a run whose robot and task are at hand."""
+        if isinstance(robot, RobotBatch):
+            return cls(lambda: robot.robots[0], lambda: task, robots=robot.robots)
         return cls(lambda: robot, lambda: task)
 
     @classmethod
@@ -60,6 +65,12 @@ class Origin:
     def task(self) -> PathTask | None:
         """The path and its velocity profile."""
         return self._task()
+
+    def rollout(self, row: int) -> Origin:
+        """That of one rollout, by its row in all that were simulated together."""
+        if not self._robots:
+            return self
+        return Origin(lambda: self._robots[row], lambda: self.task)
 
     def path(self, index: int) -> Origin:
         """That of one path of a sequence."""

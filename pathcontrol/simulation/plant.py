@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.dry_friction import stick_slip
 
@@ -21,17 +22,23 @@ class Plant:
     Viscous friction enters by the trapezoidal rule, which adds h/2 b to the diagonal of M and is stable for any b.
 
     Args:
-        robot: the arm; its ``friction`` is the friction of the plant.
+        robot: the arm, or one for each rollout; its ``friction`` is the friction of the plant.
         step: h [s].
     """
 
-    def __init__(self, robot: RobotModel, step: float) -> None:
+    def __init__(self, robot: RobotModel | RobotBatch, step: float) -> None:
         self.robot, self.step = robot, step
         self._damping = robot.friction.viscous
         levels = robot.friction.levels
         steady = levels(np.zeros(robot.n))
         self._levels = levels if robot.friction.varies else lambda qd: steady
         self._inertia = robot.with_armature(0.5 * step * self._damping)
+
+    def _mass_matrix(self, q: Array, rows: Array) -> Array:
+        """Of the arms of some ``rows``, a mask (N,), at q (k, n)."""
+        if isinstance(self._inertia, RobotBatch):
+            return self._inertia.mass_matrix(q, np.flatnonzero(rows))
+        return self._inertia.mass_matrix(q)
 
     def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
         """(q, q̇) one step later under the constant torque ``tau``; all (N, n)."""
@@ -51,7 +58,7 @@ class Plant:
         if settled.all():
             return v
         rows = ~settled.all(-1)
-        M = self._inertia.mass_matrix(q[rows])
+        M = self._mass_matrix(q[rows], rows)
         momentum = np.einsum("kij,kj->ki", M, v[rows]) + duration * friction[rows]
         low = -duration * np.broadcast_to(minus, q.shape)[rows]
         high = duration * np.broadcast_to(plus, q.shape)[rows]

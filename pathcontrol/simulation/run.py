@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
+from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.origin import Origin, Stored
 from pathcontrol.simulation.record import table
@@ -42,7 +43,7 @@ class Run:
         config: Mapping[str, Any],
         outcome: Mapping[str, Array] | None = None,
         *,
-        robot: RobotModel | None = None,
+        robot: RobotModel | RobotBatch | None = None,
         task: PathTask | None = None,
     ) -> Run:
         """A run from arrays laid out as :data:`VARIABLES` says, and the position unit of each joint by its name.
@@ -85,6 +86,9 @@ class Run:
     @property
     def robot(self) -> RobotModel:
         """The simulated arm: the one that was given, or the same one rebuilt from the file.
+
+        Of rollouts with an arm each, the first one; ``run.rollout(i).robot`` is that of rollout i, which a file keeps
+        of rollouts that are saved as runs of their own only.
 
         Raises:
             InputError: the run does not know its robot.
@@ -154,7 +158,8 @@ class Run:
         """One of the rollouts as a run of its own."""
         if not -self.rollouts <= index < self.rollouts:
             raise InputError(f"rollout {index} does not exist: the run has {self.rollouts}, counted from 0")
-        return self.with_data(self.data.isel(rollout=[index]))
+        part = self.data.isel(rollout=[index])
+        return Run(part, self.config, self._origin.rollout(int(part["rollout"][0])))
 
     def path(self, index: int) -> Run:
         """One path of a sequence as a run of its own, that begins at 0 s and where the path before was finished."""

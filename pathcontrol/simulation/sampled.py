@@ -9,10 +9,9 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
-from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.divergence import Divergence
 from pathcontrol.simulation.finish import Finish
-from pathcontrol.simulation.modes import SampledLoop, torque_limits
+from pathcontrol.simulation.modes import Arm, SampledLoop, check_rows, torque_limits
 from pathcontrol.simulation.plant import Plant
 from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sensors import Reading
@@ -23,8 +22,9 @@ _UPDATE_EVERY = 64  # ticks between updates of the progress bar
 class Actuator:
     """Torque limits and the delay between measuring and acting."""
 
-    def __init__(self, loop: SampledLoop, robot: RobotModel, shape: tuple[int, int]) -> None:
+    def __init__(self, loop: SampledLoop, robot: Arm, shape: tuple[int, int]) -> None:
         self._limits = torque_limits(loop, robot)
+        check_rows(self._limits, "torque_limits", shape[0])
         whole, late = _periods_and_rest(loop.delay, loop.period)
         self._queue = deque([np.zeros(shape)] * (whole + (late > 0)))
         self._parts = [late, loop.period - late] if late else [loop.period]
@@ -53,7 +53,7 @@ class SampledArm:
 
     Args:
         loop: the control computer.
-        robot: the arm.
+        robot: the arm, or one for each rollout.
         q: joint positions it starts at [rad], (N, n).
         qd: joint velocities it starts with [rad/s], (N, n).
 
@@ -61,9 +61,10 @@ class SampledArm:
         divergence: which rollouts have diverged, at the time since the present controller took over.
     """
 
-    def __init__(self, loop: SampledLoop, robot: RobotModel, q: Array, qd: Array) -> None:
+    def __init__(self, loop: SampledLoop, robot: Arm, q: Array, qd: Array) -> None:
         self.q, self.qd, self._period, self._substeps = q, qd, loop.period, loop.substeps
         self._sensors, self._actuator = loop.sensors(robot), Actuator(loop, robot, q.shape)
+        check_rows(self._sensors.resolution, "encoders", len(q))
         self._plants = [Plant(robot, part / loop.substeps) for part in self._actuator.parts]
         self._reading = self._sensors.read(q, qd, self._sensors.start(q, qd))
         self.divergence = Divergence(q, qd)

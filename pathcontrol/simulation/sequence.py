@@ -23,6 +23,7 @@ from pathcontrol.simulation.setup import (
     initial_state,
     joints_of,
     period_of,
+    plant_of,
     record_of,
     simulated_arm,
 )
@@ -80,7 +81,9 @@ def simulate_sequence(
         SimulationError: the arm diverged; ``run`` of the error holds what happened until then.
     """
     laws = _checked_controllers(controllers)
-    robot = laws[0].robot if plant is None else plant
+    robot = plant_of(plant, laws[0])
+    if not isinstance(robot, RobotModel):
+        raise InputError("plant is one arm for each rollout, expected one: a sequence has a single rollout")
     durations, loop = _durations(duration, len(laws)), checked_loop(loop)
     q0, qd0 = _one_state(q, qd, robot.n)
     period, ends = period_of(loop, durations.min()), [_finish(law, laps) for law in laws]

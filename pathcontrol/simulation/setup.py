@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -13,9 +13,11 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, finite, joint_array
 from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.errors import InputError, PathControlError
+from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.continuous import ContinuousArm
-from pathcontrol.simulation.modes import ContinuousTime, SampledLoop
+from pathcontrol.simulation.described import in_short
+from pathcontrol.simulation.modes import Arm, ContinuousTime, SampledLoop
 from pathcontrol.simulation.sampled import SampledArm
 
 Loop = SampledLoop | ContinuousTime
@@ -37,7 +39,29 @@ def period_of(loop: Loop, duration: float) -> float:
     return period
 
 
-def check_joints(controller: Controller, robot: RobotModel) -> None:
+def plant_of(plant: RobotModel | Sequence[RobotModel] | None, controller: Controller) -> Arm:
+    """The simulated arm: the given one or the controller's own, or where they differ one for each rollout."""
+    plants = [controller.robot] if plant is None else [plant] if isinstance(plant, RobotModel) else list(plant)
+    for i, robot in enumerate(plants):
+        if not isinstance(robot, RobotModel):
+            raise InputError(f"plant[{i}] = {robot!r}, expected a RobotModel, or one for each rollout")
+    if not plants:
+        raise InputError("plant is an empty list, expected a RobotModel, or one for each rollout")
+    first = plants[0]
+    rows = _rows_of_friction(first) if len(plants) == 1 else None
+    if rows is not None:
+        return RobotBatch([first] * rows, first.friction)
+    return first if len(plants) == 1 else RobotBatch(plants)
+
+
+def _rows_of_friction(robot: RobotModel) -> int | None:
+    """For how many rollouts the friction of a robot has coefficients, ``None`` where all have the same."""
+    law = robot.friction
+    arrays = np.broadcast_arrays(law.viscous, *law.levels(np.zeros(robot.n)))
+    return len(arrays[0]) if arrays[0].ndim > 1 else None
+
+
+def check_joints(controller: Controller, robot: Arm) -> None:
     """The controller is for the joints of the plant."""
     if robot.joint_names != controller.robot.joint_names:
         raise InputError(
@@ -45,8 +69,8 @@ def check_joints(controller: Controller, robot: RobotModel) -> None:
         )
 
 
-def initial_state(q: ArrayLike, qd: ArrayLike | None, n: int) -> tuple[Array, Array]:
-    """q and q̇ as (N, n) each, of any batch shape and broadcast against each other."""
+def initial_state(q: ArrayLike, qd: ArrayLike | None, n: int, rollouts: int | None = None) -> tuple[Array, Array]:
+    """q and q̇ as (N, n) each, of any batch shape and broadcast against each other, and one state to all rollouts."""
     position = finite("q", joint_array("q", q, n))
     velocity = np.zeros(n) if qd is None else finite("qd", joint_array("qd", qd, n))
     try:
@@ -54,6 +78,8 @@ def initial_state(q: ArrayLike, qd: ArrayLike | None, n: int) -> tuple[Array, Ar
     except ValueError as error:
         raise InputError(f"q has shape {position.shape} and qd {velocity.shape}, which do not fit together") from error
     q0, qd0 = (np.array(a).reshape(-1, n) for a in pair)
+    if rollouts is not None and len(q0) == 1:
+        return q0.repeat(rollouts, axis=0), qd0.repeat(rollouts, axis=0)
     return q0, qd0
 
 
@@ -82,25 +108,35 @@ def check_law(controller: Controller, q: Array, qd: Array) -> None:
             raise InputError(f"{name}.law gives {field} = {np.asarray(value).tolist()} at the start, expected numbers")
 
 
-def simulated_arm(loop: Loop, robot: RobotModel, q: Array, qd: Array) -> SampledArm | ContinuousArm:
-    """The arm that controllers drive, at rest or not, (N, n) each."""
+def simulated_arm(loop: Loop, robot: Arm, q: Array, qd: Array) -> SampledArm | ContinuousArm:
+    """The arm that controllers drive, at rest or not, (N, n) each.
+
+    Raises:
+        InputError: what is said of each rollout is said of another number of them.
+    """
+    if isinstance(robot, RobotBatch) and len(robot) != len(q):
+        raise InputError(f"plant has {len(robot)} arms, q and qd are {len(q)} initial states; expected as many")
     if isinstance(loop, SampledLoop):
         return SampledArm(loop, robot, q, qd)
     return ContinuousArm(loop, robot, q, qd)
 
 
-def record_of(controller: Mapping[str, Any], robot: RobotModel, loop: Loop, **settings: Any) -> dict[str, Any]:
-    """Everything that a run is made with."""
+def record_of(controller: Mapping[str, Any], robot: Arm, loop: Loop, **settings: Any) -> dict[str, Any]:
+    """Everything that a run is made with; of large arrays, their shape and range."""
     packages = ("pathcontrol", "pin", "numpy", "scipy")
+    plant = {"robot": robot.name, "friction": in_short(robot.friction.describe())}
+    if isinstance(robot, RobotBatch):
+        plant |= {"arms": len(robot), "rigid_bodies": len(robot.bodies)}
+    whole = ("task", "sequence")
     return {
-        "controller": dict(controller),
-        "plant": {"robot": robot.name, "friction": robot.friction.describe()},
-        "loop": loop.describe(),
+        "controller": {name: value if name in whole else in_short(value) for name, value in controller.items()},
+        "plant": plant,
+        "loop": in_short(loop.describe()),
         **settings,
         "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
     }
 
 
-def joints_of(robot: RobotModel) -> dict[str, str]:
+def joints_of(robot: Arm) -> dict[str, str]:
     """The unit of each joint's position by its name."""
     return dict(zip(robot.joint_names, robot.position_units, strict=True))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -18,6 +20,7 @@ from pathcontrol.simulation.setup import (
     initial_state,
     joints_of,
     period_of,
+    plant_of,
     record_of,
     simulated_arm,
 )
@@ -31,7 +34,7 @@ def simulate(
     duration: float,
     laps: int | None = None,
     until: Until = "end",
-    plant: RobotModel | None = None,
+    plant: RobotModel | Sequence[RobotModel] | None = None,
     loop: SampledLoop | ContinuousTime | None = None,
     progress: bool = True,
 ) -> Run:
@@ -53,7 +56,9 @@ def simulate(
         duration: longest simulated time [s], rounded to whole periods of the loop, one at least.
         laps: how many times a closed path is gone round, counted from where its plan starts.
         until: ``"end"`` as said above, or ``"duration"`` to go on to the end of ``duration`` in any case.
-        plant: the arm that is really there, with its friction; default the controller's own model.
+        plant: the arm that is really there, with its friction; default the controller's own model. Or one for each
+            rollout, in the order of ``q``, with the same joints: see :class:`RobotBatch`. An arm whose friction has
+            coefficients (N, n) is one for each rollout too.
         loop: how the loop is closed; default ``SampledLoop()``, a 2.5 ms hold and nothing else.
         progress: show a bar on standard error when it takes longer than two seconds.
 
@@ -62,10 +67,10 @@ def simulate(
         SimulationError: all rollouts diverged, as a single one does; its ``run`` holds what happened until then.
     """
     duration = scalar("duration", duration, positive=True)
-    robot = controller.robot if plant is None else plant
+    robot = plant_of(plant, controller)
     check_joints(controller, robot)
     loop = checked_loop(loop)
-    q0, qd0 = initial_state(q, qd, robot.n)
+    q0, qd0 = initial_state(q, qd, robot.n, None if isinstance(robot, RobotModel) else len(robot))
     period, finish = period_of(loop, duration), finish_of(controller.task, laps, until, len(q0))
     check_law(controller, q0, qd0)
     config = record_of(controller.describe(), robot, loop, duration=duration, laps=laps, until=until)

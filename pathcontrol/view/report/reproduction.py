@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from pathcontrol.simulation.described import is_whole
 from pathcontrol.simulation.record import laws, table
 from pathcontrol.simulation.run import Run
 from pathcontrol.view.report.downloads import Download, file_name, text_file
@@ -60,6 +61,8 @@ def script(name: str, run: Run) -> str:
     sequence = isinstance(run.config.get("duration"), list)
     if run.task is None or not _known(several, loop) or not _ended(run.config, sequence):
         return ""
+    if "arms" in table(run.config, "plant"):
+        return ""
     closed = _call(f"pc.{_LOOPS[loop['loop']]}", [], _without(loop, ["loop"]))
     lines = [
         "import pathcontrol as pc\n",
@@ -94,6 +97,8 @@ def _known(several: Sequence[Mapping[str, Any]], loop: Mapping[str, Any]) -> boo
     names = [*first, *loop]  # of arguments: from a file, and soon in a script
     return (
         alike
+        and all(is_whole(_without(law, ["robot", "task"])) for law in several)
+        and is_whole(loop)
         and first.get("controller") in _LAWS
         and loop.get("loop") in list(_LOOPS)
         and all(name.isidentifier() for name in names)
