@@ -54,8 +54,13 @@ from .robot.loading import known_robots as known_robots
 from .robot.loading import load_robot as load_robot
 from .robot.model import RobotModel as RobotModel
 from .robot.urdf import check_urdf as check_urdf
+from .simulation.disturbance import Disturbance as Disturbance
+from .simulation.disturbance import FrameForce as FrameForce
+from .simulation.disturbance import Harmonic as Harmonic
+from .simulation.disturbance import Push as Push
 from .simulation.modes import ContinuousTime as ContinuousTime
 from .simulation.modes import SampledLoop as SampledLoop
+from .simulation.noise import SensorNoise as SensorNoise
 from .simulation.plant import Plant as Plant
 from .simulation.run import Run as Run
 from .simulation.sequence import simulate_sequence as simulate_sequence

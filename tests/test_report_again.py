@@ -55,6 +55,21 @@ def test_the_script_in_continuous_time(arm, circle, tmp_path, monkeypatch):
     assert_same(run, made_again(run, tmp_path, monkeypatch))
 
 
+def test_the_script_of_a_noisy_part_of_a_batch(arm, circle, tmp_path, monkeypatch):
+    loop = pc.SampledLoop(noise=pc.SensorNoise(1e-4, [1e-3, 2e-3], seed=5), velocity="exact")
+    q = [[0.9, 0.1], [0.8, 0.2]]
+    run = pc.simulate(LAWS["plan"](arm, circle), q, duration=0.05, loop=loop, first_rollout=3, progress=False)
+    assert_same(run, made_again(run, tmp_path, monkeypatch))
+
+
+def test_what_the_record_has_in_short_is_in_no_script(arm, circle):
+    law = pc.ExtendedMotionPlan(arm, circle, np.full((70, 1), 800.0), 45.0, 20.0)
+    run = pc.simulate(law, np.full((70, 2), 0.5), duration=0.01, progress=False)
+    assert recipe("mine", run).kind == "none"
+    plants = pc.simulate(LAWS["plan"](arm, circle), [0.9, 0.1], plant=[arm, arm], duration=0.01, progress=False)
+    assert recipe("mine", plants).kind == "none"
+
+
 def test_the_script_of_a_sequence(arm, tmp_path, monkeypatch):
     lines = [pc.Line([0.0, 0.0], [0.1, 0.2], 1.0), pc.Line([0.1, 0.2], [0.3, 0.0], 1.0)]
     laws = [pc.ExtendedMotionPlan(arm, line, K_p=800.0, K_v=45.0, k=2.0, friction="full") for line in lines]

@@ -11,9 +11,10 @@ from scipy.integrate import LSODA
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller, ControlOutput
+from pathcontrol.simulation.disturbance import Disturbance
 from pathcontrol.simulation.divergence import NO_NUMBERS, STOPPED, Divergence, sound
 from pathcontrol.simulation.finish import Finish
-from pathcontrol.simulation.modes import Arm, ContinuousTime, check_rows, torque_limits
+from pathcontrol.simulation.modes import Arm, ContinuousTime, Outside, check_rows, torque_limits
 from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sensors import Reading
 
@@ -21,7 +22,10 @@ from pathcontrol.simulation.sensors import Reading
 class ClosedLoop:
     """The vector field of arm and controller; a state is (q, q̇, z), flat, one rollout after the other."""
 
-    def __init__(self, controller: Controller, plant_robot: Arm, mode: ContinuousTime) -> None:
+    def __init__(
+        self, controller: Controller, plant_robot: Arm, mode: ContinuousTime, push: _Push | None = None
+    ) -> None:
+        self._push = push
         self.controller, self.robot, self.mode = controller, plant_robot, mode
         self._limits = torque_limits(mode, plant_robot)
 
@@ -40,6 +44,8 @@ class ClosedLoop:
         q, qd, _ = self.split(y)
         out, tau = self.control(t, y)
         friction = self.robot.friction.smoothed(qd, self.mode.friction_width)
+        if self._push is not None:
+            tau = tau + self._push(t, q, qd)
         return np.concatenate([qd, self.robot.forward_dynamics(q, qd, tau - friction), out.zdot], axis=-1)
 
 
@@ -51,25 +57,28 @@ class ContinuousArm:
         robot: the arm, or one for each rollout.
         q: joint positions it starts at [rad], (N, n).
         qd: joint velocities it starts with [rad/s], (N, n).
+        outside: what disturbs it.
 
     Attributes:
         divergence: which rollouts have diverged, at the time since the present controller took over.
     """
 
-    def __init__(self, mode: ContinuousTime, robot: Arm, q: Array, qd: Array) -> None:
+    def __init__(self, mode: ContinuousTime, robot: Arm, q: Array, qd: Array, outside: Outside) -> None:
         check_rows(torque_limits(mode, robot), "torque_limits", len(q))
         self.q, self.qd = q, qd
         self._mode, self._robot, self._period = mode, robot, mode.output_period
+        self._disturbance, self._began = outside.disturbance, 0.0
         self.divergence = Divergence(q, qd)
 
     def run(self, controller: Controller, duration: float, finish: Finish | None, progress: bool) -> dict[str, Array]:
         """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
-        loop, recorder = ClosedLoop(controller, self._robot, self._mode), Recorder()
+        push = None if self._disturbance is None else _Push(self._disturbance, self._began)
+        loop, recorder = ClosedLoop(controller, self._robot, self._mode, push), Recorder()
         lost = self.divergence = Divergence(self.q, self.qd)
         start = np.concatenate([self.q, self.qd, controller.start(self.q, self.qd)], axis=-1)
         time = self._period * np.arange(max(1, round(duration / self._period)) + 1)
         with progress_bar("integrating", duration, progress) as update:
-            for t, y in zip(time, _Solution(loop, start, lost).at(time, update), strict=False):
+            for t, y in zip(time, _Solution(loop, start, lost, push).at(time, update), strict=False):
                 self.q, self.qd, _ = loop.split(y)
                 out, tau = loop.control(t, y)
                 recorder.write(self.q, self.qd, Reading(self.q, self.qd), out, tau)
@@ -78,7 +87,25 @@ class ContinuousArm:
                     break
         arrays = recorder.arrays()
         lost.erase(arrays, time)
+        self._began += t
         return arrays
+
+
+class _Push:
+    """A disturbance in the time since a controller took over, and without its jumps: it keeps its value up to one."""
+
+    def __init__(self, disturbance: Disturbance, began: float) -> None:
+        self._disturbance, self._began, self._before = disturbance, began, np.inf
+
+    def __call__(self, t: float, q: Array, qd: Array) -> Array:
+        return self._disturbance.torque(self._began + min(t, self._before), q, qd)
+
+    def until_next_jump(self, t: float, end: float) -> float:
+        """The time of the next jump after t [s], or the ``end``; from now on only what is before it counts."""
+        after = self._disturbance.jumps - self._began
+        after = after[(after > t) & (after < end)]
+        self._before = float(np.nextafter(after.min(), -np.inf)) if after.size else np.inf
+        return float(after.min()) if after.size else end
 
 
 class _Solution:
@@ -88,9 +115,11 @@ class _Solution:
         loop: the vector field.
         start: the state it starts from, (N, 2n + m).
         lost: which rollouts have diverged.
+        push: what disturbs it.
     """
 
-    def __init__(self, loop: ClosedLoop, start: Array, lost: Divergence) -> None:
+    def __init__(self, loop: ClosedLoop, start: Array, lost: Divergence, push: _Push | None) -> None:
+        self._push = push
         self._loop, self._start, self._lost = loop, start, lost
         self._odd = lost.lost  # rows whose rate was no number in the last step
         # the integrator's norm averages over rollouts: tighten it so that each one alone keeps the tolerance
@@ -103,8 +132,9 @@ class _Solution:
         t, y, given = 0.0, self._start, 1
         yield self._start
         while given < len(time) and not self._lost.all:
-            solver = LSODA(lambda t, y: self._rate(t, y, update), t, y.reshape(-1), time[-1], **self._settings)
-            while given < len(time):
+            end = time[-1] if self._push is None else self._push.until_next_jump(t, time[-1])
+            solver = LSODA(lambda t, y: self._rate(t, y, update), t, y.reshape(-1), end, **self._settings)
+            while given < len(time) and solver.status == "running":
                 t, y, self._odd = solver.t, solver.y.copy(), self._lost.lost
                 solver.step()
                 if self._in_trouble(solver):
@@ -115,6 +145,7 @@ class _Solution:
                 if known > given:
                     yield from solver.dense_output()(time[given:known]).T.reshape(-1, *self._start.shape)
                     given = known
+                t, y = solver.t, solver.y
 
     def _rate(self, t: float, y: Array, update: Callable[[float], None]) -> Array:
         update(t)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,22 @@ from pathcontrol._arrays import Array, as_array, finite, scalar
 from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.disturbance import Disturbance
+from pathcontrol.simulation.noise import SensorNoise
 from pathcontrol.simulation.sensors import Sensors
+
+
+class Outside(NamedTuple):
+    """What is neither arm nor loop.
+
+    Attributes:
+        disturbance: what pushes the arm, or None.
+        first: number of the first rollout.
+    """
+
+    disturbance: Disturbance | None = None
+    first: int = 0
+
 
 #: the simulated arm: one for all rollouts, or one for each
 Arm = RobotModel | RobotBatch
@@ -32,6 +47,7 @@ class SampledLoop:
         torque_limits: False for none, True for the effort limits of the robot, or limits [N m], (n,), or for each
             rollout, (N, n).
         delay: time from measuring to applying the torque [s]; no torque acts before the first one.
+        noise: noise of the sensors, or None.
     """
 
     period: float = 2.5e-3
@@ -41,6 +57,7 @@ class SampledLoop:
     filter_hz: float | None = None
     torque_limits: bool | ArrayLike = False
     delay: float = 0.0
+    noise: SensorNoise | None = None
 
     def __post_init__(self) -> None:
         scalar("period", self.period, positive=True)
@@ -51,6 +68,13 @@ class SampledLoop:
             raise InputError(f"velocity = {self.velocity!r}, expected 'exact' or 'difference'")
         if self.filter_hz is not None:
             scalar("filter_hz", self.filter_hz, positive=True)
+        if self.noise is not None and not isinstance(self.noise, SensorNoise):
+            raise InputError(f"noise = {self.noise!r}, expected a SensorNoise(...)")
+        if self.noise is not None and self.noise.on_velocity and self.velocity == "difference":
+            raise InputError(
+                "noise of the velocity, but velocity = 'difference' is not measured: its noise is that of positions; "
+                "use velocity = 'exact', or no noise of it"
+            )
 
     def sensors(self, robot: Arm) -> Sensors:
         """The measuring chain for ``robot``."""
@@ -69,7 +93,9 @@ class SampledLoop:
 
     def describe(self) -> dict[str, Any]:
         """All settings, for the record of a run."""
-        return {"loop": "sampled"} | _plain(asdict(self))
+        settings = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "noise"}
+        noise = {} if self.noise is None else {"noise": self.noise.describe()}
+        return {"loop": "sampled"} | _plain(settings) | noise
 
 
 @dataclass(frozen=True, eq=False)

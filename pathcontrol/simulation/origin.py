@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -32,7 +32,7 @@ class Origin:
         robot: gives the simulated arm.
         task: gives the path and its velocity profile.
         stored: what both are made from, if they come from a file.
-        robots: the arm of each rollout, where they differ.
+        robots: the arm of each rollout by its number, where they differ.
     """
 
     def __init__(
@@ -40,15 +40,15 @@ class Origin:
         robot: Callable[[], RobotModel | None],
         task: Callable[[], PathTask | None],
         stored: Stored | None = None,
-        robots: Sequence[RobotModel] = (),
+        robots: Mapping[int, RobotModel] | None = None,
     ) -> None:
         self._robot, self._task, self._stored, self._robots = robot, task, stored, robots
 
     @classmethod
-    def of(cls, robot: RobotModel | RobotBatch | None, task: PathTask | None) -> Origin:
-        """That of a run whose robot and task are at hand."""
+    def of(cls, robot: RobotModel | RobotBatch | None, task: PathTask | None, first: int = 0) -> Origin:
+        """That of a run whose robot and task are at hand; rollouts are numbered from ``first``."""
         if isinstance(robot, RobotBatch):
-            return cls(lambda: robot.robots[0], lambda: task, robots=robot.robots)
+            return cls(lambda: robot.robots[0], lambda: task, robots=dict(enumerate(robot.robots, first)))
         return cls(lambda: robot, lambda: task)
 
     @classmethod
@@ -66,11 +66,12 @@ class Origin:
         """The path and its velocity profile."""
         return self._task()
 
-    def rollout(self, row: int) -> Origin:
-        """That of one rollout, by its row in all that were simulated together."""
-        if not self._robots:
+    def rollout(self, number: int) -> Origin:
+        """That of one rollout."""
+        if self._robots is None:
             return self
-        return Origin(lambda: self._robots[row], lambda: self.task)
+        robot = self._robots[number]
+        return Origin(lambda: robot, lambda: self.task)
 
     def path(self, index: int) -> Origin:
         """That of one path of a sequence."""

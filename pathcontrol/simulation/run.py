@@ -45,12 +45,13 @@ class Run:
         *,
         robot: RobotModel | RobotBatch | None = None,
         task: PathTask | None = None,
+        first_rollout: int = 0,
     ) -> Run:
         """A run from arrays laid out as :data:`VARIABLES` says, and the position unit of each joint by its name.
 
         ``outcome`` is laid out as :data:`OUTCOMES`; a rollout with a time in ``diverged_time`` has diverged, one with
         a time in ``finish_time`` is finished, and any other is running. ``robot`` and ``task`` are what the run is
-        about, where they are known.
+        about, where they are known. Rollouts are numbered from ``first_rollout``.
         """
         kinds = sorted(set(joints.values()), reverse=True)
         variables = {}
@@ -60,12 +61,12 @@ class Run:
             variables[name] = (dims, array, {"units": " or ".join(units), "long_name": meaning})
         rollouts = len(arrays["q"])
         coords = {
-            "rollout": np.arange(rollouts),
+            "rollout": first_rollout + np.arange(rollouts),
             "time": ("time", time, {"units": "s"}),
             "joint": list(joints),
         }
         data = xr.Dataset(variables, coords).assign_coords(_outcome(rollouts, outcome or {}))
-        return cls(data, config, Origin.of(robot, task))
+        return cls(data, config, Origin.of(robot, task, first_rollout))
 
     def __getitem__(self, name: str) -> xr.DataArray:
         """One variable by its name."""

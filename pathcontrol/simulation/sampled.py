@@ -11,7 +11,8 @@ from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
 from pathcontrol.simulation.divergence import Divergence
 from pathcontrol.simulation.finish import Finish
-from pathcontrol.simulation.modes import Arm, SampledLoop, check_rows, torque_limits
+from pathcontrol.simulation.modes import Arm, Outside, SampledLoop, check_rows, torque_limits
+from pathcontrol.simulation.noise import NoiseSource
 from pathcontrol.simulation.plant import Plant
 from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sensors import Reading
@@ -56,17 +57,21 @@ class SampledArm:
         robot: the arm, or one for each rollout.
         q: joint positions it starts at [rad], (N, n).
         qd: joint velocities it starts with [rad/s], (N, n).
+        outside: what disturbs it, and the number of the first rollout, for its noise.
 
     Attributes:
         divergence: which rollouts have diverged, at the time since the present controller took over.
     """
 
-    def __init__(self, loop: SampledLoop, robot: Arm, q: Array, qd: Array) -> None:
+    def __init__(self, loop: SampledLoop, robot: Arm, q: Array, qd: Array, outside: Outside) -> None:
         self.q, self.qd, self._period, self._substeps = q, qd, loop.period, loop.substeps
         self._sensors, self._actuator = loop.sensors(robot), Actuator(loop, robot, q.shape)
         check_rows(self._sensors.resolution, "encoders", len(q))
         self._plants = [Plant(robot, part / loop.substeps) for part in self._actuator.parts]
-        self._reading = self._sensors.read(q, qd, self._sensors.start(q, qd))
+        self._noise = None if loop.noise is None else NoiseSource(loop.noise, q.shape, outside.first)
+        self._reading = self._sensors.start(*self._seen())
+        self._reading = self._sensors.read(*self._seen(), self._reading)
+        self._disturbance, self._ticks = outside.disturbance, 0
         self.divergence = Divergence(q, qd)
 
     def run(self, controller: Controller, duration: float, finish: Finish | None, progress: bool) -> dict[str, Array]:
@@ -106,11 +111,21 @@ class SampledArm:
 
     def _advance(self, tau: Array) -> None:
         """One period on, when ``tau`` was computed at its begin."""
+        t = self._ticks * self._period
         for plant, acting in zip(self._plants, self._actuator.torques(tau), strict=True):
             for _ in range(self._substeps):
-                self.q, self.qd = plant.advance(self.q, self.qd, acting)
+                pushed = acting
+                if self._disturbance is not None:
+                    pushed = acting + self._disturbance.torque(t + 0.5 * plant.step, self.q, self.qd)
+                self.q, self.qd = plant.advance(self.q, self.qd, pushed)
+                t += plant.step
+        self._ticks += 1
         self._actuator.hold(tau)
-        self._reading = self._sensors.read(self.q, self.qd, self._reading)
+        self._reading = self._sensors.read(*self._seen(), self._reading)
+
+    def _seen(self) -> tuple[Array, Array]:
+        """Positions and velocities (N, n) as they come to the sensors."""
+        return (self.q, self.qd) if self._noise is None else self._noise.disturbed(self.q, self.qd)
 
 
 def _periods_and_rest(delay: float, period: float) -> tuple[int, float]:

@@ -12,9 +12,10 @@ from pathcontrol._arrays import Array, as_array, finite
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.disturbance import Disturbance
 from pathcontrol.simulation.divergence import Divergence
 from pathcontrol.simulation.finish import Finish, finish_of
-from pathcontrol.simulation.modes import ContinuousTime, SampledLoop
+from pathcontrol.simulation.modes import ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.setup import (
     check_joints,
@@ -51,6 +52,7 @@ def simulate_sequence(
     task: PathSequence | None = None,
     plant: RobotModel | None = None,
     loop: SampledLoop | ContinuousTime | None = None,
+    disturbance: Disturbance | None = None,
     progress: bool = True,
 ) -> Run:
     """Simulate several paths of one arm, each from where the arm is when the one before is finished.
@@ -74,6 +76,7 @@ def simulate_sequence(
             then, with all that it says beside the paths; default a :class:`PathSequence` of these tasks.
         plant: the arm that is really there; default the model of the first controller.
         loop: how the loop is closed, as for :func:`simulate`.
+        disturbance: what else pushes the arm, such as :class:`Push`, or a sum; its time counts from the start.
         progress: show a bar on standard error when it takes longer than two seconds.
 
     Raises:
@@ -91,7 +94,7 @@ def simulate_sequence(
     for law in laws:
         check_joints(law, robot)
         check_law(law, q0, qd0)
-    arm, legs = simulated_arm(loop, robot, q0, qd0), []
+    arm, legs = simulated_arm(loop, robot, q0, qd0, Outside(disturbance)), []
     for law, longest, finish in zip(laws, durations, ends, strict=True):
         arrays = arm.run(law, longest, finish, progress)
         legs.append(_Leg(arrays, float(finish.time[0]), law.task.s0, _length(law.task, laps)))
@@ -100,7 +103,7 @@ def simulate_sequence(
     arrays, outcome = _joined(legs, len(laws), period, arm.divergence)
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws))
     described = {"controller": f"{len(laws)} paths with {names}", "sequence": [law.describe() for law in laws]}
-    config = record_of(described, robot, loop, duration=durations.tolist(), laps=laps)
+    config = record_of(described, robot, loop, disturbance, duration=durations.tolist(), laps=laps)
     time = period * np.arange(arrays["s"].shape[1])
     run = Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=whole)
     arm.divergence.check(run)

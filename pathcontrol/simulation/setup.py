@@ -17,7 +17,8 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.continuous import ContinuousArm
 from pathcontrol.simulation.described import in_short
-from pathcontrol.simulation.modes import Arm, ContinuousTime, SampledLoop
+from pathcontrol.simulation.disturbance import Disturbance, check_disturbance
+from pathcontrol.simulation.modes import Arm, ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.sampled import SampledArm
 
 Loop = SampledLoop | ContinuousTime
@@ -83,6 +84,13 @@ def initial_state(q: ArrayLike, qd: ArrayLike | None, n: int, rollouts: int | No
     return q0, qd0
 
 
+def rollout_number(first: Any) -> int:
+    """The number of the first rollout, a whole number from 0."""
+    if isinstance(first, bool) or not isinstance(first, int | np.integer) or first < 0:
+        raise InputError(f"first_rollout = {first!r}, expected a whole number from 0")
+    return int(first)
+
+
 def check_law(controller: Controller, q: Array, qd: Array) -> None:
     """The law, asked once, gives what :class:`ControlOutput` says: shapes that fit the initial states, and numbers."""
     name = type(controller).__name__
@@ -108,7 +116,7 @@ def check_law(controller: Controller, q: Array, qd: Array) -> None:
             raise InputError(f"{name}.law gives {field} = {np.asarray(value).tolist()} at the start, expected numbers")
 
 
-def simulated_arm(loop: Loop, robot: Arm, q: Array, qd: Array) -> SampledArm | ContinuousArm:
+def simulated_arm(loop: Loop, robot: Arm, q: Array, qd: Array, outside: Outside) -> SampledArm | ContinuousArm:
     """The arm that controllers drive, at rest or not, (N, n) each.
 
     Raises:
@@ -116,12 +124,16 @@ def simulated_arm(loop: Loop, robot: Arm, q: Array, qd: Array) -> SampledArm | C
     """
     if isinstance(robot, RobotBatch) and len(robot) != len(q):
         raise InputError(f"plant has {len(robot)} arms, q and qd are {len(q)} initial states; expected as many")
+    if outside.disturbance is not None:
+        check_disturbance(outside.disturbance, q, qd)
     if isinstance(loop, SampledLoop):
-        return SampledArm(loop, robot, q, qd)
-    return ContinuousArm(loop, robot, q, qd)
+        return SampledArm(loop, robot, q, qd, outside)
+    return ContinuousArm(loop, robot, q, qd, outside)
 
 
-def record_of(controller: Mapping[str, Any], robot: Arm, loop: Loop, **settings: Any) -> dict[str, Any]:
+def record_of(
+    controller: Mapping[str, Any], robot: Arm, loop: Loop, disturbance: Disturbance | None, **settings: Any
+) -> dict[str, Any]:
     """Everything that a run is made with; of large arrays, their shape and range."""
     packages = ("pathcontrol", "pin", "numpy", "scipy")
     plant = {"robot": robot.name, "friction": in_short(robot.friction.describe())}
@@ -132,6 +144,7 @@ def record_of(controller: Mapping[str, Any], robot: Arm, loop: Loop, **settings:
         "controller": {name: value if name in whole else in_short(value) for name, value in controller.items()},
         "plant": plant,
         "loop": in_short(loop.describe()),
+        **({} if disturbance is None else {"disturbance": in_short(disturbance.describe())}),
         **settings,
         "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
     }

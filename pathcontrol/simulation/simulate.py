@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import scalar
 from pathcontrol.control.base import Controller
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.disturbance import Disturbance
 from pathcontrol.simulation.finish import Until, finish_of, first_and_last, whole_laps
-from pathcontrol.simulation.modes import ContinuousTime, SampledLoop
+from pathcontrol.simulation.modes import ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.setup import (
     check_joints,
@@ -22,6 +23,7 @@ from pathcontrol.simulation.setup import (
     period_of,
     plant_of,
     record_of,
+    rollout_number,
     simulated_arm,
 )
 
@@ -36,6 +38,8 @@ def simulate(
     until: Until = "end",
     plant: RobotModel | Sequence[RobotModel] | None = None,
     loop: SampledLoop | ContinuousTime | None = None,
+    disturbance: Disturbance | None = None,
+    first_rollout: int = 0,
     progress: bool = True,
 ) -> Run:
     """Simulate a control law on an arm.
@@ -60,6 +64,9 @@ def simulate(
             rollout, in the order of ``q``, with the same joints: see :class:`RobotBatch`. An arm whose friction has
             coefficients (N, n) is one for each rollout too.
         loop: how the loop is closed; default ``SampledLoop()``, a 2.5 ms hold and nothing else.
+        disturbance: what else pushes the arm, such as :class:`Push`, or a sum; its time counts from the start.
+        first_rollout: number of the first rollout, where this is a part of a larger batch: rollouts are numbered from
+            it, and their random numbers depend on their numbers.
         progress: show a bar on standard error when it takes longer than two seconds.
 
     Raises:
@@ -67,19 +74,22 @@ def simulate(
         SimulationError: all rollouts diverged, as a single one does; its ``run`` holds what happened until then.
     """
     duration = scalar("duration", duration, positive=True)
-    robot = plant_of(plant, controller)
+    robot, first = plant_of(plant, controller), rollout_number(first_rollout)
     check_joints(controller, robot)
     loop = checked_loop(loop)
     q0, qd0 = initial_state(q, qd, robot.n, None if isinstance(robot, RobotModel) else len(robot))
     period, finish = period_of(loop, duration), finish_of(controller.task, laps, until, len(q0))
     check_law(controller, q0, qd0)
-    config = record_of(controller.describe(), robot, loop, duration=duration, laps=laps, until=until)
-    arm = simulated_arm(loop, robot, q0, qd0)
+    arm = simulated_arm(loop, robot, q0, qd0, Outside(disturbance, first))
+    settings = {"duration": duration, "laps": laps, "until": until, "first_rollout": first}
+    config = record_of(controller.describe(), robot, loop, disturbance, **settings)
     arrays = arm.run(controller, duration, finish, progress)
     outcome = arm.divergence.outcome() | ({} if finish is None else {"finish_time": finish.time})
     if controller.task.closed:
         outcome["laps"] = whole_laps(controller.task, *first_and_last(arrays["s"]))
     time = period * np.arange(arrays["s"].shape[1])
-    run = Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=controller.task)
+    run = Run.from_arrays(
+        time, joints_of(robot), arrays, config, outcome, robot=robot, task=controller.task, first_rollout=first
+    )
     arm.divergence.check(run)
     return run

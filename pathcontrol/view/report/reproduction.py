@@ -61,9 +61,12 @@ def script(name: str, run: Run) -> str:
     sequence = isinstance(run.config.get("duration"), list)
     if run.task is None or not _known(several, loop) or not _ended(run.config, sequence):
         return ""
-    if "arms" in table(run.config, "plant"):
+    if "disturbance" in run.config or "arms" in table(run.config, "plant"):
         return ""
-    closed = _call(f"pc.{_LOOPS[loop['loop']]}", [], _without(loop, ["loop"]))
+    settings = _without(loop, ["loop"])
+    if "noise" in settings:
+        settings["noise"] = _Name(_call("pc.SensorNoise", [], settings["noise"]))
+    closed = _call(f"pc.{_LOOPS[loop['loop']]}", [], settings)
     lines = [
         "import pathcontrol as pc\n",
         f'saved = pc.Run.load("{file_name(name)}.nc")  # knows its robot and its path',
@@ -78,6 +81,8 @@ def script(name: str, run: Run) -> str:
 def _of_one(law: Mapping[str, Any], config: Mapping[str, Any]) -> list[str]:
     made = _call(f"pc.{law['controller']}", ["saved.robot", "saved.task"], _without(law, _NOT_ARGUMENTS))
     settings = {key: config[key] for key in ("duration", "laps", "until")} | {"loop": _Name("loop")}
+    if config.get("first_rollout"):
+        settings["first_rollout"] = config["first_rollout"]
     return [f"law = {made}", f"run = {_call('pc.simulate', ['law', 'q', 'qd'], settings)}"]
 
 
@@ -94,7 +99,10 @@ def _known(several: Sequence[Mapping[str, Any]], loop: Mapping[str, Any]) -> boo
     """Whether the laws are one of this package with the same gains, and the loop is one of this package."""
     first = several[0]
     alike = all(_without(law, ["robot", "task"]) == _without(first, ["robot", "task"]) for law in several)
-    names = [*first, *loop]  # of arguments: from a file, and soon in a script
+    noise = loop.get("noise", {})
+    if not isinstance(noise, Mapping):
+        return False
+    names = [*first, *loop, *noise]  # of arguments: from a file, and soon in a script
     return (
         alike
         and all(is_whole(_without(law, ["robot", "task"])) for law in several)

@@ -1,0 +1,172 @@
+"""What else pushes the arm: torques on its joints, and forces on its frames, over time."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.tasks.profile import plain_attributes
+
+
+class Disturbance(ABC):
+    """Torques on the joints that no controller knows of; disturbances add up with ``+``.
+
+    The sampled loop holds a disturbance over each step of the plant, at its value in the middle of the step; so a push
+    is as long as the steps whose middle it covers. Torque limits are those of the motors and do not limit it.
+    """
+
+    @abstractmethod
+    def torque(self, t: float, q: Array, qd: Array) -> Array:
+        """Torques [N m] on the joints at t [s], with the arms at (q, q̇), (N, n) each; broadcasts to (N, n)."""
+
+    @property
+    def jumps(self) -> Array:
+        """Times [s] at which it jumps, (k,); continuous time is integrated from one to the next."""
+        return np.empty(0)
+
+    def __add__(self, other: Disturbance) -> Disturbance:
+        return _Sum((self, other))
+
+    def describe(self) -> dict[str, Any]:
+        """Name and public parameters, for the record of a run."""
+        return {"disturbance": type(self).__name__} | plain_attributes(self)
+
+
+class _Sum(Disturbance):
+    def __init__(self, terms: tuple[Disturbance, ...]) -> None:
+        self._terms = terms
+
+    def torque(self, t: float, q: Array, qd: Array) -> Array:
+        total = self._terms[0].torque(t, q, qd)
+        for term in self._terms[1:]:
+            total = total + term.torque(t, q, qd)
+        return total
+
+    @property
+    def jumps(self) -> Array:
+        return np.concatenate([term.jumps for term in self._terms])
+
+    def describe(self) -> dict[str, Any]:
+        return {"disturbance": "sum", "terms": [term.describe() for term in self._terms]}
+
+
+class _Timed(Disturbance):
+    """What begins and ends: from ``start`` for ``duration`` [s], each a number or one for each rollout, (N,)."""
+
+    def __init__(self, start: ArrayLike, duration: ArrayLike) -> None:
+        self.start, length = _each("start", start), as_array("duration", duration)
+        if length.ndim > 1 or not (length > 0).all():
+            raise InputError(f"duration = {length.tolist()}, expected times greater than 0 [s], one or (N,)")
+        self.duration = readonly(length)
+
+    def share(self, t: float) -> Array:
+        """1 while it acts and 0 else, (), or (N, 1)."""
+        since = t - self.start
+        acting = ((since >= 0) & (since < self.duration)).astype(np.float64)
+        return acting[..., None] if acting.ndim else acting
+
+    @property
+    def jumps(self) -> Array:
+        ends = np.concatenate([np.ravel(self.start), np.ravel(self.start + self.duration)])
+        return np.unique(ends[np.isfinite(ends)])
+
+
+class Push(_Timed):
+    """A constant torque on the joints for a while.
+
+    Args:
+        magnitude: torque [N m], (n,), or for each rollout, (N, n).
+        start: when it begins [s], or for each rollout, (N,).
+        duration: how long it acts [s], or for each rollout, (N,).
+    """
+
+    def __init__(self, magnitude: ArrayLike, start: ArrayLike = 0.0, duration: ArrayLike = np.inf) -> None:
+        super().__init__(start, duration)
+        self.magnitude = readonly(finite("magnitude", as_array("magnitude", magnitude)))
+
+    def torque(self, t: float, q: Array, qd: Array) -> Array:
+        return self.share(t) * self.magnitude
+
+
+class Harmonic(Disturbance):
+    """A sinusoidal torque on the joints, A sin(2πft + φ).
+
+    Args:
+        amplitude: A [N m], (n,), or for each rollout, (N, n).
+        frequency: f [Hz], or for each rollout, (N,).
+        phase: φ [rad], or for each rollout, (N,).
+    """
+
+    def __init__(self, amplitude: ArrayLike, frequency: ArrayLike, phase: ArrayLike = 0.0) -> None:
+        self.amplitude = readonly(finite("amplitude", as_array("amplitude", amplitude)))
+        self.frequency, self.phase = _each("frequency", frequency), _each("phase", phase)
+
+    def torque(self, t: float, q: Array, qd: Array) -> Array:
+        wave = np.sin(2 * np.pi * self.frequency * t + self.phase)
+        return (wave[..., None] if wave.ndim else wave) * self.amplitude
+
+
+class FrameForce(_Timed):
+    """A constant force on the origin of a frame, in axes of the base: τ = J(q)ᵀ f, J the Jacobian of that point.
+
+    In the sampled loop J is that at the beginning of the step.
+
+    Args:
+        robot: the arm, for its kinematics.
+        frame: name of the frame.
+        force: f [N], (3,), or for each rollout, (N, 3).
+        start: when it begins [s], or for each rollout, (N,).
+        duration: how long it acts [s], or for each rollout, (N,).
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        frame: str,
+        force: ArrayLike,
+        start: ArrayLike = 0.0,
+        duration: ArrayLike = np.inf,
+    ) -> None:
+        super().__init__(start, duration)
+        robot.frame_pose(np.zeros(robot.n), frame)  # there is such a frame
+        self._robot, self.frame = robot, frame
+        self.force = readonly(finite("force", as_array("force", force)))
+        if self.force.shape[-1:] != (3,):
+            raise InputError(f"force has shape {self.force.shape}, expected (3,), or (N, 3) for each rollout")
+
+    def torque(self, t: float, q: Array, qd: Array) -> Array:
+        share = self.share(t)
+        if not share.any():
+            return np.zeros_like(q)
+        jacobian = self._robot.frame_jacobian(q, self.frame)[..., :3, :]
+        return (jacobian * (share * self.force)[..., None]).sum(-2)
+
+
+def check_disturbance(disturbance: Any, q: Array, qd: Array) -> None:
+    """A disturbance gives torques for the rollouts at (q, q̇), (N, n) each.
+
+    Raises:
+        InputError: it is none, or its torques do not fit.
+    """
+    if not isinstance(disturbance, Disturbance):
+        raise InputError(f"disturbance = {disturbance!r}, expected a Disturbance, such as Push(...) or a sum of them")
+    name = type(disturbance).__name__
+    try:
+        torque = np.asarray(disturbance.torque(0.0, q, qd), dtype=np.float64)
+    except ValueError as error:
+        raise InputError(f"{name}.torque fails for {len(q)} rollouts of {q.shape[1]} joints: {error}") from error
+    if torque.shape not in ((), q.shape[1:], (1, q.shape[1]), q.shape):
+        raise InputError(f"{name}.torque has shape {torque.shape}, expected {q.shape}: rollouts and joints")
+
+
+def _each(name: str, value: ArrayLike) -> Array:
+    array = readonly(finite(name, as_array(name, value)))
+    if array.ndim > 1:
+        raise InputError(f"{name} has shape {array.shape}, expected a number, or one for each rollout, (N,)")
+    return array

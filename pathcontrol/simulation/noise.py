@@ -1,0 +1,96 @@
+"""Noise of the sensors, from generators that are told where to begin."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.random import SeedSequence, default_rng
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, finite
+from pathcontrol.errors import InputError
+
+_DRAWN = 1 << 20  # numbers drawn in advance, of all rollouts together
+_LONGEST = 256  # samples drawn in advance
+
+
+@dataclass(frozen=True, eq=False)
+class SensorNoise:
+    """White Gaussian noise on what is measured, independent from joint to joint and from sample to sample.
+
+    On the position it is added before the encoder rounds, and so comes through a difference of positions; on the
+    velocity before the filter. The numbers of a rollout depend on ``seed`` and on its own number only, and so not on
+    how many others there are, nor on how a batch is cut: rollout i has ``SeedSequence(seed, spawn_key=(i,))``.
+
+    Attributes:
+        position: standard deviation [rad], a number, (n,), or for each rollout, (N, n) or (N, 1).
+        velocity: standard deviation of a velocity that is measured [rad/s], likewise.
+        seed: where the generators begin, a whole number from 0.
+    """
+
+    position: ArrayLike = 0.0
+    velocity: ArrayLike = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("position", "velocity"):
+            deviation = finite(f"noise of the {name}", np.asarray(getattr(self, name), dtype=np.float64))
+            if (deviation < 0).any() or deviation.ndim > 2:
+                raise InputError(f"noise of the {name} = {deviation.tolist()}, expected standard deviations ≥ 0")
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int | np.integer) or self.seed < 0:
+            raise InputError(f"seed = {self.seed!r}, expected a whole number from 0")
+
+    @property
+    def on_velocity(self) -> bool:
+        """Whether there is any on the velocity."""
+        return bool(np.any(np.asarray(self.velocity) > 0))
+
+    def describe(self) -> dict[str, Any]:
+        """All settings, for the record of a run."""
+        return {name: np.asarray(value).tolist() for name, value in asdict(self).items()}
+
+
+class NoiseSource:
+    """The noise of N rollouts, sample by sample.
+
+    Args:
+        noise: how much.
+        shape: (N, n).
+        first: number of the first rollout.
+    """
+
+    def __init__(self, noise: SensorNoise, shape: tuple[int, int], first: int) -> None:
+        self._deviation = np.stack([_for_each(name, getattr(noise, name), shape) for name in ("position", "velocity")])
+        self._generators = [
+            default_rng(SeedSequence(int(noise.seed), spawn_key=(i,))) for i in range(first, first + shape[0])
+        ]
+        self._ahead = np.empty((max(1, min(_LONGEST, _DRAWN // (2 * shape[0] * shape[1]))), 2, *shape))
+        self._left = 0
+
+    def disturbed(self, q: Array, qd: Array) -> tuple[Array, Array]:
+        """Positions and velocities (N, n) with the next sample of noise."""
+        if self._left == 0:
+            self._draw()
+        sample = self._ahead[len(self._ahead) - self._left]
+        self._left -= 1
+        return q + sample[0], qd + sample[1]
+
+    def _draw(self) -> None:
+        """More samples; a generator gives the same ones one by one or many at once."""
+        samples, kinds, _, joints = self._ahead.shape
+        for i, generator in enumerate(self._generators):
+            self._ahead[:, :, i] = generator.standard_normal((samples, kinds, joints))
+        self._ahead *= self._deviation
+        self._left = samples
+
+
+def _for_each(name: str, deviation: ArrayLike, shape: tuple[int, int]) -> Array:
+    array = np.asarray(deviation, dtype=np.float64)
+    try:
+        return np.broadcast_to(array, shape)
+    except ValueError as error:
+        raise InputError(
+            f"noise of the {name} has shape {array.shape}, expected one that fits {shape}: rollouts and joints"
+        ) from error
