@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,7 @@ class Divergence:
     @property
     def all(self) -> bool:
         """Whether no rollout is left."""
-        return bool(self.lost.all())
+        return self.any and bool(self.lost.all())
 
     def look_at_state(self, t: float, q: Array, qd: Array) -> None:
         """Mark the rollouts whose state is lost at t [s]; q and q̇ are (N, n)."""
@@ -49,7 +50,7 @@ class Divergence:
 
     def look_at_torque(self, t: float, tau: Array) -> None:
         """Mark the rollouts whose law asks for torques (N, n) that are no numbers at t [s]."""
-        if not np.isfinite(np.vdot(tau, tau)):
+        if not isfinite(np.vdot(tau, tau)):
             self.mark(t, np.asarray(~np.isfinite(tau).all(-1)), NO_NUMBERS)
 
     def mark(self, t: float, rows: Array, reason: str = BEYOND) -> None:
