@@ -1,0 +1,1 @@
+"""Measurements, never tests: ``python -m benchmarks`` for the speed of simulations, the scripts for the rest."""

@@ -1,0 +1,86 @@
+"""Ours, the plain loop, and Pinocchio's batched calls alone, on a case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+import pinocchio as pin
+
+from benchmarks.cases import Case
+from benchmarks.contest import Contender
+from benchmarks.plain_loop import plain_run
+from pathcontrol import simulate
+
+
+def ours(case: Case, rollouts: int, ticks: int, threads: int = 1) -> Contender:
+    """:func:`pathcontrol.simulate` of many rollouts, from its checks to the finished run."""
+    return _simulated(case, *case.states(rollouts), ticks, threads)
+
+
+def ours_alone(case: Case, ticks: int) -> Contender:
+    """:func:`pathcontrol.simulate` of the experiment itself, one rollout that begins at rest."""
+    return _simulated(case, case.start[None], np.zeros((1, case.robot.n)), ticks, 1)
+
+
+def plain(case: Case, rollouts: int, ticks: int) -> Contender:
+    """The plain loop over the first of the rollouts that :func:`ours` does."""
+    return _plainly(case, *case.states(1000), rollouts, ticks)
+
+
+def plain_alone(case: Case, ticks: int) -> Contender:
+    """The plain loop over the experiment itself."""
+    return _plainly(case, case.start[None], np.zeros((1, case.robot.n)), 1, ticks)
+
+
+def _simulated(case: Case, q: np.ndarray, qd: np.ndarray, ticks: int, threads: int) -> Contender:
+    law, duration = case.law(threads), ticks * case.loop.period
+    return Contender(lambda: simulate(law, q, qd, duration=duration, loop=case.loop, progress=False), len(q), ticks)
+
+
+def _plainly(case: Case, q: np.ndarray, qd: np.ndarray, rollouts: int, ticks: int) -> Contender:
+    s = case.law().start(q, qd)[:, 0]
+
+    def run() -> None:
+        for i in range(rollouts):
+            plain_run(case, q[i], qd[i], float(s[i]), ticks)
+
+    return Contender(run, rollouts, ticks)
+
+
+def pinocchio_alone(case: Case, rollouts: int, ticks: int, threads: int = 1) -> Contender:
+    """What one tick needs of Pinocchio and nothing else: one RNEA for the law and two ABA for the plant's step."""
+    pool = pin.ModelPool(case.robot.pinocchio_model, threads)
+    q, qd = (state.T for state in case.states(rollouts))
+    torque, out = np.ones_like(q), np.empty_like(q)
+
+    def run() -> None:
+        for _ in range(ticks):
+            pin.rneaInParallel(threads, pool, q, qd, torque, out)
+            pin.abaInParallel(threads, pool, q, qd, torque, out)
+            pin.abaInParallel(threads, pool, q, qd, torque, out)
+
+    return Contender(run, rollouts, ticks)
+
+
+def control_tick(case: Case, repeats: int = 5000) -> tuple[float, float]:
+    """Median time [µs] of one law and step of its state, as on hardware, and of one raw RNEA, called in turn."""
+    law, period = case.law(), case.loop.period
+    q, qd = case.start, np.zeros(case.robot.n)
+    z = law.start(q, qd)
+    model, data = case.robot.pinocchio_model, case.robot.pinocchio_model.createData()
+
+    def tick() -> None:
+        nonlocal z
+        z = law.advance(z, law.law(0.0, q, qd, z), period)
+
+    times = np.array([(_time(tick), _time(lambda: pin.rnea(model, data, q, qd, qd))) for _ in range(repeats)])
+    tick_time, rnea_time = 1e6 * np.median(times, axis=0)
+    return float(tick_time), float(rnea_time)
+
+
+def _time(function: Callable[[], object]) -> float:
+    began = perf_counter()
+    function()
+    return perf_counter() - began
