@@ -22,6 +22,7 @@ from pathcontrol.errors import SimulationError
 
 _PATIENCE = 3  # block exchanges without progress before single ones
 _MAX_EXCHANGES = 10_000
+_EPSILON = np.finfo(np.float64).eps
 _ROUNDING = 1e-12  # relative to the largest momentum; a joint this close to slipping may stick
 
 _States = NDArray[np.int8]  # +1 slips forward, −1 slips backward, 0 sticks
@@ -38,7 +39,7 @@ class _Problem(NamedTuple):
         return _Problem(*(a[index] for a in self))
 
 
-def stick_slip(M: Array, p: Array, low: Array, high: Array) -> Array:
+def stick_slip(M: Array, p: Array, low: Array, high: Array, guess: Array | None = None) -> Array:
     """Velocity v⁺ [rad/s] after a step with dry friction.
 
     Args:
@@ -46,18 +47,27 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array) -> Array:
         p: momentum without dry friction [N m s], (N, n).
         low: least friction impulse [N m s], (N, n), ≤ 0.
         high: greatest friction impulse [N m s], (N, n), ≥ 0.
+        guess: the sign that v⁺ may have, (N, n), by default that of p; a good one saves time and changes nothing else.
 
     Returns:
         v⁺, (N, n); exactly 0 for joints that stick.
     """
     problem = _Problem(M, p, low, high, (low == 0) & (high == 0))
-    states = np.sign(p).astype(np.int8)
+    states = np.sign(p if guess is None else guess).astype(np.int8)
     states[problem.free] = 1
-    v = np.empty_like(p)
-    active = np.arange(len(p))
-    fewest, patience = np.full(len(p), p.shape[1] + 1), np.full(len(p), _PATIENCE)
+    v, wanted = _solve(problem, states)
+    wrong = np.flatnonzero((wanted != states).any(-1))
+    if wrong.size:
+        v[wrong] = _exchanged(problem.rows(wrong), states[wrong], wanted[wrong])
+    return v
+
+
+def _exchanged(problem: _Problem, states: _States, wanted: _States) -> Array:
+    """v⁺, from states that call for others."""
+    N, n = states.shape
+    v, active = np.empty((N, n)), np.arange(N)
+    fewest, patience = np.full(N, n + 1), np.full(N, _PATIENCE)
     for _ in range(_MAX_EXCHANGES):
-        v[active], wanted = _solve(problem.rows(active), states[active])
         violated = wanted != states[active]
         count = violated.sum(-1)
         better = count < fewest[active]
@@ -69,6 +79,7 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array) -> Array:
         active = active[count > 0]
         if not active.size:
             return v
+        v[active], wanted = _solve(problem.rows(active), states[active])
     raise SimulationError(
         f"the friction of {active.size} rollouts did not settle; is the mass matrix positive definite?"
     )
@@ -86,10 +97,9 @@ def _solve(problem: _Problem, states: _States) -> tuple[Array, _States]:
     needed = p - np.einsum("kij,kj->ki", M, v)
     # p − Mv may be a small difference of large terms: allow for their rounding, and not for more
     terms = np.einsum("kij,kj->ki", np.abs(M), np.abs(v)).max(-1, keepdims=True)
-    margin = _ROUNDING * np.abs(p).max(-1, keepdims=True) + 8 * p.shape[1] * np.finfo(np.float64).eps * terms
-    released = np.where(needed > high + margin, 1, np.where(needed < low - margin, -1, 0))
-    slipping = np.where(v * states < 0, 0, states)
-    wanted = np.where(stick, released, slipping).astype(np.int8)
+    margin = _ROUNDING * np.abs(p).max(-1, keepdims=True) + 8 * p.shape[1] * _EPSILON * terms
+    released = (needed > high + margin).astype(np.int8) - (needed < low - margin)
+    wanted = np.where(stick, released, np.where(v * states < 0, 0, states))
     return v, np.where(free, states, wanted)
 
 

@@ -35,9 +35,9 @@ class Plant:
         self._inertia = robot.with_armature(0.5 * step * self._damping)
 
     def _mass_matrix(self, q: Array, rows: Array) -> Array:
-        """Of the arms of some ``rows``, a mask (N,), at q (k, n)."""
+        """Of the arms of some ``rows`` (k,), at q (k, n)."""
         if isinstance(self._inertia, RobotBatch):
-            return self._inertia.mass_matrix(q, np.flatnonzero(rows))
+            return self._inertia.mass_matrix(q, rows)
         return self._inertia.mass_matrix(q)
 
     def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
@@ -53,14 +53,14 @@ class Plant:
         plus, minus = self._levels(qd)
         friction = np.where(qd > 0, plus, np.where(qd < 0, -minus, 0.0))
         v = start + duration * self._inertia.forward_dynamics(q, qd, drive - friction)
-        settled = (v > 0) & (qd > 0) | (v < 0) & (qd < 0) | (plus + minus == 0)
-        settled |= ~np.isfinite(v)  # a diverged arm must not be taken for one that sticks
-        if settled.all():
+        turned = (v * qd <= 0) & (plus + minus > 0)
+        if not turned.any():
             return v
-        rows = ~settled.all(-1)
-        M = self._mass_matrix(q[rows], rows)
-        momentum = np.einsum("kij,kj->ki", M, v[rows]) + duration * friction[rows]
+        turned &= np.isfinite(v)  # a diverged arm must not be taken for one that sticks
+        rows = np.flatnonzero(turned.any(-1))
+        M, impulse = self._mass_matrix(q[rows], rows), duration * friction[rows]
+        momentum = np.einsum("kij,kj->ki", M, v[rows]) + impulse
         low = -duration * np.broadcast_to(minus, q.shape)[rows]
         high = duration * np.broadcast_to(plus, q.shape)[rows]
-        v[rows] = stick_slip(M, momentum, low, high)
+        v[rows] = stick_slip(M, momentum, low, high, guess=np.where(turned[rows], 0.0, qd[rows]))
         return v
