@@ -191,10 +191,8 @@ class RobotModel:
         return self.inverse_dynamics(q, zero, zero)
 
     def mass_matrix(self, q: ArrayLike) -> Array:
-        """M(q) [kg m²], (*batch, n, n): column i is the torque of a unit acceleration of joint i, without gravity."""
-        q = joint_array("q", q, self.n)[..., None, :]
-        columns = self._batched(pin.rneaInParallel, self._weightless_pool, q=q, qd=np.zeros(self.n), qdd=np.eye(self.n))
-        return 0.5 * (columns + columns.swapaxes(-1, -2))
+        """M(q) [kg m²], (*batch, n, n), by the composite rigid body algorithm."""
+        return self._each(q, (self.n, self.n), lambda qi: pin.crba(self.pinocchio_model, self._data, qi))
 
     def coriolis(self, q: ArrayLike, qd: ArrayLike, v: ArrayLike) -> Array:
         """C(q,q̇)v [N m], (*batch, n), with the C of Christoffel symbols, for which Ṁ − 2C is skew-symmetric.
