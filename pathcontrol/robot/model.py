@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -59,6 +59,29 @@ class Actuation:
         """The actuation of some of the joints."""
         counts = None if self.encoder_counts is None else readonly(self.encoder_counts[list(joints)])
         return Actuation(self.limits.select(joints), self.friction.select(joints), counts)
+
+
+class _Algorithm(NamedTuple):
+    """One of Pinocchio's algorithms: for one configuration, and for many on several threads."""
+
+    one: Callable[..., Any]
+    many: Callable[..., Any]
+
+
+def _aba(*arguments: Any) -> Array:
+    """As :func:`pin.abaInParallel` does it: bit for bit the same, which the other convention is not."""
+    return pin.aba(*arguments, pin.Convention.WORLD)
+
+
+_RNEA, _ABA = _Algorithm(pin.rnea, pin.rneaInParallel), _Algorithm(_aba, pin.abaInParallel)
+
+
+class _Body(NamedTuple):
+    """A model with room to compute in."""
+
+    model: Any
+    data: Any
+    pool: Any
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -154,14 +177,14 @@ class RobotModel:
         With ``velocity`` v the Coriolis term is C(q,q̇)v, as passivity-based laws want it; see :meth:`coriolis`.
         """
         if velocity is None:
-            return self._batched(pin.rneaInParallel, self._pool, q=q, qd=qd, qdd=qdd)
+            return self._batched(_RNEA, self._body, q=q, qd=qd, qdd=qdd)
         qd, v = joint_array("qd", qd, self.n), joint_array("velocity", velocity, self.n)
         surplus = self._centripetal(q, 0.5 * (qd - v))
-        return self._batched(pin.rneaInParallel, self._pool, q=q, qd=0.5 * (qd + v), qdd=qdd) - surplus
+        return self._batched(_RNEA, self._body, q=q, qd=0.5 * (qd + v), qdd=qdd) - surplus
 
     def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
         """q̈ = M(q)⁻¹(τ − C(q,q̇)q̇ − g(q)) [rad/s²], (*batch, n), by the articulated-body algorithm."""
-        return self._batched(pin.abaInParallel, self._pool, q=q, qd=qd, tau=tau)
+        return self._batched(_ABA, self._body, q=q, qd=qd, tau=tau)
 
     def forward_dynamics_row(self, q: Array, qd: Array, tau: Array, armature: Array) -> Array:
         """q̈ (n,) of one configuration, each argument (n,), with another rotor inertia ``armature`` [kg m²].
@@ -175,11 +198,8 @@ class RobotModel:
     def mass_matrix_row(self, q: Array, armature: Array) -> Array:
         """M(q) [kg m²], (n, n), of one configuration (n,), with another rotor inertia, to the last bit."""
         model, data = self._scratch
-        gravity, still = model.gravity.copy(), np.zeros(self.n)
-        model.armature, model.gravity = armature, pin.Motion.Zero()
-        columns = np.array([pin.rnea(model, data, q, still, unit) for unit in np.eye(self.n)])
-        model.gravity = gravity
-        return 0.5 * (columns + columns.T)
+        model.armature = armature
+        return pin.crba(model, data, q)
 
     def nonlinear_effects(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """C(q,q̇)q̇ + g(q) [N m], (*batch, n)."""
@@ -210,7 +230,7 @@ class RobotModel:
 
     def kinetic_energy(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """½ q̇ᵀM(q)q̇ [J], (*batch,)."""
-        momentum = self._batched(pin.rneaInParallel, self._weightless_pool, q=q, qd=np.zeros(self.n), qdd=qd)
+        momentum = self._batched(_RNEA, self._weightless, q=q, qd=np.zeros(self.n), qdd=qd)
         return 0.5 * np.asarray((momentum * as_array("qd", qd)).sum(-1))
 
     def potential_energy(self, q: ArrayLike) -> Array:
@@ -365,14 +385,14 @@ class RobotModel:
         return self.pinocchio_model.createData()
 
     @cached_property
-    def _pool(self) -> Any:
-        return pin.ModelPool(self.pinocchio_model, self.threads)
+    def _body(self) -> _Body:
+        return _Body(self.pinocchio_model, self._data, pin.ModelPool(self.pinocchio_model, self.threads))
 
     @cached_property
-    def _weightless_pool(self) -> Any:
-        weightless = pin.Model(self.pinocchio_model)
-        weightless.gravity = pin.Motion.Zero()
-        return pin.ModelPool(weightless, self.threads)
+    def _weightless(self) -> _Body:
+        model = pin.Model(self.pinocchio_model)
+        model.gravity = pin.Motion.Zero()
+        return _Body(model, model.createData(), pin.ModelPool(model, self.threads))
 
     @cached_property
     def _scratch(self) -> tuple[Any, Any]:
@@ -386,19 +406,17 @@ class RobotModel:
 
     def _centripetal(self, q: ArrayLike, x: ArrayLike) -> Array:
         """c(q,x) = C(q,x)x [N m], (*batch, n)."""
-        return self._batched(pin.rneaInParallel, self._weightless_pool, q=q, qd=x, qdd=np.zeros(self.n))
+        return self._batched(_RNEA, self._weightless, q=q, qd=x, qdd=np.zeros(self.n))
 
-    def _batched(self, call: Callable[..., Any], pool: Any, **arguments: ArrayLike) -> Array:
-        """One of Pinocchio's batched calls on three (*batch, n) arguments that broadcast."""
-        arrays = self._together(arguments)
-        shape = arrays[0].shape
-        out: Array = np.empty(shape)
-        if len(shape) == 2:
-            x, y, z, result = *arrays, out
-        else:
-            x, y, z, result = (a.reshape(-1, self.n) for a in (*arrays, out))
+    def _batched(self, algorithm: _Algorithm, body: _Body, **arguments: ArrayLike) -> Array:
+        """An algorithm on three (*batch, n) arguments that broadcast."""
+        x, y, z = self._together(arguments)
+        if x.size == self.n:  # one configuration is not worth the threads' overhead
+            return algorithm.one(body.model, body.data, x.reshape(-1), y.reshape(-1), z.reshape(-1)).reshape(x.shape)
+        out: Array = np.empty(x.shape)
         if out.size:
-            call(self.threads, pool, x.T, y.T, z.T, result.T)
+            columns = (a.reshape(-1, self.n).T for a in (x, y, z, out))
+            algorithm.many(self.threads, body.pool, *columns)
         return out
 
     def _each(self, q: ArrayLike, shape: tuple[int, ...], function: Callable[..., Any], **more: ArrayLike) -> Array:
@@ -410,7 +428,7 @@ class RobotModel:
     def _together(self, arguments: Mapping[str, ArrayLike]) -> list[Array]:
         """Arguments (*batch, n) broadcast to one shape."""
         arrays = [joint_array(name, value, self.n) for name, value in arguments.items()]
-        if all(a.shape == arrays[0].shape for a in arrays):
+        if len({a.shape for a in arrays}) == 1:
             return arrays
         shape = _broadcast_shape(arguments, arrays)
         return [np.broadcast_to(a, shape) for a in arrays]
