@@ -96,7 +96,7 @@ class Controller(ABC):
         x = np.minimum(period * out.slope, 1.0)
         phi_1, phi_2 = _phi(x)
         s = out.s + period * (phi_1 * out.sdot + period * phi_2 * out.drift)
-        return (s if self.task.closed else np.clip(s, self.task.s0, self.task.s_end))[..., None]
+        return (s if self.task.closed else np.minimum(np.maximum(s, self.task.s0), self.task.s_end))[..., None]
 
     def __repr__(self) -> str:
         gains = ", ".join(f"{name}={np.asarray(getattr(self, name)).tolist()}" for name in self.gains)
@@ -151,6 +151,9 @@ class Controller(ABC):
 def _phi(x: Array) -> tuple[Array, Array]:
     """φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x, by their series where x is small."""
     small = np.abs(x) < 1e-3
+    if not np.count_nonzero(small):
+        phi_1 = np.expm1(x) / x
+        return phi_1, (phi_1 - 1) / x
     safe = np.where(small, 1.0, x)
     phi_1 = np.where(small, 1 + x / 2 * (1 + x / 3 * (1 + x / 4)), np.expm1(safe) / safe)
     phi_2 = np.where(small, 0.5 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5))), (phi_1 - 1) / safe)

@@ -28,11 +28,12 @@ class Plant:
 
     def __init__(self, robot: RobotModel | RobotBatch, step: float) -> None:
         self.robot, self.step = robot, step
-        self._damping = robot.friction.viscous
+        # rows, (1, n), which NumPy joins to those of a single rollout far faster than (n,)
+        self._damping = np.atleast_2d(robot.friction.viscous)
         levels = robot.friction.levels
-        steady = levels(np.zeros(robot.n))
+        steady = tuple(np.atleast_2d(level) for level in levels(np.zeros(robot.n)))
         self._levels = levels if robot.friction.varies else lambda qd: steady
-        self._inertia = robot.with_armature(0.5 * step * self._damping)
+        self._inertia = robot.with_armature(0.5 * step * robot.friction.viscous)
 
     def _mass_matrix(self, q: Array, rows: Array) -> Array:
         """Of the arms of some ``rows`` (k,), at q (k, n)."""
@@ -51,13 +52,16 @@ class Plant:
     def _push(self, q: Array, qd: Array, start: Array, drive: Array, duration: float) -> Array:
         """P(start + duration a(q, q̇)): dry friction keeps the direction of q̇, unless that proves wrong."""
         plus, minus = self._levels(qd)
-        friction = np.where(qd > 0, plus, np.where(qd < 0, -minus, 0.0))
+        friction = np.where(qd > 0, plus, -minus)  # whatever a joint at rest gets, it is taken back below
         v = start + duration * self._inertia.forward_dynamics(q, qd, drive - friction)
-        turned = (v * qd <= 0) & (plus + minus > 0)
-        if not turned.any():
+        turned = v * qd <= 0
+        if not np.count_nonzero(turned):
             return v
-        turned &= np.isfinite(v)  # a diverged arm must not be taken for one that sticks
+        # a diverged arm must not be taken for one that sticks
+        turned &= np.isfinite(v) & (plus + minus > 0)
         rows = np.flatnonzero(turned.any(-1))
+        if not rows.size:
+            return v
         M, impulse = self._mass_matrix(q[rows], rows), duration * friction[rows]
         momentum = np.einsum("kij,kj->ki", M, v[rows]) + impulse
         low = -duration * np.broadcast_to(minus, q.shape)[rows]

@@ -24,8 +24,9 @@ class Actuator:
     """Torque limits and the delay between measuring and acting."""
 
     def __init__(self, loop: SampledLoop, robot: Arm, shape: tuple[int, int]) -> None:
-        self._limits = torque_limits(loop, robot)
-        check_rows(self._limits, "torque_limits", shape[0])
+        limits = torque_limits(loop, robot)
+        check_rows(limits, "torque_limits", shape[0])
+        self._limits = None if limits is None else np.atleast_2d(limits)
         whole, late = _periods_and_rest(loop.delay, loop.period)
         self._queue = deque([np.zeros(shape)] * (whole + (late > 0)))
         self._parts = [late, loop.period - late] if late else [loop.period]
@@ -37,7 +38,7 @@ class Actuator:
 
     def limited(self, tau: Array) -> Array:
         """``tau`` within the limits."""
-        return tau if self._limits is None else np.clip(tau, -self._limits, self._limits)
+        return tau if self._limits is None else np.minimum(np.maximum(tau, -self._limits), self._limits)
 
     def torques(self, tau: Array) -> list[Array]:
         """The torque in each part of a period at whose begin ``tau`` is computed."""

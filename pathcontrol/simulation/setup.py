@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib.metadata import version
 from typing import Any
 
@@ -135,7 +136,6 @@ def record_of(
     controller: Mapping[str, Any], robot: Arm, loop: Loop, disturbance: Disturbance | None, **settings: Any
 ) -> dict[str, Any]:
     """Everything that a run is made with; of large arrays, their shape and range."""
-    packages = ("pathcontrol", "pin", "numpy", "scipy")
     plant = {"robot": robot.name, "friction": in_short(robot.friction.describe())}
     if isinstance(robot, RobotBatch):
         plant |= {"arms": len(robot), "rigid_bodies": len(robot.bodies)}
@@ -146,8 +146,15 @@ def record_of(
         "loop": in_short(loop.describe()),
         **({} if disturbance is None else {"disturbance": in_short(disturbance.describe())}),
         **settings,
-        "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
+        "versions": dict(_versions()),
     }
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Of Python and of what results depend on; reading them takes milliseconds."""
+    packages = ("pathcontrol", "pin", "numpy", "scipy")
+    return {"python": platform.python_version()} | {name: version(name) for name in packages}
 
 
 def joints_of(robot: Arm) -> dict[str, str]:

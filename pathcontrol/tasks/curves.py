@@ -114,10 +114,10 @@ class Circle(Ellipse):
         super().__init__((self.radius, self.radius), speed, center, joints, clockwise)
 
     def theta(self, s: Array) -> Array:
-        return np.full_like(s, self.speed / self.radius, dtype=np.float64)
+        return np.zeros(np.shape(s)) + self.speed / self.radius
 
     def dtheta(self, s: Array) -> Array:
-        return np.zeros_like(s, dtype=np.float64)
+        return np.zeros(np.shape(s))
 
     def at(self, s: Array) -> PathPoint:
         s = np.asarray(s)
