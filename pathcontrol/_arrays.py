@@ -52,11 +52,6 @@ def scalar(name: str, value: Any, *, positive: bool = False, least: float | None
     return number
 
 
-def dot(a: Array, b: Array) -> Array:
-    """aᵀb, (*batch,), of arrays (*batch, n)."""
-    return np.add.reduce(a * b, axis=-1)
-
-
 def readonly(array: Array) -> Array:
     """A copy that cannot be written to, so that values stay values."""
     copy = np.array(array)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, dot, finite, readonly
+from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
@@ -53,16 +53,16 @@ class ExtendedMotionPlan(Controller):
         point = self.point(s)
         velocity, k = point.velocity, self.plan_gain(s)
         e_p, e_v = point.q_d - q, velocity - qd
-        free = point.theta - k * dot(e_p, point.dq_d)
+        free = point.theta - k * np.vecdot(e_p, point.dq_d)
         sdot = self.inside(s, free)
-        curvature = dot(point.dq_d, point.dq_d) + dot(e_p, point.ddq_d)
+        curvature = np.vecdot(point.dq_d, point.dq_d) + np.vecdot(e_p, point.ddq_d)
         qdd = point.velocity_slope * sdot[..., None] + self.K_v * e_v + self.K_p * e_p
         tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd, velocity)
-        slope, drift = point.dtheta - k * curvature, k * dot(qd, point.dq_d)
+        slope, drift = point.dtheta - k * curvature, k * np.vecdot(qd, point.dq_d)
         if sdot is not free:  # it may be held at an end of an open path
             held = sdot != free
             slope, drift = np.where(held, 0.0, slope), np.where(held, 0.0, drift)
-        regular = np.ones(s.shape, dtype=bool)
+        regular = np.isfinite(s)
         return ControlOutput(tau, sdot[..., None], s, sdot, slope, drift, e_p, e_v, regular)
 
     def plan_gain(self, s: Array) -> Array:

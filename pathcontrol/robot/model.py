@@ -212,7 +212,11 @@ class RobotModel:
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """M(q) [kg m²], (*batch, n, n), by the composite rigid body algorithm."""
-        return self._each(q, (self.n, self.n), lambda qi: pin.crba(self.pinocchio_model, self._data, qi))
+        array = joint_array("q", q, self.n)
+        M = np.empty((array.size // self.n, self.n, self.n))
+        for k, qi in enumerate(array.reshape(-1, self.n)):
+            M[k] = pin.crba(self.pinocchio_model, self._data, qi)
+        return M.reshape(*array.shape, self.n)
 
     def coriolis(self, q: ArrayLike, qd: ArrayLike, v: ArrayLike) -> Array:
         """C(q,q̇)v [N m], (*batch, n), with the C of Christoffel symbols, for which Ṁ − 2C is skew-symmetric.
