@@ -68,15 +68,16 @@ class PlainPlant:
     def _push(self, q: NDArray, qd: NDArray, start: NDArray, drive: NDArray, duration: float) -> NDArray:
         friction = np.where(qd > 0, self.plus, -self.minus)
         v = start + duration * pin.aba(self.model, self.data, q, qd, drive - friction)
-        if (v * qd > 0).all():
+        onward = v * qd > 0
+        if onward.all():
             return v
-        M = pin.crba(self.model, self.data, q)
-        return stuck(M, M.dot(v) + duration * friction, -duration * self.minus, duration * self.plus)
+        M, state = pin.crba(self.model, self.data, q), np.where(onward, np.sign(qd), 0.0)
+        return stuck(M, M.dot(v) + duration * friction, -duration * self.minus, duration * self.plus, state)
 
 
-def stuck(M: NDArray, p: NDArray, low: NDArray, high: NDArray) -> NDArray:
-    """v with Mv + λ = p, λ the impulse of dry friction: which joints stick is corrected until it fits."""
-    state, scale = np.sign(p), 1e-12 * np.abs(p).max()
+def stuck(M: NDArray, p: NDArray, low: NDArray, high: NDArray, state: NDArray) -> NDArray:
+    """v with Mv + λ = p, λ the impulse of dry friction: ``state``, the signs of v, is corrected until it fits."""
+    scale = 1e-12 * np.abs(p).max()
     for _ in range(100):
         moving = state != 0
         v = np.zeros_like(p)
