@@ -89,7 +89,7 @@ class SampledLoop:
             raise InputError(f"encoders count revolutions, but {', '.join(sliding)} slides; use encoders = False")
         if (counts <= 0).any():
             raise InputError(f"encoders = {counts.tolist()}, expected counts per revolution greater than 0")
-        return 2 * np.pi / counts[None]
+        return 2 * np.pi / np.atleast_2d(counts)
 
     def describe(self) -> dict[str, Any]:
         """All settings, for the record of a run."""

@@ -21,7 +21,7 @@ class Sensors(NamedTuple):
 
     Attributes:
         period: sampling period [s].
-        resolution: angle of one encoder count [rad], (1, n), or None for exact positions.
+        resolution: angle of one encoder count [rad], (1, n) or (N, n), or None for exact positions.
         differentiate: velocity as the difference of two positions over the period, instead of the true one.
         cutoff: corner frequency of a first-order low-pass filter on the velocity [Hz], or None.
     """
