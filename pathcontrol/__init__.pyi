@@ -65,6 +65,10 @@ from .simulation.plant import Plant as Plant
 from .simulation.run import Run as Run
 from .simulation.sequence import simulate_sequence as simulate_sequence
 from .simulation.simulate import simulate as simulate
+from .sweeps.keep import Keep as Keep
+from .sweeps.result import SweepResult as SweepResult
+from .sweeps.run import sweep as sweep
+from .sweeps.space import Space as Space
 from .tasks.arc_length import arc_length as arc_length
 from .tasks.arc_length import curvature as curvature
 from .tasks.base import PathPoint as PathPoint

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,12 @@ def peak(values: Array) -> Array:
 
 def rms(values: Array) -> Array:
     """The root mean square over time, (rollout,) of (rollout, time)."""
-    return np.sqrt((values**2).mean(-1))
+    return np.sqrt(_mean(values**2))
+
+
+def _mean(values: Array) -> Array:
+    """The mean over time, the same to the last bit however many rollouts lie beside one another in memory."""
+    return np.ascontiguousarray(values).mean(-1)
 
 
 def contour_error(run: Run, task: PathTask | None = None) -> Array:
@@ -120,7 +126,11 @@ def end_error(run: Run, task: PathTask | None = None) -> Array:
 
 
 def metrics(
-    run: Run, task: PathTask | None = None, fraction: float = 0.5, band: float = np.deg2rad(2.0)
+    run: Run,
+    task: PathTask | None = None,
+    fraction: float = 0.5,
+    band: float = np.deg2rad(2.0),
+    only: Collection[str] = tuple(UNITS),
 ) -> dict[str, Any]:
     """The usual numbers of a run on its task, or on another, each a list with one entry for each rollout.
 
@@ -129,24 +139,26 @@ def metrics(
     should be and 0 for one that is stuck; settling time [s] of ‖e_p‖ into ``band`` [rad]; largest torque demand [N m].
     Contour error and distance to Γ are left out for paths that neither end nor repeat. Open paths have the time [s]
     after which they were finished, and the :func:`end_error` [rad], each NaN where they were not. All numbers of a
-    rollout that diverged are NaN.
+    rollout that diverged are NaN. Of these, those that ``only`` names; the distance to Γ takes the most time.
     """
     task, late = known_task(run, task), steady_state(run, fraction)
     signals = {"e_p": late.norm("e_p"), "e_v": late.norm("e_v"), "lag_error": np.abs(lag_error(late, task))}
     try:
-        signals["contour_error"] = contour_error(late, task)
-        signals["gamma_distance"] = where_known(
-            lambda q, qd: np.asarray(distance_to_gamma(task, q, qd)), late.array("q"), late.array("qd")
-        )
+        if not {"contour_error_peak", "contour_error_rms"}.isdisjoint(only):
+            signals["contour_error"] = contour_error(late, task)
+        if not {"gamma_distance_peak", "gamma_distance_rms"}.isdisjoint(only):
+            signals["gamma_distance"] = where_known(
+                lambda q, qd: np.asarray(distance_to_gamma(task, q, qd)), late.array("q"), late.array("qd")
+            )
     except TaskError:
         pass  # no nearest point on an endless path
     values = {f"{name}_peak": peak(v) for name, v in signals.items()}
     values |= {f"{name}_rms": rms(v) for name, v in signals.items()}
     theta = where_known(lambda s: task.at(s).theta, late.array("s"))
-    values["speed_ratio"] = late.array("sdot").mean(-1) / theta.mean(-1)
+    values["speed_ratio"] = _mean(late.array("sdot")) / _mean(theta)
     values["settling_time"] = settling_time(run.norm("e_p"), run.time, band)
     values["tau_demand_peak"] = np.abs(run.array("tau_demand")).max((1, 2))
     if np.isfinite(task.s_end):
         values |= {"path_time": run.finish_time, "end_error": end_error(run, task)}
     sound = run.status != "diverged"
-    return {name: np.where(sound, value, np.nan).tolist() for name, value in values.items()}
+    return {name: np.where(sound, value, np.nan).tolist() for name, value in values.items() if name in only}

@@ -1,0 +1,184 @@
+"""One chunk of a sweep: its rollouts simulated together, and reduced to numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pathcontrol._arrays import Array, as_array
+from pathcontrol.analysis.metrics import UNITS, metrics
+from pathcontrol.errors import InputError, SimulationError, UnknownNameError
+from pathcontrol.simulation.finish import seen_finished
+from pathcontrol.simulation.modes import SampledLoop
+from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.simulate import simulate
+from pathcontrol.sweeps.keep import Keep
+
+Arguments = Mapping[str, Any]
+Parts = Sequence[tuple[NDArray[np.intp], Arguments]]
+#: from parameters (k,) or (k, d) each and the numbers of their samples (k,) to the arguments of simulate()
+Build = Callable[[Mapping[str, Array], NDArray[np.int64]], Arguments | Parts]
+#: numbers of a run, each with one entry for each rollout
+Measure = Callable[[Run], Mapping[str, ArrayLike]]
+
+#: what is known of each rollout beside its metrics
+OUTCOME = ("status", "finish_time", "diverged_time", "reason")
+_BLOCK = 128  # rollouts that are measured together: it bounds the memory for their distances
+_NOT_YOURS = ("first_rollout", "progress")
+
+
+class Chunk(NamedTuple):
+    """What came of some samples.
+
+    Attributes:
+        columns: their numbers and texts by name, (k,) or (k, d) each.
+        runs: the histories that may have to be kept, by sample.
+    """
+
+    columns: dict[str, Array]
+    runs: dict[int, Run]
+
+
+def measure_of(wanted: Sequence[str] | Measure | None) -> Measure:
+    """The function that measures: all the usual metrics, those wanted of them, or one's own.
+
+    Raises:
+        UnknownNameError: there is no such metric.
+    """
+    if wanted is None:
+        return metrics
+    if callable(wanted):
+        return wanted
+    unknown = [name for name in wanted if name not in UNITS]
+    if unknown or isinstance(wanted, str):
+        raise UnknownNameError(f"metrics = {wanted!r}, expected a list of {', '.join(UNITS)}, or a function of a Run")
+    return lambda run: _some(metrics(run, only=wanted), wanted)
+
+
+def _some(values: Mapping[str, ArrayLike], wanted: Sequence[str]) -> dict[str, ArrayLike]:
+    missing = [name for name in wanted if name not in values]
+    if missing:
+        raise UnknownNameError(f"metrics = {missing}: not defined for this task; leave it out")
+    return {name: values[name] for name in wanted}
+
+
+def compute(
+    build: Build,
+    parameters: Mapping[str, Array],
+    samples: NDArray[np.int64],
+    measure: Measure,
+    keep: Keep,
+    at_random: NDArray[np.intp],
+) -> Chunk:
+    """Simulate and measure ``samples`` (k,), with the values of their ``parameters``, (k,) or (k, d) each.
+
+    Raises:
+        InputError: the parameters, or what was built of them, are refused; the message says of which samples.
+    """
+    measured: dict[str, Array] = {}
+    runs: dict[int, Run] = {}
+    try:
+        built = build(parameters, samples)
+        parts = [(np.arange(len(samples)), built)] if isinstance(built, Mapping) else built
+        for rows, arguments in parts:
+            run = _simulated(samples[rows], arguments)
+            values = _measured(run, measure)
+            _put(measured, values, rows, len(samples))
+            for row in _candidates(values, samples[rows], keep, at_random):
+                runs[int(samples[rows[row]])] = _history(run, row, parameters, rows[row], int(samples[rows[row]]))
+    except InputError as error:
+        raise InputError(f"samples {samples[0]} to {samples[-1]}: {error}") from error
+    clash = set(parameters) & set(measured) | {"sample"} & set(measured)
+    if clash:
+        raise InputError(f"{', '.join(sorted(clash))}: both a parameter and a metric; call one of them otherwise")
+    return Chunk({"sample": samples, **parameters, **measured}, runs)
+
+
+def _simulated(samples: NDArray[np.int64], arguments: Arguments) -> Run:
+    taken = [name for name in _NOT_YOURS if name in arguments]
+    if taken:
+        raise InputError(f"build gives {', '.join(taken)}, which the sweep sets itself; leave it out")
+    loop = arguments.get("loop")
+    noisy = isinstance(loop, SampledLoop) and loop.noise is not None
+    if noisy and (np.diff(samples) != 1).any():
+        raise InputError("the rows of a part with sensor noise have to follow one another, as noise goes by sample")
+    try:
+        run = simulate(**arguments, first_rollout=int(samples[0]), progress=False)
+    except SimulationError as error:
+        if error.run is None:
+            raise
+        run = error.run
+    if run.rollouts != len(samples):
+        raise InputError(f"build gives {run.rollouts} rollouts for {len(samples)} samples; make q (k, n), one row each")
+    return run
+
+
+def _measured(run: Run, measure: Measure) -> dict[str, Array]:
+    """The outcome and the metrics of each rollout, as if it had been alone, (k,) each."""
+    values: dict[str, Array] = {name: np.array(run.data[name].to_numpy()) for name in OUTCOME}
+    sound = values["status"] != "diverged"
+    some = np.flatnonzero(sound) if sound.any() else np.array([0])  # one at least, for the names
+    for rows, part in _blocks(run, some):
+        for name, value in measure(part).items():
+            array = as_array(name, value)
+            if array.shape != (len(rows),):
+                raise InputError(f"the metric {name} has shape {array.shape}, expected ({len(rows)},): one a rollout")
+            _put(values, {name: np.where(sound[rows], array, np.nan)}, rows, run.rollouts)
+    return values
+
+
+def _blocks(run: Run, some: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], Run]]:
+    """Some rollouts of a run, a few at a time, that end when all of these would have ended alone."""
+    ends = samples_alone(run)
+    for end in np.unique(ends[some]):
+        rows = some[ends[some] == end]
+        for first in range(0, len(rows), _BLOCK):
+            block = rows[first : first + _BLOCK]
+            yield block, _part(run, block, int(end))
+
+
+def samples_alone(run: Run) -> NDArray[np.intp]:
+    """How many samples of each rollout say something: until it is finished or has diverged, (k,)."""
+    last = np.where(run.status == "diverged", run.diverged_time, np.inf)
+    if run.config.get("until") == "end" and run.task is not None:
+        last = np.where(run.status == "finished", seen_finished(run.task, run.finish_time), last)
+    return np.minimum(np.searchsorted(run.time, last) + 1, len(run.time))
+
+
+def _part(run: Run, rows: NDArray[np.intp], end: int) -> Run:
+    data = run.data.isel(rollout=rows, time=slice(0, end))
+    # sums over time have the same last bit only where numbers lie in memory in the same way
+    flat = {name: (v.dims, np.ascontiguousarray(v.to_numpy()), v.attrs) for name, v in data.data_vars.items()}
+    return run.with_data(data.assign(flat))
+
+
+def _put(into: dict[str, Array], values: Mapping[str, Array], rows: NDArray[np.intp], count: int) -> None:
+    """Values of some ``rows`` of ``count``; others are NaN, or empty texts."""
+    for name, value in values.items():
+        if value.dtype.kind == "U":
+            value = value.astype(object)
+        if name not in into:
+            into[name] = np.full(count, "" if value.dtype == object else np.nan, dtype=value.dtype)
+        into[name][rows] = value
+
+
+def _candidates(
+    values: Mapping[str, Array], samples: NDArray[np.int64], keep: Keep, at_random: NDArray[np.intp]
+) -> list[int]:
+    """The rows that may have to be kept, whatever the other samples are."""
+    if keep.worst and keep.by not in values:
+        raise UnknownNameError(f"keep.by = {keep.by!r}, expected a metric: {', '.join(set(values) - set(OUTCOME))}")
+    by = values[keep.by] if keep.worst else np.full(len(samples), np.nan)
+    chosen = keep.chosen(samples, by, values["status"] == "diverged") | set(at_random.tolist())
+    return [row for row, sample in enumerate(samples.tolist()) if sample in chosen]
+
+
+def _history(run: Run, row: int, parameters: Mapping[str, Array], at: int, sample: int) -> Run:
+    end = int(samples_alone(run)[row])
+    kept = run.rollout(row)
+    kept = kept.with_data(kept.data.isel(time=slice(0, end)).copy(deep=True))
+    kept.config["sweep"] = {"sample": sample} | {name: value[at].tolist() for name, value in parameters.items()}
+    return kept

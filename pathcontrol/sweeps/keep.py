@@ -1,0 +1,53 @@
+"""Of which rollouts of a sweep the whole history is kept."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.random import SeedSequence, default_rng
+from numpy.typing import NDArray
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import InputError
+
+_STREAM = 0x6B656570  # apart from the streams of the design and of the sensors
+
+
+@dataclass(frozen=True)
+class Keep:
+    """The rollouts whose histories are kept, each as the file of a :class:`Run`.
+
+    Attributes:
+        worst: how many of those with the largest value of ``by``, of those that have one; equals in their order.
+        by: name of the metric.
+        random: how many chosen at random, by the seed of the sweep.
+        diverged: how many of those that diverged, the first ones.
+    """
+
+    worst: int = 0
+    by: str = "contour_error_peak"
+    random: int = 0
+    diverged: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("worst", "random", "diverged"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+                raise InputError(f"keep.{name} = {value!r}, expected a whole number from 0")
+
+    def at_random(self, samples: int, seed: int) -> NDArray[np.intp]:
+        """The samples that are chosen at random."""
+        rng = default_rng(SeedSequence(seed, spawn_key=(_STREAM,)))
+        return np.sort(rng.choice(samples, min(self.random, samples), replace=False))
+
+    def chosen(self, sample: NDArray[np.int64], by: Array, diverged: NDArray[np.bool_]) -> set[int]:
+        """The worst of some samples and the first that diverged, by their metric and whether they diverged."""
+        order = np.lexsort([sample, -by])
+        worst = sample[order][~np.isnan(by[order])][: self.worst]
+        return {int(i) for i in (*worst, *np.sort(sample[diverged])[: self.diverged])}
+
+    def describe(self) -> dict[str, Any]:
+        """All of it, for the record."""
+        return asdict(self)

@@ -1,0 +1,83 @@
+"""What came of a sweep, as it is on disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from pathcontrol.analysis.metrics import LABELS, UNITS
+from pathcontrol.errors import InputError
+from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.variables import OUTCOMES
+from pathcontrol.sweeps.store import Store
+
+
+class SweepResult:
+    """A sweep on disk, whole or as far as it has come.
+
+    Args:
+        folder: the folder of the sweep.
+
+    Attributes:
+        samples: how many samples the sweep has.
+        definition: what it was defined by: space, seed, metrics, keep and what builds a chunk.
+
+    Raises:
+        InputError: there is no sweep.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self._store = Store(folder)
+        self.samples: int = self._store.samples
+        self.definition: dict[str, Any] = self._store.manifest["definition"]
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the sweep."""
+        return self._store.folder
+
+    @property
+    def finished(self) -> int:
+        """How many samples have their numbers."""
+        return len(self._store.columns(["sample"])["sample"])
+
+    @property
+    def kept(self) -> list[int]:
+        """The samples whose history is kept."""
+        return self._store.kept()
+
+    def run(self, sample: int) -> Run:
+        """The history of a sample that is kept, a run of one rollout; ``run.config["sweep"]`` has its parameters.
+
+        Raises:
+            InputError: it is not kept.
+        """
+        if sample not in self.kept:
+            raise InputError(f"the history of sample {sample} is not kept; kept are {self.kept}")
+        return Run.load(self._store.run_file(sample))
+
+    def table(self) -> xr.Dataset:
+        """The numbers of all finished samples, over ``sample``: outcome and metrics, and as coordinates the parameters.
+
+        Of a rollout that diverged all metrics are NaN; its status, ``diverged_time`` and ``reason`` say why.
+        """
+        columns = self._store.columns()
+        parameters = self.definition["space"]["parameters"]
+        coords: dict[str, Any] = {"sample": columns.pop("sample")}
+        values: dict[str, Any] = {}
+        for name, column in columns.items():
+            into = coords if name in parameters else values
+            into[name] = (("sample", f"{name} component")[: column.ndim], column, _labels(name))
+        return xr.Dataset(values, coords)
+
+    def __repr__(self) -> str:
+        finished = self.finished
+        of = f"{finished} samples" if finished == self.samples else f"{finished} of {self.samples} samples"
+        return f"SweepResult({str(self.folder)!r}; {of}, {len(self.kept)} histories)"
+
+
+def _labels(name: str) -> dict[str, str]:
+    _, unit, meaning = OUTCOMES.get(name, ((), UNITS.get(name, ""), LABELS.get(name, "")))
+    return ({"long_name": meaning} if meaning else {}) | ({"units": unit} if unit else {})

@@ -1,0 +1,121 @@
+"""One call from a space of parameters to a table of numbers on disk."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pathcontrol._arrays import Array
+from pathcontrol._progress import progress_bar
+from pathcontrol.errors import InputError
+from pathcontrol.sweeps.compute import Build, Measure, compute, measure_of
+from pathcontrol.sweeps.keep import Keep
+from pathcontrol.sweeps.result import SweepResult
+from pathcontrol.sweeps.space import Space, check_seed, digest
+from pathcontrol.sweeps.store import MANIFEST, Store
+
+
+def sweep(
+    build: Build,
+    space: Space,
+    out: str | Path,
+    *,
+    metrics: Sequence[str] | Measure | None = None,
+    chunk: int = 500,
+    keep: Keep | None = None,
+    seed: int = 0,
+    resume: bool = False,
+    progress: bool = True,
+) -> SweepResult:
+    """Simulate every sample of a space, a chunk at a time, and keep its numbers on disk.
+
+    A rollout that diverges is a row with the status ``"diverged"`` and NaN for its metrics. The numbers of a sample
+    are those of a simulation of it alone, to the last bit in a sampled loop, and so the same in chunks of any size; in
+    continuous time they agree within the integrator's tolerance. Memory is bounded by a chunk: a rollout of 10 s at
+    400 samples a second takes 0.5 MB with two joints and 1.6 MB with seven, twice while it is measured.
+
+    A process may be killed at any moment: what is on disk is a number of whole chunks, and ``resume`` goes on from
+    there. A function's definition is its name and its source; what it takes from elsewhere is for you to keep the same.
+
+    Args:
+        build: from the parameters of k samples, (k,) or (k, d) each, and the numbers of these samples (k,), to the
+            arguments of :func:`simulate` for k rollouts, as a dict: controller, q, duration, plant, loop and so on. Or
+            a list of pairs, of rows of the chunk and the arguments for these, where they do not fit in one batch. With
+            a method ``describe``, what that gives is its definition.
+        space: the parameters and how they are sampled.
+        out: the folder of the sweep, made if need be.
+        metrics: names of some of those of :func:`pathcontrol.metrics`, or a function from a :class:`Run` to numbers
+            by name, one for each rollout; default all the usual ones.
+        chunk: how many samples are simulated together, and lost if the process is killed.
+        keep: the rollouts whose whole history is kept; default none.
+        seed: where the random numbers of the design and of the choice of histories begin.
+        resume: go on with the sweep in ``out``, if there is one.
+        progress: show a bar with the time left on standard error when it takes longer than two seconds.
+
+    Raises:
+        InputError: an argument has the wrong value, ``out`` holds a sweep and ``resume`` is not asked for, or it holds
+            one of another definition.
+        MissingExtraError: the extra ``sweep`` is not installed.
+    """
+    if not isinstance(space, Space):
+        raise InputError(f"space = {space!r}, expected a Space, such as Space.grid({{'k': [1.0, 2.0]}})")
+    if isinstance(chunk, bool) or not isinstance(chunk, int) or chunk < 1:
+        raise InputError(f"chunk = {chunk!r}, expected a whole number from 1")
+    keep, measure, seed = Keep() if keep is None else keep, measure_of(metrics), check_seed(seed)
+    if not isinstance(keep, Keep):
+        raise InputError(f"keep = {keep!r}, expected a Keep, such as Keep(worst=5), or None")
+    design = space.design(seed)
+    definition = _definition(build, space, design, metrics, keep, seed)
+    store = _opened(Path(out), space.samples, definition, resume)
+    at_random = keep.at_random(space.samples, seed)
+    store.tidy(keep, at_random)
+    missing, done = store.missing(chunk), 0
+    with progress_bar("sweep", sum(map(len, missing)), progress) as update:
+        for samples in missing:
+            parameters = {name: values[samples] for name, values in design.items()}
+            found = compute(build, parameters, samples, measure, keep, at_random)
+            store.write(found)
+            if found.runs:
+                store.tidy(keep, at_random)
+            done += len(samples)
+            update(done)
+    return SweepResult(out)
+
+
+def _opened(folder: Path, samples: int, definition: Mapping[str, Any], resume: bool) -> Store:
+    if not resume or not (folder / MANIFEST).exists():
+        return Store.begin(folder, samples, definition)
+    store = Store(folder)
+    store.resume(definition)
+    return store
+
+
+def _definition(
+    build: Build, space: Space, design: Mapping[str, Array], metrics: Any, keep: Keep, seed: int
+) -> dict[str, Any]:
+    """All that the numbers depend on, as JSON has it."""
+    whole = {
+        "build": _told(build),
+        "space": space.describe(),
+        "design_sha256": digest(list(design.values())),
+        "seed": seed,
+        "metrics": _told(metrics) if callable(metrics) else metrics if metrics is None else list(metrics),
+        "keep": keep.describe(),
+    }
+    return json.loads(json.dumps(whole))
+
+
+def _told(function: Callable[..., Any]) -> dict[str, Any]:
+    """What a function says of itself, or its name and a digest of its source where that is known."""
+    if hasattr(function, "describe"):
+        return function.describe()
+    name = getattr(function, "__qualname__", type(function).__qualname__)
+    try:
+        source = inspect.getsource(function if hasattr(function, "__qualname__") else type(function))
+    except (OSError, TypeError):
+        return {"function": name}
+    return {"function": name, "source_sha256": hashlib.sha256(source.encode()).hexdigest()}

@@ -1,0 +1,197 @@
+"""Where the samples of a sweep are: grids, random points, Latin hypercubes, Sobol sequences, or those given."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.random import SeedSequence, default_rng
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import InputError
+
+_TOLD = 100  # values that a record lists; of more, their number and a digest
+
+
+class Choice(NamedTuple):
+    """Values to choose from, (m,) or (m, d)."""
+
+    values: Array
+
+    def at(self, u: Array) -> Array:
+        """The values for u (N, 1) in [0, 1), each equally often."""
+        return self.values[np.minimum((u[:, 0] * len(self.values)).astype(np.intp), len(self.values) - 1)]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """() of numbers, (1,) of vectors, which are chosen as a whole."""
+        return ()
+
+    def describe(self) -> dict[str, Any]:
+        """The values, for the record."""
+        if len(self.values) <= _TOLD:
+            return {"values": self.values.tolist()}
+        return {"count": len(self.values), "sha256": digest([self.values])}
+
+
+class Distribution(NamedTuple):
+    """A frozen distribution of scipy.stats, of a number or of a vector whose components are independent."""
+
+    frozen: Any
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """() of a number, (d,) of a vector."""
+        return np.shape(self.frozen.ppf(0.5))
+
+    def at(self, u: Array) -> Array:
+        """Its quantiles at u (N, d)."""
+        return np.asarray(self.frozen.ppf(u if self.shape else u[:, 0]))
+
+    def describe(self) -> dict[str, Any]:
+        """Its name and arguments, for the record."""
+        kwds = {name: np.asarray(value).tolist() for name, value in self.frozen.kwds.items()}
+        args = [np.asarray(value).tolist() for value in self.frozen.args]
+        return {"distribution": self.frozen.dist.name, "args": args, **kwds}
+
+
+class Space:
+    """Named parameters and how samples of them are drawn; make one with :meth:`grid`, :meth:`random` and so on.
+
+    A parameter is a frozen distribution of ``scipy.stats``, such as ``stats.uniform(1, 4)`` or with arrays as its
+    arguments that of a vector, or a list of values, of which each is as likely as any other. A value is a number, a
+    text or a vector. Distributions are sampled at their quantiles of points in the unit cube.
+
+    Attributes:
+        names: of the parameters.
+        method: how the samples are drawn.
+        samples: how many there are.
+    """
+
+    def __init__(self, parameters: Mapping[str, Any], method: str, samples: int | None) -> None:
+        if not isinstance(parameters, Mapping) or not parameters:
+            raise InputError(f"parameters = {parameters!r}, expected a dict with a parameter at least")
+        self._parameters = {str(name): _parameter(name, given) for name, given in parameters.items()}
+        self.names, self.method = tuple(self._parameters), method
+        self.samples = self._count() if samples is None else _whole("samples", samples)
+
+    @classmethod
+    def grid(cls, parameters: Mapping[str, Any]) -> Self:
+        """Every combination of the values of all parameters; the last one changes first."""
+        return cls(parameters, "grid", None)
+
+    @classmethod
+    def given(cls, parameters: Mapping[str, Any]) -> Self:
+        """The samples themselves: of each parameter a value for each sample, (N,) or (N, d)."""
+        return cls(parameters, "given", None)
+
+    @classmethod
+    def random(cls, parameters: Mapping[str, Any], samples: int) -> Self:
+        """Independent random samples; fewer of them are the first ones of more."""
+        return cls(parameters, "random", samples)
+
+    @classmethod
+    def latin_hypercube(cls, parameters: Mapping[str, Any], samples: int) -> Self:
+        """A Latin hypercube: of each parameter one sample in each of N equally likely intervals."""
+        return cls(parameters, "lhs", samples)
+
+    @classmethod
+    def sobol(cls, parameters: Mapping[str, Any], samples: int) -> Self:
+        """A scrambled Sobol sequence; best with a power of 2 of samples, fewer are the first ones of more."""
+        return cls(parameters, "sobol", samples)
+
+    def design(self, seed: int = 0) -> dict[str, Array]:
+        """All samples: of each parameter its values, (N,) or (N, d). It depends on ``seed`` and on nothing else."""
+        if self.method == "grid":
+            sizes = [len(values) for values in self._choices()]
+            which = np.indices(sizes).reshape(len(sizes), -1)
+            return {name: v[i] for name, v, i in zip(self.names, self._choices(), which, strict=True)}
+        if self.method == "given":
+            return dict(zip(self.names, self._choices(), strict=True))
+        widths = [math.prod(parameter.shape) for parameter in self._parameters.values()]
+        ends = list(itertools.accumulate(widths))
+        cube = np.split(_unit_cube(self.method, self.samples, ends[-1], seed), ends[:-1], axis=1)
+        return {name: p.at(u) for (name, p), u in zip(self._parameters.items(), cube, strict=True)}
+
+    def describe(self) -> dict[str, Any]:
+        """Everything that makes the samples, for the record."""
+        parameters = {name: parameter.describe() for name, parameter in self._parameters.items()}
+        return {"method": self.method, "samples": self.samples, "parameters": parameters}
+
+    def _choices(self) -> list[Array]:
+        return [parameter.values for parameter in self._parameters.values() if isinstance(parameter, Choice)]
+
+    def _count(self) -> int:
+        for name, parameter in self._parameters.items():
+            if not isinstance(parameter, Choice):
+                kind = parameter.frozen.dist.name
+                raise InputError(
+                    f"{name} is a {kind} distribution, of which a {self.method} cannot have every value; give a list "
+                    "of values, or use Space.random, latin_hypercube or sobol"
+                )
+        sizes = [len(values) for values in self._choices()]
+        if self.method == "grid":
+            return math.prod(sizes)
+        if len(set(sizes)) > 1:
+            told = ", ".join(f"{name}: {size}" for name, size in zip(self.names, sizes, strict=True))
+            raise InputError(f"the parameters have different numbers of samples ({told}), expected the same")
+        return sizes[0]
+
+
+def digest(arrays: list[Array]) -> str:
+    """SHA-256 of the values, kinds and shapes of arrays."""
+    found = hashlib.sha256()
+    for array in arrays:
+        found.update(f"{array.dtype.str}{array.shape}".encode())
+        found.update(np.ascontiguousarray(array).tobytes())
+    return found.hexdigest()
+
+
+def check_seed(seed: Any) -> int:
+    """A whole number from 0."""
+    return _whole("seed", seed, 0)
+
+
+def _unit_cube(method: str, samples: int, width: int, seed: int) -> Array:
+    """Points (samples, width) inside the unit cube."""
+    from scipy.stats import qmc
+
+    rng = default_rng(SeedSequence(check_seed(seed)))
+    if method == "random":
+        points = rng.random((samples, width))
+    elif method == "lhs":
+        points = qmc.LatinHypercube(width, rng=rng).random(samples)
+    else:
+        points = qmc.Sobol(width, rng=rng).random_base2((samples - 1).bit_length())[:samples]
+    return np.clip(points, 2.0**-54, 1 - 2.0**-53)  # where no quantile is infinite
+
+
+def _parameter(name: str, given: Any) -> Choice | Distribution:
+    if hasattr(given, "ppf"):
+        parameter = Distribution(given)
+        median = np.asarray(given.ppf(0.5))
+        if median.ndim > 1 or not np.isfinite(median).all():
+            raise InputError(f"{name}: the distribution has the median {median.tolist()}, expected a number or vector")
+        return parameter
+    try:
+        values = np.asarray(given)
+    except ValueError as error:
+        raise InputError(f"{name} = {given!r}, expected values of one kind and length") from error
+    if values.dtype.kind not in "biufU" or values.ndim not in (1, 2) or not values.size:
+        raise InputError(
+            f"{name} = {given!r}, expected a list of numbers, texts or vectors, or a frozen distribution of "
+            "scipy.stats, such as stats.uniform(1, 4)"
+        )
+    if values.dtype.kind == "f" and not np.isfinite(values).all():
+        raise InputError(f"{name} holds {values[~np.isfinite(values)][0]}, expected finite numbers")
+    return Choice(values)
+
+
+def _whole(name: str, value: Any, least: int = 1) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise InputError(f"{name} = {value!r}, expected a whole number from {least}")
+    return int(value)
