@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -89,9 +91,20 @@ def build(experiment: Experiment, base_dir: str | Path = ".") -> Setup:
 
 def _controllers(experiment: Experiment, model: RobotModel, task: PathTask) -> tuple[Controller, ...]:
     """The law for the task, or one for each path of a sequence."""
-    law, made = experiment.controller.arguments(experiment.to_radians), _LAWS[experiment.controller.type]
+    return tuple(law_of(experiment, model, path) for path in (task.paths if isinstance(task, PathSequence) else [task]))
+
+
+def law_of(
+    experiment: Experiment, model: RobotModel, task: PathTask, gains: Mapping[str, Array] = MappingProxyType({})
+) -> Controller:
+    """The law of an experiment for one path, with other ``gains`` where some are given.
+
+    Raises:
+        ExperimentError: an argument is out of range.
+    """
+    law = experiment.controller.arguments(experiment.to_radians) | gains
     with keyed("controller", law):
-        return tuple(made(model, path, **law) for path in (task.paths if isinstance(task, PathSequence) else [task]))
+        return _LAWS[experiment.controller.type](model, task, **law)
 
 
 def _refuse_joints(output: Output, robot: RobotModel) -> None:

@@ -21,11 +21,29 @@ def build_arms(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, Robo
     Raises:
         ExperimentError: a robot, joint or frame does not exist, or a value is out of range.
     """
+    bare, model = build_models(experiment, base_dir)
+    return model, build_plant(experiment, bare, model)
+
+
+def build_models(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, RobotModel]:
+    """The arm without a payload, and the controller's model.
+
+    Raises:
+        ExperimentError: a robot, joint or frame does not exist, or a value is out of range.
+    """
     bare = _with_tool(_load(experiment, base_dir), experiment)
-    robot, plant = experiment.robot, experiment.plant
-    model = _carrying("robot.payload", bare, robot.payload)
+    return bare, _carrying("robot.payload", bare, experiment.robot.payload)
+
+
+def build_plant(experiment: Experiment, bare: RobotModel, model: RobotModel) -> RobotModel:
+    """The simulated arm, of the arm without a payload and the controller's model.
+
+    Raises:
+        ExperimentError: a frame does not exist, or a value is out of range.
+    """
+    plant = experiment.plant
     carrier = model if plant.payload is None else _carrying("plant.payload", bare, plant.payload)
-    return model, with_friction(carrier, plant.friction, experiment.to_radians)
+    return with_friction(carrier, plant.friction, experiment.to_radians)
 
 
 def _load(experiment: Experiment, base_dir: Path) -> RobotModel:

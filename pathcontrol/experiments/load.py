@@ -22,11 +22,11 @@ def load_experiment(path: str | Path) -> Experiment:
             for each error, with the key path, the value, what was expected and the choices.
     """
     path = Path(path)
-    data = _read(path)
+    data = read_toml(path)
     try:
         return Experiment.model_validate(data)
     except ValidationError as error:
-        raise invalid(path, map(_finding, error.errors(include_url=False))) from None
+        raise invalid(path, map(finding, error.errors(include_url=False))) from None
 
 
 def invalid(path: str | Path, findings: Iterable[str]) -> ExperimentError:
@@ -35,7 +35,13 @@ def invalid(path: str | Path, findings: Iterable[str]) -> ExperimentError:
     return ExperimentError(f"{str(path)!r} is not a valid experiment:\n  {lines}")
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """What a TOML file says.
+
+    Raises:
+        ExperimentError: the file is missing, or is not TOML.
+    """
+    path = Path(path)
     try:
         with path.open("rb") as file:
             return tomllib.load(file)
@@ -49,7 +55,7 @@ def _read(path: Path) -> dict[str, Any]:
         raise invalid(path, [f"it cannot be read as TOML: {error}"]) from error
 
 
-def _finding(error: Any) -> str:
+def finding(error: Any) -> str:
     """One line: the key path, and what is wrong with it."""
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error["loc"]).lstrip(".")
     if error["type"] == "explained":

@@ -12,6 +12,7 @@ from pydantic import PlainValidator
 from pathcontrol.experiments.arm_sections import Plant, Robot
 from pathcontrol.experiments.controller_sections import Law, Loop, SampledSection
 from pathcontrol.experiments.section import Section
+from pathcontrol.experiments.sweep_section import SweepSection
 from pathcontrol.experiments.task_sections import Task
 from pathcontrol.experiments.values import Numbers, Positive, Whole, expected
 
@@ -74,6 +75,7 @@ class Experiment(Section):
         angle_unit: of all angles and angular rates: ``lock``, the task's lengths, speeds and phases,
             ``start``, the Stribeck velocity and ``friction_width``. All else is in SI units, as gains are, or
             taken as it is, as ``task.parameters`` are.
+        sweep: keys that vary, for :func:`run_sweep`; an experiment by itself does without.
     """
 
     angle_unit: Literal["rad", "deg"] = "rad"
@@ -86,6 +88,7 @@ class Experiment(Section):
     plant: Plant = Plant()
     loop: Loop = SampledSection()
     output: Output = Output()
+    sweep: SweepSection | None = None
 
     @property
     def to_radians(self) -> Callable[[float], float]:

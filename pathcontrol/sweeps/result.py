@@ -56,7 +56,11 @@ class SweepResult:
         """
         if sample not in self.kept:
             raise InputError(f"the history of sample {sample} is not kept; kept are {self.kept}")
-        return Run.load(self._store.run_file(sample))
+        return Run.load(self.history(sample))
+
+    def history(self, sample: int) -> Path:
+        """The file of the history of a sample."""
+        return self._store.run_file(sample)
 
     def table(self) -> xr.Dataset:
         """The numbers of all finished samples, over ``sample``: outcome and metrics, and as coordinates the parameters.

@@ -1,0 +1,66 @@
+"""``pathcontrol sweep``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pathcontrol.cli.group import json_option, uninterrupted
+
+if TYPE_CHECKING:
+    from pathcontrol.sweeps.result import SweepResult
+
+
+@click.command("sweep")
+@click.argument("file", type=click.Path(exists=False, path_type=Path))
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Default: results/ and the file's name.")
+@click.option("--resume", is_flag=True, help="Go on with the sweep in the folder, if there is one.")
+@click.option(
+    "--chunk", type=click.IntRange(1), default=500, show_default=True, help="Samples that are simulated together."
+)
+@json_option
+def command(file: Path, out: Path | None, resume: bool, chunk: int, as_json: bool) -> None:
+    """Simulate every sample of the [sweep] in FILE.toml and keep its numbers.
+
+    They are in Parquet files in the folder chunks/, histories that the file asks for in runs/. After Ctrl-C, or a
+    crash, finished chunks stay, and --resume computes the rest.
+    """
+    with uninterrupted():
+        from pathcontrol.experiments.sweep_runner import run_sweep
+        from pathcontrol.sweeps.store import parquet
+
+        parquet()
+    result = run_sweep(file, Path("results") / file.stem if out is None else out, chunk=chunk, resume=resume)
+    _tell(result, as_json)
+
+
+def _tell(result: SweepResult, as_json: bool) -> None:
+    table = result.table()
+    numbers = {str(name): v for name, v in table.data_vars.items() if v.dtype.kind == "f" and name != "diverged_time"}
+    spread = {name: _spread(values.to_numpy()) for name, values in numbers.items()}
+    statuses = table["status"].to_numpy().tolist()
+    count = {status: statuses.count(status) for status in sorted(set(statuses))}
+    if as_json:
+        histories = {str(i): str(result.history(i)) for i in result.kept}
+        told = {"out": str(result.folder), "samples": result.samples, "status": count, "metrics": spread}
+        click.echo(json.dumps(told | {"histories": histories}))
+        return
+    click.echo(f"{result!r}: {', '.join(f'{n} {status}' for status, n in count.items())}")
+    click.echo(f"  {'':22} {'least':>12} {'median':>12} {'largest':>12}")
+    for name, values in spread.items():
+        if values["median"] is not None:
+            click.echo(f"  {name:22} " + " ".join(f"{v:12.5g}" for v in values.values()))
+    for sample in result.kept:
+        click.echo(f"  history of sample {sample}: {result.history(sample)}")
+
+
+def _spread(values: Any) -> dict[str, float | None]:
+    """Least, median and largest of the values that are finite."""
+    import numpy as np
+
+    values = values[np.isfinite(values)]
+    known = {"least": np.min, "median": np.median, "largest": np.max}
+    return {name: float(of(values)) if values.size else None for name, of in known.items()}

@@ -1,0 +1,92 @@
+"""One call from an experiment file with a ``[sweep]`` to its table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pathcontrol.errors import ExperimentError
+from pathcontrol.experiments.keyed import keyed
+from pathcontrol.experiments.load import invalid, load_experiment, read_toml
+from pathcontrol.experiments.sweep_section import SweepSection
+from pathcontrol.experiments.swept import SweptExperiment
+from pathcontrol.sweeps.keep import Keep
+from pathcontrol.sweeps.result import SweepResult
+from pathcontrol.sweeps.run import sweep
+from pathcontrol.sweeps.space import Space
+
+
+def run_sweep(
+    path: str | Path, out: str | Path, *, chunk: int = 500, resume: bool = False, progress: bool = True
+) -> SweepResult:
+    """Run the sweep of an experiment file; every sample is checked before anything is computed.
+
+    Args:
+        path: the experiment file, with a section ``[sweep]``; paths in it are relative to its folder.
+        out: the folder of the sweep, made if need be.
+        chunk: how many samples are simulated together at most.
+        resume: go on with the sweep in ``out``, if there is one.
+        progress: show a bar with the time left on standard error when it takes longer than two seconds.
+
+    Raises:
+        ExperimentError: the file is invalid.
+        InputError: ``out`` holds a sweep and ``resume`` is not asked for, or it holds another one.
+        MissingExtraError: the extra ``sweep`` is not installed.
+    """
+    section = load_experiment(path).sweep
+    try:
+        if section is None:
+            raise ExperimentError("sweep: missing; add a section [sweep] with its parameters")
+        build = SweptExperiment(_without(read_toml(path), "sweep", "output"), Path(path).parent)
+        space = space_of(section)
+        with keyed("sweep"):
+            keep = Keep(**({} if section.keep is None else section.keep.arguments(float)))
+            design = space.design(section.seed)
+        build.check(design)
+    except ExperimentError as error:
+        raise invalid(path, [str(error)]) from error
+    options: dict[str, Any] = {"chunk": chunk, "resume": resume, "progress": progress}
+    return sweep(build, space, out, metrics=section.metrics, keep=keep, seed=section.seed, **options)
+
+
+def space_of(section: SweepSection) -> Space:
+    """The samples that a section ``[sweep]`` asks for.
+
+    Raises:
+        ExperimentError: the parameters do not fit the method.
+    """
+    parameters = {key: _values(key, given) for key, given in section.parameters.items()}
+    if (section.method == "grid") != (section.samples is None):
+        said = "is as large as its grids; leave samples out" if section.method == "grid" else "needs samples = …"
+        raise ExperimentError(f"sweep.samples: method = {section.method!r} {said}")
+    with keyed("sweep.parameters"):
+        return Space(parameters, section.method, section.samples)
+
+
+def _values(key: str, given: dict[str, list[Any]]) -> Any:
+    """The values of a grid, or the frozen distribution."""
+    from scipy import stats
+
+    [(kind, values)] = given.items()
+    if kind == "grid":
+        return values
+    with keyed(f"sweep.parameters.{key}"):
+        try:
+            a, b = (np.asarray(value, dtype=np.float64) for value in values)
+            a, b = np.broadcast_arrays(a, b)
+        except (TypeError, ValueError) as error:
+            raise ExperimentError(f"sweep.parameters.{key}: {kind} = {values}, expected numbers or lists") from error
+        least = {"uniform": a < b, "log_uniform": (a > 0) & (a < b), "normal": b > 0}[kind]
+        if not least.all() or not np.isfinite([a, b]).all():
+            wanted = {"uniform": "a < b", "log_uniform": "0 < a < b", "normal": "a deviation greater than 0"}[kind]
+            raise ExperimentError(f"sweep.parameters.{key}: {kind} = {values}, expected {wanted}")
+    a, b = a[()], b[()]
+    if kind == "uniform":
+        return stats.uniform(a, b - a)
+    return stats.norm(a, b) if kind == "normal" else stats.loguniform(a, b)
+
+
+def _without(data: dict[str, Any], *names: str) -> dict[str, Any]:
+    return {name: value for name, value in data.items() if name not in names}

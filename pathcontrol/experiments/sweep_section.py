@@ -1,0 +1,76 @@
+"""``[sweep]``: which keys of an experiment file vary, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import PlainValidator
+
+from pathcontrol.experiments.section import Section
+from pathcontrol.experiments.values import Text, Whole, expected
+
+KINDS = ("grid", "uniform", "log_uniform", "normal")
+_EXAMPLE = '"controller.k" = { uniform = [1.0, 50.0] }'
+
+
+class KeepSection(Section):
+    """The rollouts whose history is kept: see :class:`pathcontrol.Keep`."""
+
+    worst: Whole | None = None
+    by: Text | None = None
+    random: Whole | None = None
+    diverged: Whole | None = None
+
+
+def _parameters(value: Any) -> dict[str, dict[str, list[Any]]]:
+    """Dotted keys, in quotes or as tables in tables, each with one kind and its list."""
+    if not isinstance(value, dict) or not value:
+        raise expected(f"a table of keys of this file that vary, such as {_EXAMPLE}")
+    return dict(_leaves(value, ""))
+
+
+def _leaves(table: dict[str, Any], above: str) -> Iterator[tuple[str, dict[str, list[Any]]]]:
+    for name, value in table.items():
+        key = above + name
+        if not isinstance(value, dict) or not value:
+            raise expected(f"of {key!r} a table of {' or '.join(map(repr, KINDS))}, as {_EXAMPLE}")
+        if not set(value) <= set(KINDS):
+            if set(value) & set(KINDS):
+                raise expected(f"of {key!r} one of {', '.join(map(repr, KINDS))}, not also {sorted(set(value))}")
+            yield from _leaves(value, f"{key}.")
+        else:
+            yield key, _checked(key, value)
+
+
+def _checked(key: str, value: dict[str, Any]) -> dict[str, list[Any]]:
+    [(kind, numbers)] = value.items() if len(value) == 1 else [("", None)]
+    if not kind:
+        raise expected(f"of {key!r} one of {', '.join(map(repr, KINDS))}, not {sorted(value)}")
+    if not isinstance(numbers, list) or not numbers:
+        raise expected(f"of {key!r} {kind} = [...], a list")
+    if kind != "grid" and len(numbers) != 2:
+        two = "mean and standard deviation" if kind == "normal" else "the ends of an interval"
+        raise expected(f"of {key!r} {kind} = [a, b], {two}")
+    return value
+
+
+class SweepSection(Section):
+    """``[sweep]``: values of other keys of the file, in the units of the file.
+
+    Attributes:
+        parameters: by dotted key, as ``controller.k`` or ``start.q[0]``, its values ``grid = [...]``, or a
+            distribution: ``uniform = [a, b]``, ``log_uniform = [a, b]``, ``normal = [mean, deviation]``.
+        method: every combination of the grids, or so many samples, random or by a Latin hypercube or a Sobol sequence.
+        samples: how many, of all methods but the grid.
+        seed: where the random numbers begin.
+        metrics: which ones to compute; default all.
+        keep: the rollouts whose history is kept; default none.
+    """
+
+    parameters: Annotated[dict[str, dict[str, list[Any]]], PlainValidator(_parameters)]
+    method: Literal["grid", "random", "lhs", "sobol"] = "grid"
+    samples: Whole | None = None
+    seed: Whole = 0
+    metrics: list[Text] | None = None
+    keep: KeepSection | None = None

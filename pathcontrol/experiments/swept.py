@@ -1,0 +1,196 @@
+"""The experiments of a sweep: a file with other values for some of its keys, built for many samples at once."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import ExperimentError
+from pathcontrol.experiments.build import Setup, build, law_of
+from pathcontrol.experiments.build_arms import build_models, build_plant
+from pathcontrol.experiments.keyed import keyed
+from pathcontrol.experiments.load import finding
+from pathcontrol.experiments.schema import Experiment
+from pathcontrol.experiments.values import shown
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.tasks.sequence import PathSequence
+
+_GAIN = re.compile(r"controller\.(K_p|K_v|k|k_p|Lambda|K_d)(\[\d+\])?")
+_TOGETHER = re.compile(r"(start|plant)\.")  # what may differ from rollout to rollout of a batch, as gains may
+_STEP = re.compile(r"([^\[\]]+)|\[(\d+)\]")
+_REMEMBERED = 16  # groups whose task and arm are kept from chunk to chunk
+
+
+class SweptExperiment:
+    """Builds the arguments of ``simulate`` for samples of an experiment file.
+
+    Initial states, gains and what is in ``[plant]`` vary within a batch; samples in which another key differs are
+    built and simulated apart, one batch for each value.
+
+    Args:
+        data: what the file says, without ``[sweep]`` and ``[output]``.
+        base_dir: the folder that the paths in it are relative to.
+    """
+
+    def __init__(self, data: dict[str, Any], base_dir: Path) -> None:
+        self._data, self._base_dir = data, base_dir
+        self._built: dict[str, tuple[Setup, RobotModel, RobotModel]] = {}
+
+    def describe(self) -> dict[str, Any]:
+        """What the file says, and digests of the files that it names."""
+        files = {name: _digest(path) for name, path in self._files(self._data)}
+        return {"experiment": self._data, "files_sha256": files}
+
+    def check(self, design: Mapping[str, Array]) -> None:
+        """Every sample is a valid experiment with gains greater than 0, and the first one can be built.
+
+        Raises:
+            ExperimentError: one is not.
+        """
+        count = len(next(iter(design.values())))
+        for i in range(count):
+            _check_gains(self._experiment(design, i, i), i)
+        self({name: values[:1] for name, values in design.items()}, np.zeros(1, dtype=np.int64))
+
+    def __call__(
+        self, parameters: Mapping[str, Array], samples: NDArray[np.int64]
+    ) -> list[tuple[NDArray[np.intp], dict[str, Any]]]:
+        """The rows that fit in one batch, and the arguments of simulate() for them."""
+        experiments = [self._experiment(parameters, row, int(i)) for row, i in enumerate(samples)]
+        plants = any(name.startswith("plant.") for name in parameters)
+        apart = [name for name in parameters if not (_TOGETHER.match(name) or _GAIN.fullmatch(name))]
+        groups: dict[str, list[int]] = {}
+        for row in range(len(samples)):
+            groups.setdefault(json.dumps([parameters[name][row].tolist() for name in apart]), []).append(row)
+        parts = []
+        for key, rows in groups.items():
+            try:
+                arguments = self._arguments(key, [experiments[row] for row in rows], plants)
+            except ExperimentError as error:
+                raise ExperimentError(f"in samples {samples[rows[0]]} to {samples[rows[-1]]}: {error}") from error
+            parts.append((np.array(rows), arguments))
+        return parts
+
+    def _experiment(self, parameters: Mapping[str, Array], row: int, sample: int) -> Experiment:
+        values = {name: column[row].tolist() for name, column in parameters.items()}
+        data = deepcopy(self._data)
+        for name, value in values.items():
+            put(data, name, value)
+        try:
+            return Experiment.model_validate(data)
+        except ValidationError as error:
+            told = "; ".join(map(finding, error.errors(include_url=False)))
+            raise ExperimentError(f"sweep.parameters: in sample {sample}: {told}") from None
+
+    def _arguments(self, key: str, experiments: list[Experiment], plants: bool) -> dict[str, Any]:
+        setup, bare, model = self._of_group(key, experiments[0])
+        plant: Any = setup.plant
+        if plants:
+            plant = [build_plant(experiment, bare, model) for experiment in experiments]
+        law = {name: _rows(name, experiments) for name in type(setup.controller).gains}
+        q, qd = _states(setup, experiments)
+        return {
+            "controller": law_of(experiments[0], model, setup.task, law),
+            "q": q,
+            "qd": qd,
+            "duration": float(setup.duration),
+            "laps": setup.laps,
+            "plant": plant,
+            "loop": setup.loop,
+        }
+
+    def _of_group(self, key: str, experiment: Experiment) -> tuple[Setup, RobotModel, RobotModel]:
+        if key not in self._built:
+            setup = build(experiment, self._base_dir)
+            if isinstance(setup.task, PathSequence):
+                raise ExperimentError("task: a sequence of paths cannot be swept; sweep one of its paths")
+            if len(self._built) >= _REMEMBERED:
+                self._built.pop(next(iter(self._built)))
+            self._built[key] = (setup, *build_models(experiment, self._base_dir))
+        return self._built[key]
+
+    def _files(self, value: Any) -> Iterator[tuple[str, Path]]:
+        """The files below ``value`` that it names."""
+        if isinstance(value, dict | list):
+            for item in value.values() if isinstance(value, dict) else value:
+                yield from self._files(item)
+        elif isinstance(value, str) and len(value) < 1000 and "\0" not in value:
+            path = self._base_dir / re.sub(r"(\.py):\w+$", r"\1", value)
+            if path.is_file():
+                yield value, path
+
+
+def put(data: dict[str, Any], key: str, value: Any) -> None:
+    """Set the value of a dotted ``key``, in which ``[i]`` is the entry i of a list, in ``data``.
+
+    Raises:
+        ExperimentError: there is no such table or entry.
+    """
+    steps = [name or int(index) for part in key.split(".") for name, index in _STEP.findall(part)]
+    inside: Any = data
+    for step, after in pairwise(steps):
+        if isinstance(step, str) and isinstance(inside, dict) and isinstance(after, str):
+            inside = inside.setdefault(step, {})
+        else:
+            inside = _entry(inside, step, key)
+    if not isinstance(inside, dict):
+        _entry(inside, steps[-1], key)
+    inside[steps[-1]] = value
+
+
+def _entry(inside: Any, step: str | int, key: str) -> Any:
+    try:
+        return inside[step]
+    except (KeyError, IndexError, TypeError) as error:
+        raise ExperimentError(
+            f"sweep.parameters: the file has no entry {step!r} on the way to {key!r}; give a value for it, or vary "
+            "the whole list"
+        ) from error
+
+
+def _check_gains(experiment: Experiment, sample: int) -> None:
+    for name, value in experiment.controller.arguments(float).items():
+        numbers = np.asarray(value if _GAIN.fullmatch(f"controller.{name}") else 1.0)
+        if (numbers < 0).any() or (name != "k" and (numbers == 0).any()):
+            raise ExperimentError(
+                f"sweep.parameters: controller.{name} = {shown(value)} in sample {sample}, expected gains greater "
+                "than 0; choose another distribution, such as log_uniform"
+            )
+
+
+def _rows(name: str, experiments: list[Experiment]) -> Array:
+    """A gain of one number for all, (), or of all rollouts, (N, 1), (N, n), and (N,) of the gain k."""
+    values = [getattr(experiment.controller, name) for experiment in experiments]
+    if all(value == values[0] for value in values):
+        return np.asarray(values[0], dtype=np.float64)
+    rows = np.asarray(values, dtype=np.float64)
+    return rows if rows.ndim == 2 or name == "k" else rows[:, None]
+
+
+def _states(setup: Setup, experiments: list[Experiment]) -> tuple[Array, Array]:
+    """q and q̇ at the start, (N, n) each."""
+    found = {"q": [setup.q] * len(experiments), "qd": [setup.qd] * len(experiments)}
+    for i, experiment in enumerate(experiments):
+        for name, value in experiment.start.arguments(experiment.to_radians).items():
+            found[name][i] = np.asarray(value, dtype=np.float64)
+    for name, states in found.items():
+        with keyed(f"start.{name}"):
+            wrong = [state.tolist() for state in states if state.shape != setup.q.shape]
+            if wrong:
+                raise ExperimentError(f"start.{name} = {wrong[0]}, expected {len(setup.q)} values, one for each joint")
+    return np.array(found["q"]), np.array(found["qd"])
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
