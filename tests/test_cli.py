@@ -33,7 +33,7 @@ def results(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--help"], *([name, "--help"] for name in ("reproduce", "run", "view", "report", "check"))]
+    "arguments", [["--help"], *([name, "--help"] for name in ("reproduce", "run", "sweep", "view", "report", "check"))]
 )
 def test_help_imports_nothing_heavy(arguments):
     """What takes the time is the imports; a clock would only measure how busy the machine is."""

@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import random
 import signal
+import sys
 import time
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import pytest
 from scipy import stats
 
 import pathcontrol as pc
-from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.errors import InputError, MissingExtraError, UnknownNameError
 
 pytest.importorskip("pyarrow")
 
@@ -307,6 +308,13 @@ def test_bad_arguments_are_refused(change, error, message, tmp_path):
     with pytest.raises(error, match=message):
         pc.sweep(out=tmp_path / "out", progress=False, **arguments)
     assert not list(tmp_path.rglob("*.parquet"))
+
+
+def test_the_extra_is_named_where_it_is_missing(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'pathcontrol\[sweep\]'"):
+        pc.sweep(circle, SPACE, tmp_path / "out", progress=False)
+    assert not (tmp_path / "out").exists()
 
 
 def test_what_is_no_sweep_is_told(tmp_path):

@@ -153,7 +153,7 @@ def test_another_file_is_refused_by_the_key_that_differs(experiment, tmp_path):
 
 
 def test_a_task_in_a_file_is_part_of_the_definition(experiment, tmp_path):
-    code = "import pathcontrol\nclass Mine(pathcontrol.Circle):\n    def __init__(self):\n        super().__init__(1.0, 2.0)"
+    code = "from pathcontrol import Circle\nclass Mine(Circle):\n  def __init__(self):\n    super().__init__(1.0, 2.0)"
     (tmp_path / "mine.py").write_text(code)
     head, task, tail = BASE.partition('[task]\ntype = "circle"\nradius = 57.3\nspeed = 114.59\n')
     file = experiment(head + '[task]\ntype = "mine.py:Mine"\n' + tail + GRID)

@@ -62,5 +62,6 @@ def _spread(values: Any) -> dict[str, float | None]:
     import numpy as np
 
     values = values[np.isfinite(values)]
-    known = {"least": np.min, "median": np.median, "largest": np.max}
-    return {name: float(of(values)) if values.size else None for name, of in known.items()}
+    if not values.size:
+        return {"least": None, "median": None, "largest": None}
+    return {"least": float(values.min()), "median": float(np.median(values)), "largest": float(values.max())}

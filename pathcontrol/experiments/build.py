@@ -102,7 +102,7 @@ def law_of(
     Raises:
         ExperimentError: an argument is out of range.
     """
-    law = experiment.controller.arguments(experiment.to_radians) | gains
+    law = experiment.controller.arguments(experiment.to_radians) | dict(gains)
     with keyed("controller", law):
         return _LAWS[experiment.controller.type](model, task, **law)
 
