@@ -105,6 +105,8 @@ from .view.figures.path import path_figure as path_figure
 from .view.figures.path import phase_figure as phase_figure
 from .view.figures.speed import speed_figure as speed_figure
 from .view.figures.style import save_figure as save_figure
+from .view.figures.sweep import basin_figure as basin_figure
+from .view.figures.sweep import robustness_figure as robustness_figure
 from .view.figures.tool import tool_figure as tool_figure
 from .view.figures.toolpath import toolpath_figure as toolpath_figure
 from .view.figures.torque import torque_figure as torque_figure

@@ -77,10 +77,7 @@ def sweep(
     with progress_bar("sweep", sum(map(len, missing)), progress) as update:
         for samples in missing:
             parameters = {name: values[samples] for name, values in design.items()}
-            found = compute(build, parameters, samples, measure, keep, at_random)
-            store.write(found)
-            if found.runs:
-                store.tidy(keep, at_random)
+            store.write(compute(build, parameters, samples, measure, keep, at_random), keep, at_random)
             done += len(samples)
             update(done)
     return SweepResult(out)

@@ -56,6 +56,7 @@ class Store:
         self.manifest = _read_manifest(self.folder)
         self.samples = int(self.manifest["samples"])
         self._parquet = parquet()
+        self._known: dict[tuple[Path, tuple[str, ...]], dict[str, Array]] = {}
 
     @classmethod
     def begin(cls, folder: str | Path, samples: int, definition: Mapping[str, Any]) -> Store:
@@ -103,38 +104,50 @@ class Store:
         stretches = np.split(lost, np.flatnonzero(np.diff(lost) != 1) + 1)
         return [s[i : i + chunk].astype(np.int64) for s in stretches for i in range(0, len(s), chunk)]
 
-    def write(self, chunk: Chunk) -> None:
-        """Add a chunk: first the histories, then its table, with which it is there."""
+    def write(self, chunk: Chunk, keep: Keep, at_random: NDArray[np.intp]) -> None:
+        """Add a chunk: first the histories that are to be kept so far, then its table, with which it is there."""
         import pyarrow as pa
 
+        chosen = self._chosen(keep, at_random, chunk.columns) if chunk.runs else set()
         for number, run in chunk.runs.items():
-            run.save(self.run_file(number))
+            if number in chosen:
+                run.save(self.run_file(number))
         sample = chunk.columns["sample"]
         table = pa.table({name: _column(values) for name, values in chunk.columns.items()})
         with whole_file(self.folder / "chunks" / f"{sample[0]:09d}-{sample[-1]:09d}.parquet") as temporary:
             self._parquet.write_table(table, temporary)
+        if chosen:
+            self._remove_others(chosen)
 
     def columns(self, names: list[str] | None = None) -> dict[str, Array]:
         """The finished samples in order, their numbers and texts, (k,) or (k, d) each; NaN or "" where one has none."""
-        chunks = [self._read(file, names) for file in self._files()]
-        if not chunks:
-            return {"sample": np.empty(0, dtype=np.int64)}
-        every = dict.fromkeys(name for chunk in chunks for name in chunk)
-        found = {name: np.concatenate([_filled(chunk, name, chunks) for chunk in chunks]) for name in every}
-        _, order = np.unique(found["sample"], return_index=True)
-        return {name: values[order] for name, values in found.items()}
+        return _joined([self._read(file, names) for file in self._files()])
 
     def tidy(self, keep: Keep, at_random: NDArray[np.intp]) -> None:
         """Remove the histories that need not be kept, and what a killed process left behind."""
         for left in (*self.folder.glob(".*"), *self.folder.glob("chunks/.*"), *self.folder.glob("runs/.*")):
             left.unlink()
-        chosen = set(at_random.tolist())
-        if keep.worst or keep.diverged:
-            names = ["sample", "status"] + ([keep.by] if keep.worst else [])
-            found = self.columns(names)
-            if len(found["sample"]):
-                by = found.get(keep.by, np.full(len(found["sample"]), np.nan))
-                chosen |= keep.chosen(found["sample"], by, found["status"] == "diverged")
+        self._remove_others(self._chosen(keep, at_random))
+
+    def _chosen(self, keep: Keep, at_random: NDArray[np.intp], more: Mapping[str, Array] | None = None) -> set[int]:
+        """The samples whose history is to be kept, of those that are there and ``more``."""
+        if not (keep.worst or keep.diverged):
+            return set(at_random.tolist())
+        names = ["sample", "status"] + ([keep.by] if keep.worst else [])
+        chunks = [self._remembered(file, names) for file in self._files()]
+        found = _joined(chunks + ([] if more is None else [{name: more[name] for name in names}]))
+        count = len(found["sample"])
+        diverged = found["status"] == "diverged" if count else np.zeros(0, dtype=bool)
+        by = found.get(keep.by, np.full(count, np.nan))
+        return set(at_random.tolist()) | keep.chosen(found["sample"], by, diverged)
+
+    def _remembered(self, file: Path, names: list[str]) -> dict[str, Array]:
+        key = (file, tuple(names))
+        if key not in self._known:
+            self._known[key] = self._read(file, names)
+        return self._known[key]
+
+    def _remove_others(self, chosen: set[int]) -> None:
         for sample in self.kept():
             if sample not in chosen:
                 self.run_file(sample).unlink()
@@ -160,6 +173,16 @@ class Store:
         except (OSError, pa.ArrowInvalid) as error:
             raise InputError(f"{str(file)!r} cannot be read: {error}; remove it and resume the sweep") from error
         return {name: _values(table.column(name)) for name in table.column_names}
+
+
+def _joined(chunks: list[dict[str, Array]]) -> dict[str, Array]:
+    """The rows of all chunks in the order of their samples."""
+    if not chunks:
+        return {"sample": np.empty(0, dtype=np.int64)}
+    every = dict.fromkeys(name for chunk in chunks for name in chunk)
+    found = {name: np.concatenate([_filled(chunk, name, chunks) for chunk in chunks]) for name in every}
+    _, order = np.unique(found["sample"], return_index=True)
+    return {name: values[order] for name, values in found.items()}
 
 
 def versions() -> dict[str, str]:

@@ -1,0 +1,147 @@
+"""Sweeps: a metric over two parameters, as a basin of attraction, and how it spreads over one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from pathcontrol._arrays import Array
+from pathcontrol.analysis.metrics import LABELS
+from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.sweeps.result import SweepResult
+from pathcontrol.view.figures.style import BLUE, COLUMN, INK, ORANGE, Look, dressed, error_colours, new_figure, style
+from pathcontrol.view.figures.words import legend
+
+_LOST: Look = {"marker": "x", "color": INK, "linestyle": "none", "markersize": 3.5}
+_DIVERGED = "diverged"
+_BINS = 20  # of samples of a distribution, with as many samples each
+
+
+def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = "contour_error_peak") -> Figure:
+    """A metric over two parameters, a point for each sample; what diverged is crossed out. Degrees for radians.
+
+    Args:
+        sweep: a sweep, or its table.
+        x: the parameter to the right; of a vector one component, as ``q[0]``.
+        y: the parameter upwards.
+        metric: the metric.
+
+    Raises:
+        UnknownNameError: there is no such parameter or metric.
+    """
+    table = _table(sweep)
+    right, up, (value, unit) = _parameter(table, x), _parameter(table, y), _metric(table, metric)
+    with style():
+        figure = new_figure(COLUMN, 2.9)
+        axes = dressed(figure.add_subplot())
+        known = np.isfinite(value)
+        side = 180.0 / np.sqrt(len(value))  # so that the points of a square grid nearly touch, in pt
+        points = axes.scatter(
+            right[known], up[known], c=value[known], s=min(side, 12.0) ** 2, marker="s", cmap=error_colours(), lw=0
+        )
+        bar = figure.colorbar(points, ax=axes, label=_label(metric, unit))
+        bar.outline.set_visible(False)  # type: ignore[operator]
+        lost = (table["status"] == "diverged").to_numpy()
+        axes.plot(right[lost], up[lost], **_LOST)
+        axes.set(xlabel=x, ylabel=y)
+        if lost.any():
+            legend(figure, {_DIVERGED: Line2D([], [], **_LOST)})
+    return figure
+
+
+def robustness_figure(sweep: SweepResult | xr.Dataset, parameter: str, metric: str = "contour_error_peak") -> Figure:
+    """How a metric spreads over a parameter: median, the middle 80 % and the worst, and the share that diverged.
+
+    Values of a grid each for themselves; samples of a distribution in bins with as many samples each, drawn at their
+    medians. Degrees for radians.
+
+    Args:
+        sweep: a sweep, or its table.
+        parameter: the parameter; of a vector one component, as ``q[0]``.
+        metric: the metric.
+
+    Raises:
+        UnknownNameError: there is no such parameter or metric.
+    """
+    table = _table(sweep)
+    along, (value, unit) = _parameter(table, parameter), _metric(table, metric)
+    lost = (table["status"] == "diverged").to_numpy()
+    bins = _bins(along)
+    where = np.array([np.median(along[rows]) for rows in bins])
+    low, middle, high, worst = np.array([_spread(value[rows]) for rows in bins]).T
+    with style():
+        figure = new_figure(COLUMN, 3.2 if lost.any() else 2.4)
+        grid = figure.add_gridspec(2 if lost.any() else 1, 1, height_ratios=[3, 1][: 2 if lost.any() else 1])
+        axes = dressed(figure.add_subplot(grid[0]))
+        axes.fill_between(where, low, high, color=BLUE, alpha=0.25, lw=0)
+        axes.plot(where, middle, color=BLUE)
+        axes.plot(where, worst, color=ORANGE)
+        axes.set_ylabel(_label(metric, unit))
+        if lost.any():
+            axes = _draw_lost(dressed(figure.add_subplot(grid[1], sharex=axes)), where, lost, bins)
+        axes.set_xlabel(parameter)
+        legend(figure, {"median, 10 to 90 %": Line2D([], [], color=BLUE), "worst": Line2D([], [], color=ORANGE)})
+    return figure
+
+
+def _draw_lost(axes: Axes, where: Array, lost: Array, bins: list[Array]) -> Axes:
+    axes.plot(where, [100 * lost[rows].mean() for rows in bins], color=INK)
+    axes.set(ylabel="diverged [%]", ylim=(0, None))
+    return axes
+
+
+def _table(sweep: SweepResult | xr.Dataset) -> xr.Dataset:
+    table = sweep.table() if isinstance(sweep, SweepResult) else sweep
+    if not isinstance(table, xr.Dataset) or "sample" not in table.dims:
+        raise InputError(f"sweep = {sweep!r}, expected a SweepResult or its table")
+    if not table.sizes["sample"]:
+        raise InputError("the sweep has no finished samples yet")
+    return table
+
+
+def _parameter(table: xr.Dataset, name: str) -> Array:
+    """A parameter that is a number, (sample,)."""
+    numbers: dict[str, Any] = {}
+    for known, values in table.coords.items():
+        if known != "sample" and values.dtype.kind in "iuf":
+            many = values.ndim == 2
+            numbers |= {f"{known}[{i}]": v for i, v in enumerate(values.T)} if many else {str(known): values}
+    if name not in numbers:
+        raise UnknownNameError(f"parameter {name!r}: expected one of {', '.join(numbers)}")
+    return np.asarray(numbers[name], dtype=np.float64)
+
+
+def _metric(table: xr.Dataset, name: str) -> tuple[Array, str]:
+    """A metric (sample,), NaN where it is not finite, and its unit as a person reads it."""
+    known = [str(key) for key, values in table.data_vars.items() if values.dtype.kind == "f"]
+    if name not in known:
+        raise UnknownNameError(f"metric {name!r}: expected one of {', '.join(known)}")
+    values, unit = table[name].to_numpy(), table[name].attrs.get("units", "")
+    values = np.where(np.isfinite(values), values, np.nan)
+    return (np.rad2deg(values), unit.replace("rad", "deg")) if unit in ("rad", "rad/s") else (values, unit)
+
+
+def _label(metric: str, unit: str) -> str:
+    return LABELS.get(metric, metric) + (f" [{unit}]" if unit else "")
+
+
+def _bins(values: Array) -> list[Array]:
+    """Rows with one value each where these repeat, else as many rows in each of some bins, in order."""
+    found = np.unique(values)
+    if len(found) <= max(_BINS, len(values) // 4):
+        return [np.flatnonzero(values == one) for one in found]
+    return np.array_split(np.argsort(values, kind="stable"), min(_BINS, max(1, len(values) // 5)))
+
+
+def _spread(values: Array) -> tuple[float, float, float, float]:
+    """10 %, median, 90 % and the largest of the values that are known."""
+    values = values[~np.isnan(values)]
+    if not values.size:
+        return (np.nan,) * 4
+    low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
+    return float(low), float(middle), float(high), float(values.max())
