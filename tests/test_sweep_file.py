@@ -134,7 +134,12 @@ def test_the_command_writes_a_table_and_tells_it(experiment, tmp_path):
 def test_after_ctrl_c_finished_chunks_stay(experiment, tmp_path):
     many = SWEEP.replace("samples = 9", "samples = 3000")
     file, out = experiment(BASE + many), tmp_path / "out"
-    process = subprocess.Popen([*COMMAND, file, "--out", out, "--chunk", "1"], stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [*COMMAND, file, "--out", out, "--chunk", "1"],
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background ignore it
+    )
     until = time.monotonic() + 60
     while not list(out.glob("chunks/0*.parquet")) and time.monotonic() < until:
         time.sleep(0.05)

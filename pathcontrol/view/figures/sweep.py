@@ -45,7 +45,7 @@ def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = 
             right[known], up[known], c=value[known], s=min(side, 12.0) ** 2, marker="s", cmap=error_colours(), lw=0
         )
         bar = figure.colorbar(points, ax=axes, label=_label(metric, unit))
-        bar.outline.set_visible(False)  # type: ignore[operator]
+        bar.outline.set_visible(False)
         lost = (table["status"] == "diverged").to_numpy()
         axes.plot(right[lost], up[lost], **_LOST)
         axes.set(xlabel=x, ylabel=y)
