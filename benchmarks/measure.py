@@ -59,7 +59,7 @@ def _alone(case: Case, arm: str) -> tuple[dict[str, float], list[Row]]:
     contenders = {"plain loop": plain_alone(case, TICKS), "pathcontrol, 1 rollout": ours_alone(case, TICKS)}
     times = contest(contenders | single(case, TICKS), ROUNDS)
     rows = [Row(arm, name, times.median(name), times.ratio("plain loop", name)) for name in times.rounds]
-    return {"single": times.ratio("pathcontrol, 1 rollout", "plain loop")}, rows
+    return {"single": times.ratio("plain loop", "pathcontrol, 1 rollout")}, rows
 
 
 def _crowd(case: Case, arm: str, rows: list[Row]) -> dict[str, float]:
