@@ -238,7 +238,8 @@ def test_the_same_comparison_is_the_same_bytes(run: Run, tmp_path: Path) -> None
 
 
 def test_half_a_character_in_a_name_can_be_written(run: Run, tmp_path: Path) -> None:
-    record({"a\ud800": run, "b": run}).save(tmp_path / "half.html")
+    page = record({"a\ud800": run, "b": run}).save(tmp_path / "half.html")
+    assert "a\\ud800" in page.read_text("utf-8")
 
 
 def test_positions_beyond_any_arm_are_refused(arm: RobotModel) -> None:

@@ -20,12 +20,13 @@ from strategies import floats
 import pathcontrol as pc
 from pathcontrol import Circle, InputError, RobotModel, Run, metrics
 from pathcontrol.analysis.metrics import LABELS, UNITS
+from pathcontrol.analysis.readable import reading
 from pathcontrol.simulation.origin import Origin
 from pathcontrol.view.report.pictures import pictures
 from pathcontrol.view.report.report import report
 from pathcontrol.view.report.sections import _section
 from pathcontrol.view.report.settings import settings as groups_of
-from pathcontrol.view.report.summary import Row, measured, readable, rows
+from pathcontrol.view.report.summary import Row, measured, rows
 
 HOSTILE = "</script><img src=x onerror=alert(1)>&amp;\"'<b>"
 SI = {"deg": np.pi / 180, "deg/s": np.pi / 180, "s": 1.0, "N m": 1.0, "": 1.0, "mm": 1e-3, "µm": 1e-6}
@@ -144,7 +145,7 @@ def test_what_never_happens_is_never_the_best(runs):
 
 @given(st.lists(floats(1e-9, 1e3), min_size=1, max_size=5), st.sampled_from(["rad", "rad/s", "m", "s", "N m"]))
 def test_readable_units_are_the_same_quantity(values, unit):
-    scale, name = readable(unit, np.array(values))
+    scale, name = reading(unit, np.array(values))
     assert scale * SI[name] == pytest.approx(1.0)
 
 

@@ -4,23 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 
+from pathcontrol._arrays import Array
 from pathcontrol.analysis.metrics import UNITS
 from pathcontrol.simulation.run import Run
 
 _VARIABLES = {"rad": "q", "rad/s": "qd", "N m": "tau_demand"}
 
 
+def reading(unit: str, values: Array) -> tuple[float, str]:
+    """The factor to, and the name of, the unit in which a person reads values of a unit."""
+    if unit in ("rad", "rad/s"):
+        return 180 / np.pi, unit.replace("rad", "deg")
+    if unit == "m":
+        return (1e3, "mm") if np.abs(values[np.isfinite(values)]).max(initial=0.0) >= 1e-3 else (1e6, "µm")
+    return 1.0, unit
+
+
+def in_degrees(values: Array, unit: str) -> tuple[Array, str]:
+    """Values over time, and their unit: degrees for angles; unchanged where joints slide, too."""
+    if unit.split("/")[0] != "rad" or " or " in unit:
+        return values, unit
+    return np.rad2deg(values), unit.replace("rad", "deg")
+
+
 def readable_number(value: float, unit: str) -> str:
-    """A number with its unit, as a person reads it: degrees for radians, millimetres or micrometres for metres."""
+    """A number with its unit, as a person reads it."""
     if np.isnan(value):
         return "–"
     if np.isinf(value):
         return "never" if unit == "s" else "∞"
-    if unit in ("rad", "rad/s"):
-        value, unit = float(np.rad2deg(value)), unit.replace("rad", "deg")
-    elif unit == "m":
-        value, unit = (1e6 * value, "µm") if abs(value) < 1e-3 else (1e3 * value, "mm")
-    return f"{value:.4g} {unit}".strip()
+    factor, name = reading(unit, np.array([value]))
+    return f"{factor * value:.4g} {name}".strip()
 
 
 def unit_of(metric: str, run: Run) -> str:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
@@ -123,9 +124,7 @@ def readable(run: Run, name: str, joint: int | None = None) -> tuple[Array, str]
     values, unit = run.array(name), str(run[name].attrs.get("units", "1"))
     if joint is not None:
         values, unit = values[..., joint], _unit_of_joint(run, unit, joint)
-    if unit.split("/")[0] != "rad" or " or " in unit:
-        return drawable(values), unit
-    return np.rad2deg(drawable(values)), unit.replace("rad", "deg")
+    return in_degrees(drawable(values), unit)
 
 
 def readable_like(values: Array, unit: str) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import tool_deviation
 from pathcontrol.analysis.metrics import contour_error
+from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import TaskError
 from pathcontrol.view.film.take import Take
@@ -65,7 +66,7 @@ def path_error(take: Take) -> PathError | None:
         error = contour_error(take.run, take.task)[0]
     except TaskError:  # an endless path has no nearest point
         return None
-    values, unit = readable(error, str(take.run["q"].attrs["units"]))
+    values, unit = in_degrees(error, str(take.run["q"].attrs["units"]))
     return PathError("contour error", unit, values)
 
 
@@ -76,13 +77,6 @@ def in_fitting_units(errors: Sequence[PathError | None]) -> list[PathError | Non
         return list(errors)
     scale = MICROMETRE / MILLIMETRE
     return [replace(e, unit="µm", values=scale * e.values) if e in lengths else e for e in errors]
-
-
-def readable(values: Array, unit: str) -> tuple[Array, str]:
-    """Values in the unit a person reads, and that unit: degrees for angles; unchanged where joints slide, too."""
-    if unit.split("/")[0] != "rad" or " or " in unit:
-        return values, unit
-    return np.rad2deg(values), unit.replace("rad", "deg")
 
 
 def _deviation(take: Take, task: ToolpathTask) -> Array:

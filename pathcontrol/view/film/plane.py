@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.view.film.drawing import Line, alike, desired_joints
-from pathcontrol.view.film.error import readable
 from pathcontrol.view.film.film import Film
 from pathcontrol.view.film.keys import line_keys
 from pathcontrol.view.film.shot import Shot
@@ -68,13 +68,13 @@ def plane(shots: Sequence[Shot]) -> Plane:
 
 def _joint_plane(shots: Sequence[Shot], own_unit: str) -> Plane:
     def shown(q: Array) -> Array:
-        return readable(q, own_unit)[0]
+        return in_degrees(q, own_unit)[0]
 
     takes = [shot.take for shot in shots]
     return Plane(
         "q1–q2",
         ("q1", "q2"),
-        readable(np.zeros(1), own_unit)[1],
+        in_degrees(np.zeros(1), own_unit)[1],
         [[Line(shown(line.points)) for line in desired_joints(take)] for take in takes],
         [shown(take.q) for take in takes],
         [None if take.task is None else shown(take.task.q_d(take.s)) for take in takes],

@@ -8,8 +8,8 @@ from typing import TypeAlias
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.view.film.charts import Chart, Curve
-from pathcontrol.view.film.error import readable
 from pathcontrol.view.film.shot import Shot
 from pathcontrol.view.film.take import Take
 from pathcontrol.view.torque_limits import torque_limits
@@ -35,7 +35,7 @@ def _norms(shot: Shot, index: int, several: bool) -> list[_Entry]:
     take, entries = shot.take, []
     for name, symbol, words in (("e_p", "‖e_p‖", "position error"), ("e_v", "‖e_v‖", "velocity error")):
         if name in take.run.data:
-            values, unit = readable(take.run.norm(name)[0], take.run[name].attrs["units"])
+            values, unit = in_degrees(take.run.norm(name)[0], take.run[name].attrs["units"])
             curve = Curve(take.name if several else symbol, take.time, values, index)
             entries.append((f"{words} {symbol}", unit, [curve]))
     return entries

@@ -11,7 +11,8 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import toolpath_metrics
-from pathcontrol.analysis.metrics import LABELS, UNITS, metrics, peak, rms, steady_state
+from pathcontrol.analysis.metrics import LABELS, metrics, peak, rms, steady_state
+from pathcontrol.analysis.readable import reading, unit_of
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.simulation.record import table
 from pathcontrol.simulation.run import Run
@@ -112,31 +113,15 @@ def rows(runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]
 
 def _units(key: str, runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]]]) -> Iterable[str]:
     """The units in which runs have a metric, one unless angles of some are compared with lengths of others."""
-    return dict.fromkeys(_unit_of(key, run) for name, run in runs.items() if key in numbers[name])
-
-
-def _unit_of(key: str, run: Run) -> str:
-    unit = UNITS[key]
-    if unit == "N m":
-        return run["tau_demand"].attrs["units"]
-    return run["e_v" if unit == "rad/s" else "e_p"].attrs["units"] if unit.startswith("rad") else unit
+    return dict.fromkeys(unit_of(key, run) for name, run in runs.items() if key in numbers[name])
 
 
 def _row(key: str, unit: str, runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]]]) -> Row:
-    values = {n: np.asarray(numbers[n][key]) for n, r in runs.items() if key in numbers[n] and _unit_of(key, r) == unit}
-    scale, shown = readable(unit, np.concatenate(list(values.values())))
+    values = {n: np.asarray(numbers[n][key]) for n, r in runs.items() if key in numbers[n] and unit_of(key, r) == unit}
+    scale, shown = reading(unit, np.concatenate(list(values.values())))
     texts = {name: _text(scale * value, _ENDLESS.get(key, "–")) for name, value in values.items()}
     best = _best(_BADNESS.get(key, abs), {name: float(np.median(value)) for name, value in values.items()}, texts)
     return Row(LABELS[key], shown, tuple(Cell(texts.get(name, "–"), name in best) for name in runs))
-
-
-def readable(unit: str, values: Array) -> tuple[float, str]:
-    """The factor to, and the name of, the unit in which a person reads values of a unit."""
-    if unit in ("rad", "rad/s"):
-        return 180 / np.pi, unit.replace("rad", "deg")
-    if unit == "m":
-        return (1e3, "mm") if np.abs(values[np.isfinite(values)]).max(initial=0.0) >= 1e-3 else (1e6, "µm")
-    return 1.0, unit
 
 
 def _text(values: Array, endless: str) -> str:
