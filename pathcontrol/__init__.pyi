@@ -73,6 +73,7 @@ from .tasks.arc_length import arc_length as arc_length
 from .tasks.arc_length import curvature as curvature
 from .tasks.base import PathPoint as PathPoint
 from .tasks.base import PathTask as PathTask
+from .tasks.batch import TaskBatch as TaskBatch
 from .tasks.check import check_task as check_task
 from .tasks.concatenation import concatenated as concatenated
 from .tasks.curves import Circle as Circle

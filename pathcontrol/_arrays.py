@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -57,3 +58,16 @@ def readonly(array: Array) -> Array:
     copy = np.array(array)
     copy.setflags(write=False)
     return copy
+
+
+def in_common(values: Sequence[Array]) -> Array:
+    """What all rows have, (*shape,), or what each has, (N, *shape)."""
+    if all(value is values[0] for value in values):
+        return values[0]
+    rows = np.stack(values)
+    return readonly(rows[0] if (rows == rows[0]).all() else rows)
+
+
+def as_slice(rows: NDArray[np.intp]) -> NDArray[np.intp] | slice:
+    """Increasing rows as a slice where they follow one another, which copies nothing."""
+    return slice(int(rows[0]), int(rows[-1]) + 1) if rows[-1] - rows[0] == len(rows) - 1 else rows

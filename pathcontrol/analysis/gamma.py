@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, joint_array, scalar
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import TaskBatch
 from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 
 
@@ -25,6 +26,8 @@ def distance_to_gamma(
         weight: w [s], how much a velocity counts beside a position; 1 as in the paper, 0 for the path alone.
         return_s: also return the path parameter of the nearest point of Γ.
 
+    A :class:`TaskBatch` takes q and q̇ of shape (*batch, N, n).
+
     Returns:
         The distance [rad], (*batch,), and with ``return_s`` the parameter, (*batch,).
 
@@ -35,6 +38,10 @@ def distance_to_gamma(
     q, qd = joint_array("q", q, task.n), joint_array("qd", qd, task.n)
     if q.shape != qd.shape:
         raise InputError(f"q has shape {q.shape} and qd {qd.shape}, expected the same")
+    if isinstance(task, TaskBatch):
+        each = [distance_to_gamma(one, q[..., i, :], qd[..., i, :], w, True) for i, one in enumerate(task)]
+        distance, s = (np.stack(parts, axis=-1) for parts in zip(*each, strict=True))
+        return (distance, s) if return_s else distance
     state, gamma = np.concatenate([q, w * qd], axis=-1), gamma_curve(task, w)
     lower, upper = task.one_traverse
     s = ClosestPoint(gamma, lower, upper, task.closed, task.knots)(state)

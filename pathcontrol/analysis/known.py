@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import TaskBatch
 
 
 def known_task(run: Run, task: PathTask | None) -> PathTask:
@@ -38,6 +40,34 @@ def known_toolpath(run: Run, task: ToolpathTask | None) -> ToolpathTask:
             "it to simulate_sequence(…, task=…)"
         )
     return found
+
+
+def of_rollouts(function: Callable[[Run, PathTask], Array], run: Run, task: PathTask | None) -> Array:
+    """Values (rollout, …) that a ``function`` gives of a run and the one task of all its rollouts, of each by its own.
+
+    Raises:
+        InputError: no task is known, or it is a batch for another number of rollouts.
+    """
+    values, rows = [], []
+    for part, own, some in by_task(run, known_task(run, task)):
+        values.append(function(part, own))
+        rows.append(some)
+    return np.concatenate(values)[np.argsort(np.concatenate(rows))]
+
+
+def by_task(run: Run, task: PathTask) -> Iterator[tuple[Run, PathTask, NDArray[np.intp]]]:
+    """The rollouts that have a task in common, as a run with its task, and their rows.
+
+    Raises:
+        InputError: ``task`` is a batch for another number of rollouts.
+    """
+    if not isinstance(task, TaskBatch):
+        yield run, task, np.arange(run.rollouts)
+        return
+    if len(task) != run.rollouts:
+        raise InputError(f"the TaskBatch has {len(task)} tasks, the run {run.rollouts} rollouts; expected as many")
+    for own, rows in task.groups():
+        yield run.with_data(run.data.isel(rollout=rows)), own, rows
 
 
 def where_known(function: Callable[..., Array], *arrays: Array) -> Array:

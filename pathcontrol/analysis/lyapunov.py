@@ -54,10 +54,10 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     """
     e_p, e_v = run.array("e_p"), run.array("e_v")
     if isinstance(controller, ExtendedMotionPlan):
-        s, K_p, K_v = run.array("s"), _over_time(controller.K_p), _over_time(controller.K_v)
-        # where a rollout has diverged its errors are NaN, whatever the path does
-        tangent = controller.point(np.where(np.isfinite(s), s, controller.task.s0)).dq_d
-        k = np.where(controller.timed(s), 0.0, controller.k[..., None])
+        s, K_p, K_v = run.array("s").T, _over_time(controller.K_p), _over_time(controller.K_v)
+        # where a rollout has diverged its errors are NaN, whatever the path does; laws want the rollouts last in s
+        tangent = controller.point(np.where(np.isfinite(s), s, controller.task.s0)).dq_d.swapaxes(0, 1)
+        k = np.broadcast_to(controller.plan_gain(s), s.shape).T
         return _extended(K_p, K_v, k, e_p, e_v, tangent)
     if isinstance(controller, Projection):
         return _projected(_over_time(controller.k_p), _over_time(controller.K_v), e_p, e_v)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.analysis.gamma import distance_to_gamma
-from pathcontrol.analysis.known import known_task, where_known
+from pathcontrol.analysis.known import by_task, known_task, of_rollouts, where_known
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
@@ -79,7 +79,10 @@ def contour_error(run: Run, task: PathTask | None = None) -> Array:
 
     The path is ``run.task`` unless another is given.
     """
-    task = known_task(run, task)
+    return of_rollouts(_contour_error, run, task)
+
+
+def _contour_error(run: Run, task: PathTask) -> Array:
     return where_known(lambda q: np.linalg.norm(task.q_d(task.sigma_bar(q)) - q, axis=-1), run.array("q"))
 
 
@@ -88,8 +91,10 @@ def lag_error(run: Run, task: PathTask | None = None) -> Array:
 
     The path is ``run.task`` unless another is given.
     """
-    task = known_task(run, task)
+    return of_rollouts(_lag_error, run, task)
 
+
+def _lag_error(run: Run, task: PathTask) -> Array:
     def lag(s: Array, q: Array) -> Array:
         tangent = task.dq_d(s)
         return ((task.q_d(s) - q) * tangent).sum(-1) / np.linalg.norm(tangent, axis=-1)
@@ -116,7 +121,10 @@ def end_error(run: Run, task: PathTask | None = None) -> Array:
     Raises:
         TaskError: the path has no end.
     """
-    task = known_task(run, task)
+    return of_rollouts(_end_error, run, task)
+
+
+def _end_error(run: Run, task: PathTask) -> Array:
     if not np.isfinite(task.s_end):
         raise TaskError(f"{type(task).__name__} has no end that an arm could be away from")
     finished = run.status == "finished"
@@ -140,12 +148,23 @@ def metrics(
     Contour error and distance to Γ are left out for paths that neither end nor repeat. Open paths have the time [s]
     after which they were finished, and the :func:`end_error` [rad], each NaN where they were not. All numbers of a
     rollout that diverged are NaN. Of these, those that ``only`` names; the distance to Γ takes the most time.
+
+    Rollouts with a task each have the numbers of their own.
     """
-    task, late = known_task(run, task), steady_state(run, fraction)
-    signals = {"e_p": late.norm("e_p"), "e_v": late.norm("e_v"), "lag_error": np.abs(lag_error(late, task))}
+    values: dict[str, Array] = {}
+    for part, own, rows in by_task(run, known_task(run, task)):
+        for name, value in _metrics(part, own, fraction, band, only).items():
+            values.setdefault(name, np.empty(run.rollouts))[rows] = value
+    return {name: value.tolist() for name, value in values.items()}
+
+
+def _metrics(run: Run, task: PathTask, fraction: float, band: float, only: Collection[str]) -> dict[str, Array]:
+    """The metrics of rollouts with one task, (rollout,) each."""
+    late = steady_state(run, fraction)
+    signals = {"e_p": late.norm("e_p"), "e_v": late.norm("e_v"), "lag_error": np.abs(_lag_error(late, task))}
     try:
         if not {"contour_error_peak", "contour_error_rms"}.isdisjoint(only):
-            signals["contour_error"] = contour_error(late, task)
+            signals["contour_error"] = _contour_error(late, task)
         if not {"gamma_distance_peak", "gamma_distance_rms"}.isdisjoint(only):
             signals["gamma_distance"] = where_known(
                 lambda q, qd: np.asarray(distance_to_gamma(task, q, qd)), late.array("q"), late.array("qd")
@@ -159,6 +178,6 @@ def metrics(
     values["settling_time"] = settling_time(run.norm("e_p"), run.time, band)
     values["tau_demand_peak"] = np.abs(run.array("tau_demand")).max((1, 2))
     if np.isfinite(task.s_end):
-        values |= {"path_time": run.finish_time, "end_error": end_error(run, task)}
+        values |= {"path_time": run.finish_time, "end_error": _end_error(run, task)}
     sound = run.status != "diverged"
-    return {name: np.where(sound, value, np.nan).tolist() for name, value in values.items() if name in only}
+    return {name: np.where(sound, value, np.nan) for name, value in values.items() if name in only}

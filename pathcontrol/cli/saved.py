@@ -88,8 +88,6 @@ def _parts(file: Path) -> tuple[str, ...]:
 
 def _with_robot(run: Run, file: Path, robot: RobotModel | None) -> Run:
     """The run, with ``robot`` if it does not know its own; errors name its file."""
-    from pathcontrol.simulation.origin import Origin
-    from pathcontrol.simulation.run import Run
     from pathcontrol.view.film.take import check_filmed
 
     try:
@@ -97,8 +95,7 @@ def _with_robot(run: Run, file: Path, robot: RobotModel | None) -> Run:
     except PathControlError as error:
         if robot is None:
             raise InputError(f"{str(file)!r}: {error}; on the command line with --robot FILE") from error
-        known = run
-        run = Run(known.data, known.config, Origin(lambda: robot, lambda: known.task))
+        run = run.with_robot(robot)
     try:
         check_filmed(run, run.robot, run.task)
     except PathControlError as error:

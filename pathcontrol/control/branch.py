@@ -10,6 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import UnknownNameError
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import rows_of
 
 Branch = Literal["follow", "nearest", "local"]
 
@@ -60,10 +61,11 @@ class BranchPolicy:
         away = distance > self.capture
         if not away.any():
             return s
-        other = task.sigma_bar(q[away])
-        jumps = np.linalg.norm(task.q_d(other) - q[away], axis=-1) < _NEARER * distance[away]
+        there = rows_of(task, away)
+        other = there.sigma_bar(q[away])
+        jumps = np.linalg.norm(there.q_d(other) - q[away], axis=-1) < _NEARER * distance[away]
         s = np.array(s)
-        s[away] = np.where(jumps, _in_lap(task, other, s[away]), s[away])
+        s[away] = np.where(jumps, _in_lap(there, other, s[away]), s[away])
         return s
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.batch import TaskBatch, of_each
 from pathcontrol.tasks.profile import END_TIME
 
 _SAMPLES = 257  # of the path, for its average speed
@@ -24,18 +25,20 @@ class Ending(NamedTuple):
     or to the braking if that is longer. The arm is drawn to the end by its position gain and held there.
 
     Attributes:
-        s_end: last path parameter.
+        s_end: last path parameter, as all of these a number, or (N,) for a batch of tasks in which it differs.
         braking: Tϑ(s_end), the length of parameter over which ϑ is brought to 0.
         begin: path parameter from which on the plan is timed.
     """
 
-    s_end: float
-    braking: float
-    begin: float
+    s_end: float | Array
+    braking: float | Array
+    begin: float | Array
 
     @classmethod
     def of(cls, task: PathTask) -> Self | None:
         """The ending of ``task``, None where it has none."""
+        if isinstance(task, TaskBatch):
+            return None if task.closed else cls(*of_each(task, cls.of).T)
         if not np.isfinite(task.s_end):
             return None
         s = np.linspace(task.s0, task.s_end, _SAMPLES)

@@ -58,7 +58,7 @@ class Projection(Controller):
         **options: Any,
     ) -> None:
         # an open path may end close to where it begins, and an arm at its begin be nearer to the end
-        ends = np.isfinite(getattr(task, "s_end", np.inf))  # what is no task is refused below
+        ends = np.all(np.isfinite(getattr(task, "s_end", np.inf)))  # what is no task is refused below
         super().__init__(robot, task, **({"start": "s0" if ends else "nearest"} | options))
         self.branches = BranchPolicy(branch, capture)
         self.k_p, self.K_v = scalar_gain("k_p", k_p), diagonal_gain("K_v", K_v, robot.n)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pathcontrol._arrays import Array, readonly
+from pathcontrol._arrays import Array, as_slice, in_common
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import FrictionLaw, friction_of_each
 from pathcontrol.robot.model import Actuation, Limits, RobotModel
@@ -96,7 +96,7 @@ class RobotBatch:
             if len(rows) >= _FEW and (armature[rows] == armature[rows[0]]).all():
                 extra = np.broadcast_to(added, armature.shape)[rows[0]]
                 parts.part[rows] = len(parts.together)
-                parts.together.append((body.with_armature(extra) if extra.any() else body, _slice(rows)))
+                parts.together.append((body.with_armature(extra) if extra.any() else body, as_slice(rows)))
             else:
                 parts.alone.extend((body, int(i), armature[i]) for i in rows)
         return parts
@@ -138,24 +138,11 @@ def _same_body(a: RobotModel, b: RobotModel) -> bool:
     return a.pinocchio_model == b.pinocchio_model
 
 
-def _slice(rows: NDArray[np.intp]) -> NDArray[np.intp] | slice:
-    """Rows one after another as a slice, which copies nothing."""
-    return slice(int(rows[0]), int(rows[-1]) + 1) if rows[-1] - rows[0] == len(rows) - 1 else rows
-
-
 def _limits(robots: Sequence[RobotModel]) -> Limits:
     names = ("lower", "upper", "velocity", "effort")
-    return Limits(*(_common([getattr(robot.limits, name) for robot in robots]) for name in names))
+    return Limits(*(in_common([getattr(robot.limits, name) for robot in robots]) for name in names))
 
 
 def _encoder_counts(robots: Sequence[RobotModel]) -> Array | None:
     counts: list[Any] = [robot.actuation.encoder_counts for robot in robots]
-    return None if any(count is None for count in counts) else _common(counts)
-
-
-def _common(values: Sequence[Array]) -> Array:
-    """What all rows have, (n,), or what each has, (N, n)."""
-    if all(value is values[0] for value in values):
-        return values[0]
-    rows = np.stack(values)
-    return readonly(rows[0] if (rows == rows[0]).all() else rows)
+    return None if any(count is None for count in counts) else in_common(counts)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import of_each
 
 Until = Literal["end", "duration"]
 
@@ -55,7 +56,7 @@ class AtEnd(Finish):
 
     def __init__(self, task: PathTask, rollouts: int, ends_run: bool = True) -> None:
         super().__init__(rollouts, ends_run)
-        self._arrival = task.s_end - _REMAINING / np.linalg.norm(task.dq_d(np.array(task.s_end)))
+        self._arrival = of_each(task, _arrival)
         self._since = np.full(rollouts, np.inf)
 
     def finished(self, t: float, s: Array, qd: Array) -> Array | None:
@@ -65,6 +66,11 @@ class AtEnd(Finish):
         resting = arrived & (np.linalg.norm(qd, axis=-1) <= _AT_REST)
         self._since = np.where(resting, np.minimum(self._since, t), np.inf)
         return np.where(t - self._since >= _REST * (1 - 1e-9), self._since, np.nan)
+
+
+def _arrival(task: PathTask) -> float:
+    """The s from which on an arm has arrived."""
+    return task.s_end - _REMAINING / float(np.linalg.norm(task.dq_d(np.array(task.s_end))))
 
 
 class AfterLaps(Finish):
@@ -96,7 +102,7 @@ def first_and_last(s: Array) -> tuple[Array, Array]:
 
 def seen_finished(task: PathTask, finish_time: Array) -> Array:
     """The times [s] at which it is known that rollouts were finished at ``finish_time`` [s], (N,) each."""
-    return finish_time + (_REST * (1 - 1e-9) if np.isfinite(task.s_end) else 0.0)
+    return finish_time + (_REST * (1 - 1e-9) if np.all(np.isfinite(task.s_end)) else 0.0)
 
 
 def finish_of(task: PathTask, laps: int | None, until: Until, rollouts: int) -> Finish | None:
@@ -111,7 +117,7 @@ def finish_of(task: PathTask, laps: int | None, until: Until, rollouts: int) -> 
     if laps is not None:
         _check_laps(task, laps)
         return AfterLaps(task, laps, rollouts, until == "end")
-    return AtEnd(task, rollouts, until == "end") if np.isfinite(task.s_end) else None
+    return AtEnd(task, rollouts, until == "end") if np.all(np.isfinite(task.s_end)) else None
 
 
 def _check_laps(task: PathTask, laps: Any) -> None:

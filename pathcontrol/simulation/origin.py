@@ -8,12 +8,15 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.saved.shelf import Shelf
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import TaskBatch
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.sequence import PathSequence
 
@@ -33,6 +36,7 @@ class Origin:
         task: gives the path and its velocity profile.
         stored: what both are made from, if they come from a file.
         robots: the arm of each rollout by its number, where they differ.
+        first: gives the number of the first rollout that a :class:`TaskBatch` has a task for.
     """
 
     def __init__(
@@ -41,20 +45,23 @@ class Origin:
         task: Callable[[], PathTask | None],
         stored: Stored | None = None,
         robots: Mapping[int, RobotModel] | None = None,
+        first: Callable[[], int] = lambda: 0,
     ) -> None:
         self._robot, self._task, self._stored, self._robots = robot, task, stored, robots
+        self._first = first
 
     @classmethod
     def of(cls, robot: RobotModel | RobotBatch | None, task: PathTask | None, first: int = 0) -> Origin:
         """That of a run whose robot and task are at hand; rollouts are numbered from ``first``."""
         if isinstance(robot, RobotBatch):
-            return cls(lambda: robot.robots[0], lambda: task, robots=dict(enumerate(robot.robots, first)))
-        return cls(lambda: robot, lambda: task)
+            robots = dict(enumerate(robot.robots, first))
+            return cls(lambda: robot.robots[0], lambda: task, robots=robots, first=lambda: first)
+        return cls(lambda: robot, lambda: task, first=lambda: first)
 
     @classmethod
     def load(cls, stored: Stored) -> Origin:
         """What was stored; it is looked at when it is asked for."""
-        return cls(lambda: _robot(stored), lambda: _task(stored), stored)
+        return cls(lambda: _robot(stored), lambda: _task(stored), stored, first=lambda: _first(stored))
 
     @cached_property
     def robot(self) -> RobotModel | None:
@@ -66,12 +73,26 @@ class Origin:
         """The path and its velocity profile."""
         return self._task()
 
+    def task_of(self, rollouts: Array) -> PathTask | None:
+        """The task of ``rollouts`` by their numbers, of one among several its own."""
+        task = self.task
+        if not isinstance(task, TaskBatch):
+            return task
+        rows = rollouts - self._first()
+        if ((rows < 0) | (rows >= len(task))).any():
+            raise InputError(f"the data have rollouts {rollouts.tolist()}, of which the run does not know all tasks")
+        return task.rows(rows)
+
     def rollout(self, number: int) -> Origin:
         """That of one rollout."""
-        if self._robots is None:
+        if self._stored is not None or (self._robots is None and not isinstance(self.task, TaskBatch)):
             return self
-        robot = self._robots[number]
-        return Origin(lambda: robot, lambda: self.task)
+        robot, task = self.robot if self._robots is None else self._robots[number], self.task_of(np.array([number]))
+        return Origin(lambda: robot, lambda: task)
+
+    def with_robot(self, robot: RobotModel) -> Origin:
+        """The same with another robot."""
+        return Origin(lambda: robot, lambda: self.task, first=self._first)
 
     def path(self, index: int) -> Origin:
         """That of one path of a sequence."""
@@ -84,7 +105,10 @@ class Origin:
         from pathcontrol.robot.recipe import recipe_of
 
         shelf, robot = Shelf(), self.robot
-        recipes = {"robot": None if robot is None else recipe_of(robot), "task": _recipe(self.task, shelf, upto)}
+        recipes: dict[str, Any] = {"robot": None if robot is None else recipe_of(robot)}
+        recipes["task"] = _recipe(self.task, shelf, upto)
+        if isinstance(self.task, TaskBatch):
+            recipes["first_rollout"] = self._first()
         return Stored(json.dumps(recipes), shelf.numbers)
 
 
@@ -113,6 +137,13 @@ def _task(stored: Stored) -> PathTask | None:
 
     recipe = _part_of(stored, "task")
     return None if recipe is None else task_of(recipe, Shelf(stored.numbers))
+
+
+def _first(stored: Stored) -> int:
+    first = _part_of(stored, "first_rollout")
+    if not isinstance(first, int):
+        raise InputError(f"the tasks of the run are said to begin with rollout {first!r}, expected a number")
+    return first
 
 
 def _part_of(stored: Stored, name: str) -> Any:

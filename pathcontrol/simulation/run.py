@@ -100,8 +100,11 @@ class Run:
 
     @property
     def task(self) -> PathTask | None:
-        """The path and its velocity profile, or ``None`` where the run does not know them."""
-        return self._origin.task
+        """The path and its velocity profile, or ``None`` where the run does not know them.
+
+        Of several rollouts with a task each, a :class:`TaskBatch`; of one of them, as in ``run.rollout(i)``, its own.
+        """
+        return self._origin.task_of(self.data["rollout"].to_numpy())
 
     @property
     def time(self) -> Array:
@@ -185,6 +188,10 @@ class Run:
     def with_data(self, data: xr.Dataset) -> Run:
         """Other ``data`` of the same robot, task and configuration, such as a part of the time."""
         return Run(data, self.config, self._origin)
+
+    def with_robot(self, robot: RobotModel) -> Run:
+        """The same run with the ``robot`` given, where it does not know its own."""
+        return Run(self.data, self.config, self._origin.with_robot(robot))
 
     def save(self, path: str | Path) -> Path:
         """Write netCDF, whole or not at all; :meth:`load` reads it back, :attr:`robot` and :attr:`task` included.

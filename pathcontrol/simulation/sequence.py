@@ -29,6 +29,7 @@ from pathcontrol.simulation.setup import (
     simulated_arm,
 )
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import refuse_batch
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.sequence import PathSequence
 
@@ -150,6 +151,7 @@ def _checked_controllers(controllers: Iterable[Controller]) -> list[Controller]:
     for i, law in enumerate(laws):
         if not isinstance(law, Controller):
             raise InputError(f"controllers[{i}] = {law!r}, expected a Controller")
+        refuse_batch(f"the task of controllers[{i}]", law.task)
     return laws
 
 

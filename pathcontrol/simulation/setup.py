@@ -21,6 +21,8 @@ from pathcontrol.simulation.described import in_short
 from pathcontrol.simulation.disturbance import Disturbance, check_disturbance
 from pathcontrol.simulation.modes import Arm, ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.sampled import SampledArm
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import TaskBatch
 
 Loop = SampledLoop | ContinuousTime
 
@@ -85,6 +87,26 @@ def initial_state(q: ArrayLike, qd: ArrayLike | None, n: int, rollouts: int | No
     return q0, qd0
 
 
+def states_of_each(q: ArrayLike, qd: ArrayLike | None, robot: Arm, task: PathTask) -> tuple[Array, Array]:
+    """q and q̇ as (N, n) each, one state to all rollouts; where arms or tasks are one for each, they are N too.
+
+    Raises:
+        InputError: there are not as many of each.
+    """
+    counts = {"plant has {} arms": len(robot)} if isinstance(robot, RobotBatch) else {}
+    if isinstance(task, TaskBatch):
+        counts["the controller's TaskBatch has {} tasks"] = len(task)
+    _check_equal(counts)
+    q0, qd0 = initial_state(q, qd, robot.n, next(iter(counts.values()), None))
+    _check_equal(counts | {"q and qd are {} initial states": len(q0)})
+    return q0, qd0
+
+
+def _check_equal(counts: Mapping[str, int]) -> None:
+    if len(set(counts.values())) > 1:
+        raise InputError(", ".join(said.format(count) for said, count in counts.items()) + "; expected as many")
+
+
 def rollout_number(first: Any) -> int:
     """The number of the first rollout, a whole number from 0."""
     if isinstance(first, bool) or not isinstance(first, int | np.integer) or first < 0:
@@ -123,8 +145,6 @@ def simulated_arm(loop: Loop, robot: Arm, q: Array, qd: Array, outside: Outside)
     Raises:
         InputError: what is said of each rollout is said of another number of them.
     """
-    if isinstance(robot, RobotBatch) and len(robot) != len(q):
-        raise InputError(f"plant has {len(robot)} arms, q and qd are {len(q)} initial states; expected as many")
     if outside.disturbance is not None:
         check_disturbance(outside.disturbance, q, qd)
     if isinstance(loop, SampledLoop):

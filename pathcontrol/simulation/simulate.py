@@ -18,13 +18,13 @@ from pathcontrol.simulation.setup import (
     check_joints,
     check_law,
     checked_loop,
-    initial_state,
     joints_of,
     period_of,
     plant_of,
     record_of,
     rollout_number,
     simulated_arm,
+    states_of_each,
 )
 
 
@@ -54,7 +54,7 @@ def simulate(
     without it; in continuous time they share the steps of one integrator, and agree within its tolerance.
 
     Args:
-        controller: the law, with its own model of the arm.
+        controller: the law, with its own model of the arm, and one task for all rollouts or a :class:`TaskBatch`.
         q: initial joint positions [rad], (n,) or a batch (*batch, n); the run counts batches as rollouts.
         qd: initial joint velocities [rad/s], broadcast against ``q``; default at rest.
         duration: longest simulated time [s], rounded to whole periods of the loop, one at least.
@@ -77,7 +77,7 @@ def simulate(
     robot, first = plant_of(plant, controller), rollout_number(first_rollout)
     check_joints(controller, robot)
     loop = checked_loop(loop)
-    q0, qd0 = initial_state(q, qd, robot.n, None if isinstance(robot, RobotModel) else len(robot))
+    q0, qd0 = states_of_each(q, qd, robot, controller.task)
     period, finish = period_of(loop, duration), finish_of(controller.task, laps, until, len(q0))
     check_law(controller, q0, qd0)
     arm = simulated_arm(loop, robot, q0, qd0, Outside(disturbance, first))

@@ -10,20 +10,25 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import TaskBatch
 
 _SAMPLES = 129
 _GOLDEN = (5**0.5 - 1) / 2
 
 
 def check_task(task: PathTask, n: int) -> None:
-    """Check shapes and values of a task for an arm of ``n`` joints on samples of its domain.
+    """Check shapes and values of a task, or of each in a batch, for an arm of ``n`` joints on samples of its domain.
 
     Raises:
         TaskError: it is not a path for ``n`` joints, returns a wrong shape or NaN, or ϑ is not positive somewhere.
     """
+    if isinstance(task, TaskBatch):
+        _check_each(task, n)
+        return
     name = type(task).__name__
     if not isinstance(task, PathTask):
-        raise TaskError(f"the task is {task!r}, expected an instance of a PathTask subclass")
+        several = ", or TaskBatch([...]) for a task of each rollout" if isinstance(task, list | tuple) else ""
+        raise TaskError(f"the task is {task!r:.80}, expected an instance of a PathTask subclass{several}")
     _check_domain(task, name)
     lower, upper = task.sampled_interval
     s = np.linspace(lower, upper, _SAMPLES)
@@ -41,6 +46,14 @@ def check_task(task: PathTask, n: int) -> None:
     _check_regular(task, name, s)
     for function, derivative in (("q_d", "dq_d"), ("dq_d", "ddq_d"), ("theta", "dtheta")):
         _check_derivative(task, name, s, function, derivative)
+
+
+def _check_each(batch: TaskBatch, n: int) -> None:
+    for task, rows in batch.groups():
+        try:
+            check_task(task, n)
+        except TaskError as error:
+            raise TaskError(f"tasks[{rows[0]}]: {error}") from error
 
 
 def _check_domain(task: PathTask, name: str) -> None:

@@ -11,6 +11,7 @@ from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.arc_length import ArcLength
 from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.batch import refuse_batch
 from pathcontrol.tasks.blend import Blend
 from pathcontrol.tasks.junction import gap, why_apart, why_not_smooth
 
@@ -176,6 +177,7 @@ def _checked(paths: Sequence[PathTask]) -> list[PathTask]:
     for i, path in enumerate(checked):
         if not isinstance(path, PathTask):
             raise InputError(f"paths[{i}] = {path!r}, expected a PathTask")
+        refuse_batch(f"paths[{i}]", path)
         if path.closed or path.s_end == np.inf:
             kind = "is closed" if path.closed else "has no end"
             raise InputError(

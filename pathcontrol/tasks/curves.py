@@ -19,6 +19,7 @@ class JointCurve(PathTask):
 
     def __init__(self, speed: float) -> None:
         self.speed = scalar("speed", speed, positive=True)
+        self._profile = ConstantSpeed(self.speed)
 
     @abstractmethod
     def dq_d(self, s: Array) -> Array:
@@ -29,14 +30,14 @@ class JointCurve(PathTask):
         """q_d''(s), (*batch, n)."""
 
     def theta(self, s: Array) -> Array:
-        return ConstantSpeed(self.speed).theta(self, s)
+        return self._profile.theta(self, s)
 
     def dtheta(self, s: Array) -> Array:
-        return ConstantSpeed(self.speed).dtheta(self, s)
+        return self._profile.dtheta(self, s)
 
     def at(self, s: Array) -> PathPoint:
         dq_d, ddq_d = self.dq_d(s), self.ddq_d(s)
-        theta, dtheta = ConstantSpeed(self.speed).at(dq_d, ddq_d, self, s)
+        theta, dtheta = self._profile.at(dq_d, ddq_d, self, s)
         return PathPoint(self.q_d(s), dq_d, ddq_d, theta, dtheta)
 
 
@@ -220,7 +221,7 @@ class Line(JointCurve):
         return np.zeros_like(self.dq_d(s))
 
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
-        return np.clip((as_array("q", q) - self.start) @ self._direction, 0.0, self.s_end)
+        return np.clip(np.vecdot(as_array("q", q) - self.start, self._direction), 0.0, self.s_end)
 
 
 def _two_joints(joints: Sequence[int], n: int) -> tuple[int, int]:

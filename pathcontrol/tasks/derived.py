@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import refuse_batch
 
 
 class DerivedPath(PathTask):
     """A path made from ``path``, which it names in the record of a run."""
 
     def __init__(self, path: PathTask) -> None:
+        refuse_batch(f"the path of a {type(self).__name__}", path)
         self.path = path
 
     def _keep_domain(self) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, as_array, readonly
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import refuse_batch
 
 _MEET = 1e-3  # rad
 
@@ -40,6 +41,7 @@ class PathSequence(PathTask):
         if not self.paths:
             raise InputError("a sequence needs at least one path")
         for i, path in enumerate(self.paths):
+            refuse_batch(f"path {i} of the sequence", path)
             if path.closed or not np.isfinite(path.s_end):
                 raise InputError(
                     f"path {i} of the sequence does not end; take a part of it, as path.between(s0, s_end)"

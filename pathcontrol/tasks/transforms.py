@@ -89,7 +89,7 @@ class _MovedPath(DerivedPath):
         return PathPoint(self._factor * q_d + self._offset, self._factor * dq_d, self._factor * ddq_d, theta, dtheta)
 
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
-        if np.ptp(np.abs(self._factor)) == 0:  # similar figures have the same nearest point
+        if not np.ptp(np.abs(self._factor), axis=-1).any():  # similar figures have the same nearest point
             return self.path.sigma_bar((as_array("q", q) - self._offset) / self._factor, near)
         return super().sigma_bar(q, near)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping
 from hashlib import blake2b
 from typing import Any
 
@@ -25,6 +25,7 @@ class Shelf:
         self._parts = [] if numbers is None else [numbers]
         self._size = 0 if numbers is None else len(numbers)
         self._places: dict[bytes, dict[str, Any]] = {}
+        self._known: dict[Hashable, tuple[Any, dict[str, Any]]] = {}
 
     @property
     def numbers(self) -> Array:
@@ -42,6 +43,12 @@ class Shelf:
             self._parts.append(array.reshape(-1))
             self._size += array.size
         return self._places[key]
+
+    def once(self, key: Hashable, what: Any, recipe: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """The ``recipe`` of an object, called by a ``key`` that has its id: the same one if it is asked for again."""
+        if key not in self._known:
+            self._known[key] = what, recipe()  # with the object itself, so that no other one gets its id
+        return self._known[key][1]
 
     def get(self, place: Mapping[str, Any]) -> Array:
         """The array that :meth:`put` put at a place.

@@ -6,7 +6,7 @@ to the last bit. Any other path is kept as samples, a :class:`RecordedPath`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,10 @@ from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.table import TabulatedProfile
 from pathcontrol.simulation.saved.contours import contour_of, contour_recipe
+from pathcontrol.simulation.saved.shared import shared
 from pathcontrol.simulation.saved.shelf import Shelf
 from pathcontrol.tasks.base import PathTask, Reprofiled
+from pathcontrol.tasks.batch import TaskBatch
 from pathcontrol.tasks.curves import Circle, Ellipse, Line, Lissajous
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, VelocityProfile
@@ -57,6 +59,12 @@ def task_recipe(task: PathTask, shelf: Shelf, upto: float | None = None, rated: 
         upto: the largest s that was used of an endless path.
         rated: whether its ϑ matters.
     """
+    return shelf.once((id(task), upto, rated), task, lambda: _task_recipe(task, shelf, upto, rated))
+
+
+def _task_recipe(task: PathTask, shelf: Shelf, upto: float | None, rated: bool) -> dict[str, Any]:
+    if isinstance(task, TaskBatch):
+        return {"class": "TaskBatch"} | shared([task_recipe(one, shelf, upto) for one in task])
     if isinstance(task, ToolpathTask):
         return _toolpath_recipe(task, shelf)
     if isinstance(task, PathSequence):
@@ -131,18 +139,26 @@ def _toolpath_recipe(task: ToolpathTask, shelf: Shelf) -> dict[str, Any]:
     }
 
 
-def _made(recipe: Any, shelf: Shelf) -> Any:
-    """A value of a recipe: an object, an array, a list, or what JSON says."""
+def _made(recipe: Any, shelf: Shelf, parts: Sequence[Any] = ()) -> Any:
+    """A value of a recipe: an object, an array, a list, what JSON says, or one of ``parts`` made before."""
     if isinstance(recipe, list):
-        return [_made(item, shelf) for item in recipe]
+        return [_made(item, shelf, parts) for item in recipe]
     if not isinstance(recipe, Mapping):
         return recipe
+    if "part" in recipe:
+        return parts[recipe["part"]]
     if "class" not in recipe:
         return shelf.get(recipe)
+    if recipe["class"] == "TaskBatch":
+        made: list[Any] = []
+        for part in recipe["parts"]:
+            made.append(_made(part, shelf, made))
+        return TaskBatch(_made(recipe["tasks"], shelf, made))
     values = {name: value for name, value in recipe.items() if name != "class"}
     if recipe["class"] == "RecordedToolpath":
         contours = [contour_of(contour, shelf) for contour in values.pop("placed")]
-        return RecordedToolpath(placed=contours, **{name: _made(value, shelf) for name, value in values.items()})
+        arguments = {name: _made(value, shelf, parts) for name, value in values.items()}
+        return RecordedToolpath(placed=contours, **arguments)
     if recipe["class"] not in _CLASSES:
         raise InputError(f"class {recipe['class']!r} of a task, expected one of {', '.join(_CLASSES)}")
-    return _CLASSES[recipe["class"]](**{name: _made(value, shelf) for name, value in values.items()})
+    return _CLASSES[recipe["class"]](**{name: _made(value, shelf, parts) for name, value in values.items()})

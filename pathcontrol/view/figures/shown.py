@@ -13,6 +13,7 @@ from pathcontrol.errors import InputError, TaskError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import rows_of
 from pathcontrol.tasks.sequence import PathSequence
 from pathcontrol.view.figures.lines import drawable
 from pathcontrol.view.figures.style import RUN_COLOURS
@@ -69,15 +70,18 @@ def shown(run: Runs, task: PathTask | None = None, rollout: int | None = None) -
     if not named or not all(isinstance(one, Run) for one in named.values()):
         raise InputError(f"run = {run!r:.80}, expected a Run, or some by their names, as {{'path control': run}}")
     several = isinstance(run, Mapping)
+    if rollout is not None and task is not None:
+        task = rows_of(task, np.array([rollout]))
+    chosen = {name: one if rollout is None else one.rollout(rollout) for name, one in named.items()}
     return [
         Shown(
             str(name) if several else "",
-            one if rollout is None else one.rollout(rollout),
+            one,
             _fitting(one, task),
             RUN_COLOURS[i % len(RUN_COLOURS)],
             _DASHES[i // len(RUN_COLOURS) % len(_DASHES)],
         )
-        for i, (name, one) in enumerate(named.items())
+        for i, (name, one) in enumerate(chosen.items())
     ]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.record import table
 from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.batch import rows_of
 from pathcontrol.view.bodies.sticks import stick_figure
 from pathcontrol.view.bodies.visuals import LinkVisual, link_visuals
 from pathcontrol.view.film.palette import run_color
@@ -41,12 +42,14 @@ def cast_takes(
     looks: dict[UrdfSource, list[LinkVisual]] = {}
     takes = []
     for i, (name, one) in enumerate(runs.items()):
-        arm, path = one.robot if robot is None else robot, one.task if task is None else task
+        part = one.rollout(rollout)
+        arm = part.robot if robot is None else robot
+        path = part.task if task is None else rows_of(task, np.array([rollout]))
         if arm.source not in looks:
             looks[arm.source] = link_visuals(arm.source, FINENESS) or stick_figure(arm.source)
         path = path if "s" in one.data else None  # where on it the arm should be is not known
         frame = default_tool(arm, path) if tool is None else tool
-        part, visuals = _until_it_diverged(one.rollout(rollout)), looks[arm.source]
+        part, visuals = _until_it_diverged(part), looks[arm.source]
         takes.append(Take(str(name), part, arm, path, frame, visuals, run_color(i), one.rollouts))
     return takes
 

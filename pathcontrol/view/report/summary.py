@@ -16,6 +16,7 @@ from pathcontrol.analysis.readable import reading, unit_of
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.simulation.record import table
 from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.batch import TaskBatch
 from pathcontrol.tasks.sequence import PathSequence
 
 #: how far from good a value is, where that is not the value itself; None where none is better than another
@@ -80,6 +81,8 @@ def _path(run: Run) -> str:
         return f"{Path(task.drawing.source).name}, {len(task)} paths"
     if isinstance(task, PathSequence):
         return f"{len(task)} paths"
+    if isinstance(task, TaskBatch):
+        return f"{len(task)} tasks, {', '.join(task.describe()['kinds'])}"
     # what was sampled for a file has its own name still in the configuration
     described = _law(run).get("task")
     name = described.get("task") if isinstance(described, Mapping) else None

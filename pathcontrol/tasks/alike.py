@@ -1,0 +1,88 @@
+"""What the tasks of a batch have in common, and what they must have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from pathcontrol.errors import InputError
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.together import by_identity
+
+
+def listed(tasks: Any) -> tuple[PathTask, ...]:
+    """``tasks`` if they are tasks, one at least.
+
+    Raises:
+        InputError: they are not.
+    """
+    if isinstance(tasks, PathTask) or not isinstance(tasks, Iterable):
+        raise InputError(f"tasks = {tasks!r}, expected a list of tasks, one for each rollout")
+    found = tuple(tasks)
+    if not found:
+        raise InputError("tasks is an empty list, expected a task for each rollout")
+    for i, task in enumerate(found):
+        if not isinstance(task, PathTask):
+            raise InputError(f"tasks[{i}] = {task!r}, expected an instance of a PathTask subclass")
+    return found
+
+
+def check_alike(tasks: Sequence[PathTask]) -> None:
+    """Single tasks are for as many joints, and all closed or all open.
+
+    Raises:
+        InputError: they are not, or one neither ends nor repeats.
+    """
+    first, n = _kind(tasks[0]), _joints(tasks, 0)
+    for rows in by_identity(tasks):
+        i, task = rows[0], tasks[rows[0]]
+        if _joints(tasks, i) != n:
+            raise InputError(
+                f"tasks[{i}] is a path of {task.n} joints, tasks[0] of {n}; all rollouts are of one arm, so give each "
+                "number of joints a batch of its own"
+            )
+        kind = _kind(task)
+        if kind == "endless":
+            raise InputError(
+                f"tasks[{i}], a {type(task).__name__}, neither ends nor repeats; give it a finite s_end, as "
+                "task.between(s0, s_end), or a period"
+            )
+        if kind != first:
+            raise InputError(
+                f"tasks[{i}], a {type(task).__name__}, is {kind}, but tasks[0], a {type(tasks[0]).__name__}, is "
+                f"{first}; give each kind a batch of its own, or make a closed path an open one with "
+                "task.between(s0, s_end)"
+            )
+
+
+def in_common_or_range(every: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """What several descriptions have in common, and the range of numbers that differ."""
+    first, told = every[0], {}
+    for name in first:
+        values = [one[name] for one in every if name in one]
+        if len(values) < len(every):
+            continue
+        if all(value == values[0] for value in values):
+            told[name] = values[0]
+        elif all(isinstance(value, dict) for value in values):
+            told[name] = in_common_or_range(values)
+        else:
+            with suppress(ValueError):  # other things than numbers, or numbers of several shapes
+                array = np.array(values)
+                if array.dtype.kind in "iuf":
+                    told[name] = {"shape": list(array.shape), "min": array.min().item(), "max": array.max().item()}
+    return told
+
+
+def _kind(task: PathTask) -> str:
+    return "closed" if task.closed else "open" if np.isfinite(task.s_end) else "endless"
+
+
+def _joints(tasks: Sequence[PathTask], i: int) -> int:
+    try:
+        return tasks[i].n
+    except (TypeError, ValueError, IndexError) as error:
+        raise InputError(f"tasks[{i}].q_d fails at s0 = {tasks[i].s0}: {error}; try check_task on it") from error

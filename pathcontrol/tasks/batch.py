@@ -1,0 +1,215 @@
+"""Tasks that differ from rollout to rollout, as the task of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pathcontrol._arrays import Array, as_array, in_common
+from pathcontrol.errors import InputError
+from pathcontrol.tasks.alike import check_alike, in_common_or_range, listed
+from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.profile import VelocityProfile
+from pathcontrol.tasks.together import Part, by_identity, one_by_one, together
+
+
+class TaskBatch(PathTask):
+    """One task for each of N rollouts: paths and velocity profiles may differ, joints may not.
+
+    A controller takes it as its ``task``, and :func:`simulate` then N initial states, or one for all. Rollout i has the
+    same result to the last bit as if it were alone with ``tasks[i]``.
+
+    Its s has shape (*batch, N) and its q_d(s) (*batch, N, n), where i of the N belongs to tasks[i]. ``s0``, ``s_end``
+    and ``period`` are numbers where all tasks have the same, else (N,).
+
+    Tasks of one class that differ only in numbers are evaluated all at once where that gives the same bits, which is
+    tried out; a task that several rollouts have is evaluated once for them; others are evaluated one by one.
+
+    Args:
+        tasks: the tasks, one for each rollout, all closed or all open.
+
+    Attributes:
+        tasks: as given.
+
+    Raises:
+        InputError: tasks are for different numbers of joints, not all closed or all open, endless or no single task.
+    """
+
+    def __init__(self, tasks: Sequence[PathTask]) -> None:
+        self.tasks = listed(tasks)
+        for i, task in enumerate(self.tasks):
+            refuse_batch(f"tasks[{i}]", task)
+        check_alike(self.tasks)
+        self.s0, self.s_end = (_number([getattr(task, name) for task in self.tasks]) for name in ("s0", "s_end"))
+        if self.tasks[0].closed:
+            self.period = _number([task.period for task in self.tasks])
+        self._n = self.tasks[0].n
+
+    def __len__(self) -> int:
+        return len(self.tasks)
+
+    def __iter__(self) -> Iterator[PathTask]:
+        return iter(self.tasks)
+
+    @property
+    def n(self) -> int:
+        return self._n
+
+    def q_d(self, s: Array) -> Array:
+        return self._evaluated("q_d", s, (self._n,))
+
+    def dq_d(self, s: Array) -> Array:
+        return self._evaluated("dq_d", s, (self._n,))
+
+    def ddq_d(self, s: Array) -> Array:
+        return self._evaluated("ddq_d", s, (self._n,))
+
+    def theta(self, s: Array) -> Array:
+        return self._evaluated("theta", s, ())
+
+    def dtheta(self, s: Array) -> Array:
+        return self._evaluated("dtheta", s, ())
+
+    def at(self, s: Array) -> PathPoint:
+        s = self._of_rows("s", s, 1)
+        parts = self._parts
+        if len(parts) == 1:
+            return parts[0].task.at(s)
+        vectors, numbers = np.empty((3, *s.shape, self._n)), np.empty((2, *s.shape))
+        for part in parts:
+            point = part.task.at(s[..., part.rows])
+            for into, value in zip(vectors, point[:3], strict=True):
+                into[..., part.rows, :] = value
+            for into, value in zip(numbers, point[3:], strict=True):
+                into[..., part.rows] = value
+        return PathPoint(*vectors, *numbers)
+
+    def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
+        q = self._of_rows("q", as_array("q", q), 2)
+        start = None if near is None else np.broadcast_to(as_array("near", near), q.shape[:-1])
+        s = np.empty(q.shape[:-1])
+        for part in self._parts:
+            there = q[..., part.rows, :]
+            s[..., part.rows] = part.sigma_bar(there, None if start is None else start[..., part.rows])
+        return s
+
+    @property
+    def one_traverse(self) -> tuple[Any, Any]:
+        return self.s0, self.s_end if self.period is None else self.s0 + self.period
+
+    @property
+    def sampled_interval(self) -> tuple[Any, Any]:
+        return self.one_traverse
+
+    def rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> PathTask:
+        """The task of some ``rows``, a mask (N,) or numbers (k,); of one row its own, and of all this batch itself.
+
+        It is for a few calls: equal tasks are evaluated together, others one by one.
+        """
+        chosen = np.arange(len(self))[rows]
+        if len(chosen) == 1:
+            return self.tasks[chosen[0]]
+        if np.array_equal(chosen, np.arange(len(self))):
+            return self
+        some = TaskBatch([self.tasks[i] for i in chosen])
+        some.__dict__["_parts"] = one_by_one(some.tasks)
+        return some
+
+    def groups(self) -> list[tuple[PathTask, NDArray[np.intp]]]:
+        """Each different task, and the rows (k,) that have it."""
+        return [(self.tasks[rows[0]], rows) for rows in by_identity(self.tasks)]
+
+    def with_profile(self, profile: VelocityProfile) -> TaskBatch:
+        return TaskBatch([task.with_profile(profile) for task in self.tasks])
+
+    def reversed(self) -> TaskBatch:
+        return TaskBatch([task.reversed() for task in self.tasks])
+
+    def shifted(self, offset: ArrayLike) -> TaskBatch:
+        return TaskBatch([task.shifted(offset) for task in self.tasks])
+
+    def scaled(self, factor: ArrayLike, about: ArrayLike | None = None) -> TaskBatch:
+        return TaskBatch([task.scaled(factor, about) for task in self.tasks])
+
+    def between(self, s0: float, s_end: float) -> TaskBatch:
+        return TaskBatch([task.between(s0, s_end) for task in self.tasks])
+
+    def by_arc_length(self) -> TaskBatch:
+        return TaskBatch([task.by_arc_length() for task in self.tasks])
+
+    def arc_length(self, s0: ArrayLike | None = None, s_end: ArrayLike | None = None) -> Array:
+        return np.stack([task.arc_length(s0, s_end) for task in self.tasks], axis=-1)
+
+    def __repr__(self) -> str:
+        return f"TaskBatch({len(self)} tasks, {', '.join(self.describe()['kinds'])})"
+
+    def describe(self) -> dict[str, Any]:
+        """How many tasks there are, of which kinds, and what they have in common; of numbers that differ the range."""
+        every = [task.describe() for task, _ in self.groups()]
+        kinds = list(dict.fromkeys(one.get("task", "unknown") for one in every))
+        count = {"task": "TaskBatch", "tasks": len(self), "different": len(every), "kinds": kinds}
+        return count | {name: value for name, value in in_common_or_range(every).items() if name != "task"}
+
+    # --- inside ---------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _parts(self) -> list[Part]:
+        return together(self.tasks)
+
+    def _evaluated(self, method: str, s: Array, shape: tuple[int, ...]) -> Array:
+        """A method of all tasks at s (*batch, N), of values (*batch, N, *shape)."""
+        s = self._of_rows("s", s, 1)
+        parts = self._parts
+        if len(parts) == 1:
+            return getattr(parts[0].task, method)(s)
+        values, whole = np.empty(s.shape + shape), (slice(None),) * len(shape)
+        for part in parts:
+            values[(..., part.rows, *whole)] = getattr(part.task, method)(s[..., part.rows])
+        return values
+
+    def _of_rows(self, name: str, values: ArrayLike, axes: int) -> Array:
+        """``values`` with the rollouts as the last but so many of their ``axes``; one number is for all."""
+        array = np.asarray(values, dtype=np.float64)
+        if array.ndim == 0:
+            return np.broadcast_to(array, len(self))
+        if array.ndim < axes or array.shape[-axes] != len(self):
+            expected = f"(*batch, {len(self)}{', n' if axes == 2 else ''})"
+            raise InputError(f"{name} has shape {array.shape}, expected {expected}: there are {len(self)} tasks")
+        return array
+
+
+def refuse_batch(name: str, task: PathTask) -> None:
+    """Something is for one task.
+
+    Raises:
+        InputError: ``task``, which is called so, is a batch.
+    """
+    if isinstance(task, TaskBatch):
+        raise InputError(f"{name} is a TaskBatch of {len(task)} tasks, expected one task; take them one by one")
+
+
+def rows_of(task: PathTask, rows: NDArray[np.bool_] | NDArray[np.intp]) -> PathTask:
+    """The task of some rollouts, a mask (N,) or numbers (k,): one task is that of any."""
+    return task.rows(rows) if isinstance(task, TaskBatch) else task
+
+
+def of_each(task: PathTask, function: Callable[[PathTask], Any]) -> Any:
+    """What a function gives of a task: of a batch numbers (N,), or several, (N, m), of each of its tasks."""
+    if not isinstance(task, TaskBatch):
+        return function(task)
+    groups = task.groups()
+    each = np.array([function(one) for one, _ in groups], dtype=np.float64)
+    values = np.empty((len(task), *each.shape[1:]))
+    for value, (_, rows) in zip(each, groups, strict=True):
+        values[rows] = value
+    return values
+
+
+def _number(values: Sequence[Any]) -> Any:
+    """What all have, or (N,)."""
+    rows = in_common([np.asarray(value, dtype=np.float64) for value in values])
+    return float(rows) if rows.ndim == 0 else rows
