@@ -6,6 +6,7 @@ import importlib.util
 import inspect
 import sys
 import traceback
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 
@@ -22,7 +23,9 @@ def own_class(file: Path, name: str) -> type[PathTask]:
     Raises:
         ExperimentError: the file is missing or fails, or has no such class; the message lists those it has.
     """
-    module = _run(file)
+    if not file.is_file():
+        raise ExperimentError(f"{_KEY}: there is no Python file {str(file)!r}; the path is relative to the TOML file")
+    module = _run(file, file.read_bytes())
     found = getattr(module, name, None)
     if isinstance(found, type) and issubclass(found, PathTask):
         return found
@@ -35,9 +38,9 @@ def own_class(file: Path, name: str) -> type[PathTask]:
     raise ExperimentError(f"{_KEY}: {problem}; {there}")
 
 
-def _run(file: Path) -> ModuleType:
-    if not file.is_file():
-        raise ExperimentError(f"{_KEY}: there is no Python file {str(file)!r}; the path is relative to the TOML file")
+@lru_cache(maxsize=16)
+def _run(file: Path, source: bytes) -> ModuleType:
+    """The module of a file with this ``source``, the same one as long as it has it: so tasks are of one class."""
     module_name = f"pathcontrol_task_{file.stem}"
     spec = importlib.util.spec_from_file_location(module_name, file)
     assert spec is not None

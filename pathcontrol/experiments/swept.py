@@ -22,12 +22,12 @@ from pathcontrol.experiments.build_arms import build_models, build_plant
 from pathcontrol.experiments.keyed import keyed
 from pathcontrol.experiments.load import finding
 from pathcontrol.experiments.schema import Experiment
+from pathcontrol.experiments.swept_tasks import SweptTask, joined, refuse_sequence, rows_together, swept_tasks
 from pathcontrol.experiments.values import shown
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.sequence import PathSequence
 
 _GAIN = re.compile(r"controller\.(K_p|K_v|k|k_p|Lambda|K_d)(\[\d+\])?")
-_TOGETHER = re.compile(r"(start|plant)\.")  # what may differ from rollout to rollout of a batch, as gains may
+_TOGETHER = re.compile(r"(start|plant|task)\.")  # what may differ from rollout to rollout of a batch, as gains may
 _STEP = re.compile(r"([^\[\]]+)|\[(\d+)\]")
 _REMEMBERED = 16  # groups whose task and arm are kept from chunk to chunk
 
@@ -35,8 +35,9 @@ _REMEMBERED = 16  # groups whose task and arm are kept from chunk to chunk
 class SweptExperiment:
     """Builds the arguments of ``simulate`` for samples of an experiment file.
 
-    Initial states, gains and what is in ``[plant]`` vary within a batch; samples in which another key differs are
-    built and simulated apart, one batch for each value.
+    Initial states, gains and what is in ``[task]`` and ``[plant]`` vary within a batch; samples in which another key
+    differs are built and simulated apart, one batch for each value, and so are closed and open paths, paths without
+    an end, and samples of different durations.
 
     Args:
         data: what the file says, without ``[sweep]`` and ``[output]``.
@@ -68,19 +69,33 @@ class SweptExperiment:
     ) -> list[tuple[NDArray[np.intp], dict[str, Any]]]:
         """The rows that fit in one batch, and the arguments of simulate() for them."""
         experiments = [self._experiment(parameters, row, int(i)) for row, i in enumerate(samples)]
-        plants = any(name.startswith("plant.") for name in parameters)
+        plants, tasks = (any(name.startswith(key) for name in parameters) for key in ("plant.", "task."))
         apart = [name for name in parameters if not (_TOGETHER.match(name) or _GAIN.fullmatch(name))]
         groups: dict[str, list[int]] = {}
         for row in range(len(samples)):
             groups.setdefault(json.dumps([parameters[name][row].tolist() for name in apart]), []).append(row)
-        parts = []
+        parts: list[tuple[NDArray[np.intp], dict[str, Any]]] = []
         for key, rows in groups.items():
             try:
-                arguments = self._arguments(key, [experiments[row] for row in rows], plants)
+                parts += self._parts(key, np.array(rows), [experiments[row] for row in rows], plants, tasks)
             except ExperimentError as error:
                 raise ExperimentError(f"in samples {samples[rows[0]]} to {samples[rows[-1]]}: {error}") from error
-            parts.append((np.array(rows), arguments))
         return parts
+
+    def _parts(
+        self, key: str, rows: NDArray[np.intp], experiments: list[Experiment], plants: bool, tasks: bool
+    ) -> Iterator[tuple[NDArray[np.intp], dict[str, Any]]]:
+        """The batches of samples that differ in nothing but what may differ between rollouts."""
+        setup, bare, model = self._of_group(key, experiments[0])
+        found = [SweptTask(setup.task, float(setup.duration), setup.laps)] * len(rows)
+        if tasks:
+            found = swept_tasks(experiments, model, self._base_dir)
+        for some in rows_together(found):
+            chosen, own = [experiments[i] for i in some], [found[i] for i in some]
+            plant: Any = setup.plant
+            if plants:
+                plant = [build_plant(experiment, bare, model) for experiment in chosen]
+            yield rows[some], _arguments(setup, model, chosen, own) | {"plant": plant}
 
     def _experiment(self, parameters: Mapping[str, Array], row: int, sample: int) -> Experiment:
         values = {name: column[row].tolist() for name, column in parameters.items()}
@@ -93,28 +108,10 @@ class SweptExperiment:
             told = "; ".join(map(finding, error.errors(include_url=False)))
             raise ExperimentError(f"sweep.parameters: in sample {sample}: {told}") from None
 
-    def _arguments(self, key: str, experiments: list[Experiment], plants: bool) -> dict[str, Any]:
-        setup, bare, model = self._of_group(key, experiments[0])
-        plant: Any = setup.plant
-        if plants:
-            plant = [build_plant(experiment, bare, model) for experiment in experiments]
-        law = {name: _rows(name, experiments) for name in type(setup.controller).gains}
-        q, qd = _states(setup, experiments)
-        return {
-            "controller": law_of(experiments[0], model, setup.task, law),
-            "q": q,
-            "qd": qd,
-            "duration": float(setup.duration),
-            "laps": setup.laps,
-            "plant": plant,
-            "loop": setup.loop,
-        }
-
     def _of_group(self, key: str, experiment: Experiment) -> tuple[Setup, RobotModel, RobotModel]:
         if key not in self._built:
             setup = build(experiment, self._base_dir)
-            if isinstance(setup.task, PathSequence):
-                raise ExperimentError("task: a sequence of paths cannot be swept; sweep one of its paths")
+            refuse_sequence(setup.task)
             if len(self._built) >= _REMEMBERED:
                 self._built.pop(next(iter(self._built)))
             self._built[key] = (setup, *build_models(experiment, self._base_dir))
@@ -178,9 +175,26 @@ def _rows(name: str, experiments: list[Experiment]) -> Array:
     return rows if rows.ndim == 2 or name == "k" else rows[:, None]
 
 
-def _states(setup: Setup, experiments: list[Experiment]) -> tuple[Array, Array]:
-    """q and q̇ at the start, (N, n) each."""
-    found = {"q": [setup.q] * len(experiments), "qd": [setup.qd] * len(experiments)}
+def _arguments(
+    setup: Setup, model: RobotModel, experiments: list[Experiment], tasks: list[SweptTask]
+) -> dict[str, Any]:
+    """Those of simulate() beside the plant."""
+    law = {name: _rows(name, experiments) for name in type(setup.controller).gains}
+    q, qd = _states(setup, experiments, tasks)
+    return {
+        "controller": law_of(experiments[0], model, joined(tasks), law),
+        "q": q,
+        "qd": qd,
+        "duration": tasks[0].duration,
+        "laps": tasks[0].laps,
+        "loop": setup.loop,
+    }
+
+
+def _states(setup: Setup, experiments: list[Experiment], tasks: list[SweptTask]) -> tuple[Array, Array]:
+    """q and q̇ at the start, (N, n) each; at rest where the path begins unless the file says otherwise."""
+    begins = [one.task.q_d(np.array(one.task.s0)) for one in tasks]
+    found = {"q": begins, "qd": [setup.qd] * len(experiments)}
     for i, experiment in enumerate(experiments):
         for name, value in experiment.start.arguments(experiment.to_radians).items():
             found[name][i] = np.asarray(value, dtype=np.float64)

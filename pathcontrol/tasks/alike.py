@@ -36,7 +36,7 @@ def check_alike(tasks: Sequence[PathTask]) -> None:
     Raises:
         InputError: they are not, or one neither ends nor repeats.
     """
-    first, n = _kind(tasks[0]), _joints(tasks, 0)
+    first, n = kind_of(tasks[0]), _joints(tasks, 0)
     for rows in by_identity(tasks):
         i, task = rows[0], tasks[rows[0]]
         if _joints(tasks, i) != n:
@@ -44,7 +44,7 @@ def check_alike(tasks: Sequence[PathTask]) -> None:
                 f"tasks[{i}] is a path of {task.n} joints, tasks[0] of {n}; all rollouts are of one arm, so give each "
                 "number of joints a batch of its own"
             )
-        kind = _kind(task)
+        kind = kind_of(task)
         if kind == "endless":
             raise InputError(
                 f"tasks[{i}], a {type(task).__name__}, neither ends nor repeats; give it a finite s_end, as "
@@ -77,7 +77,8 @@ def in_common_or_range(every: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return told
 
 
-def _kind(task: PathTask) -> str:
+def kind_of(task: PathTask) -> str:
+    """Whether a path is ``"closed"``, ``"open"``, or ``"endless"``."""
     return "closed" if task.closed else "open" if np.isfinite(task.s_end) else "endless"
 
 

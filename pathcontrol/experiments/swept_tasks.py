@@ -1,0 +1,68 @@
+"""The tasks of the samples of a sweep, and which of them are simulated together."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pathcontrol.errors import ExperimentError
+from pathcontrol.experiments.build_duration import build_duration
+from pathcontrol.experiments.build_task import build_task
+from pathcontrol.experiments.schema import Experiment
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.tasks.alike import kind_of
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import TaskBatch
+from pathcontrol.tasks.sequence import PathSequence
+
+
+class SweptTask(NamedTuple):
+    """The task of a sample, the longest time [s] that it is followed, and how many times."""
+
+    task: PathTask
+    duration: float
+    laps: int | None
+
+
+def swept_tasks(experiments: Sequence[Experiment], model: RobotModel, base_dir: Path) -> list[SweptTask]:
+    """The task of each of some samples for one arm; samples that say the same have the same one.
+
+    Raises:
+        ExperimentError: a task cannot be made, is a sequence, or returns what a task must not.
+    """
+    made: dict[str, SweptTask] = {}
+    found = []
+    for experiment in experiments:
+        key = experiment.task.model_dump_json()
+        if key not in made:
+            task = build_task(experiment.task, model, base_dir, experiment.to_radians)
+            refuse_sequence(task)
+            duration, laps = build_duration(experiment, task)
+            made[key] = SweptTask(task, float(duration), laps)
+        found.append(made[key])
+    return found
+
+
+def refuse_sequence(task: PathTask) -> None:
+    """A sweep is of single tasks."""
+    if isinstance(task, PathSequence):
+        raise ExperimentError("task: a sequence of paths cannot be swept; sweep one of its paths")
+
+
+def rows_together(tasks: Sequence[SweptTask]) -> list[NDArray[np.intp]]:
+    """The rows that one batch takes: all closed or all open, and of one duration; an endless path is for itself."""
+    groups: dict[Hashable, list[int]] = {}
+    for row, (task, duration, _) in enumerate(tasks):
+        kind = kind_of(task)
+        groups.setdefault((id(task) if kind == "endless" else kind, duration), []).append(row)
+    return [np.array(rows) for rows in groups.values()]
+
+
+def joined(tasks: Sequence[SweptTask]) -> PathTask:
+    """The task of all rollouts, or a batch of them."""
+    first = tasks[0].task
+    return first if all(one.task is first for one in tasks) else TaskBatch([one.task for one in tasks])
