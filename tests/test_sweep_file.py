@@ -9,16 +9,18 @@ import subprocess
 import sys
 import time
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import pathcontrol as pc
 from pathcontrol.errors import ExperimentError, InputError
 from pathcontrol.experiments.build import build
 from pathcontrol.experiments.schema import Experiment
 from pathcontrol.experiments.sweep_runner import run_sweep
-from pathcontrol.experiments.swept import put
+from pathcontrol.experiments.swept import SweptExperiment, put
 
 pytest.importorskip("pyarrow")
 
@@ -98,6 +100,79 @@ def test_a_sample_is_the_experiment_with_its_values(experiment, tmp_path):
             np.testing.assert_array_equal(table[name][i], value[0], err_msg=f"{name} of sample {i}")
     assert set(table["task.radius"].to_numpy()) == {50.0, 57.3}
     assert table["loop.substeps"].dtype.kind == "i"
+
+
+TASKS = """
+[sweep]
+method = "sobol"
+samples = 8
+[sweep.parameters]
+"task.radius" = { uniform = [20.0, 80.0] }
+"task.speed" = { uniform = [50.0, 150.0] }
+"""
+
+
+def parts_of(text, samples, folder=Path(), **parameters):
+    """The rows of the batches in which samples are simulated, and their tasks."""
+    swept = SweptExperiment(tomllib.loads(text), folder)
+    return [(rows.tolist(), built["controller"].task) for rows, built in swept(parameters, np.arange(samples))]
+
+
+def test_tasks_vary_within_a_batch(experiment, tmp_path):
+    [(rows, task)] = parts_of(BASE, 3, **{"task.radius": np.array([30.0, 40.0, 30.0])})
+    assert rows == [0, 1, 2]
+    assert_allclose([one.radius for one in task.tasks], np.deg2rad([30.0, 40.0, 30.0]))
+    assert task.tasks[0] is task.tasks[2]
+    anywhere = BASE.replace("q = [40.0, 70.0]", "")  # each starts where its own path begins
+    table = run_sweep(experiment(anywhere + TASKS), tmp_path / "out", progress=False).table()
+    for i in range(8):
+        data = tomllib.loads(anywhere)
+        data["task"] |= {name: table[f"task.{name}"][i].item() for name in ("radius", "speed")}
+        setup = build(Experiment.model_validate(data))
+        run = pc.simulate(setup.controller, setup.q, duration=0.1, plant=setup.plant, loop=setup.loop, progress=False)
+        for name, value in pc.metrics(run).items():
+            np.testing.assert_array_equal(table[name][i], value[0], err_msg=f"{name} of sample {i}")
+
+
+def test_paths_of_other_kinds_or_durations_are_simulated_apart():
+    line = BASE.replace('type = "circle"\nradius = 57.3', 'type = "line"\nstart = [0.0, 0.0]\nend = [10.0, 0.0]')
+    ends = {"task.end": np.array([[10.0, 0.0], [20.0, 5.0], [10.0, 0.0]])}
+    assert [rows for rows, _ in parts_of(line, 3, **ends)] == [[0, 1, 2]]
+    assert [rows for rows, _ in parts_of(line.replace("duration = 0.1", ""), 3, **ends)] == [[0, 2], [1]]
+
+
+OWN = """
+import numpy as np
+import pathcontrol as pc
+
+class Own(pc.PathTask):
+    def __init__(self, kind, size):
+        self.size = size
+        if kind == "closed":
+            self.period = 2 * np.pi
+        elif kind == "open":
+            self.s_end = 1.0
+
+    def q_d(self, s):
+        return self.size * np.stack([np.cos(s), np.sin(s)], axis=-1)
+
+    def theta(self, s):
+        return 1.0
+
+    def sigma_bar(self, q, near=None):
+        return np.arctan2(q[..., 1], q[..., 0])
+"""
+
+
+def test_tasks_of_a_file_are_of_one_class(tmp_path):
+    (tmp_path / "own.py").write_text(OWN, encoding="utf-8")
+    text = BASE.replace('type = "circle"\nradius = 57.3\nspeed = 114.59', 'type = "own.py:Own"')
+    text = text.replace("[controller]", '[task.parameters]\nkind = "closed"\nsize = 1.0\n[controller]')
+    kinds = np.array(["closed", "open", "closed", "endless", "endless"])
+    sizes = {"task.parameters.size": np.array([1.0, 1.1, 1.2, 1.0, 1.1]), "task.parameters.kind": kinds}
+    parts = parts_of(text, 5, tmp_path, **sizes)
+    assert [rows for rows, _ in parts] == [[0, 2], [1], [3], [4]]
+    assert len({type(task) for task in parts[0][1].tasks}) == 1
 
 
 def test_any_chunk_gives_the_same_table(experiment, tmp_path):

@@ -36,6 +36,28 @@ def test_default_derivatives_are_accurate_to_1e8_relative(task):
         assert np.abs(got - exact).max() <= 1e-8 * np.abs(exact).max()
 
 
+class Bent(PathTask):
+    """An open path of three joints; derivatives are left to the library."""
+
+    s_end = 2.0
+
+    def q_d(self, s):
+        return np.stack([np.sin(s), np.exp(-s), s * s], axis=-1)
+
+    def theta(self, s):
+        return 1 + s
+
+
+@given(st.lists(floats(0.0, 2.0), min_size=2, max_size=20).map(np.array))
+def test_no_row_of_a_batch_depends_on_the_others(s):
+    bent, line = Bent(), Line([0.1, 0.2, -0.3], [1.0, -0.5, 0.7], 1.0)
+    q = bent.q_d(s) / 3
+    for i in range(len(s)):
+        for method in ("dq_d", "ddq_d", "dtheta"):
+            assert np.array_equal(getattr(bent, method)(s)[[i]], getattr(bent, method)(s[[i]])), method
+        assert line.sigma_bar(q)[i] == line.sigma_bar(q[[i]])[0]
+
+
 @pytest.mark.parametrize("frequency", [0.3, 1.0, 12.0])
 def test_default_derivatives_near_the_ends_look_only_inside_the_domain(frequency):
     seen = []

@@ -60,9 +60,9 @@ def interpolated(values: Array, u: Array, scale: float | Array, order: int) -> A
 def _weights(u: Array, order: int) -> Array:
     """Weights of the samples for the derivative at u in [-1, 1]."""
     derivative = _DERIVATIVES[order]
-    basis = chebyshev.chebvander(u, len(derivative) - 1).reshape(*np.shape(u), len(derivative))
-    # one product for each s: that of all together would round a row differently in another batch
-    return (basis[..., None, :] @ (derivative @ _TO_COEFFICIENTS))[..., 0, :]
+    basis = chebyshev.chebvander(u, len(derivative) - 1).reshape(*np.shape(u), 1, len(derivative))
+    # one product for each s, of numbers side by side: else a row would be rounded differently in another batch
+    return (np.ascontiguousarray(basis) @ (derivative @ _TO_COEFFICIENTS))[..., 0, :]
 
 
 def best_width(function: Callable[[Array], Array], lower: float, upper: float, samples: int = 33) -> float:
