@@ -162,7 +162,7 @@ def begin(tasks: list[PathTask]) -> np.ndarray:
     return np.add([task.q_d(np.array(task.s0)) for task in tasks], [0.02, -0.03])
 
 
-def ran(law: Controller, q: np.ndarray, duration: float = 0.1, **options) -> Run:
+def ran(law: Controller, q: np.ndarray, duration: float = 0.06, **options) -> Run:
     return simulate(law, q, duration=duration, progress=False, **({"loop": LOOP} | options))
 
 
@@ -306,7 +306,7 @@ def test_tasks_that_only_seem_to_differ_in_numbers_are_not():
     assert not np.array_equal(wrong.q_d(np.full(2, 0.3)), alone)
 
 
-@settings(max_examples=15)
+@settings(max_examples=10)
 @given(st.lists(random_tasks(), min_size=2, max_size=5), st.integers(0, 9999))
 def test_a_batch_has_the_values_of_its_tasks(tasks, seed):
     rng, batch = np.random.default_rng(seed), TaskBatch(tasks)
@@ -374,13 +374,14 @@ def test_a_part_of_a_run_knows_the_tasks_of_its_rollouts():
         _ = strange.task
 
 
-@pytest.mark.parametrize("family", ["circles", "lines", "moved"])
+@pytest.mark.parametrize("family", ["lines", "moved"])
 def test_a_file_keeps_the_task_of_each_rollout(family, tmp_path):
     tasks = FAMILIES[family]
     run = ran(LAWS["plan"](TaskBatch(tasks)), begin(tasks), first_rollout=3)
     loaded = Run.load(run.save(tmp_path / "run.nc"))
     part = run.with_data(run.data.isel(rollout=[2, 0]))
     again = Run.load(part.save(tmp_path / "part.nc"))
+    assert "TaskBatch" not in run.rollout(2)._stored().text
     alone = Run.load(loaded.rollout(2).save(tmp_path / "one.nc"))
     assert len(again.task) == 2
     s = np.linspace(0.0, 0.1, 5)

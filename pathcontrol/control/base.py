@@ -53,7 +53,7 @@ class Controller(ABC):
 
     Args:
         robot: the model the law uses, which need not be the simulated arm.
-        task: path and velocity profile, for as many joints.
+        task: path and velocity profile, for as many joints; one of each rollout is a :class:`TaskBatch`.
         friction: what the torque compensates of ``robot.friction``: ``"none"``, ``"viscous"`` (as in the paper) or
             ``"full"``, which adds the Coulomb level in the direction of motion; of the desired one where a joint rests.
         start: the first path parameter: ``"s0"`` of the task, or that of the ``"nearest"`` point of the path.
