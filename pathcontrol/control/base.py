@@ -19,6 +19,9 @@ FrictionCompensation = Literal["none", "viscous", "full"]
 Start = Literal["s0", "nearest"]
 
 
+_ONE = np.array(1.0)
+
+
 class ControlOutput(NamedTuple):
     """What a law says at one moment.
 
@@ -51,6 +54,11 @@ class Controller(ABC):
     :meth:`start` gives the state z, (*batch, m); :meth:`law` maps (t, q, q̇, z) to torques and ż and keeps nothing;
     :meth:`advance` takes z over one control period. The state of the controllers here is the path parameter, m = 1.
 
+    A subclass made with ``single=True``, as ``class Mine(Controller, single=True)``, says that its law
+    takes a single state, q (n,) and z (m,), as well, and answers to the last bit what it would in a batch of one; a
+    simulation of one rollout is then faster. (NumPy raises a number to a power with another last bit than an array.)
+    It is not inherited, since the law of a subclass may be another.
+
     Args:
         robot: the model the law uses, which need not be the simulated arm.
         task: path and velocity profile, for as many joints; one of each rollout is a :class:`TaskBatch`.
@@ -73,6 +81,12 @@ class Controller(ABC):
         self.ending = Ending.of(task)
         self._viscous = robot.friction.viscous
 
+    single = False
+
+    def __init_subclass__(cls, single: bool = False, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls.single = single
+
     @abstractmethod
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         """Torques for the joint positions q [rad] and velocities q̇ [rad/s], (*batch, n), at time t [s]."""
@@ -93,7 +107,7 @@ class Controller(ABC):
         k → ∞ it is a step of Newton's method for (29) from the present arm, plus hσ̄̇ for its motion.
         (Hochbruck and Ostermann, Acta Numerica 19, 2010.)
         """
-        x = np.minimum(period * out.slope, 1.0)
+        x = np.minimum(period * out.slope, _ONE)
         phi_1, phi_2 = _phi(x)
         s = out.s + period * (phi_1 * out.sdot + period * phi_2 * out.drift)
         return (s if self.task.closed else np.minimum(np.maximum(s, self.task.s0), self.task.s_end))[..., None]
@@ -118,6 +132,8 @@ class Controller(ABC):
 
         Outside [s0, s_end] the point is the end that was passed.
         """
+        if not s.ndim and not self.task.single:
+            return PathPoint(*(value[0] for value in self.point(s[None])))
         if self.ending is None:
             return self.task.at(s if self.task.closed else np.maximum(s, self.task.s0))
         return self.ending.braked(self.task.at(np.minimum(np.maximum(s, self.task.s0), self.task.s_end)), s)

@@ -1,7 +1,6 @@
-"""The rigid-body model of an arm. The only module that imports Pinocchio.
+"""The rigid-body model of an arm.
 
-Arrays have leading batch axes: q, q̇, τ are ``(*batch, n)`` in the order of ``joint_names``. The transpose of a
-C-ordered ``(N, n)`` array is the ``(n, N)`` array Pinocchio's batched calls want, so nothing is copied on the way.
+Arrays have leading batch axes: q, q̇, τ are ``(*batch, n)`` in the order of ``joint_names``.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -19,6 +18,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly, scalar
 from pathcontrol.errors import InputError, UnknownNameError, UrdfError
 from pathcontrol.robot.friction import FrictionLaw, no_friction
+from pathcontrol.robot.rigid_body import RigidBody, together
 
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED  # the frame's origin, axes parallel to the base's
 
@@ -59,29 +59,6 @@ class Actuation:
         """The actuation of some of the joints."""
         counts = None if self.encoder_counts is None else readonly(self.encoder_counts[list(joints)])
         return Actuation(self.limits.select(joints), self.friction.select(joints), counts)
-
-
-class _Algorithm(NamedTuple):
-    """One of Pinocchio's algorithms: for one configuration, and for many on several threads."""
-
-    one: Callable[..., Any]
-    many: Callable[..., Any]
-
-
-def _aba(*arguments: Any) -> Array:
-    """As :func:`pin.abaInParallel` does it: bit for bit the same, which the other convention is not."""
-    return pin.aba(*arguments, pin.Convention.WORLD)
-
-
-_RNEA, _ABA = _Algorithm(pin.rnea, pin.rneaInParallel), _Algorithm(_aba, pin.abaInParallel)
-
-
-class _Body(NamedTuple):
-    """A model with room to compute in."""
-
-    model: Any
-    data: Any
-    pool: Any
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -177,14 +154,14 @@ class RobotModel:
         With ``velocity`` v the Coriolis term is C(q,q̇)v, as passivity-based laws want it; see :meth:`coriolis`.
         """
         if velocity is None:
-            return self._batched(_RNEA, self._body, q=q, qd=qd, qdd=qdd)
+            return self._body.inverse_dynamics(q, qd, qdd)
         qd, v = joint_array("qd", qd, self.n), joint_array("velocity", velocity, self.n)
         surplus = self._centripetal(q, 0.5 * (qd - v))
-        return self._batched(_RNEA, self._body, q=q, qd=0.5 * (qd + v), qdd=qdd) - surplus
+        return self._body.inverse_dynamics(q, 0.5 * (qd + v), qdd) - surplus
 
     def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
         """q̈ = M(q)⁻¹(τ − C(q,q̇)q̇ − g(q)) [rad/s²], (*batch, n), by the articulated-body algorithm."""
-        return self._batched(_ABA, self._body, q=q, qd=qd, tau=tau)
+        return self._body.forward_dynamics(q, qd, tau)
 
     def forward_dynamics_row(self, q: Array, qd: Array, tau: Array, armature: Array) -> Array:
         """q̈ (n,) of one configuration, each argument (n,), with another rotor inertia ``armature`` [kg m²].
@@ -212,11 +189,7 @@ class RobotModel:
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """M(q) [kg m²], (*batch, n, n), by the composite rigid body algorithm."""
-        array = joint_array("q", q, self.n)
-        M = np.empty((array.size // self.n, self.n, self.n))
-        for k, qi in enumerate(array.reshape(-1, self.n)):
-            M[k] = pin.crba(self.pinocchio_model, self._data, qi)
-        return M.reshape(*array.shape, self.n)
+        return self._body.mass_matrix(q)
 
     def coriolis(self, q: ArrayLike, qd: ArrayLike, v: ArrayLike) -> Array:
         """C(q,q̇)v [N m], (*batch, n), with the C of Christoffel symbols, for which Ṁ − 2C is skew-symmetric.
@@ -234,7 +207,7 @@ class RobotModel:
 
     def kinetic_energy(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """½ q̇ᵀM(q)q̇ [J], (*batch,)."""
-        momentum = self._batched(_RNEA, self._weightless, q=q, qd=np.zeros(self.n), qdd=qd)
+        momentum = self._weightless.inverse_dynamics(q, np.zeros(self.n), qd)
         return 0.5 * np.asarray((momentum * as_array("qd", qd)).sum(-1))
 
     def potential_energy(self, q: ArrayLike) -> Array:
@@ -385,18 +358,18 @@ class RobotModel:
     # --- inside ---------------------------------------------------------------------------------------------
 
     @cached_property
+    def _body(self) -> RigidBody:
+        return RigidBody(self.pinocchio_model, self.threads)
+
+    @property
     def _data(self) -> Any:
-        return self.pinocchio_model.createData()
+        return self._body.data
 
     @cached_property
-    def _body(self) -> _Body:
-        return _Body(self.pinocchio_model, self._data, pin.ModelPool(self.pinocchio_model, self.threads))
-
-    @cached_property
-    def _weightless(self) -> _Body:
+    def _weightless(self) -> RigidBody:
         model = pin.Model(self.pinocchio_model)
         model.gravity = pin.Motion.Zero()
-        return _Body(model, model.createData(), pin.ModelPool(model, self.threads))
+        return RigidBody(model, self.threads)
 
     @cached_property
     def _scratch(self) -> tuple[Any, Any]:
@@ -410,32 +383,13 @@ class RobotModel:
 
     def _centripetal(self, q: ArrayLike, x: ArrayLike) -> Array:
         """c(q,x) = C(q,x)x [N m], (*batch, n)."""
-        return self._batched(_RNEA, self._weightless, q=q, qd=x, qdd=np.zeros(self.n))
-
-    def _batched(self, algorithm: _Algorithm, body: _Body, **arguments: ArrayLike) -> Array:
-        """An algorithm on three (*batch, n) arguments that broadcast."""
-        x, y, z = self._together(arguments)
-        if x.size == self.n:  # one configuration is not worth the threads' overhead
-            return algorithm.one(body.model, body.data, x.reshape(-1), y.reshape(-1), z.reshape(-1)).reshape(x.shape)
-        out: Array = np.empty(x.shape)
-        if out.size:
-            columns = (a.reshape(-1, self.n).T for a in (x, y, z, out))
-            algorithm.many(self.threads, body.pool, *columns)
-        return out
+        return self._weightless.inverse_dynamics(q, x, np.zeros(self.n))
 
     def _each(self, q: ArrayLike, shape: tuple[int, ...], function: Callable[..., Any], **more: ArrayLike) -> Array:
         """``function`` of each configuration (and ``more`` beside it), for what Pinocchio has no batched call for."""
-        arrays = self._together({"q": q, **more})
+        arrays = together(self.n, {"q": q, **more})
         values = [function(*rows) for rows in zip(*(a.reshape(-1, self.n) for a in arrays), strict=True)]
         return np.array(values, dtype=np.float64).reshape(arrays[0].shape[:-1] + shape)
-
-    def _together(self, arguments: Mapping[str, ArrayLike]) -> list[Array]:
-        """Arguments (*batch, n) broadcast to one shape."""
-        arrays = [joint_array(name, value, self.n) for name, value in arguments.items()]
-        if len({a.shape for a in arrays}) == 1:
-            return arrays
-        shape = _broadcast_shape(arguments, arrays)
-        return [np.broadcast_to(a, shape) for a in arrays]
 
     def _frame_id(self, frame: str) -> int:
         # getFrameId answers nframes for a frame that does not exist, so ask first
@@ -445,14 +399,6 @@ class RobotModel:
         if model.existFrame(frame, pin.FrameType.BODY):  # a link and a joint may share a name
             return model.getFrameId(frame, pin.FrameType.BODY)
         return model.getFrameId(frame)
-
-
-def _broadcast_shape(arguments: Mapping[str, ArrayLike], arrays: Sequence[Array]) -> tuple[int, ...]:
-    try:
-        return np.broadcast_shapes(*(a.shape for a in arrays))
-    except ValueError as error:
-        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(arguments, arrays, strict=True))
-        raise InputError(f"the batch axes do not fit together: {shapes}") from error
 
 
 def build_model(text: str) -> Any:

@@ -73,10 +73,10 @@ class ContinuousArm:
     def run(self, controller: Controller, duration: float, finish: Finish | None, progress: bool) -> dict[str, Array]:
         """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
         push = None if self._disturbance is None else _Push(self._disturbance, self._began)
-        loop, recorder = ClosedLoop(controller, self._robot, self._mode, push), Recorder()
+        time = self._period * np.arange(max(1, round(duration / self._period)) + 1)
+        loop, recorder = ClosedLoop(controller, self._robot, self._mode, push), Recorder(*self.q.shape, len(time))
         lost = self.divergence = Divergence(self.q, self.qd)
         start = np.concatenate([self.q, self.qd, controller.start(self.q, self.qd)], axis=-1)
-        time = self._period * np.arange(max(1, round(duration / self._period)) + 1)
         with progress_bar("integrating", duration, progress) as update:
             for t, y in zip(time, _Solution(loop, start, lost, push).at(time, update), strict=False):
                 self.q, self.qd, _ = loop.split(y)

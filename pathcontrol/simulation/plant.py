@@ -9,6 +9,8 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.dry_friction import stick_slip
 
+_ZERO = np.array(0.0)
+
 
 class Plant:
     """M(q)q̈ + C(q,q̇)q̇ + g(q) + b q̇ + F(q̇) ∋ τ over steps of ``step`` seconds, F the set-valued dry friction.
@@ -28,12 +30,16 @@ class Plant:
 
     def __init__(self, robot: RobotModel | RobotBatch, step: float) -> None:
         self.robot, self.step = robot, step
-        # rows, (1, n), which NumPy joins to those of a single rollout far faster than (n,)
+        # rows, (1, n), and numbers as arrays, (), which NumPy joins to those of a single rollout far faster than others
         self._damping = np.atleast_2d(robot.friction.viscous)
-        levels = robot.friction.levels
-        steady = tuple(np.atleast_2d(level) for level in levels(np.zeros(robot.n)))
-        self._levels = levels if robot.friction.varies else lambda qd: steady
+        self._whole, self._half, self._quarter = np.array(step), np.array(0.5 * step), np.array(0.25 * step)
+        self._steady = None if robot.friction.varies else self._levels_at(np.zeros((1, robot.n)))
         self._inertia = robot.with_armature(0.5 * step * robot.friction.viscous)
+
+    def _levels_at(self, qd: Array) -> tuple[Array, Array]:
+        """Dry friction of forward and of backward motion, F⁺ and −F⁻ [N m], as rows."""
+        plus, minus = self.robot.friction.levels(qd)
+        return np.atleast_2d(plus), -np.atleast_2d(minus)
 
     def _mass_matrix(self, q: Array, rows: Array) -> Array:
         """Of the arms of some ``rows`` (k,), at q (k, n)."""
@@ -43,28 +49,27 @@ class Plant:
 
     def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
         """(q, q̇) one step later under the constant torque ``tau``; all (N, n)."""
-        h, drive = self.step, tau - self._damping * qd
-        middle_qd = self._push(q, qd, qd, drive, 0.5 * h)
-        middle_q = q + 0.25 * h * (qd + middle_qd)
-        next_qd = self._push(middle_q, middle_qd, qd, drive, h)
-        return q + 0.5 * h * (qd + next_qd), next_qd
+        drive = tau - self._damping * qd
+        middle_qd = self._push(q, qd, qd, drive, self._half)
+        middle_q = q + self._quarter * (qd + middle_qd)
+        next_qd = self._push(middle_q, middle_qd, qd, drive, self._whole)
+        return q + self._half * (qd + next_qd), next_qd
 
-    def _push(self, q: Array, qd: Array, start: Array, drive: Array, duration: float) -> Array:
+    def _push(self, q: Array, qd: Array, start: Array, drive: Array, duration: Array) -> Array:
         """P(start + duration a(q, q̇)): dry friction keeps the direction of q̇, unless that proves wrong."""
-        plus, minus = self._levels(qd)
-        friction = np.where(qd > 0, plus, -minus)  # whatever a joint at rest gets, it is taken back below
+        forward, backward = self._steady or self._levels_at(qd)
+        friction = np.where(qd > _ZERO, forward, backward)  # whatever a joint at rest gets, it is taken back below
         v = start + duration * self._inertia.forward_dynamics(q, qd, drive - friction)
-        turned = v * qd <= 0
+        turned = v * qd <= _ZERO
         if not np.count_nonzero(turned):
             return v
         # a diverged arm must not be taken for one that sticks
-        turned &= np.isfinite(v) & (plus + minus > 0)
+        turned &= np.isfinite(v) & (forward > backward)
         rows = np.flatnonzero(turned.any(-1))
         if not rows.size:
             return v
         M, impulse = self._mass_matrix(q[rows], rows), duration * friction[rows]
         momentum = np.einsum("kij,kj->ki", M, v[rows]) + impulse
-        low = -duration * np.broadcast_to(minus, q.shape)[rows]
-        high = duration * np.broadcast_to(plus, q.shape)[rows]
+        low, high = (duration * np.broadcast_to(level, q.shape)[rows] for level in (backward, forward))
         v[rows] = stick_slip(M, momentum, low, high, guess=np.where(turned[rows], 0.0, qd[rows]))
         return v

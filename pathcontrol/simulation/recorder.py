@@ -2,52 +2,55 @@
 
 from __future__ import annotations
 
+from math import prod
+
 import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import ControlOutput
 from pathcontrol.simulation.sensors import Reading
+from pathcontrol.simulation.variables import VARIABLES
 
-_ROOM = 1024  # samples at first
+_ROOM = 1 << 30  # bytes at first; what is not written to takes no memory
 
 
 class Recorder:
-    """Arrays (time, rollout, …) that grow a sample at a time, handed out as (rollout, time, …)."""
+    """Arrays (time, rollout, …) that grow a sample at a time, handed out as (rollout, time, …).
 
-    def __init__(self) -> None:
-        self._samples, self._room = 0, 0
-        self._arrays: dict[str, Array] = {}
+    Args:
+        rollouts: how many rollouts.
+        joints: how many joints.
+        samples: how many samples there will be at most.
+    """
+
+    def __init__(self, rollouts: int, joints: int, samples: int) -> None:
+        self._most, self._samples = samples, 0
+        shapes = {name: (rollouts, joints)[: len(dims) - 1] for name, (dims, _, _) in VARIABLES.items()}
+        bytes_a_sample = sum(8 * prod(shape) for shape in shapes.values())
+        self._room = min(samples, max(1, _ROOM // bytes_a_sample))
+        self._arrays = {
+            name: np.empty((self._room, *shape), dtype=bool if name == "regular" else np.float64)
+            for name, shape in shapes.items()
+        }
 
     def write(self, q: Array, qd: Array, reading: Reading, out: ControlOutput, tau: Array) -> None:
         """Store one more sample: the true state, what was measured, what the law said and the torque that acts."""
-        values = {
-            "q": q,
-            "qd": qd,
-            "q_measured": reading.q,
-            "qd_measured": reading.qd,
-            "tau_demand": out.tau,
-            "tau": tau,
-            "s": out.s,
-            "sdot": out.sdot,
-            "e_p": out.e_p,
-            "e_v": out.e_v,
-            "regular": out.regular,
-        }
         if self._samples == self._room:
-            self._grow(values)
-        for name, value in values.items():
-            self._arrays[name][self._samples] = value
+            self._grow()
+        i = self._samples
+        values = (q, qd, *reading, out.tau, tau, out.s, out.sdot, out.e_p, out.e_v, out.regular)  # as in VARIABLES
+        for array, value in zip(self._arrays.values(), values, strict=True):
+            array[i] = value
         self._samples += 1
 
     def arrays(self) -> dict[str, Array]:
         """Everything stored, rollouts first."""
         return {name: np.moveaxis(array[: self._samples], 0, 1) for name, array in self._arrays.items()}
 
-    def _grow(self, values: dict[str, Array]) -> None:
+    def _grow(self) -> None:
         """Twice the room; a run may end long before the time it was given."""
-        self._room = 2 * self._room or _ROOM
-        for name, value in values.items():
-            larger = np.empty((self._room, *value.shape), dtype=value.dtype)
-            if self._samples:
-                larger[: self._samples] = self._arrays[name]
+        self._room = min(2 * self._room, self._most)
+        for name, array in self._arrays.items():
+            larger = np.empty((self._room, *array.shape[1:]), dtype=array.dtype)
+            larger[: self._samples] = array
             self._arrays[name] = larger

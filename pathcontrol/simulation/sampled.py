@@ -26,7 +26,8 @@ class Actuator:
     def __init__(self, loop: SampledLoop, robot: Arm, shape: tuple[int, int]) -> None:
         limits = torque_limits(loop, robot)
         check_rows(limits, "torque_limits", shape[0])
-        self._limits = None if limits is None else np.atleast_2d(limits)
+        self._most = None if limits is None else np.atleast_2d(limits)
+        self._least = None if limits is None else -np.atleast_2d(limits)
         whole, late = _periods_and_rest(loop.delay, loop.period)
         self._queue = deque([np.zeros(shape)] * (whole + (late > 0)))
         self._parts = [late, loop.period - late] if late else [loop.period]
@@ -38,7 +39,7 @@ class Actuator:
 
     def limited(self, tau: Array) -> Array:
         """``tau`` within the limits."""
-        return tau if self._limits is None else np.minimum(np.maximum(tau, -self._limits), self._limits)
+        return tau if self._most is None else np.minimum(np.maximum(tau, self._least), self._most)
 
     def torques(self, tau: Array) -> list[Array]:
         """The torque in each part of a period at whose begin ``tau`` is computed."""
@@ -77,8 +78,10 @@ class SampledArm:
 
     def run(self, controller: Controller, duration: float, finish: Finish | None, progress: bool) -> dict[str, Array]:
         """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
-        ticks, recorder = max(1, round(duration / self._period)), Recorder()
-        first = z = controller.start(self.q, self.qd)
+        ticks = max(1, round(duration / self._period))
+        recorder, first = Recorder(*self.q.shape, ticks + 1), controller.start(self.q, self.qd)
+        single = _single(controller, self.q, self.qd, first)
+        first = z = first[0] if single else first
         lost = self.divergence = Divergence(self.q, self.qd)
         # a rollout that diverges may overflow in the step before
         with progress_bar("simulating", ticks, progress) as update, np.errstate(over="ignore", invalid="ignore"):
@@ -89,15 +92,19 @@ class SampledArm:
                     self._hold_lost(lost)
                     z = lost.replaced(z, first)
                 reading = self._reading
-                out = controller.law(t, reading.q, reading.qd, z)
-                lost.look_at_torque(t, out.tau)
-                tau = self._actuator.limited(out.tau)
+                seen = (reading.q[0], reading.qd[0]) if single else reading
+                out = controller.law(t, *seen, z)
+                demand = out.tau.reshape(self.q.shape)
+                lost.look_at_torque(t, demand)
+                tau = self._actuator.limited(demand)
                 if lost.any:
                     tau = lost.replaced(tau, 0.0)
                 recorder.write(self.q, self.qd, reading, out, self._actuator.torques(tau)[0])
                 if tick % _UPDATE_EVERY == 0:
                     update(tick)
-                if tick == ticks or lost.all or (finish is not None and finish(t, out.s, self.qd, lost.lost)):
+                if tick == ticks or lost.all:
+                    break
+                if finish is not None and finish(t, np.atleast_1d(out.s), self.qd, lost.lost):
                     break
                 z = controller.advance(z, out, self._period)
                 self._advance(tau)
@@ -127,6 +134,13 @@ class SampledArm:
     def _seen(self) -> tuple[Array, Array]:
         """Positions and velocities (N, n) as they come to the sensors."""
         return (self.q, self.qd) if self._noise is None else self._noise.disturbed(self.q, self.qd)
+
+
+def _single(controller: Controller, q: Array, qd: Array, z: Array) -> bool:
+    """Whether there is one rollout only, (1, n), and the law can be asked for the torques of its state, (n,)."""
+    if len(q) > 1 or not controller.single:
+        return False
+    return controller.law(0.0, q[0], qd[0], z[0]).tau.ndim == 1  # more where a gain has a row for each rollout
 
 
 def _periods_and_rest(delay: float, period: float) -> tuple[int, float]:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, factor
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 from pathcontrol.tasks.differentiation import Differentiator, best_width
@@ -30,12 +30,12 @@ class PathPoint(NamedTuple):
     @property
     def velocity(self) -> Array:
         """Desired joint velocity r = q_d'ϑ, (*batch, n)."""
-        return self.dq_d * self.theta[..., None]
+        return self.dq_d * factor(self.theta)
 
     @property
     def velocity_slope(self) -> Array:
         """Slope r' = dr/ds = q_d''ϑ + q_d'ϑ', (*batch, n); the desired acceleration is r'ṡ."""
-        return self.ddq_d * self.theta[..., None] + self.dq_d * self.dtheta[..., None]
+        return self.ddq_d * factor(self.theta) + self.dq_d * factor(self.dtheta)
 
 
 class PathTask(ABC):
@@ -48,6 +48,10 @@ class PathTask(ABC):
 
     in state space (Moreno and Kelly, eqs. 2, 3 and 5) is what the task asks for.
 
+    A subclass made with ``single=True``, as ``class Mine(PathTask, single=True)``, says that it gives for a number s to
+    the last bit what it gives for an array of it, and so is faster for one rollout. (What raises s to a power does not:
+    NumPy's powers of numbers and of arrays may differ.) It is not inherited, since a subclass may be another path.
+
     Attributes:
         s0: first path parameter.
         s_end: last path parameter; ``inf`` for a path that does not end.
@@ -57,6 +61,12 @@ class PathTask(ABC):
     s0: float = 0.0
     s_end: float = np.inf
     period: float | None = None
+
+    single = False
+
+    def __init_subclass__(cls, single: bool = False, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls.single = single
 
     @abstractmethod
     def q_d(self, s: Array) -> Array:

@@ -41,7 +41,7 @@ class JointCurve(PathTask):
         return PathPoint(self.q_d(s), dq_d, ddq_d, theta, dtheta)
 
 
-class Ellipse(JointCurve):
+class Ellipse(JointCurve, single=True):
     """An ellipse drawn by two joints, the others holding still.
 
     q_d(s) = c + (a cos s) e_i ± (b sin s) e_j,  s ∈ [s0, ∞), period 2π.
@@ -72,23 +72,31 @@ class Ellipse(JointCurve):
         self.center = readonly(finite("center", np.atleast_1d(as_array("center", center))))
         self.joints = _two_joints(joints, len(self.center))
         self.clockwise = bool(clockwise)
-        self._cosine, self._sine = np.zeros((2, len(self.center)))
-        self._cosine[self.joints[0]] = axes[0]
-        self._sine[self.joints[1]] = -axes[1] if clockwise else axes[1]
+        self._along = axes[0], -axes[1] if clockwise else axes[1]
 
     def q_d(self, s: Array) -> Array:
-        return self.center - self.ddq_d(s)
+        return self.center + self._outward(s)
 
     def dq_d(self, s: Array) -> Array:
-        s = np.asarray(s)[..., None]
-        return self._sine * np.cos(s) - self._cosine * np.sin(s)
+        a, b = self._along
+        return self._in_plane(-a * np.sin(s), b * np.cos(s))
 
     def ddq_d(self, s: Array) -> Array:
-        s = np.asarray(s)[..., None]
-        return -self._cosine * np.cos(s) - self._sine * np.sin(s)
+        return -self._outward(s)
+
+    def _outward(self, s: Array) -> Array:
+        """From the centre to the path, (*batch, n)."""
+        a, b = self._along
+        return self._in_plane(a * np.cos(s), b * np.sin(s))
+
+    def _in_plane(self, x: Array, y: Array) -> Array:
+        """The vectors, (*batch, n), with components x and y (*batch,) along the two joints."""
+        vector = np.zeros((*x.shape, len(self.center)))
+        vector[..., self.joints[0]], vector[..., self.joints[1]] = x, y
+        return vector
 
 
-class Circle(Ellipse):
+class Circle(Ellipse, single=True):
     """The paper's task, eqs. (9) and (10): a circle of radius r₀ [rad] at the path speed v₀ [rad/s].
 
     q_d(s) = c + r₀ (cos s e_i ± sin s e_j),  ϑ = v₀/r₀,  σ̄(q) = atan2(±(q_j − c_j), q_i − c_i).
@@ -113,18 +121,17 @@ class Circle(Ellipse):
     ) -> None:
         self.radius = scalar("radius", radius, positive=True)
         super().__init__((self.radius, self.radius), speed, center, joints, clockwise)
+        self._rate = np.array(self.speed / self.radius)
 
     def theta(self, s: Array) -> Array:
-        return np.zeros(np.shape(s)) + self.speed / self.radius
+        return np.zeros(s.shape) + self._rate
 
     def dtheta(self, s: Array) -> Array:
-        return np.zeros(np.shape(s))
+        return np.zeros(s.shape)
 
     def at(self, s: Array) -> PathPoint:
-        s = np.asarray(s)
-        cos, sin = np.cos(s)[..., None], np.sin(s)[..., None]
-        outward = self._cosine * cos + self._sine * sin
-        dq_d = self._sine * cos - self._cosine * sin
+        (a, b), cos, sin = self._along, np.cos(s), np.sin(s)
+        outward, dq_d = self._in_plane(a * cos, b * sin), self._in_plane(-a * sin, b * cos)
         return PathPoint(self.center + outward, dq_d, -outward, self.theta(s), self.dtheta(s))
 
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
@@ -135,7 +142,7 @@ class Circle(Ellipse):
         return angle + self.period * np.round((reference - angle) / self.period)
 
 
-class Lissajous(JointCurve):
+class Lissajous(JointCurve, single=True):
     """Each joint swings at its own frequency: q_{d,i}(s) = c_i + a_i sin(f_i s + φ_i).
 
     With whole frequencies the path closes after 2π; frequencies (1, 2) draw a figure of eight.
@@ -189,7 +196,7 @@ class Lissajous(JointCurve):
         return self.frequencies * np.asarray(s)[..., None] + self.phases
 
 
-class Line(JointCurve):
+class Line(JointCurve, single=True):
     """The straight line from ``start`` to ``end`` in joint space, its parameter the arc length.
 
     q_d(s) = start + s u,  u = (end − start)/‖end − start‖,  s ∈ [0, ‖end − start‖],  ϑ = ``speed``.

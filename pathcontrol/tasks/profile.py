@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, inner, scalar
 
 #: time constant [s] T with which every controller brings its plan to rest on the end of an open path, ṡ ∝ (s_end − s)/T
 END_TIME = 0.1
@@ -88,8 +88,9 @@ class ConstantSpeed(VelocityProfile):
         return self.at(path.dq_d(s), path.ddq_d(s), path, s)[1]
 
     def at(self, dq_d: Array, ddq_d: Array, path: Path, s: Array) -> tuple[Array, Array]:
-        length = np.sqrt((dq_d * dq_d).sum(-1))
-        return self.speed / length, -self.speed * (dq_d * ddq_d).sum(-1) / length**3
+        square = inner(dq_d, dq_d)
+        length = np.sqrt(square)
+        return self.speed / length, -self.speed * inner(dq_d, ddq_d) / (square * length)
 
 
 def plain_attributes(instance: Any) -> dict[str, Any]:
