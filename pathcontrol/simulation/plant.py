@@ -9,7 +9,7 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.dry_friction import stick_slip
 
-_ZERO = np.array(0.0)
+_ZERO, _ONLY = np.array(0.0), np.array([0])
 
 
 class Plant:
@@ -65,11 +65,11 @@ class Plant:
             return v
         # a diverged arm must not be taken for one that sticks
         turned &= np.isfinite(v) & (forward > backward)
-        rows = np.flatnonzero(turned.any(-1))
-        if not rows.size:
+        if not np.count_nonzero(turned):
             return v
+        rows = _ONLY if len(v) == 1 else np.flatnonzero(turned.any(-1))
         M, impulse = self._mass_matrix(q[rows], rows), duration * friction[rows]
         momentum = np.einsum("kij,kj->ki", M, v[rows]) + impulse
-        low, high = (duration * np.broadcast_to(level, q.shape)[rows] for level in (backward, forward))
-        v[rows] = stick_slip(M, momentum, low, high, guess=np.where(turned[rows], 0.0, qd[rows]))
+        low, high = (duration * (level if len(level) == 1 else level[rows]) for level in (backward, forward))
+        v[rows] = stick_slip(M, momentum, low, high, guess=np.where(turned[rows], _ZERO, qd[rows]))
         return v
