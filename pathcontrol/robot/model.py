@@ -163,6 +163,11 @@ class RobotModel:
         """q̈ = M(q)⁻¹(τ − C(q,q̇)q̇ − g(q)) [rad/s²], (*batch, n), by the articulated-body algorithm."""
         return self._body.forward_dynamics(q, qd, tau)
 
+    @property
+    def forward_dynamics_of_one(self) -> Callable[[Array, Array, Array], Array]:
+        """:meth:`forward_dynamics` of three arrays of floats (1, n), which are not looked at: for inner loops."""
+        return self._body.forward_dynamics_of_one
+
     def forward_dynamics_row(self, q: Array, qd: Array, tau: Array, armature: Array) -> Array:
         """q̈ (n,) of one configuration, each argument (n,), with another rotor inertia ``armature`` [kg m²].
 

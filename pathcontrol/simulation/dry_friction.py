@@ -9,34 +9,27 @@ pivoting on which joints stick: finitely many linear solves, no iteration error.
 progress, single exchanges by Murty's least-index rule guarantee the end (Júdice and Pires, Computers & Operations
 Research 21, 1994).
 
-Everything is written for the entries of vectors and matrices one by one. They are numbers for one rollout and columns,
-(N,), for N: the same operations in the same order, and so the same result to the last bit.
+One rollout is solved with plain numbers, which is fast where there are few, and N with columns (N,) of them: the same
+operations on the same numbers in the same order, and so the same result to the last bit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import SimulationError
 
+_FEW = 5  # rows up to which plain numbers are faster
 _PATIENCE = 3  # block exchanges without progress before single ones
 _MAX_EXCHANGES = 10_000
 _EPSILON = float(np.finfo(np.float64).eps)
 _ROUNDING = 1e-12  # relative to the largest momentum; a joint this close to slipping may stick
 
-_Entry = Any  # a number or a column of them
-
-
-class _Problem(NamedTuple):
-    M: Sequence[Sequence[_Entry]]
-    p: Sequence[_Entry]
-    low: Sequence[_Entry]  # ≤ 0
-    high: Sequence[_Entry]  # ≥ 0
-    where: Callable[[_Entry, _Entry, _Entry], _Entry]
+_Entry = Any  # a number, or a column of them
+_States = list[_Entry]  # +1 slips forward, −1 slips backward, 0 sticks; one for each joint
 
 
 def stick_slip(M: Array, p: Array, low: Array, high: Array, guess: Array | None = None) -> Array:
@@ -55,85 +48,145 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array, guess: Array | None 
     Raises:
         SimulationError: M is not positive definite.
     """
-    guess = p if guess is None else guess
-    if len(p) == 1:
-        numbers = (a[0].tolist() for a in (M, p, low, high))
-        return np.array([_settled(_Problem(*numbers, _either), [(g > 0) - (g < 0) for g in guess[0].tolist()], bool)])
-    columns = (np.ascontiguousarray(np.moveaxis(a, 0, -1)) for a in (M, p, low, high))
-    return np.stack(_settled(_Problem(*columns, np.where), [*np.sign(guess).astype(np.int8).T], np.any), axis=-1)
+    guess = np.sign(p if guess is None else guess).astype(np.int8)
+    if len(p) <= _FEW:
+        return np.array([_alone(row, M, p, low, high, guess) for row in range(len(p))]).reshape(p.shape)
+    columns = _Columns(*(np.ascontiguousarray(np.moveaxis(a, 0, -1)) for a in (M, p, low, high)))
+    v = columns.velocities(states := columns.possible(list(guess.T)))
+    wrong = np.flatnonzero(sum(a != b for a, b in zip(columns.wanted(v, states), states, strict=True)))
+    if len(wrong) > _FEW:
+        v[:, wrong] = _settled(columns.some(wrong), [state[wrong] for state in states])
+    else:
+        for row in wrong.tolist():
+            v[:, row] = _alone(row, M, p, low, high, guess)
+    return v.T.copy()
 
 
-def _either(condition: bool, a: float, b: float) -> float:
-    return a if condition else b
+def _alone(row: int, *arrays: Array) -> list[float]:
+    """v⁺ of one row of M, p, low, high and the guess; there may be one row of these for all."""
+    M, p, low, high, guess = (a[row if len(a) > 1 else 0].tolist() for a in arrays)
+    return _settled(_Numbers(M, p, low, high), guess)
 
 
-def _settled(problem: _Problem, states: list[_Entry], some: Callable[[_Entry], Any]) -> list[_Entry]:
-    """v⁺, from a guess of its signs: +1 slips forward, −1 slips backward, 0 sticks."""
-    where, free = problem.where, [(a == 0) & (b == 0) for a, b in zip(problem.low, problem.high, strict=True)]
-    # joints without dry friction never stick
-    states = [where(never, 1, state) for never, state in zip(free, states, strict=True)]
+def _settled(problem: _Numbers, guess: _States) -> Any:
+    """v⁺, from a guess of its signs."""
+    where, states = problem.where, problem.possible(guess)
     fewest, patience = len(states) + 1, _PATIENCE
     for _ in range(_MAX_EXCHANGES):
-        v = _velocities(problem, states)
-        wanted = _wanted(problem, v, states, free)
+        v = problem.velocities(states)
+        wanted = problem.wanted(v, states)
         wrong = [a != b for a, b in zip(wanted, states, strict=True)]
         count = sum(wrong)
-        if not some(count):
+        if not problem.any(count):
             return v
         better = count < fewest
         fewest, patience = where(better, count, fewest), where(better, _PATIENCE, patience - 1)
-        states = _exchanged(where, states, wanted, wrong, patience < 0)
+        changed = _last_only(wrong, patience < 0)
+        states = [where(*each) for each in zip(changed, wanted, states, strict=True)]
     raise SimulationError("the friction of some rollouts did not settle; is the mass matrix positive definite?")
 
 
-def _exchanged(where: Callable[..., _Entry], states: Any, wanted: Any, wrong: Any, single: _Entry) -> list[_Entry]:
-    """The states, where they are ``wrong`` as ``wanted``; of a ``single`` exchange only the last of them."""
-    new, later = [], False
-    for state, other, off in zip(reversed(states), reversed(wanted), reversed(wrong), strict=True):
-        new.append(where(off & (1 - (single & later)), other, state))
+def _last_only(wrong: list[_Entry], single: _Entry) -> list[_Entry]:
+    """Those that are ``wrong``; where there is to be a ``single`` one, the last of them."""
+    kept, later = [], False
+    for off in reversed(wrong):
+        kept.append((off > later) | (off & (single == 0)))
         later = later | off
-    return new[::-1]
+    return kept[::-1]
 
 
-def _velocities(problem: _Problem, states: Sequence[_Entry]) -> list[_Entry]:
-    """M v = p − λ for the joints that move, by elimination without exchanges, as M is positive definite; others rest."""
-    M, p, low, high, where = problem
-    n, moving = len(p), [state != 0 for state in states]
-    U = [list(row) for row in M]
-    b = [p[i] - where(states[i] > 0, high[i], low[i]) for i in range(n)]
-    for k in range(n):
-        for i in range(k + 1, n):
-            share = where(moving[i] & moving[k], U[k][i] / U[k][k], 0.0)
-            for j in range(i, n):
-                U[i][j] = U[i][j] - share * U[k][j]
-            b[i] = b[i] - share * b[k]
-    v: list[_Entry] = [0.0] * n
-    for k in reversed(range(n)):
-        rest = b[k]
-        for j in range(k + 1, n):
-            rest = rest - U[k][j] * v[j]
-        v[k] = where(moving[k], rest / U[k][k], 0.0)
-    return v
+class _Numbers:
+    """M (n × n), p, low and high (n each) of one rollout, lists of numbers."""
+
+    def __init__(self, M: Any, p: Any, low: Any, high: Any) -> None:
+        self.M, self.p, self.low, self.high = M, p, low, high
+        self.free = [(a == 0) & (b == 0) for a, b in zip(low, high, strict=True)]
+
+    def any(self, entry: _Entry) -> bool:
+        """Whether it is not 0, or somewhere not."""
+        return bool(entry)
+
+    def where(self, condition: _Entry, a: _Entry, b: _Entry) -> _Entry:
+        """One of two entries."""
+        return a if condition else b
+
+    def possible(self, states: _States) -> _States:
+        """Joints without dry friction never stick."""
+        return [self.where(free, 1, state) for free, state in zip(self.free, states, strict=True)]
+
+    def velocities(self, states: _States) -> Any:
+        """M v = p − λ for the joints that slip, by elimination, without pivots as M is positive definite."""
+        n, U = len(states), [row[:] for row in self.M]
+        b = [self.p[i] - (self.high[i] if states[i] > 0 else self.low[i]) for i in range(n)]
+        slips = [i for i in range(n) if states[i]]
+        for at, k in enumerate(slips):
+            for i in slips[at + 1 :]:
+                share = U[k][i] / U[k][k]
+                for j in slips[at + 1 :]:
+                    U[i][j] -= share * U[k][j]
+                b[i] -= share * b[k]
+        v = [0.0] * n
+        for k in reversed(slips):
+            v[k] = b[k] / U[k][k]
+            for i in slips:
+                b[i] -= U[i][k] * v[k]
+        return v
+
+    def wanted(self, v: Any, states: _States) -> _States:
+        """The states that the velocities, and the impulses where joints stick, call for."""
+        products = [[m * x for m, x in zip(row, v, strict=True)] for row in self.M]
+        # p − Mv may be a small difference of large terms: allow for their rounding, and not for more
+        terms = max(sum(map(abs, row)) for row in products)
+        margin = _ROUNDING * max(map(abs, self.p)) + 8 * len(v) * _EPSILON * terms
+        wanted = []
+        for i, state in enumerate(states):
+            needed = self.p[i] - sum(products[i])
+            released = (needed > self.high[i] + margin) - (needed < self.low[i] - margin)
+            wanted.append(state if self.free[i] else (0 if v[i] * state < 0 else state) if state else released)
+        return wanted
 
 
-def _wanted(problem: _Problem, v: Sequence[_Entry], states: Sequence[_Entry], free: Sequence[_Entry]) -> list[_Entry]:
-    """The states that the velocities, and the impulses where joints stick, call for."""
-    M, p, low, high, where = problem
-    joints = range(len(p))
-    needed = [p[i] - sum(M[i][j] * v[j] for j in joints) for i in joints]
-    # p − Mv may be a small difference of large terms: allow for their rounding, and not for more
-    terms = _largest(where, [sum(abs(M[i][j]) * abs(v[j]) for j in joints) for i in joints])
-    margin = _ROUNDING * _largest(where, [abs(x) for x in p]) + 8 * len(p) * _EPSILON * terms
-    wanted = []
-    for i, state in enumerate(states):
-        released = where(needed[i] > high[i] + margin, 1, where(needed[i] < low[i] - margin, -1, 0))
-        onward = where(v[i] * state < 0, 0, state)
-        wanted.append(where(free[i], state, where(state == 0, released, onward)))
-    return wanted
+class _Columns(_Numbers):
+    """The same of N rollouts, (n, n, N) and (n, N): the same operations on every number, in the same order."""
+
+    def any(self, entry: Array) -> bool:
+        return bool(entry.any())
+
+    def where(self, condition: Array, a: _Entry, b: _Entry) -> Array:
+        return np.asarray(np.where(condition, a, b))
+
+    def some(self, columns: Array) -> _Columns:
+        """Only some of the rollouts."""
+        return _Columns(*(a[..., columns] if a.shape[-1] > 1 else a for a in (self.M, self.p, self.low, self.high)))
+
+    def velocities(self, states: _States) -> Array:
+        signs, U, v = np.array(states), self.M.copy(), np.empty_like(self.p)
+        b = self.p - np.where(signs > 0, self.high, self.low)
+        slips = (signs != 0).astype(np.float64)
+        for k in range(len(v) - 1):
+            after = slice(k + 1, None)
+            share = U[k, after] / U[k, k] * slips[after] * slips[k]
+            U[after, after] -= share[:, None] * U[k, after]
+            b[after] -= share * b[k]
+        for k in reversed(range(len(v))):
+            v[k] = b[k] / U[k, k] * slips[k]
+            b[:k] -= U[:k, k] * v[k]
+        v[signs == 0] = 0.0  # and not −0
+        return v
+
+    def wanted(self, v: Array, states: _States) -> _States:
+        signs, products = np.array(states), self.M * v
+        terms = _sum(np.abs(products)).max(0)
+        margin = _ROUNDING * np.abs(self.p).max(0) + 8 * len(v) * _EPSILON * terms
+        needed = self.p - _sum(products)
+        released = (needed > self.high + margin).astype(np.int8) - (needed < self.low - margin)
+        wanted = np.where(signs == 0, released, np.where(v * signs < 0, 0, signs))
+        return list(np.where(self.free, signs, wanted))
 
 
-def _largest(where: Callable[..., _Entry], values: Sequence[_Entry]) -> _Entry:
-    largest = values[0]
-    for value in values[1:]:
-        largest = where(value > largest, value, largest)
-    return largest
+def _sum(terms: Array) -> Array:
+    """The sums, (n, N), over the middle axis of (n, n, N), one term after the other."""
+    total = terms[:, 0]
+    for j in range(1, terms.shape[1]):
+        total = total + terms[:, j]
+    return total

@@ -34,7 +34,8 @@ class Plant:
         self._damping = np.atleast_2d(robot.friction.viscous)
         self._whole, self._half, self._quarter = np.array(step), np.array(0.5 * step), np.array(0.25 * step)
         self._steady = None if robot.friction.varies else self._levels_at(np.zeros((1, robot.n)))
-        self._inertia = robot.with_armature(0.5 * step * robot.friction.viscous)
+        self._inertia = arm = robot.with_armature(0.5 * step * robot.friction.viscous)
+        self._of_one = arm.forward_dynamics if isinstance(arm, RobotBatch) else arm.forward_dynamics_of_one
 
     def _levels_at(self, qd: Array) -> tuple[Array, Array]:
         """Dry friction of forward and of backward motion, F⁺ and −F⁻ [N m], as rows."""
@@ -59,7 +60,8 @@ class Plant:
         """P(start + duration a(q, q̇)): dry friction keeps the direction of q̇, unless that proves wrong."""
         forward, backward = self._steady or self._levels_at(qd)
         friction = np.where(qd > _ZERO, forward, backward)  # whatever a joint at rest gets, it is taken back below
-        v = start + duration * self._inertia.forward_dynamics(q, qd, drive - friction)
+        forward_dynamics = self._of_one if len(q) == 1 else self._inertia.forward_dynamics
+        v = start + duration * forward_dynamics(q, qd, drive - friction)
         turned = v * qd <= _ZERO
         if not np.count_nonzero(turned):
             return v

@@ -25,7 +25,8 @@ class Recorder:
 
     def __init__(self, rollouts: int, joints: int, samples: int) -> None:
         self._most, self._samples = samples, 0
-        shapes = {name: (rollouts, joints)[: len(dims) - 1] for name, (dims, _, _) in VARIABLES.items()}
+        whole = {"rollout": rollouts, "joint": joints}
+        shapes = {name: [whole[dim] for dim in dims if dim in whole] for name, (dims, _, _) in VARIABLES.items()}
         bytes_a_sample = sum(8 * prod(shape) for shape in shapes.values())
         self._room = min(samples, max(1, _ROOM // bytes_a_sample))
         self._arrays = {

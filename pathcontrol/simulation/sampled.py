@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -26,8 +27,7 @@ class Actuator:
     def __init__(self, loop: SampledLoop, robot: Arm, shape: tuple[int, int]) -> None:
         limits = torque_limits(loop, robot)
         check_rows(limits, "torque_limits", shape[0])
-        self._most = None if limits is None else np.atleast_2d(limits)
-        self._least = None if limits is None else -np.atleast_2d(limits)
+        self._limits = None if limits is None else (-np.atleast_2d(limits), np.atleast_2d(limits))
         whole, late = _periods_and_rest(loop.delay, loop.period)
         self._queue = deque([np.zeros(shape)] * (whole + (late > 0)))
         self._parts = [late, loop.period - late] if late else [loop.period]
@@ -39,7 +39,10 @@ class Actuator:
 
     def limited(self, tau: Array) -> Array:
         """``tau`` within the limits."""
-        return tau if self._most is None else np.minimum(np.maximum(tau, self._least), self._most)
+        if self._limits is None:
+            return tau
+        least, most = self._limits
+        return np.minimum(np.maximum(tau, least), most)
 
     def torques(self, tau: Array) -> list[Array]:
         """The torque in each part of a period at whose begin ``tau`` is computed."""
@@ -79,7 +82,7 @@ class SampledArm:
     def run(self, controller: Controller, duration: float, finish: Finish | None, progress: bool) -> dict[str, Array]:
         """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
         ticks = max(1, round(duration / self._period))
-        recorder, first = Recorder(*self.q.shape, ticks + 1), controller.start(self.q, self.qd)
+        recorder, first = Recorder(len(self.q), controller.robot.n, ticks + 1), controller.start(self.q, self.qd)
         single = _single(controller, self.q, self.qd, first)
         first = z = first[0] if single else first
         lost = self.divergence = Divergence(self.q, self.qd)
@@ -92,14 +95,15 @@ class SampledArm:
                     self._hold_lost(lost)
                     z = lost.replaced(z, first)
                 reading = self._reading
-                seen = (reading.q[0], reading.qd[0]) if single else reading
-                out = controller.law(t, *seen, z)
+                measured = Reading(reading.q[0], reading.qd[0]) if single else reading
+                out = controller.law(t, measured.q, measured.qd, z)
                 demand = out.tau.reshape(self.q.shape)
                 lost.look_at_torque(t, demand)
                 tau = self._actuator.limited(demand)
                 if lost.any:
                     tau = lost.replaced(tau, 0.0)
-                recorder.write(self.q, self.qd, reading, out, self._actuator.torques(tau)[0])
+                torques = self._actuator.torques(tau)
+                recorder.write(self.q, self.qd, reading, out, torques[0])
                 if tick % _UPDATE_EVERY == 0:
                     update(tick)
                 if tick == ticks or lost.all:
@@ -107,7 +111,8 @@ class SampledArm:
                 if finish is not None and finish(t, np.atleast_1d(out.s), self.qd, lost.lost):
                     break
                 z = controller.advance(z, out, self._period)
-                self._advance(tau)
+                self._advance(torques)
+                self._actuator.hold(tau)
         arrays = recorder.arrays()
         lost.erase(arrays, self._period * np.arange(arrays["s"].shape[1]))
         return arrays
@@ -117,10 +122,10 @@ class SampledArm:
         self.q, self.qd = lost.home(self.q, self.qd)
         self._reading = Reading(*lost.home(*self._reading))
 
-    def _advance(self, tau: Array) -> None:
-        """One period on, when ``tau`` was computed at its begin."""
+    def _advance(self, torques: Sequence[Array]) -> None:
+        """One period on, with the torque of each part of it."""
         t = self._ticks * self._period
-        for plant, acting in zip(self._plants, self._actuator.torques(tau), strict=True):
+        for plant, acting in zip(self._plants, torques, strict=True):
             for _ in range(self._substeps):
                 pushed = acting
                 if self._disturbance is not None:
@@ -128,7 +133,6 @@ class SampledArm:
                 self.q, self.qd = plant.advance(self.q, self.qd, pushed)
                 t += plant.step
         self._ticks += 1
-        self._actuator.hold(tau)
         self._reading = self._sensors.read(*self._seen(), self._reading)
 
     def _seen(self) -> tuple[Array, Array]:

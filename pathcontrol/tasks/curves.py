@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol._arrays import Array, as_array, finite, inner, readonly, scalar
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.profile import ConstantSpeed
@@ -228,7 +228,7 @@ class Line(JointCurve, single=True):
         return np.zeros_like(self.dq_d(s))
 
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
-        return np.clip(np.vecdot(as_array("q", q) - self.start, self._direction), 0.0, self.s_end)
+        return np.clip(inner(as_array("q", q) - self.start, self._direction), 0.0, self.s_end)
 
 
 def _two_joints(joints: Sequence[int], n: int) -> tuple[int, int]:
