@@ -115,3 +115,22 @@ def test_gains_with_a_row_for_the_only_rollout_are_gains(K_p, k):
     rows = simulate(ExtendedMotionPlan(ARM, TASKS["circle"], K_p, 60.0, k), q, duration=0.1, progress=False)
     plain = simulate(ExtendedMotionPlan(ARM, TASKS["circle"], 800.0, 60.0, 20.0), q, duration=0.1, progress=False)
     assert_runs_equal(rows, plain)
+
+
+class Bare(PathTask):
+    """A path whose derivatives are left to the library; it is open, so that they are one-sided at its ends."""
+
+    s_end = 3.0
+
+    def q_d(self, s):
+        return np.stack([1.3 * np.cos(s), np.sin(2 * s)], axis=-1)
+
+    def theta(self, s):
+        return 1.0 + 0.1 * np.sin(s)
+
+
+@pytest.mark.parametrize("derivative", ["dq_d", "ddq_d", "dtheta"])
+@given(s=st.lists(st.floats(0.0, 3.0), min_size=2, max_size=9))
+def test_derivatives_of_a_path_do_not_depend_on_the_batch(derivative, s):
+    function = getattr(Bare(), derivative)
+    assert_array_equal(function(np.array(s)), [function(np.array([one]))[0] for one in s])
