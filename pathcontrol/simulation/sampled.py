@@ -95,8 +95,8 @@ class SampledArm:
                     self._hold_lost(lost)
                     z = lost.replaced(z, first)
                 reading = self._reading
-                measured = Reading(reading.q[0], reading.qd[0]) if single else reading
-                out = controller.law(t, measured.q, measured.qd, z)
+                q, qd = (reading.q[0], reading.qd[0]) if single else reading
+                out = controller.law(t, q, qd, z)
                 demand = out.tau.reshape(self.q.shape)
                 lost.look_at_torque(t, demand)
                 tau = self._actuator.limited(demand)

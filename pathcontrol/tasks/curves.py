@@ -72,26 +72,24 @@ class Ellipse(JointCurve, single=True):
         self.center = readonly(finite("center", np.atleast_1d(as_array("center", center))))
         self.joints = _two_joints(joints, len(self.center))
         self.clockwise = bool(clockwise)
-        self._along = axes[0], -axes[1] if clockwise else axes[1]
+        self._a, self._b = axes[0], -axes[1] if clockwise else axes[1]
 
     def q_d(self, s: Array) -> Array:
         return self.center + self._outward(s)
 
     def dq_d(self, s: Array) -> Array:
-        a, b = self._along
-        return self._in_plane(-a * np.sin(s), b * np.cos(s))
+        return self._in_plane(-self._a * np.sin(s), self._b * np.cos(s))
 
     def ddq_d(self, s: Array) -> Array:
         return -self._outward(s)
 
     def _outward(self, s: Array) -> Array:
         """From the centre to the path, (*batch, n)."""
-        a, b = self._along
-        return self._in_plane(a * np.cos(s), b * np.sin(s))
+        return self._in_plane(self._a * np.cos(s), self._b * np.sin(s))
 
     def _in_plane(self, x: Array, y: Array) -> Array:
         """The vectors, (*batch, n), with components x and y (*batch,) along the two joints."""
-        vector = np.zeros((*x.shape, len(self.center)))
+        vector = np.zeros((*x.shape, self.center.shape[-1]))
         vector[..., self.joints[0]], vector[..., self.joints[1]] = x, y
         return vector
 
@@ -130,7 +128,7 @@ class Circle(Ellipse, single=True):
         return np.zeros(s.shape)
 
     def at(self, s: Array) -> PathPoint:
-        (a, b), cos, sin = self._along, np.cos(s), np.sin(s)
+        a, b, cos, sin = self._a, self._b, np.cos(s), np.sin(s)
         outward, dq_d = self._in_plane(a * cos, b * sin), self._in_plane(-a * sin, b * cos)
         return PathPoint(self.center + outward, dq_d, -outward, self.theta(s), self.dtheta(s))
 
