@@ -45,6 +45,10 @@ class ExperimentError(PathControlError, ValueError):
     """An experiment file is invalid; the message names the key and the choices."""
 
 
+class ClusterError(PathControlError, RuntimeError):
+    """A cluster cannot be reached, or cannot go on; the message says which machine and why."""
+
+
 class SimulationError(PathControlError, RuntimeError):
     """A simulation cannot go on; the message says at which time and why.
 

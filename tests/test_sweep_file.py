@@ -220,7 +220,9 @@ def test_after_ctrl_c_finished_chunks_stay(experiment, tmp_path):
         time.sleep(0.05)
     os.kill(process.pid, signal.SIGINT)
     assert process.wait(60) == 130
-    assert "interrupted" in process.stderr.read()
+    told = process.stderr.read()
+    assert "interrupted" in told
+    assert f"--resume goes on with what is in {out}" in told
     finished = pc.SweepResult(out).finished
     assert 0 < finished < 3000
     assert not list(out.rglob("*/.*"))

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 @click.option(
     "--chunk", type=click.IntRange(1), default=500, show_default=True, help="Samples that are simulated together."
 )
+@click.option("--cluster", metavar="ADDRESS", help="Of a Dask scheduler, as tcp://host:8786, or its scheduler file.")
 @json_option
-def command(file: Path, out: Path | None, resume: bool, chunk: int, as_json: bool) -> None:
+def command(file: Path, out: Path | None, resume: bool, chunk: int, cluster: str | None, as_json: bool) -> None:
     """Simulate every sample of the [sweep] in FILE.toml and keep its numbers.
 
     They are in Parquet files in the folder chunks/, histories that the file asks for in runs/. After Ctrl-C, or a
@@ -33,7 +34,12 @@ def command(file: Path, out: Path | None, resume: bool, chunk: int, as_json: boo
         from pathcontrol.sweeps.store import parquet
 
         parquet()
-    result = run_sweep(file, Path("results") / file.stem if out is None else out, chunk=chunk, resume=resume)
+    folder = Path("results") / file.stem if out is None else out
+    try:
+        result = run_sweep(file, folder, chunk=chunk, resume=resume, cluster=cluster)
+    except KeyboardInterrupt:
+        click.echo(f"--resume goes on with what is in {folder}", err=True)
+        raise
     _tell(result, as_json)
 
 

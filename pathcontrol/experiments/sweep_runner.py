@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,14 +12,24 @@ from pathcontrol.experiments.keyed import keyed
 from pathcontrol.experiments.load import invalid, load_experiment, read_toml
 from pathcontrol.experiments.sweep_section import SweepSection
 from pathcontrol.experiments.swept import SweptExperiment
+from pathcontrol.sweeps.cluster import connected
 from pathcontrol.sweeps.keep import Keep
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.sweeps.run import sweep
 from pathcontrol.sweeps.space import Space
 
+if TYPE_CHECKING:
+    from distributed import Client
+
 
 def run_sweep(
-    path: str | Path, out: str | Path, *, chunk: int = 500, resume: bool = False, progress: bool = True
+    path: str | Path,
+    out: str | Path,
+    *,
+    chunk: int = 500,
+    resume: bool = False,
+    progress: bool = True,
+    cluster: str | Path | Client | None = None,
 ) -> SweepResult:
     """Run the sweep of an experiment file; every sample is checked before anything is computed.
 
@@ -29,26 +39,31 @@ def run_sweep(
         chunk: how many samples are simulated together at most.
         resume: go on with the sweep in ``out``, if there is one.
         progress: show a bar with the time left on standard error when it takes longer than two seconds.
+        cluster: a Dask cluster whose workers compute the chunks, as :func:`sweep` takes it; files that the experiment
+            names are sent to them.
 
     Raises:
+        ClusterError: the cluster does not answer or cannot go on, or a worker has other versions than this process.
         ExperimentError: the file is invalid.
         InputError: ``out`` holds a sweep and ``resume`` is not asked for, or it holds another one.
-        MissingExtraError: the extra ``sweep`` is not installed.
+        MissingExtraError: the extra ``sweep`` or, for a cluster, ``cluster`` is not installed.
     """
     section = load_experiment(path).sweep
-    try:
-        if section is None:
-            raise ExperimentError("sweep: missing; add a section [sweep] with its parameters")
-        build = SweptExperiment(_without(read_toml(path), "sweep", "output"), Path(path).parent)
-        space = space_of(section)
-        with keyed("sweep"):
-            keep = Keep(**({} if section.keep is None else section.keep.arguments(float)))
-            design = space.design(section.seed)
-        build.check(design)
-    except ExperimentError as error:
-        raise invalid(path, [str(error)]) from error
-    options: dict[str, Any] = {"chunk": chunk, "resume": resume, "progress": progress}
-    return sweep(build, space, out, metrics=section.metrics, keep=keep, seed=section.seed, **options)
+    with connected(cluster) as client:
+        try:
+            if section is None:
+                raise ExperimentError("sweep: missing; add a section [sweep] with its parameters")
+            data = _without(read_toml(path), "sweep", "output")
+            build = SweptExperiment(data, Path(path).parent.absolute(), section.parameters)
+            space = space_of(section)
+            with keyed("sweep"):
+                keep = Keep(**({} if section.keep is None else section.keep.arguments(float)))
+                design = space.design(section.seed)
+            build.check(design)
+        except ExperimentError as error:
+            raise invalid(path, [str(error)]) from error
+        options: dict[str, Any] = {"chunk": chunk, "resume": resume, "progress": progress, "cluster": client}
+        return sweep(build, space, out, metrics=section.metrics, keep=keep, seed=section.seed, **options)
 
 
 def space_of(section: SweepSection) -> Space:

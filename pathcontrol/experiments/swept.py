@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -21,10 +24,12 @@ from pathcontrol.experiments.build import Setup, build, law_of
 from pathcontrol.experiments.build_arms import build_models, build_plant
 from pathcontrol.experiments.keyed import keyed
 from pathcontrol.experiments.load import finding
+from pathcontrol.experiments.named_files import named_files, relative
 from pathcontrol.experiments.schema import Experiment
 from pathcontrol.experiments.swept_tasks import SweptTask, joined, refuse_sequence, rows_together, swept_tasks
 from pathcontrol.experiments.values import shown
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.sweeps.luggage import Luggage
 
 _GAIN = re.compile(r"controller\.(K_p|K_v|k|k_p|Lambda|K_d)(\[\d+\])?")
 _TOGETHER = re.compile(r"(start|plant|task)\.")  # what may differ from rollout to rollout of a batch, as gains may
@@ -42,16 +47,27 @@ class SweptExperiment:
     Args:
         data: what the file says, without ``[sweep]`` and ``[output]``.
         base_dir: the folder that the paths in it are relative to.
+        varied: what the samples may have instead, in which files may be named too.
     """
 
-    def __init__(self, data: dict[str, Any], base_dir: Path) -> None:
-        self._data, self._base_dir = data, base_dir
+    def __init__(self, data: dict[str, Any], base_dir: Path, varied: Mapping[str, Any] = MappingProxyType({})) -> None:
+        self._data, self._base_dir, self._varied = data, base_dir, dict(varied)
         self._built: dict[str, tuple[Setup, RobotModel, RobotModel]] = {}
 
     def describe(self) -> dict[str, Any]:
         """What the file says, and digests of the files that it names."""
-        files = {name: _digest(path) for name, path in self._files(self._data)}
+        files = {name: _digest(path) for name, path in self._files()}
         return {"experiment": self._data, "files_sha256": files}
+
+    def luggage(self) -> Luggage:
+        """Itself and these files, for a machine that has neither."""
+        base, *paths = (Path(os.path.abspath(path)) for path in (self._base_dir, *dict(self._files()).values()))
+        home = Path(os.path.commonpath([base, *paths]))
+        files = {str(path.relative_to(home)): path.read_bytes() for path in paths}
+        return Luggage(home, files, partial(_unpacked, relative(self._data, base), base.relative_to(home)))
+
+    def _files(self) -> Iterator[tuple[str, Path]]:
+        return named_files([self._data, self._varied], self._base_dir)
 
     def check(self, design: Mapping[str, Array]) -> None:
         """Every sample is a valid experiment with gains greater than 0, and the first one can be built.
@@ -117,15 +133,9 @@ class SweptExperiment:
             self._built[key] = (setup, *build_models(experiment, self._base_dir))
         return self._built[key]
 
-    def _files(self, value: Any) -> Iterator[tuple[str, Path]]:
-        """The files below ``value`` that it names."""
-        if isinstance(value, dict | list):
-            for item in value.values() if isinstance(value, dict) else value:
-                yield from self._files(item)
-        elif isinstance(value, str) and len(value) < 1000 and "\0" not in value:
-            path = self._base_dir / re.sub(r"(\.py):\w+$", r"\1", value)
-            if path.is_file():
-                yield value, path
+
+def _unpacked(data: dict[str, Any], inside: Path, folder: Path) -> SweptExperiment:
+    return SweptExperiment(data, folder / inside)
 
 
 def put(data: dict[str, Any], key: str, value: Any) -> None:

@@ -23,6 +23,8 @@ Parts = Sequence[tuple[NDArray[np.intp], Arguments]]
 Build = Callable[[Mapping[str, Array], NDArray[np.int64]], Arguments | Parts]
 #: numbers of a run, each with one entry for each rollout
 Measure = Callable[[Run], Mapping[str, ArrayLike]]
+#: what a chunk is computed of: its parameters (k,) or (k, d) each, and the numbers of its samples (k,)
+Piece = tuple[dict[str, Array], NDArray[np.int64]]
 
 #: what is known of each rollout beside its metrics
 OUTCOME = ("status", "finish_time", "diverged_time", "reason")
@@ -40,6 +42,18 @@ class Chunk(NamedTuple):
 
     columns: dict[str, Array]
     runs: dict[int, Run]
+
+
+class Job(NamedTuple):
+    """How any chunk is computed: the arguments of :func:`compute` that all chunks share."""
+
+    build: Build
+    measure: Measure
+    keep: Keep
+    at_random: NDArray[np.intp]
+
+    def __call__(self, parameters: Mapping[str, Array], samples: NDArray[np.int64]) -> Chunk:
+        return compute(self.build, parameters, samples, self.measure, self.keep, self.at_random)
 
 
 def measure_of(wanted: Sequence[str] | Measure | None) -> Measure:

@@ -5,18 +5,25 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import closing
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.errors import InputError
-from pathcontrol.sweeps.compute import Build, Measure, compute, measure_of
+from pathcontrol.sweeps.cluster import connected
+from pathcontrol.sweeps.compute import Build, Chunk, Job, Measure, Piece, measure_of
+from pathcontrol.sweeps.desk import Desk
 from pathcontrol.sweeps.keep import Keep
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.sweeps.space import Space, check_seed, digest
 from pathcontrol.sweeps.store import MANIFEST, Store
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 
 def sweep(
@@ -30,6 +37,7 @@ def sweep(
     seed: int = 0,
     resume: bool = False,
     progress: bool = True,
+    cluster: str | Path | Client | None = None,
 ) -> SweepResult:
     """Simulate every sample of a space, a chunk at a time, and keep its numbers on disk.
 
@@ -55,11 +63,15 @@ def sweep(
         seed: where the random numbers of the design and of the choice of histories begin.
         resume: go on with the sweep in ``out``, if there is one.
         progress: show a bar with the time left on standard error when it takes longer than two seconds.
+        cluster: a Dask cluster whose workers compute the chunks: the address of its scheduler, as
+            ``"tcp://host:8786"``, its scheduler file, or a ``distributed.Client``; default this process. The table and
+            the histories are the same.
 
     Raises:
+        ClusterError: the cluster does not answer or cannot go on, or a worker has other versions than this process.
         InputError: an argument has the wrong value, ``out`` holds a sweep and ``resume`` is not asked for, or it holds
             one of another definition.
-        MissingExtraError: the extra ``sweep`` is not installed.
+        MissingExtraError: the extra ``sweep`` or, for a cluster, ``cluster`` is not installed.
     """
     if not isinstance(space, Space):
         raise InputError(f"space = {space!r}, expected a Space, such as Space.grid({{'k': [1.0, 2.0]}})")
@@ -68,19 +80,25 @@ def sweep(
     keep, measure, seed = Keep() if keep is None else keep, measure_of(metrics), check_seed(seed)
     if not isinstance(keep, Keep):
         raise InputError(f"keep = {keep!r}, expected a Keep, such as Keep(worst=5), or None")
-    design = space.design(seed)
-    definition = _definition(build, space, design, metrics, keep, seed)
-    store = _opened(Path(out), space.samples, definition, resume)
-    at_random = keep.at_random(space.samples, seed)
-    store.tidy(keep, at_random)
-    missing, done = store.missing(chunk), 0
-    with progress_bar("sweep", sum(map(len, missing)), progress) as update:
-        for samples in missing:
-            parameters = {name: values[samples] for name, values in design.items()}
-            store.write(compute(build, parameters, samples, measure, keep, at_random), keep, at_random)
-            done += len(samples)
-            update(done)
+    with connected(cluster) as client:
+        design = space.design(seed)
+        job = Job(build, measure, keep, keep.at_random(space.samples, seed))
+        computed = partial(_computed_here, job) if client is None else Desk(client, job).chunks
+        store = _opened(Path(out), space.samples, _definition(build, space, design, metrics, keep, seed), resume)
+        store.tidy(keep, job.at_random)
+        missing, done = store.missing(chunk), 0
+        pieces = (({name: values[samples] for name, values in design.items()}, samples) for samples in missing)
+        with closing(computed(pieces)) as chunks, progress_bar("sweep", sum(map(len, missing)), progress) as update:
+            for finished in chunks:
+                store.write(finished, keep, job.at_random)
+                done += len(finished.columns["sample"])
+                update(done)
     return SweepResult(out)
+
+
+def _computed_here(job: Job, pieces: Iterable[Piece]) -> Generator[Chunk]:
+    for parameters, samples in pieces:
+        yield job(parameters, samples)
 
 
 def _opened(folder: Path, samples: int, definition: Mapping[str, Any], resume: bool) -> Store:

@@ -25,7 +25,7 @@ from pathcontrol.sweeps.keep import Keep
 
 FORMAT, FORMAT_VERSION = "pathcontrol sweep", 1
 MANIFEST = "manifest.json"
-_PACKAGES = ("pathcontrol", "pin", "numpy", "scipy")
+PACKAGES = ("pathcontrol", "pin", "numpy", "scipy")
 
 
 def parquet() -> ModuleType:
@@ -187,7 +187,7 @@ def _joined(chunks: list[dict[str, Array]]) -> dict[str, Array]:
 
 def versions() -> dict[str, str]:
     """What computes the numbers."""
-    return {"python": platform.python_version()} | {name: version(name) for name in _PACKAGES}
+    return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
 
 
 def _column(values: Array) -> Any:
