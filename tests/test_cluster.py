@@ -444,7 +444,7 @@ def test_a_scheduler_without_workers_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster_module, "_PATIENCE", 0.3)
     with (
         distributed.LocalCluster(**QUIET, processes=False, n_workers=0) as empty,
-        pytest.raises(ClusterError, match=r"has no workers; start some: `dask worker .* --nworkers auto --nthreads 1`"),
+        pytest.raises(ClusterError, match=r"has no workers; start some: `dask worker .* --nworkers=-1 --nthreads 1`"),
     ):
         swept(tmp_path / "out", cluster=empty)
     assert not (tmp_path / "out").exists()

@@ -82,7 +82,7 @@ def _check_workers(client: Client) -> None:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except TimeoutError as error:
         raise ClusterError(
-            f"{address} has no workers; start some: `dask worker {address} --nworkers auto --nthreads 1`"
+            f"{address} has no workers; start some: `dask worker {address} --nworkers=-1 --nthreads 1`"
         ) from error
     expected, ask = expected_versions(), _asker()
     found = {"the scheduler": client.run_on_scheduler(ask), **client.run(ask)}
@@ -96,7 +96,7 @@ def _check_workers(client: Client) -> None:
     if crowded:
         warnings.warn(
             f"{len(crowded)} workers have several threads, as {crowded[0]}, of which one computes at a time; start "
-            "them as processes: --nworkers auto --nthreads 1",
+            "them as processes: --nworkers=-1 --nthreads 1",
             stacklevel=5,
         )
 
