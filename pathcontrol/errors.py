@@ -5,6 +5,7 @@ Every message names the value, what was expected and what to try.
 
 from __future__ import annotations
 
+import copyreg
 from typing import Any
 
 
@@ -31,6 +32,9 @@ class MissingExtraError(PathControlError, ImportError):
         super().__init__(
             f"{purpose} needs the package {package!r}, which is not installed; try: pip install 'pathcontrol[{extra}]'"
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return copyreg.__newobj__, (type(self), *self.args)  # type: ignore[attr-defined]  # not by __init__ again
 
 
 class TaskError(PathControlError, ValueError):

@@ -516,6 +516,22 @@ def test_what_cannot_be_sent_is_told_before_anything_is_begun(address, tmp_path)
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    "error",
+    [
+        MissingExtraError("yourdfpy", "robots", "a robot by name"),
+        pc.SimulationError("it diverged"),
+        pc.UnknownNameError("no robot 'a'"),
+        ClusterError("it is lost"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_errors_come_back_from_workers_as_they_are(error):
+    there = pickle.loads(pickle.dumps(error))
+    assert type(there) is type(error)
+    assert str(there) == str(error)
+
+
 def test_a_module_that_workers_lack_is_named(address, tmp_path):
     def lacking(p, samples):
         import not_installed_there

@@ -118,7 +118,6 @@ def _is_own(module: ModuleType) -> bool:
     if type(module) is not ModuleType or sys.modules.get(module.__name__) is not module:  # as lazy ones, and __main__
         return False
     file = Path(vars(module).get("__file__") or "")
-    installed = {"site-packages", "dist-packages"} & set(file.parts) or file.is_relative_to(
-        sysconfig.get_path("stdlib")
-    )
+    stdlib, others = sysconfig.get_path("stdlib"), {"site-packages", "dist-packages"}
+    installed = file.is_relative_to(stdlib) or others.intersection(file.parts)
     return file.suffix == ".py" and not installed and module.__name__.partition(".")[0] not in (_OURS, "__main__")
