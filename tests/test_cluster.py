@@ -332,7 +332,8 @@ def experiment(tmp_path):
     for inner in (folder / "tables", folder.parent / "robots"):
         inner.mkdir(parents=True)
     shutil.copy(pc.load_robot("cicese_2dof").source.base_dir / "cicese_2dof.urdf", folder.parent / "robots/arm.urdf")
-    (folder / "mine.py").write_text(TASK.format(pid=os.getpid(), home=tmp_path))
+    too_long_for_a_file = f"{'text' * 100!r}\n"
+    (folder / "mine.py").write_text(too_long_for_a_file + TASK.format(pid=os.getpid(), home=tmp_path))
     (folder / "tables" / "numbers.csv").write_text("1.0,2.0\n")
     (folder / "more.txt").write_text("0.1")
     (folder / "even_more.txt").write_text("0.2")
