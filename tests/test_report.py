@@ -29,7 +29,7 @@ from pathcontrol.view.report.settings import settings as groups_of
 from pathcontrol.view.report.summary import Row, measured, rows
 
 HOSTILE = "</script><img src=x onerror=alert(1)>&amp;\"'<b>"
-SI = {"deg": np.pi / 180, "deg/s": np.pi / 180, "s": 1.0, "N m": 1.0, "": 1.0, "mm": 1e-3, "µm": 1e-6}
+SI = {"deg": np.pi / 180, "deg/s": np.pi / 180, "s": 1.0, "N m": 1.0, "N m/rad": 1.0, "": 1.0, "mm": 1e-3, "µm": 1e-6}
 
 
 def followed(arm: RobotModel, task: pc.PathTask, law: str = "projection", q=(0.7, 1.2), duration: float = 1.5) -> Run:

@@ -10,6 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.analysis.gamma import distance_to_gamma
 from pathcontrol.analysis.known import by_task, known_task, of_rollouts, where_known
+from pathcontrol.analysis.torque import torque_metrics
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
@@ -22,6 +23,10 @@ UNITS = {
     "speed_ratio": "",
     "settling_time": "s",
     "tau_demand_peak": "N m",
+    "tau_peak": "N m",
+    "tau_demand_ratio": "",
+    "tau_noise": "N m",
+    "noise_amplification": "N m/rad",
     **{f"tool_deviation_{kind}": "m" for kind in ("peak", "rms")},
     "smoothing_deviation": "m",
     "path_time": "s",
@@ -47,6 +52,10 @@ LABELS = {
     "path_time": "time for the path",
     "end_error": "‖e_p‖ at the end",
     "tau_demand_peak": "torque demand, peak",
+    "tau_peak": "torque that acted, peak",
+    "tau_demand_ratio": "torque demand over its limit, peak",
+    "tau_noise": "noise of the torque demand",
+    "noise_amplification": "noise of the torque over that of the position",
 }
 
 
@@ -144,7 +153,15 @@ def metrics(
 
     Peaks and RMS of ‖e_p‖ [rad], ‖e_v‖ [rad/s], contour and lag error [rad] and distance to Γ over the last
     ``fraction`` of the time; there also the mean rate of s over the mean of ϑ, 1 for an arm that is as fast as it
-    should be and 0 for one that is stuck; settling time [s] of ‖e_p‖ into ``band`` [rad]; largest torque demand [N m].
+    should be and 0 for one that is stuck; settling time [s] of ‖e_p‖ into ``band`` [rad].
+
+    Largest torque demand and largest torque that acted [N m], over all joints and all of the time; the largest share
+    that a demand has of its limit, the loop's or else the robot's, left out where nothing is limited. Over the last
+    ``fraction`` of the time, the standard deviation of the noise on the torque demand [N m], see
+    :func:`~pathcontrol.analysis.torque.noise_deviation`, and its amplification [N m/rad]: that deviation over the RMS
+    error of the measured position, by encoder and noise, of the same joint, left out where positions are measured
+    exactly. Both are those of the joint where they are largest.
+
     Contour error and distance to Γ are left out for paths that neither end nor repeat. Open paths have the time [s]
     after which they were finished, and the :func:`end_error` [rad], each NaN where they were not. All numbers of a
     rollout that diverged are NaN. Of these, those that ``only`` names; the distance to Γ takes the most time.
@@ -176,7 +193,7 @@ def _metrics(run: Run, task: PathTask, fraction: float, band: float, only: Colle
     theta = where_known(lambda s: task.at(s).theta, late.array("s"))
     values["speed_ratio"] = _mean(late.array("sdot")) / _mean(theta)
     values["settling_time"] = settling_time(run.norm("e_p"), run.time, band)
-    values["tau_demand_peak"] = np.abs(run.array("tau_demand")).max((1, 2))
+    values |= torque_metrics(run, late)
     if np.isfinite(task.s_end):
         values |= {"path_time": run.finish_time, "end_error": _end_error(run, task)}
     sound = run.status != "diverged"

@@ -40,4 +40,11 @@ def readable_number(value: float, unit: str) -> str:
 def unit_of(metric: str, run: Run) -> str:
     """The unit of a metric; that of the run where joints slide."""
     unit = UNITS[metric]
-    return str(run[_VARIABLES[unit]].attrs["units"]) if _VARIABLES.get(unit) in run.data else unit
+    if unit == "N m/rad":
+        return " or ".join(map("/".join, zip(*(_units(part, run) for part in ("N m", "rad")), strict=True)))
+    return " or ".join(_units(unit, run))
+
+
+def _units(unit: str, run: Run) -> list[str]:
+    """What stands for a unit where joints turn, slide, or both."""
+    return str(run[_VARIABLES[unit]].attrs["units"]).split(" or ") if _VARIABLES.get(unit) in run.data else [unit]

@@ -99,6 +99,16 @@ class Run:
         return self._origin.robot
 
     @property
+    def robots(self) -> list[RobotModel]:
+        """The simulated arm of each rollout; of a loaded run, which keeps one arm, that one for all.
+
+        Raises:
+            InputError: the run does not know its robot.
+        """
+        numbers = self.data["rollout"].to_numpy().tolist()
+        return [self._origin.rollout(number).robot or self.robot for number in numbers]
+
+    @property
     def task(self) -> PathTask | None:
         """The path and its velocity profile, or ``None`` where the run does not know them.
 

@@ -16,7 +16,7 @@ from pathcontrol.view.figures.lines import drawable, series
 from pathcontrol.view.figures.shown import Runs, Shown, of_one_arm, own_robot, readable, shown
 from pathcontrol.view.figures.style import COLUMN, LIMIT_LOOK, PAGE, SMALL, dressed, new_figure, style
 from pathcontrol.view.figures.words import joint_label, legend
-from pathcontrol.view.torque_limits import torque_limits as clamped_limits
+from pathcontrol.analysis.torque_limits import torque_limits as clamped_limits
 
 _BEYOND = "#ECECEC"  # what lies beyond a limit
 _TALL_COLUMN = 3  # panels

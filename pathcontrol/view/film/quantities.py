@@ -12,7 +12,7 @@ from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.view.film.charts import Chart, Curve
 from pathcontrol.view.film.shot import Shot
 from pathcontrol.view.film.take import Take
-from pathcontrol.view.torque_limits import torque_limits
+from pathcontrol.analysis.torque_limits import torque_limits
 
 #: title, unit and lines of one run
 _Entry: TypeAlias = tuple[str, str, list[Curve]]

@@ -13,6 +13,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.metrics import LABELS, metrics, peak, rms, steady_state
 from pathcontrol.analysis.readable import reading, unit_of
+from pathcontrol.analysis.torque import torque_metrics
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.simulation.record import table
 from pathcontrol.simulation.run import Run
@@ -59,7 +60,7 @@ def _without_path(run: Run) -> dict[str, list[float]]:
     errors = [name for name in ("e_p", "e_v") if name in run.data]
     values = {f"{name}_{kind.__name__}": kind(late.norm(name)) for name in errors for kind in (peak, rms)}
     if "tau_demand" in run.data:
-        values["tau_demand_peak"] = np.abs(run.array("tau_demand")).max((1, 2))
+        values |= torque_metrics(run, late)
     return {name: value.tolist() for name, value in values.items()}
 
 

@@ -26,9 +26,11 @@ def torque_limits(run: Run, robot: RobotModel | None) -> Array:
 
 
 def _clamped(run: Run, n: int) -> Array | None:
-    """What the loop clamped to if that were not the robot's own limits."""
+    """What the loop clamped to if that were not the robot's own limits; of rows for rollouts it is not known whose."""
     try:
         given = np.asarray(table(run.config, "loop").get("torque_limits"), dtype=np.float64)
     except (TypeError, ValueError):
         return None
+    if given.ndim == 2:
+        return np.full(n, np.inf)
     return given if given.shape == (n,) else None
