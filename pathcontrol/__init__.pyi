@@ -10,6 +10,7 @@ from .analysis.metrics import peak as peak
 from .analysis.metrics import rms as rms
 from .analysis.metrics import settling_time as settling_time
 from .analysis.metrics import steady_state as steady_state
+from .analysis.pareto import non_dominated as non_dominated
 from .cartesian.orientation import FixedOrientation as FixedOrientation
 from .cartesian.orientation import NormalOrientation as NormalOrientation
 from .cartesian.orientation import TangentOrientation as TangentOrientation
@@ -99,10 +100,13 @@ from .toolpaths.points import read_csv as read_csv
 from .toolpaths.read import read_toolpath as read_toolpath
 from .toolpaths.smoothing import smooth as smooth
 from .toolpaths.svg import read_svg as read_svg
+from .tuning.result import Tuning as Tuning
+from .tuning.tune import tune as tune
 from .view.figures.comparison import comparison_figure as comparison_figure
 from .view.figures.deviation import deviation_figure as deviation_figure
 from .view.figures.errors import error_bands_figure as error_bands_figure
 from .view.figures.errors import error_figure as error_figure
+from .view.figures.pareto import pareto_figure as pareto_figure
 from .view.figures.path import path_figure as path_figure
 from .view.figures.path import phase_figure as phase_figure
 from .view.figures.speed import speed_figure as speed_figure

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.torque_limits import torque_limits
 from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
 
 _DEMAND = "tau_demand"
@@ -59,7 +62,7 @@ def _mean_square(values: Array) -> Array:
 def _limits(run: Run) -> Array:
     """Torque limits [N m], (rollout, n); inf without one, or where the run does not know its robot."""
     try:
-        robots = run.robots
+        robots: Sequence[RobotModel | None] = run.robots
     except InputError:
         robots = [None]
     each = {id(robot): torque_limits(run, robot) for robot in robots}

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
+from pathcontrol._arrays import Array
 from pathcontrol.analysis.metrics import LABELS, UNITS
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.variables import OUTCOMES
+from pathcontrol.sweeps.goals import Limits, Objectives, front
 from pathcontrol.sweeps.store import Store
 
 
@@ -67,19 +70,39 @@ class SweepResult:
 
         Of a rollout that diverged all metrics are NaN; its status, ``diverged_time`` and ``reason`` say why.
         """
-        columns = self._store.columns()
-        parameters = self.definition["space"]["parameters"]
-        coords: dict[str, Any] = {"sample": columns.pop("sample")}
-        values: dict[str, Any] = {}
-        for name, column in columns.items():
-            into = coords if name in parameters else values
-            into[name] = (("sample", f"{name} component")[: column.ndim], column, _labels(name))
-        return xr.Dataset(values, coords)
+        return dataset(self._store.columns(), self.definition["space"]["parameters"])
+
+    def pareto(self, objectives: Objectives, limits: Limits | None = None) -> xr.Dataset:
+        """The Pareto front: rows of the table that no other row beats in all objectives, in order of the first one.
+
+        Equal rows are all on it; what diverged, or has an objective that is not finite, never is.
+
+        Args:
+            objectives: names of metrics that are to be small, or ``"min"`` or ``"max"`` by name.
+            limits: of metrics the largest value allowed, or (smallest, largest), of which one may be None; samples
+                beyond them are left out.
+
+        Raises:
+            InputError: an objective or a limit is something else.
+            UnknownNameError: there is no such metric.
+        """
+        return front(self.table(), objectives, limits)
 
     def __repr__(self) -> str:
         finished = self.finished
         of = f"{finished} samples" if finished == self.samples else f"{finished} of {self.samples} samples"
         return f"SweepResult({str(self.folder)!r}; {of}, {len(self.kept)} histories)"
+
+
+def dataset(columns: Mapping[str, Array], parameters: Collection[str]) -> xr.Dataset:
+    """Columns of numbers and texts, (k,) or (k, d) each, over their column ``sample``: parameters as coordinates."""
+    coords: dict[str, Any] = {"sample": columns["sample"]}
+    values: dict[str, Any] = {}
+    for name, column in columns.items():
+        if name != "sample":
+            into = coords if name in parameters else values
+            into[name] = (("sample", f"{name} component")[: column.ndim], column, _labels(name))
+    return xr.Dataset(values, coords)
 
 
 def _labels(name: str) -> dict[str, str]:

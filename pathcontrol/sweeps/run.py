@@ -84,7 +84,7 @@ def sweep(
         design = space.design(seed)
         job = Job(build, measure, keep, keep.at_random(space.samples, seed))
         computed = partial(_computed_here, job) if client is None else Desk(client, job).chunks
-        store = _opened(Path(out), space.samples, _definition(build, space, design, metrics, keep, seed), resume)
+        store = opened(Path(out), space.samples, _definition(build, space, design, metrics, keep, seed), resume)
         store.tidy(keep, job.at_random)
         missing, done = store.missing(chunk), 0
         pieces = (({name: values[samples] for name, values in design.items()}, samples) for samples in missing)
@@ -101,7 +101,8 @@ def _computed_here(job: Job, pieces: Iterable[Piece]) -> Generator[Chunk]:
         yield job(parameters, samples)
 
 
-def _opened(folder: Path, samples: int, definition: Mapping[str, Any], resume: bool) -> Store:
+def opened(folder: Path, samples: int, definition: Mapping[str, Any], resume: bool) -> Store:
+    """The folder of a new sweep, or with ``resume`` that of one which was begun."""
     if not resume or not (folder / MANIFEST).exists():
         return Store.begin(folder, samples, definition)
     store = Store(folder)
@@ -114,17 +115,17 @@ def _definition(
 ) -> dict[str, Any]:
     """All that the numbers depend on, as JSON has it."""
     whole = {
-        "build": _told(build),
+        "build": told(build),
         "space": space.describe(),
         "design_sha256": digest(list(design.values())),
         "seed": seed,
-        "metrics": _told(metrics) if callable(metrics) else metrics if metrics is None else list(metrics),
+        "metrics": told(metrics) if callable(metrics) else metrics if metrics is None else list(metrics),
         "keep": keep.describe(),
     }
     return json.loads(json.dumps(whole))
 
 
-def _told(function: Callable[..., Any]) -> dict[str, Any]:
+def told(function: Callable[..., Any]) -> dict[str, Any]:
     """What a function says of itself, or its name and a digest of its source where that is known."""
     if hasattr(function, "describe"):
         return function.describe()

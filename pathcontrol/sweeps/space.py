@@ -77,7 +77,7 @@ class Space:
             raise InputError(f"parameters = {parameters!r}, expected a dict with a parameter at least")
         self._parameters = {str(name): _parameter(name, given) for name, given in parameters.items()}
         self.names, self.method = tuple(self._parameters), method
-        self.samples = self._count() if samples is None else _whole("samples", samples)
+        self.samples = self._count() if samples is None else check_whole("samples", samples)
 
     @classmethod
     def grid(cls, parameters: Mapping[str, Any]) -> Self:
@@ -112,10 +112,22 @@ class Space:
             return {name: v[i] for name, v, i in zip(self.names, self._choices(), which, strict=True)}
         if self.method == "given":
             return dict(zip(self.names, self._choices(), strict=True))
-        widths = [math.prod(parameter.shape) for parameter in self._parameters.values()]
-        ends = list(itertools.accumulate(widths))
-        cube = np.split(_unit_cube(self.method, self.samples, ends[-1], seed), ends[:-1], axis=1)
-        return {name: p.at(u) for (name, p), u in zip(self._parameters.items(), cube, strict=True)}
+        return self.at(unit_cube(self.method, self.samples, self.width, seed))
+
+    @property
+    def width(self) -> int:
+        """How many numbers make a sample: the components of all parameters."""
+        return sum(self._widths())
+
+    def at(self, cube: Array) -> dict[str, Array]:
+        """Of each parameter its quantiles at points (N, :attr:`width`) of the unit cube, (N,) or (N, d)."""
+        ends = list(itertools.accumulate(self._widths()))
+        inside = np.clip(cube, 2.0**-54, 1 - 2.0**-53)  # where no quantile is infinite
+        parts = np.split(inside, ends[:-1], axis=1)
+        return {name: p.at(u) for (name, p), u in zip(self._parameters.items(), parts, strict=True)}
+
+    def _widths(self) -> list[int]:
+        return [math.prod(parameter.shape) for parameter in self._parameters.values()]
 
     def describe(self) -> dict[str, Any]:
         """Everything that makes the samples, for the record."""
@@ -153,21 +165,19 @@ def digest(arrays: list[Array]) -> str:
 
 def check_seed(seed: Any) -> int:
     """A whole number from 0."""
-    return _whole("seed", seed, 0)
+    return check_whole("seed", seed, 0)
 
 
-def _unit_cube(method: str, samples: int, width: int, seed: int) -> Array:
-    """Points (samples, width) inside the unit cube."""
+def unit_cube(method: str, samples: int, width: int, seed: int) -> Array:
+    """Points (samples, width) of the unit cube."""
     from scipy.stats import qmc
 
     rng = default_rng(SeedSequence(check_seed(seed)))
     if method == "random":
-        points = rng.random((samples, width))
-    elif method == "lhs":
-        points = qmc.LatinHypercube(width, rng=rng).random(samples)
-    else:
-        points = qmc.Sobol(width, rng=rng).random_base2((samples - 1).bit_length())[:samples]
-    return np.clip(points, 2.0**-54, 1 - 2.0**-53)  # where no quantile is infinite
+        return rng.random((samples, width))
+    if method == "lhs":
+        return qmc.LatinHypercube(width, rng=rng).random(samples)
+    return qmc.Sobol(width, rng=rng).random_base2((samples - 1).bit_length())[:samples]
 
 
 def _parameter(name: str, given: Any) -> Choice | Distribution:
@@ -191,7 +201,8 @@ def _parameter(name: str, given: Any) -> Choice | Distribution:
     return Choice(values)
 
 
-def _whole(name: str, value: Any, least: int = 1) -> int:
+def check_whole(name: str, value: Any, least: int = 1) -> int:
+    """A whole number not below ``least``."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise InputError(f"{name} = {value!r}, expected a whole number from {least}")
     return int(value)

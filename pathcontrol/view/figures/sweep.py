@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -11,9 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.metrics import LABELS
-from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.sweeps.result import SweepResult
+from pathcontrol.view.figures.columns import column_of_parameter, label, readable_metric, table_of
 from pathcontrol.view.figures.style import BLUE, COLUMN, INK, ORANGE, Look, dressed, error_colours, new_figure, style
 from pathcontrol.view.figures.words import legend
 
@@ -34,8 +31,12 @@ def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = 
     Raises:
         UnknownNameError: there is no such parameter or metric.
     """
-    table = _table(sweep)
-    right, up, (value, unit) = _parameter(table, x), _parameter(table, y), _metric(table, metric)
+    table = table_of(sweep)
+    right, up, (value, unit) = (
+        column_of_parameter(table, x),
+        column_of_parameter(table, y),
+        readable_metric(table, metric),
+    )
     with style():
         figure = new_figure(COLUMN, 2.9)
         axes = dressed(figure.add_subplot())
@@ -44,7 +45,7 @@ def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = 
         points = axes.scatter(
             right[known], up[known], c=value[known], s=min(side, 12.0) ** 2, marker="s", cmap=error_colours(), lw=0
         )
-        bar = figure.colorbar(points, ax=axes, label=_label(metric, unit))
+        bar = figure.colorbar(points, ax=axes, label=label(metric, unit))
         bar.outline.set_visible(False)
         lost = (table["status"] == "diverged").to_numpy()
         axes.plot(right[lost], up[lost], **_LOST)
@@ -68,8 +69,8 @@ def robustness_figure(sweep: SweepResult | xr.Dataset, parameter: str, metric: s
     Raises:
         UnknownNameError: there is no such parameter or metric.
     """
-    table = _table(sweep)
-    along, (value, unit) = _parameter(table, parameter), _metric(table, metric)
+    table = table_of(sweep)
+    along, (value, unit) = column_of_parameter(table, parameter), readable_metric(table, metric)
     lost = (table["status"] == "diverged").to_numpy()
     bins = _bins(along)
     where = np.array([np.median(along[rows]) for rows in bins])
@@ -81,7 +82,7 @@ def robustness_figure(sweep: SweepResult | xr.Dataset, parameter: str, metric: s
         axes.fill_between(where, low, high, color=BLUE, alpha=0.25, lw=0)
         axes.plot(where, middle, color=BLUE)
         axes.plot(where, worst, color=ORANGE)
-        axes.set_ylabel(_label(metric, unit))
+        axes.set_ylabel(label(metric, unit))
         if lost.any():
             axes = _draw_lost(dressed(figure.add_subplot(grid[1], sharex=axes)), where, lost, bins)
         axes.set_xlabel(parameter)
@@ -93,41 +94,6 @@ def _draw_lost(axes: Axes, where: Array, lost: Array, bins: list[Array]) -> Axes
     axes.plot(where, [100 * lost[rows].mean() for rows in bins], color=INK)
     axes.set(ylabel="diverged [%]", ylim=(0, None))
     return axes
-
-
-def _table(sweep: SweepResult | xr.Dataset) -> xr.Dataset:
-    table = sweep.table() if isinstance(sweep, SweepResult) else sweep
-    if not isinstance(table, xr.Dataset) or "sample" not in table.dims:
-        raise InputError(f"sweep = {sweep!r}, expected a SweepResult or its table")
-    if not table.sizes["sample"]:
-        raise InputError("the sweep has no finished samples yet")
-    return table
-
-
-def _parameter(table: xr.Dataset, name: str) -> Array:
-    """A parameter that is a number, (sample,)."""
-    numbers: dict[str, Any] = {}
-    for known, values in table.coords.items():
-        if known != "sample" and values.dtype.kind in "iuf":
-            many = values.ndim == 2
-            numbers |= {f"{known}[{i}]": v for i, v in enumerate(values.T)} if many else {str(known): values}
-    if name not in numbers:
-        raise UnknownNameError(f"parameter {name!r}: expected one of {', '.join(numbers)}")
-    return np.asarray(numbers[name], dtype=np.float64)
-
-
-def _metric(table: xr.Dataset, name: str) -> tuple[Array, str]:
-    """A metric (sample,), NaN where it is not finite, and its unit as a person reads it."""
-    known = [str(key) for key, values in table.data_vars.items() if values.dtype.kind == "f"]
-    if name not in known:
-        raise UnknownNameError(f"metric {name!r}: expected one of {', '.join(known)}")
-    values, unit = table[name].to_numpy(), table[name].attrs.get("units", "")
-    values = np.where(np.isfinite(values), values, np.nan)
-    return (np.rad2deg(values), unit.replace("rad", "deg")) if unit in ("rad", "rad/s") else (values, unit)
-
-
-def _label(metric: str, unit: str) -> str:
-    return LABELS.get(metric, metric) + (f" [{unit}]" if unit else "")
 
 
 def _bins(values: Array) -> list[Array]:

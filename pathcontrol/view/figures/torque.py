@@ -11,12 +11,12 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, joint_array
+from pathcontrol.analysis.torque_limits import torque_limits as clamped_limits
 from pathcontrol.view.figures.limits import extent, over_time, span
 from pathcontrol.view.figures.lines import drawable, series
 from pathcontrol.view.figures.shown import Runs, Shown, of_one_arm, own_robot, readable, shown
 from pathcontrol.view.figures.style import COLUMN, LIMIT_LOOK, PAGE, SMALL, dressed, new_figure, style
 from pathcontrol.view.figures.words import joint_label, legend
-from pathcontrol.analysis.torque_limits import torque_limits as clamped_limits
 
 _BEYOND = "#ECECEC"  # what lies beyond a limit
 _TALL_COLUMN = 3  # panels

@@ -9,10 +9,10 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.readable import in_degrees
+from pathcontrol.analysis.torque_limits import torque_limits
 from pathcontrol.view.film.charts import Chart, Curve
 from pathcontrol.view.film.shot import Shot
 from pathcontrol.view.film.take import Take
-from pathcontrol.analysis.torque_limits import torque_limits
 
 #: title, unit and lines of one run
 _Entry: TypeAlias = tuple[str, str, list[Curve]]

@@ -1,0 +1,1 @@
+"""Gains for stated objectives within limits, and what the limits cost."""

@@ -1,0 +1,72 @@
+"""Candidates in every scenario: simulated together, as samples of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pathcontrol._arrays import Array
+from pathcontrol.sweeps.compute import Build, Measure, compute
+from pathcontrol.sweeps.keep import Keep
+from pathcontrol.sweeps.store import Store
+
+_NONE = np.zeros(0, dtype=np.intp)
+
+
+@dataclass(frozen=True)
+class Cases:
+    """Simulates candidates in scenarios.
+
+    Attributes:
+        build: as of a sweep, of the parameters of both.
+        scenarios: values by name, (m,) or (m, d) each.
+        count: how many scenarios there are, m; without any it is 1.
+        measure: numbers of a run.
+        chunk: how many rollouts are simulated together at most.
+        store: where every rollout is noted, or None.
+        known: what was noted before, by column.
+    """
+
+    build: Build
+    scenarios: Mapping[str, Array]
+    count: int
+    measure: Measure
+    chunk: int
+    store: Store | None
+    known: Mapping[str, Array]
+
+    def rows(self, candidates: Mapping[str, Array], first: int) -> dict[str, Array]:
+        """A row for each scenario of each candidate, (N · m,), the scenarios of a candidate one after another.
+
+        Args:
+            candidates: their parameters by name, (N,) or (N, d) each.
+            first: number of the first candidate; candidate i in scenario j is the sample i · m + j.
+        """
+        size = len(next(iter(candidates.values())))
+        values = {name: np.repeat(each, self.count, axis=0) for name, each in candidates.items()}
+        values |= {name: np.concatenate([each] * size) for name, each in self.scenarios.items()}
+        samples = first * self.count + np.arange(size * self.count, dtype=np.int64)
+        starts = range(0, len(samples), self.chunk)
+        parts = [self._part(values, samples, slice(at, at + self.chunk)) for at in starts]
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+    def _part(self, values: Mapping[str, Array], samples: NDArray[np.int64], rows: slice) -> dict[str, Array]:
+        known = self._known(samples[rows])
+        if known is not None:
+            return known
+        parameters = {name: each[rows] for name, each in values.items()}
+        found = compute(self.build, parameters, samples[rows], self.measure, Keep(), _NONE)
+        if self.store is not None:
+            self.store.write(found, Keep(), _NONE)
+        return found.columns
+
+    def _known(self, samples: NDArray[np.int64]) -> dict[str, Array] | None:
+        """The rows of samples if all of them were noted before."""
+        noted = self.known.get("sample", samples[:0])
+        if not np.isin(samples, noted).all():
+            return None
+        at = np.searchsorted(noted, samples)
+        return {name: values[at] for name, values in self.known.items()}

@@ -1,0 +1,187 @@
+"""What a tuning found: every candidate, the best ones, the front, and what the limits cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import UnknownNameError
+from pathcontrol.sweeps.goals import costs, excess, front, metric, within
+from pathcontrol.tuning.terms import Terms
+
+
+class Candidate(NamedTuple):
+    """One choice of the parameters.
+
+    Attributes:
+        number: which one it is in the table.
+        parameters: their values by name, numbers or arrays (d,).
+        metrics: by name; over several scenarios as they were reduced.
+    """
+
+    number: int
+    parameters: dict[str, Any]
+    metrics: dict[str, float]
+
+
+class Activity(NamedTuple):
+    """What a limit means for the best candidate of an objective.
+
+    Attributes:
+        value: the metric at the best candidate.
+        share: of the limit, 1 where it stops the objective from getting better.
+        bought: objective of the best candidate if this limit alone is relaxed by 10 % of itself. It is at least as
+            good as that: no search was made there, candidates were met on the way.
+    """
+
+    value: float
+    share: float
+    bought: float
+
+
+class Tuning:
+    """What :func:`tune` found; ``print`` it for a summary.
+
+    Args:
+        table: see :meth:`table`.
+        terms: what was asked for.
+        scenarios: how many each candidate was simulated in.
+        generations: how many are whole, and how many were asked for.
+    """
+
+    def __init__(self, table: xr.Dataset, terms: Terms, scenarios: int, generations: tuple[int, int]) -> None:
+        self._table, self.terms, self.scenarios, self.generations = table, terms, scenarios, generations
+
+    @property
+    def objectives(self) -> dict[str, str]:
+        """``"min"`` or ``"max"`` by objective."""
+        return dict(self.terms.goals)
+
+    @property
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """The smallest and the largest value by limited metric, infinite where there is none."""
+        return dict(self.terms.bounds)
+
+    @property
+    def directions(self) -> dict[str, str]:
+        """``"min"`` or ``"max"`` by objective and by limited metric."""
+        return {name: self._direction(name) for name in self.limits} | self.objectives
+
+    def table(self) -> xr.Dataset:
+        """All candidates, over ``sample``: status and metrics, and as coordinates the parameters.
+
+        Over several scenarios metrics are as they were reduced, and a candidate that diverged in one has diverged.
+        """
+        return self._table
+
+    def feasible(self) -> xr.Dataset:
+        """The candidates that keep all limits."""
+        return self._table.isel(sample=np.flatnonzero(within(self._table, self.limits)))
+
+    def front(self) -> xr.Dataset:
+        """The Pareto front of the objectives, of the candidates that keep all limits."""
+        return front(self._table, self.objectives, self.limits)
+
+    def trade(self, limit: str) -> xr.Dataset:
+        """The Pareto front of the objectives and a limited metric, that limit left aside and the others kept.
+
+        Raises:
+            UnknownNameError: there is no such limit.
+        """
+        return front(self._table, {limit: self._direction(limit)} | self.objectives, self._others(limit))
+
+    def best(self, objective: str | None = None) -> Candidate | None:
+        """The candidate within limits with the best value of an objective, by default the first; None without one.
+
+        Raises:
+            UnknownNameError: it is no objective.
+        """
+        cost = np.where(within(self._table, self.limits), self._cost(objective), np.inf)
+        return self.candidate(int(cost.argmin())) if np.isfinite(cost).any() else None
+
+    def nearest(self) -> Candidate | None:
+        """The candidate with the least sum of the shares by which it exceeds limits; None if all diverged."""
+        beyond = np.zeros(self._table.sizes["sample"])
+        for name in self.limits:
+            beyond += np.maximum(self.beyond(name), 0.0)
+        beyond = np.where(np.isfinite(self._cost(None)), beyond, np.inf)
+        return self.candidate(int(np.argmin(beyond))) if np.isfinite(beyond).any() else None
+
+    def knee(self) -> Candidate | None:
+        """Where the front of two objectives bends most; None without one.
+
+        It is the point of the front that is farthest below the line between its ends, both objectives scaled to their
+        range on the front. (I. Das, On characterizing the "knee" of the Pareto curve based on normal-boundary
+        intersection, Structural Optimization 18, 1999.)
+        """
+        rows = self.front()
+        if len(self.objectives) != 2 or rows.sizes["sample"] < 3:
+            return None
+        values = costs(rows, self.objectives)
+        spread = np.ptp(values, axis=0)
+        if (spread == 0).any():
+            return None
+        below = 1 - ((values - values.min(0)) / spread).sum(1)
+        which = int(below.argmax())
+        return self.candidate(int(rows["sample"][which])) if below[which] > 0 else None
+
+    def activity(self, objective: str | None = None) -> dict[str, Activity]:
+        """How active each limit is at the best candidate of an objective; nothing if no candidate keeps the limits."""
+        best = self.best(objective)
+        if best is None:
+            return {}
+        return {name: self._activity(name, best, objective) for name in self.limits}
+
+    def beyond(self, limit: str) -> Array:
+        """How far each candidate exceeds a limit, (sample,), as a share of it; not above 0 within it."""
+        return excess(metric(self._table, limit), self.limits[self._known(limit)])
+
+    def candidate(self, number: int) -> Candidate:
+        """A row of the table."""
+        row = self._table.isel(sample=number)
+        parameters = {str(name): v.to_numpy()[()] for name, v in row.coords.items() if name != "sample"}
+        metrics = {str(name): float(v) for name, v in row.data_vars.items() if v.dtype.kind in "fiu"}
+        return Candidate(number, parameters, metrics)
+
+    def _activity(self, limit: str, best: Candidate, objective: str | None) -> Activity:
+        over = self.beyond(limit)
+        allowed = within(self._table, self._others(limit)) & (over <= 0.1)
+        cost = np.where(allowed, self._cost(objective), np.inf)
+        name = self._objective(objective)
+        bought = self.candidate(int(cost.argmin())).metrics[name]
+        return Activity(best.metrics[limit], 1 + float(over[best.number]), bought)
+
+    def _cost(self, objective: str | None) -> Array:
+        name = self._objective(objective)
+        return costs(self._table, {name: self.objectives[name]})[:, 0]
+
+    def _objective(self, name: str | None) -> str:
+        if name is not None and name not in self.objectives:
+            raise UnknownNameError(f"objective {name!r}: expected one of {', '.join(self.objectives)}")
+        return next(iter(self.objectives)) if name is None else name
+
+    def _known(self, limit: str) -> str:
+        if limit not in self.limits:
+            raise UnknownNameError(f"limit {limit!r}: expected one of {', '.join(self.limits) or 'none'}")
+        return limit
+
+    def _others(self, limit: str) -> Mapping[str, tuple[float, float]]:
+        return {name: ends for name, ends in self.limits.items() if name != self._known(limit)}
+
+    def _direction(self, limit: str) -> str:
+        return "min" if np.isfinite(self.limits[self._known(limit)][1]) else "max"
+
+    def __repr__(self) -> str:
+        whole, asked = self.generations
+        stopped = "" if whole == asked else f", stopped after {whole} of {asked} generations"
+        every, kept = self._table.sizes["sample"], self.feasible().sizes["sample"]
+        return f"Tuning({every} candidates, {kept} within limits{stopped})"
+
+    def __str__(self) -> str:
+        from pathcontrol.tuning.summary import summary
+
+        return summary(self)

@@ -1,0 +1,143 @@
+"""One call from a space of gains to the best ones within limits, and to what the limits cost."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import xarray as xr
+
+from pathcontrol._progress import progress_bar
+from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.sweeps.compute import OUTCOME, Build, Measure, measure_of
+from pathcontrol.sweeps.goals import Limits, Objectives, check_limits, check_objectives
+from pathcontrol.sweeps.result import dataset
+from pathcontrol.sweeps.run import opened, told
+from pathcontrol.sweeps.space import Space, check_seed, check_whole, digest
+from pathcontrol.tuning.cases import Cases
+from pathcontrol.tuning.result import Tuning
+from pathcontrol.tuning.search import Search
+from pathcontrol.tuning.terms import Reduce, Terms
+
+
+def tune(
+    build: Build,
+    space: Space | Mapping[str, Any],
+    objectives: Objectives,
+    *,
+    limits: Limits | None = None,
+    scenarios: Space | Mapping[str, Any] | None = None,
+    reduce: Reduce = "worst",
+    metrics: Sequence[str] | Measure | None = None,
+    population: int = 40,
+    generations: int = 25,
+    seed: int = 0,
+    chunk: int = 500,
+    out: str | Path | None = None,
+    resume: bool = False,
+    progress: bool = True,
+) -> Tuning:
+    """Search gains, or other parameters, for objectives within limits; all of a generation is one batch of simulations.
+
+    The result has every candidate that was tried, which of them keep the limits, the best ones, the Pareto front and
+    what each limit costs. A candidate that diverges, or has an objective that is not finite, counts as beyond all
+    limits. That none keeps the limits is a result, too: it says which limit is missed, and by how much.
+
+    The optimiser sees the unit cube; a parameter is the quantile of its distribution there, so that a
+    ``stats.loguniform`` is searched in its logarithm. The same seed gives the same candidates, whatever ``chunk`` is,
+    in a sampled loop. After Ctrl-C the result has the generations that are whole.
+
+    Args:
+        build: as of :func:`sweep`: from parameters, (k,) or (k, d) each, and the numbers of k samples to the arguments
+            of :func:`simulate`. Parameters are those of ``space`` and of ``scenarios``.
+        space: the parameters that are searched, by name: a distribution of ``scipy.stats``, or a list of values. Of a
+            :class:`Space` its parameters.
+        objectives: a metric that is to be small, several, or ``"min"`` or ``"max"`` by name.
+        limits: of metrics the largest value allowed, or (smallest, largest), of which one may be None.
+        scenarios: what each candidate has to cope with: parameters with a value for each scenario, such as payloads, or
+            a :class:`Space` with so many samples. Sensor noise goes by the number of the sample, so that each of
+            ``{"repeat": range(5)}`` is another realisation.
+        reduce: of the scenarios of a candidate the ``"worst"`` value of each metric counts, or the ``"mean"``.
+        metrics: more metrics for the table, by name, or a function from a :class:`Run` to numbers by name in place of
+            the usual ones.
+        population: candidates in a generation, from 5.
+        generations: how many.
+        seed: where the random numbers begin.
+        chunk: how many rollouts are simulated together at most.
+        out: a folder that notes every rollout, as that of a sweep does; :class:`SweepResult` reads it.
+        resume: go on with the tuning in ``out``, if there is one.
+        progress: show a bar with the time left on standard error when it takes longer than two seconds.
+
+    Raises:
+        InputError: an argument has the wrong value, or ``out`` holds something else.
+        UnknownNameError: there is no such metric.
+        MissingExtraError: the extra ``tune`` is not installed.
+    """
+    terms = Terms(check_objectives(objectives), check_limits(limits), _reduce(reduce))
+    check_whole("population", population, 5)
+    check_whole("generations", generations)
+    check_whole("chunk", chunk)
+    wanted = metrics if callable(metrics) else list(dict.fromkeys((*terms.metrics, *(metrics or ()))))
+    space, several = _space(space, "random"), None if scenarios is None else _space(scenarios, "given")
+    search = Search(space.width, (len(terms.goals), 1 + len(terms.bounds)), population, check_seed(seed))
+    design = {} if several is None else several.design(seed)
+    if both := set(design) & set(space.names):
+        raise InputError(f"{', '.join(sorted(both))}: both searched and in the scenarios; call one of them otherwise")
+    count = 1 if several is None else several.samples
+    store = None
+    if out is not None:
+        parameters = space.describe()["parameters"] | ({} if several is None else several.describe()["parameters"])
+        definition = {
+            "build": told(build),
+            "space": {"parameters": parameters},
+            "scenarios_sha256": digest(list(design.values())),
+            "metrics": told(wanted) if callable(wanted) else wanted,
+            "population": population,
+            "seed": seed,
+        }
+        definition |= terms.describe()
+        store = opened(Path(out), population * generations * count, json.loads(json.dumps(definition)), resume)
+    known = {} if store is None else store.columns()
+    cases = Cases(build, design, count, measure_of(wanted), chunk, store, known)
+    tables: list[xr.Dataset] = []
+    with progress_bar("tune", generations, progress) as update:
+        try:
+            for _ in range(generations):
+                tables.append(_generation(search, space, cases, terms, sum(table.sizes["sample"] for table in tables)))
+                update(len(tables))
+        except KeyboardInterrupt:
+            if not tables:
+                raise
+    return Tuning(xr.concat(tables, "sample"), terms, count, (len(tables), generations))
+
+
+def _generation(search: Search, space: Space, cases: Cases, terms: Terms, first: int) -> xr.Dataset:
+    """The candidates of the next generation, simulated and told to the search."""
+    parameters = space.at(search.ask())
+    rows = cases.rows(parameters, first)
+    inputs = {"sample", *OUTCOME, *parameters, *cases.scenarios}
+    numbers = {name: v.reshape(-1, cases.count) for name, v in rows.items() if name not in inputs}
+    status = rows["status"].reshape(-1, cases.count)
+    every = np.where((status == "finished").all(1), "finished", "running")
+    columns = {
+        "sample": first + np.arange(len(status)),
+        **parameters,
+        "status": np.where((status == "diverged").any(1), "diverged", every),
+        **{name: terms.reduced(name, values) for name, values in numbers.items()},
+    }
+    table = dataset(columns, parameters)
+    search.tell(terms.told(table))
+    return table
+
+
+def _space(given: Space | Mapping[str, Any], method: str) -> Space:
+    return given if isinstance(given, Space) else Space(given, method, None if method == "given" else 1)
+
+
+def _reduce(given: Any) -> Reduce:
+    if given not in get_args(Reduce):
+        raise UnknownNameError(f"reduce = {given!r}, expected one of {', '.join(map(repr, get_args(Reduce)))}")
+    return given

@@ -1,0 +1,66 @@
+"""Columns of a sweep's table, as figures show them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pathcontrol._arrays import Array
+from pathcontrol.analysis.metrics import LABELS
+from pathcontrol.analysis.readable import reading
+from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.sweeps import goals
+from pathcontrol.sweeps.result import SweepResult
+
+
+def table_of(sweep: SweepResult | xr.Dataset) -> xr.Dataset:
+    """The table of a sweep, or itself.
+
+    Raises:
+        InputError: it is something else, or empty.
+    """
+    table = sweep.table() if isinstance(sweep, SweepResult) else sweep
+    if not isinstance(table, xr.Dataset) or "sample" not in table.dims:
+        raise InputError(f"sweep = {sweep!r}, expected a SweepResult or its table")
+    if not table.sizes["sample"]:
+        raise InputError("the sweep has no finished samples yet")
+    return table
+
+
+def column_of_parameter(table: xr.Dataset, name: str) -> Array:
+    """A parameter that is a number, (sample,); of a vector one component, as ``q[0]``.
+
+    Raises:
+        UnknownNameError: there is no such parameter.
+    """
+    numbers: dict[str, Any] = {}
+    for known, values in table.coords.items():
+        if known != "sample" and values.dtype.kind in "iuf":
+            many = values.ndim == 2
+            numbers |= {f"{known}[{i}]": v for i, v in enumerate(values.T)} if many else {str(known): values}
+    if name not in numbers:
+        raise UnknownNameError(f"parameter {name!r}: expected one of {', '.join(numbers)}")
+    return np.asarray(numbers[name], dtype=np.float64)
+
+
+def readable_metric(table: xr.Dataset, name: str) -> tuple[Array, str]:
+    """A metric (sample,), NaN where it is not finite, in the unit in which a person reads it, and that unit.
+
+    Raises:
+        UnknownNameError: there is no such metric.
+    """
+    values = goals.metric(table, name)
+    factor, unit = readable_factor(table, name)
+    return np.where(np.isfinite(values), factor * values, np.nan), unit
+
+
+def readable_factor(table: xr.Dataset, name: str) -> tuple[float, str]:
+    """What a metric is multiplied by for a person to read it, and its unit then."""
+    return reading(table[name].attrs.get("units", ""), goals.metric(table, name))
+
+
+def label(metric: str, unit: str) -> str:
+    """What a metric is called on an axis."""
+    return LABELS.get(metric, metric) + (f" [{unit}]" if unit else "")
