@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from pathcontrol._arrays import Array
@@ -48,3 +51,18 @@ def unit_of(metric: str, run: Run) -> str:
 def _units(unit: str, run: Run) -> list[str]:
     """What stands for a unit where joints turn, slide, or both."""
     return str(run[_VARIABLES[unit]].attrs["units"]).split(" or ") if _VARIABLES.get(unit) in run.data else [unit]
+
+
+def readable_parameters(parameters: Mapping[str, Any], digits: int = 4) -> str:
+    """Parameters in as many digits, by name; of dotted keys by the last part, where that tells them apart."""
+    last = [name.rpartition(".")[2] for name in parameters]
+    names = last if len(set(last)) == len(last) else list(parameters)
+    return ", ".join(f"{name} = {_value(value, digits)}" for name, value in zip(names, parameters.values(), strict=True))
+
+
+def _value(value: Any, digits: int) -> str:
+    if np.ndim(value):
+        return f"[{', '.join(_value(one, digits) for one in value)}]"
+    if np.asarray(value).dtype.kind != "f":
+        return str(value)
+    return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"

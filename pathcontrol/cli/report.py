@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from pathcontrol.cli.group import import_all, json_option, open_option, open_page
-from pathcontrol.cli.saved import check_out, load_runs, robot_option, runs_argument
+from pathcontrol.cli.saved import check_out, load_runs, robot_option, runs_argument, sweep_of, worst_option
 from pathcontrol.cli.view import layout_option, one_or_all, tell
 
 
@@ -23,6 +23,7 @@ from pathcontrol.cli.view import layout_option, one_or_all, tell
 )
 @click.option("--title", help="Heads the page.  [default: robot, controller and duration]")
 @layout_option
+@worst_option
 @robot_option
 @open_option
 @json_option
@@ -31,6 +32,7 @@ def command(
     out: Path,
     title: str | None,
     layout: str,
+    worst: int | None,
     robot: str | None,
     opened: bool,
     as_json: bool,
@@ -38,6 +40,7 @@ def command(
     """Write a report on saved runs: one HTML page.
 
     A RUN is a file that Run.save or `pathcontrol run` has written (.nc), or the folder of one. Several are compared.
+    Of the folder of a sweep, its numbers and figures, and the histories that it has kept, the worst first.
     The page has the animation, the metrics, the figures, the whole configuration and how to make the runs again; it
     needs no network, so that it can be kept and sent.
     """
@@ -45,11 +48,13 @@ def command(
     from pathcontrol.view.report.report import report
 
     check_out(out, runs)
-    loaded = load_runs(runs, robot)
+    loaded = load_runs(runs, robot, worst)
     words = ["pathcontrol", "report", *map(str, runs), "--out", str(out)]
-    for option, value in (("--title", title), ("--layout", layout if layout != "beside" else None), ("--robot", robot)):
-        words += [option, value] if value is not None else []
-    page = report(one_or_all(loaded), out, title=title, layout=layout, command=shlex.join(words))  # type: ignore[arg-type]
+    different = layout if layout != "beside" else None
+    for option, value in (("--title", title), ("--layout", different), ("--worst", worst), ("--robot", robot)):
+        words += [option, str(value)] if value is not None else []
+    told = {"title": title, "command": shlex.join(words), "sweep": sweep_of(runs)}
+    page = report(one_or_all(loaded), out, layout=layout, **told)  # type: ignore[arg-type]
     tell(loaded, {"report": page}, as_json)
     if opened:
         open_page(page)

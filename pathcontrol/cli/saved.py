@@ -14,6 +14,7 @@ from pathcontrol.errors import InputError, PathControlError
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel
     from pathcontrol.simulation.run import Run
+    from pathcontrol.sweeps.result import SweepResult
 
 _DEFAULT = "run.nc"  # as experiments call it unless told
 
@@ -23,10 +24,15 @@ runs_argument = click.argument(
 robot_option = click.option(
     "--robot", metavar="FILE", help="The URDF file or known name of the arm, for runs that do not know theirs."
 )
+worst_option = click.option(
+    "--worst", type=click.IntRange(1), metavar="N", help="Of the histories that a sweep has kept, the N worst ones."
+)
 
 
-def load_runs(paths: Sequence[Path], robot: str | None) -> dict[str, Run]:
+def load_runs(paths: Sequence[Path], robot: str | None, worst: int | None = None) -> dict[str, Run]:
     """The runs by the shortest names that tell them apart: of their files, or of the folders of files ``run.nc``.
+
+    Of a sweep, alone, its ``worst`` histories, by their samples and parameters.
 
     Raises:
         InputError: a file is missing, is no run, or is named twice, or a run does not know its robot.
@@ -34,6 +40,8 @@ def load_runs(paths: Sequence[Path], robot: str | None) -> dict[str, Run]:
     from pathcontrol.robot.loading import load_robot
     from pathcontrol.simulation.run import Run
 
+    if (sweep := sweep_of(paths)) is not None:
+        return sweep.histories(worst)
     files = [run_file(path) for path in paths]
     twice = [path for path, file in zip(paths, files, strict=True) if files.count(file) > 1]
     if twice:
@@ -42,13 +50,32 @@ def load_runs(paths: Sequence[Path], robot: str | None) -> dict[str, Run]:
     return {name: _with_robot(Run.load(file), file, arm) for name, file in zip(names(files), files, strict=True)}
 
 
+def sweep_of(paths: Sequence[Path]) -> SweepResult | None:
+    """The sweep whose folder is named, if one is.
+
+    Raises:
+        InputError: something else is named beside it.
+    """
+    from pathcontrol.sweeps.result import SweepResult
+    from pathcontrol.sweeps.store import MANIFEST
+
+    found = [path for path in paths if (path / MANIFEST).is_file()]
+    if found and len(paths) > 1:
+        raise InputError(f"{str(found[0])!r} is a sweep, expected it alone; name runs in its folder runs/ one by one")
+    return SweepResult(found[0]) if found else None
+
+
 def check_out(out: Path | None, paths: Sequence[Path]) -> None:
     """What is written is not what is read.
 
     Raises:
         InputError: ``out`` is the file of one of the runs.
     """
-    if out is not None and out.resolve() in [run_file(path).resolve() for path in paths]:
+    if out is None:
+        return
+    sweep = sweep_of(paths)
+    files = [run_file(path) for path in paths] if sweep is None else [sweep.history(i) for i in sweep.kept]
+    if out.resolve() in [file.resolve() for file in files]:
         raise InputError(f"{str(out)!r} is the run itself, which would be lost; name another file to write")
 
 

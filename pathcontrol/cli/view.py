@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from pathcontrol.cli.group import import_all, json_option, open_option, open_page, printable
-from pathcontrol.cli.saved import check_out, load_runs, robot_option, run_file, runs_argument
+from pathcontrol.cli.saved import check_out, load_runs, robot_option, run_file, runs_argument, sweep_of, worst_option
 
 if TYPE_CHECKING:
     from pathcontrol.simulation.run import Run
@@ -36,6 +36,7 @@ layout_option = click.option(
 @layout_option
 @click.option("--rollout", type=int, default=0, show_default=True, help="Which rollout of each run, from 0.")
 @click.option("--tool", metavar="FRAME", help="The frame whose path is drawn. Default: that of the task, or the last.")
+@worst_option
 @robot_option
 @open_option
 @json_option
@@ -46,6 +47,7 @@ def command(
     layout: str,
     rollout: int,
     tool: str | None,
+    worst: int | None,
     robot: str | None,
     opened: bool,
     as_json: bool,
@@ -53,14 +55,15 @@ def command(
     """Write the animation of saved runs: one HTML page.
 
     The page plays in any browser and needs no network. A RUN is a file that Run.save or `pathcontrol run` has written
-    (.nc), or the folder of one. Several move side by side. With --mp4 a video is written, which needs the extra `video`
+    (.nc), or the folder of one. Several move side by side. Of the folder of a sweep the histories that it has kept are
+    shown, the worst first, as histories.html there. With --mp4 a video is written, which needs the extra `video`
     and a Chromium, Chrome or Edge on this machine; the page is then written only if --out or --open asks for it.
     """
     import_all()
     from pathcontrol.view.film.recorder import record
 
     check_out(out, runs)
-    loaded = load_runs(runs, robot)
+    loaded = load_runs(runs, robot, worst)
     animation = record(one_or_all(loaded), rollout=rollout, layout=layout, tool=tool)  # type: ignore[arg-type]
     written = {}
     if out is not None or opened or mp4 is None:
@@ -80,6 +83,8 @@ def one_or_all(runs: Mapping[str, Run]) -> Run | Mapping[str, Run]:
 
 
 def _default(runs: tuple[Path, ...]) -> Path:
+    if sweep_of(runs) is not None:
+        return runs[0] / "histories.html"
     first = run_file(runs[0])
     return first.with_suffix(".html") if len(runs) == 1 else first.with_name("comparison.html")
 

@@ -6,14 +6,17 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.metrics import LABELS, UNITS
+from pathcontrol.analysis.readable import readable_parameters
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.variables import OUTCOMES
 from pathcontrol.sweeps.goals import Limits, Objectives, front
+from pathcontrol.sweeps.keep import Keep
 from pathcontrol.sweeps.store import Store
 
 
@@ -64,6 +67,36 @@ class SweepResult:
     def history(self, sample: int) -> Path:
         """The file of the history of a sample."""
         return self._store.run_file(sample)
+
+    def histories(self, worst: int | None = None) -> dict[str, Run]:
+        """The kept histories by number and parameters of their samples, the worst first, to be filmed or compared.
+
+        What diverged comes first, then the largest values of the metric by which histories were kept.
+
+        Args:
+            worst: how many of them; default all.
+
+        Raises:
+            InputError: none is kept.
+        """
+        kept = self.kept
+        if not kept:
+            raise InputError(f"the sweep in {str(self.folder)!r} keeps no histories; give it keep=Keep(worst=3)")
+        columns = self._store.columns(["sample", "status", self.kept_by])
+        rows = np.searchsorted(columns["sample"], kept)
+        badness = columns.get(self.kept_by, np.zeros(len(columns["sample"])))[rows]
+        order = np.argsort(np.where(columns["status"][rows] == "diverged", -np.inf, -badness), kind="stable")
+        return dict(self._named(kept[i]) for i in order[:worst])
+
+    @property
+    def kept_by(self) -> str:
+        """The metric whose largest values are the worst ones."""
+        return str(self.definition.get("keep", {}).get("by", Keep.by))
+
+    def _named(self, sample: int) -> tuple[str, Run]:
+        run = self.run(sample)
+        values = {name: value for name, value in run.config["sweep"].items() if name != "sample"}
+        return f"{sample}: {readable_parameters(values, 3)}", run
 
     def table(self) -> xr.Dataset:
         """The numbers of all finished samples, over ``sample``: outcome and metrics, and as coordinates the parameters.

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pathcontrol.analysis.metrics import LABELS, UNITS
-from pathcontrol.analysis.readable import readable_number
+from pathcontrol.analysis.readable import readable_number, readable_parameters
 
 if TYPE_CHECKING:
     from pathcontrol.tuning.result import Candidate, Tuning
@@ -45,7 +44,7 @@ def _found(tuning: Tuning) -> list[str]:
 
 def _candidate(tuning: Tuning, one: Candidate) -> list[str]:
     numbers = ", ".join(f"{_label(name)} {_number(name, one.metrics[name])}" for name in tuning.objectives)
-    return [f"  {numbers}", f"  candidate {one.number}: {parameters_text(one.parameters)}"]
+    return [f"  {numbers}", f"  candidate {one.number}: {readable_parameters(one.parameters)}"]
 
 
 def _limits(tuning: Tuning, objective: str) -> list[str]:
@@ -78,17 +77,6 @@ def _missed(tuning: Tuning) -> list[str]:
             said = "kept" if share <= 0 else f"{100 * share:.0f} % beyond"
             lines.append(f"  {_label(name)} {_number(name, nearest.metrics[name])}: {said}")
     return lines
-
-
-def parameters_text(parameters: Mapping[str, Any]) -> str:
-    """Parameters by name, with four digits."""
-    return ", ".join(f"{name} = {_value(value)}" for name, value in parameters.items())
-
-
-def _value(value: Any) -> str:
-    if np.ndim(value):
-        return f"[{', '.join(map(_value, value))}]"
-    return f"{value:.4g}" if np.asarray(value).dtype.kind == "f" else str(value)
 
 
 def _label(name: str) -> str:

@@ -14,11 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
+from pathcontrol.analysis.readable import readable_parameters
 from pathcontrol.errors import InputError
 from pathcontrol.sweeps.goals import Limits, check_limits, front, within
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.tuning.result import Tuning
-from pathcontrol.tuning.summary import parameters_text
 from pathcontrol.view.figures.columns import column_of_parameter, label, readable_factor, readable_metric, table_of
 from pathcontrol.view.figures.style import (
     BLUE,
@@ -101,7 +101,7 @@ def pareto_figure(
         for letter, i in zip(ascii_uppercase, marked, strict=False):
             _mark(axes, letter, (right[rows[i]], up[rows[i]]), choice)
         axes.set(xlabel=label(choice.x, x_unit), ylabel=label(choice.y, y_unit))
-        figure.supxlabel("\n".join(plain(line, COLUMN) for line in words), fontsize=SMALL, ha="left", x=0.02)
+        figure.supxlabel("\n".join(plain(line, 1.1 * COLUMN) for line in words), fontsize=SMALL, ha="left", x=0.02)
         legend(figure, _entries(choice, bool((~kept & np.isfinite(right * up)).any()), colour is None))
     return figure
 
@@ -121,7 +121,7 @@ def _choice(sweep: Any, x: str | None, y: str | None, goals: Mapping[str, str] |
 def _told(best: xr.Dataset, row: int) -> str:
     one = best.isel(sample=row)
     values = {str(name): v.to_numpy()[()] for name, v in one.coords.items() if name != "sample"}
-    return f"{int(one['sample'])}: {parameters_text(values)}"
+    return f"{int(one['sample'])}: {readable_parameters(values)}"
 
 
 def _wide(values: Array) -> bool:

@@ -35,10 +35,10 @@ def pictures(runs: Mapping[str, Run]) -> list[Picture]:
     """
     joints = {tuple(run["joint"].to_numpy()) for run in runs.values()}
     if len(joints) == 1:
-        return [_picture(figure, caption) for caption, figure in _figures(runs)]
+        return [picture(figure, caption) for caption, figure in _figures(runs)]
     own = {name: _figures({name: run}) for name, run in runs.items()}
-    found = [_picture(figure, f"{name}: {caption}") for name, figures in own.items() for caption, figure in figures]
-    return sorted(found, key=lambda picture: picture.wide)  # which end a row of those beside one another
+    found = [picture(figure, f"{name}: {caption}") for name, figures in own.items() for caption, figure in figures]
+    return sorted(found, key=lambda one: one.wide)  # which end a row of those beside one another
 
 
 def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
@@ -75,7 +75,7 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
             yield f"Distance of the tool from the drawing{of}", deviation_figure(run, run.robot, run.task)
 
 
-def _picture(figure: Figure, caption: str) -> Picture:
+def picture(figure: Figure, caption: str) -> Picture:
     """A figure as SVG, or as PNG where the SVG would be too large to be sent around."""
     width, drawn = figure.get_figwidth(), _drawn(figure, "svg")
     kind = "svg+xml" if len(drawn) <= _LARGEST else "png"

@@ -12,6 +12,7 @@ from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
 
 if TYPE_CHECKING:
+    from pathcontrol.sweeps.result import SweepResult
     from pathcontrol.view.film.layout import Layout
 
 
@@ -22,6 +23,7 @@ def report(
     title: str | None = None,
     layout: Layout = "beside",
     command: str | None = None,
+    sweep: SweepResult | None = None,
 ) -> Path:
     """Write one page with the animation, the metrics, the figures and the configuration of runs; it needs no network.
 
@@ -35,6 +37,7 @@ def report(
         title: heads the page; by default robot, controller and duration.
         layout: several arms ``"beside"`` one another, or ``"ghosted"`` in one place.
         command: what to say made the page, by default this function.
+        sweep: what the runs are histories of, :meth:`SweepResult.histories`; its numbers and figures come first.
 
     Raises:
         InputError: there are no runs, or one does not know its robot.
@@ -48,7 +51,7 @@ def report(
     # the sections have tables of their own
     film = dataclasses.replace(animation.film, header=animation.film.header | {"tables": []})
     words = animation.title if title is None else (title,)
-    text = page(film, words, sections(named, command or _call(named, out)))
+    text = page(film, words, sections(named, command or _call(named, out), sweep))
     with whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return out

@@ -13,25 +13,29 @@ from markupsafe import Markup, escape
 
 from pathcontrol.analysis.metrics import UNITS
 from pathcontrol.simulation.run import Run
+from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.view.page.html import Section
 from pathcontrol.view.report.downloads import Download, json_file, signals_file
 from pathcontrol.view.report.pictures import pictures
 from pathcontrol.view.report.reproduction import recipe, versions
 from pathcontrol.view.report.settings import settings
 from pathcontrol.view.report.summary import facts, measured, rows
+from pathcontrol.view.report.sweep import told_of
 
 
-def sections(runs: Mapping[str, Run], made_by: str) -> list[Section]:
+def sections(runs: Mapping[str, Run], made_by: str, sweep: SweepResult | None = None) -> list[Section]:
     """What stands below the animation: summary, figures, configuration, and how to make it again.
 
     Args:
         runs: the runs by their names.
         made_by: the call or the command that makes this page.
+        sweep: what the runs are histories of, if they are.
     """
     numbers = {name: measured(run) for name, run in runs.items()}
     configs = [run.config for run in runs.values()]
     configuration = configs[0] if len(runs) == 1 else {name: run.config for name, run in runs.items()}
     return [
+        *([] if sweep is None else [_section("Sweep", **told_of(sweep))]),
         _section(
             "Summary",
             runs=runs,

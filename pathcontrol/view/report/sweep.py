@@ -1,0 +1,48 @@
+"""The numbers and figures of a sweep, as its report has them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pathcontrol.analysis.metrics import LABELS
+from pathcontrol.sweeps.result import SweepResult
+from pathcontrol.view.figures.columns import readable_metric
+from pathcontrol.view.figures.overview import overview
+from pathcontrol.view.report.pictures import picture
+from pathcontrol.view.report.summary import Cell, Row
+
+_NOT_METRICS = ("finish_time", "diverged_time")
+
+
+def told_of(sweep: SweepResult) -> dict[str, Any]:
+    """What the section of a sweep is made of: a sentence, a row for each metric, and figures."""
+    table = sweep.table()
+    names = [str(name) for name, v in table.data_vars.items() if v.dtype.kind == "f" and name not in _NOT_METRICS]
+    return {
+        "said": _said(sweep, table),
+        "rows": [row for name in names if (row := _row(table, name)) is not None],
+        "pictures": [picture(figure, caption) for caption, figure in overview(table, names, sweep.kept_by)],
+    }
+
+
+def _said(sweep: SweepResult, table: xr.Dataset) -> str:
+    statuses = table["status"].to_numpy().tolist()
+    counts = ", ".join(f"{statuses.count(status)} {status}" for status in sorted(set(statuses)))
+    finished = (
+        f"{sweep.finished} of {sweep.samples} samples" if sweep.finished < sweep.samples else f"{sweep.samples} samples"
+    )
+    return f"{finished}: {counts}. It keeps {len(sweep.kept)} histories; above are the worst of them, the worst first."
+
+
+def _row(table: xr.Dataset, name: str) -> Row | None:
+    """A metric over all samples, of which it has one at least."""
+    values, unit = readable_metric(table, name)
+    if np.isnan(values).all():
+        return None
+    largest = int(np.nanargmax(values))
+    numbers = [np.nanmin(values), np.nanmedian(values), values[largest]]
+    cells = [*(f"{number:#.4g}".rstrip(".") for number in numbers), str(int(table["sample"][largest]))]
+    return Row(LABELS.get(name, name), unit, tuple(map(Cell, cells)))
