@@ -19,6 +19,7 @@ EXAMPLES = {
     "lettering": 3,
     "mill_pocket": 3,
     "deburr_bracket": 3,
+    "tune_gains": 3,
 }
 OF_THE_EXTRA = {"six_joints", "mill_pocket", "deburr_bracket"}
 ALONG_FILES = {"lettering", "mill_pocket", "deburr_bracket"}
@@ -28,6 +29,8 @@ ALONG_FILES = {"lettering", "mill_pocket", "deburr_bracket"}
 def test_example(name, tmp_path):
     if name in OF_THE_EXTRA:
         pytest.importorskip("example_robot_data")
+    if name == "tune_gains":
+        pytest.importorskip("pymoo")
     script = ROOT / "examples" / f"{name}.py"
     done = subprocess.run([sys.executable, script, tmp_path], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
@@ -38,6 +41,12 @@ def test_example(name, tmp_path):
         ended, distance = re.search(r", (\w+) after .*: (\d+) µm", done.stdout, re.DOTALL).groups()
         assert ended == "finished"
         assert 0 < int(distance) < 500  # friction and payload that the law does not know leave some 0.1 to 0.4 mm
+    if name == "tune_gains":
+        rows = re.findall(r"^(paper|tuned) +(\d) kg +([\d.]+) +([\d.]+) +([\d.]+)$", done.stdout, re.MULTILINE)
+        error = {(who, load): float(e) for who, load, e, _, _ in rows}
+        share = {(who, load): float(s) for who, load, _, s, _ in rows}
+        assert error["tuned", "1"] < error["paper", "1"]
+        assert max(share["tuned", "0"], share["tuned", "1"]) <= 1.0 < share["paper", "1"]
 
 
 def test_every_example_is_tested():

@@ -57,7 +57,9 @@ def readable_parameters(parameters: Mapping[str, Any], digits: int = 4) -> str:
     """Parameters in as many digits, by name; of dotted keys by the last part, where that tells them apart."""
     last = [name.rpartition(".")[2] for name in parameters]
     names = last if len(set(last)) == len(last) else list(parameters)
-    return ", ".join(f"{name} = {_value(value, digits)}" for name, value in zip(names, parameters.values(), strict=True))
+    return ", ".join(
+        f"{name} = {_value(value, digits)}" for name, value in zip(names, parameters.values(), strict=True)
+    )
 
 
 def _value(value: Any, digits: int) -> str:

@@ -56,7 +56,7 @@ def _limits(tuning: Tuning, objective: str) -> list[str]:
         change = found.bought / best.metrics[objective] - 1 if best.metrics[objective] else 0.0
         gain = f"changes it by {100 * change:+.1f} % at least" if change else "was not found to change it"
         value = f"{_label(name)} {_number(name, found.value)}, limit {_ends(tuning, name)}"
-        lines.append(f"  {value}: {100 * found.share:.0f} % used; 10 % more {gain}")
+        lines.append(f"  {value}: {100 * found.share:.0f} % used; 10 % looser {gain}")
     return lines
 
 
