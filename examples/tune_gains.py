@@ -1,8 +1,10 @@
-"""Gains of the extended motion plan, tuned for the paper's arm, with what it carries unknown, within what its motors can do.
+"""Gains of the extended motion plan for the paper's arm with a load of 0 or 1 kg, within what its motors can do.
 
 The paper's gains ask for far more torque than there is at the start, and amplify noise of the encoders. Here the
 contour error of the worst load is made as small as it gets if the law never asks for more than the motors give, its
-torque is no noisier than with the paper's gains, and the arm is hardly late. Needs the extra "tune". Usage: python examples/tune_gains.py [folder]
+torque is no noisier than with the paper's gains, and the arm is hardly late.
+
+Needs the extra "tune". Usage: python examples/tune_gains.py [folder]
 """
 
 import sys

@@ -177,4 +177,4 @@ def test_ctrl_c_leaves_no_half_written_file(tmp_path):
 
 def test_the_console_script_is_the_same_command():
     assert main.name == "main"
-    assert set(main.commands) == {"reproduce", "run", "sweep", "view", "report", "check", "toolpath"}
+    assert set(main.commands) == {"reproduce", "run", "sweep", "tune", "view", "report", "check", "toolpath"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -92,21 +93,22 @@ def test_a_report_may_not_overwrite_a_history(kept):
     assert "is the run itself, which would be lost" in result.stderr
 
 
-def test_the_sweep_of_the_template_is_one(tmp_path):
+def test_the_sweep_and_the_tuning_of_the_template_are_some(tmp_path):
+    pytest.importorskip("pymoo")
     from pathcontrol.experiments.sweep_runner import run_sweep
     from pathcontrol.experiments.template import example_text
+    from pathcontrol.experiments.tune_runner import run_tune
 
-    text = example_text()
-    head, marker, sweep = text.partition("#[sweep]\n")
+    head, marker, last = example_text().partition("#[sweep]\n")
     assert marker
-    on = marker + sweep
-    text = head + "\n".join(line.removeprefix("#") for line in on.splitlines())
-    text = text.replace("samples = 1024", "samples = 4").replace("duration = 10.0", "duration = 0.05")
-    text = text.replace(
-        '#payload = { mass = 0.5, frame = "tool" }    # carried', 'payload = { mass = 0.5, frame = "tool" } #'
-    )
+    text = head + re.sub(r"(?m)^#(?=\S)", "", marker + last).replace("1024", "4").replace("= 25", "= 1")
+    text = text.replace('#payload = { mass = 0.5, frame = "tool" }  ', 'payload = { mass = 0.5, frame = "tool" }  ')
     file = tmp_path / "mine.toml"
-    file.write_text(text, encoding="utf-8")
+    file.write_text(text.replace("duration = 10.0", "duration = 0.05"), encoding="utf-8")
     result = run_sweep(file, tmp_path / "out", progress=False)
     assert set(result.definition["space"]["parameters"]) >= {"controller.K_p", "start.q[0]", "plant.payload.mass"}
     assert result.finished == 4
+    found = run_tune(file, tmp_path / "tuned", progress=False)
+    assert set(found.limits) == {"tau_demand_ratio", "speed_ratio"}
+    assert found.scenarios == 2
+    assert found.table().sizes["sample"] == 40

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from pathcontrol.cli import check, report, reproduce, run, sweep, toolpath, view
+from pathcontrol.cli import check, report, reproduce, run, sweep, toolpath, tune, view
 from pathcontrol.cli.group import Group
 
 
@@ -14,5 +14,5 @@ def main() -> None:
     """Path control of robot arms: tasks as a path and a velocity profile, not as a schedule."""
 
 
-for _part in (reproduce, run, sweep, view, report, check, toolpath):
+for _part in (reproduce, run, sweep, tune, view, report, check, toolpath):
     main.add_command(_part.command)

@@ -14,13 +14,20 @@ if TYPE_CHECKING:
     from pathcontrol.sweeps.result import SweepResult
 
 
-@click.command("sweep")
-@click.argument("file", type=click.Path(exists=False, path_type=Path))
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Default: results/ and the file's name.")
-@click.option("--resume", is_flag=True, help="Go on with the sweep in the folder, if there is one.")
-@click.option(
+out_option = click.option(
+    "--out", type=click.Path(file_okay=False, path_type=Path), help="Default: results/ and the file's name."
+)
+resume_option = click.option("--resume", is_flag=True, help="Go on with what is in the folder, if there is something.")
+chunk_option = click.option(
     "--chunk", type=click.IntRange(1), default=500, show_default=True, help="Samples that are simulated together."
 )
+
+
+@click.command("sweep")
+@click.argument("file", type=click.Path(exists=False, path_type=Path))
+@out_option
+@resume_option
+@chunk_option
 @click.option("--cluster", metavar="ADDRESS", help="Of a Dask scheduler, as tcp://host:8786, or its scheduler file.")
 @json_option
 def command(file: Path, out: Path | None, resume: bool, chunk: int, cluster: str | None, as_json: bool) -> None:

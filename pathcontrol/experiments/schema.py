@@ -14,6 +14,7 @@ from pathcontrol.experiments.controller_sections import Law, Loop, SampledSectio
 from pathcontrol.experiments.section import Section
 from pathcontrol.experiments.sweep_section import SweepSection
 from pathcontrol.experiments.task_sections import Task
+from pathcontrol.experiments.tune_section import TuneSection
 from pathcontrol.experiments.values import Numbers, Positive, Whole, expected
 
 
@@ -76,6 +77,7 @@ class Experiment(Section):
             ``start``, the Stribeck velocity and ``friction_width``. All else is in SI units, as gains are, or
             taken as it is, as ``task.parameters`` are.
         sweep: keys that vary, for :func:`run_sweep`; an experiment by itself does without.
+        tune: keys that are searched, for :func:`run_tune`; likewise.
     """
 
     angle_unit: Literal["rad", "deg"] = "rad"
@@ -89,6 +91,7 @@ class Experiment(Section):
     loop: Loop = SampledSection()
     output: Output = Output()
     sweep: SweepSection | None = None
+    tune: TuneSection | None = None
 
     @property
     def to_radians(self) -> Callable[[float], float]:

@@ -53,7 +53,7 @@ def run_sweep(
         try:
             if section is None:
                 raise ExperimentError("sweep: missing; add a section [sweep] with its parameters")
-            data = _without(read_toml(path), "sweep", "output")
+            data = of_samples(read_toml(path))
             build = SweptExperiment(data, Path(path).parent.absolute(), section.parameters)
             space = space_of(section)
             with keyed("sweep"):
@@ -72,7 +72,7 @@ def space_of(section: SweepSection) -> Space:
     Raises:
         ExperimentError: the parameters do not fit the method.
     """
-    parameters = {key: _values(key, given) for key, given in section.parameters.items()}
+    parameters = {key: values_of(f"sweep.parameters.{key}", given) for key, given in section.parameters.items()}
     if (section.method == "grid") != (section.samples is None):
         said = "is as large as its grids; leave samples out" if section.method == "grid" else "needs samples = …"
         raise ExperimentError(f"sweep.samples: method = {section.method!r} {said}")
@@ -80,28 +80,29 @@ def space_of(section: SweepSection) -> Space:
         return Space(parameters, section.method, section.samples)
 
 
-def _values(key: str, given: dict[str, list[Any]]) -> Any:
-    """The values of a grid, or the frozen distribution."""
+def values_of(key: str, given: dict[str, list[Any]]) -> Any:
+    """The values of a grid, or the frozen distribution; errors tell the ``key``."""
     from scipy import stats
 
     [(kind, values)] = given.items()
     if kind == "grid":
         return values
-    with keyed(f"sweep.parameters.{key}"):
+    with keyed(key):
         try:
             a, b = (np.asarray(value, dtype=np.float64) for value in values)
             a, b = np.broadcast_arrays(a, b)
         except (TypeError, ValueError) as error:
-            raise ExperimentError(f"sweep.parameters.{key}: {kind} = {values}, expected numbers or lists") from error
+            raise ExperimentError(f"{key}: {kind} = {values}, expected numbers or lists") from error
         least = {"uniform": a < b, "log_uniform": (a > 0) & (a < b), "normal": b > 0}[kind]
         if not least.all() or not np.isfinite([a, b]).all():
             wanted = {"uniform": "a < b", "log_uniform": "0 < a < b", "normal": "a deviation greater than 0"}[kind]
-            raise ExperimentError(f"sweep.parameters.{key}: {kind} = {values}, expected {wanted}")
+            raise ExperimentError(f"{key}: {kind} = {values}, expected {wanted}")
     a, b = a[()], b[()]
     if kind == "uniform":
         return stats.uniform(a, b - a)
     return stats.norm(a, b) if kind == "normal" else stats.loguniform(a, b)
 
 
-def _without(data: dict[str, Any], *names: str) -> dict[str, Any]:
-    return {name: value for name, value in data.items() if name not in names}
+def of_samples(data: dict[str, Any]) -> dict[str, Any]:
+    """What a file says of each sample."""
+    return {name: value for name, value in data.items() if name not in ("sweep", "tune", "output")}

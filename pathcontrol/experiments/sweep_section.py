@@ -55,6 +55,10 @@ def _checked(key: str, value: dict[str, Any]) -> dict[str, list[Any]]:
     return value
 
 
+#: by dotted key
+Varied = Annotated[dict[str, dict[str, list[Any]]], PlainValidator(_parameters)]
+
+
 class SweepSection(Section):
     """``[sweep]``: values of other keys of the file, in the units of the file.
 
@@ -68,7 +72,7 @@ class SweepSection(Section):
         keep: the rollouts whose history is kept; default none.
     """
 
-    parameters: Annotated[dict[str, dict[str, list[Any]]], PlainValidator(_parameters)]
+    parameters: Varied
     method: Literal["grid", "random", "lhs", "sobol"] = "grid"
     samples: Whole | None = None
     seed: Whole = 0

@@ -45,13 +45,21 @@ class SweptExperiment:
     an end, and samples of different durations.
 
     Args:
-        data: what the file says, without ``[sweep]`` and ``[output]``.
+        data: what the file says, without ``[sweep]``, ``[tune]`` and ``[output]``.
         base_dir: the folder that the paths in it are relative to.
         varied: what the samples may have instead, in which files may be named too.
+        section: the one that says what varies, for messages.
     """
 
-    def __init__(self, data: dict[str, Any], base_dir: Path, varied: Mapping[str, Any] = MappingProxyType({})) -> None:
+    def __init__(
+        self,
+        data: dict[str, Any],
+        base_dir: Path,
+        varied: Mapping[str, Any] = MappingProxyType({}),
+        section: str = "sweep",
+    ) -> None:
         self._data, self._base_dir, self._varied = data, base_dir, dict(varied)
+        self._where = f"{section}.parameters"
         self._built: dict[str, tuple[Setup, RobotModel, RobotModel]] = {}
 
     def describe(self) -> dict[str, Any]:
@@ -77,7 +85,7 @@ class SweptExperiment:
         """
         count = len(next(iter(design.values())))
         for i in range(count):
-            _check_gains(self._experiment(design, i, i), i)
+            _check_gains(self._experiment(design, i, i), i, self._where)
         self({name: values[:1] for name, values in design.items()}, np.zeros(1, dtype=np.int64))
 
     def __call__(
@@ -117,12 +125,12 @@ class SweptExperiment:
         values = {name: column[row].tolist() for name, column in parameters.items()}
         data = deepcopy(self._data)
         for name, value in values.items():
-            put(data, name, value)
+            put(data, name, value, self._where)
         try:
             return Experiment.model_validate(data)
         except ValidationError as error:
             told = "; ".join(map(finding, error.errors(include_url=False)))
-            raise ExperimentError(f"sweep.parameters: in sample {sample}: {told}") from None
+            raise ExperimentError(f"{self._where}: in sample {sample}: {told}") from None
 
     def _of_group(self, key: str, experiment: Experiment) -> tuple[Setup, RobotModel, RobotModel]:
         if key not in self._built:
@@ -138,7 +146,7 @@ def _unpacked(data: dict[str, Any], inside: Path, folder: Path) -> SweptExperime
     return SweptExperiment(data, folder / inside)
 
 
-def put(data: dict[str, Any], key: str, value: Any) -> None:
+def put(data: dict[str, Any], key: str, value: Any, where: str = "sweep.parameters") -> None:
     """Set the value of a dotted ``key``, in which ``[i]`` is the entry i of a list, in ``data``.
 
     Raises:
@@ -150,9 +158,9 @@ def put(data: dict[str, Any], key: str, value: Any) -> None:
         if isinstance(step, str) and isinstance(inside, dict) and isinstance(after, str):
             inside = inside.setdefault(step, {})
         else:
-            inside = _entry(inside, step, key)
+            inside = _entry(inside, step, f"{where}: {key}")
     if not isinstance(inside, dict):
-        _entry(inside, steps[-1], key)
+        _entry(inside, steps[-1], f"{where}: {key}")
     inside[steps[-1]] = value
 
 
@@ -161,17 +169,16 @@ def _entry(inside: Any, step: str | int, key: str) -> Any:
         return inside[step]
     except (KeyError, IndexError, TypeError) as error:
         raise ExperimentError(
-            f"sweep.parameters: the file has no entry {step!r} on the way to {key!r}; give a value for it, or vary "
-            "the whole list"
+            f"{key}: the file has no entry {step!r} on the way there; give a value for it, or vary the whole list"
         ) from error
 
 
-def _check_gains(experiment: Experiment, sample: int) -> None:
+def _check_gains(experiment: Experiment, sample: int, where: str) -> None:
     for name, value in experiment.controller.arguments(float).items():
         numbers = np.asarray(value if _GAIN.fullmatch(f"controller.{name}") else 1.0)
         if (numbers < 0).any() or (name != "k" and (numbers == 0).any()):
             raise ExperimentError(
-                f"sweep.parameters: controller.{name} = {shown(value)} in sample {sample}, expected gains greater "
+                f"{where}: controller.{name} = {shown(value)} in sample {sample}, expected gains greater "
                 "than 0; choose another distribution, such as log_uniform"
             )
 

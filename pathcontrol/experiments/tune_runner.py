@@ -1,0 +1,71 @@
+"""One call from an experiment file with a ``[tune]`` to what was found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from pathcontrol.errors import ExperimentError
+from pathcontrol.experiments.keyed import keyed
+from pathcontrol.experiments.load import invalid, load_experiment, read_toml
+from pathcontrol.experiments.sweep_runner import of_samples, values_of
+from pathcontrol.experiments.swept import SweptExperiment
+from pathcontrol.experiments.tune_section import TuneSection
+from pathcontrol.sweeps.space import Space
+from pathcontrol.tuning.result import Tuning
+from pathcontrol.tuning.tune import tune
+
+
+def run_tune(
+    path: str | Path, out: str | Path, *, chunk: int = 500, resume: bool = False, progress: bool = True
+) -> Tuning:
+    """Run the tuning of an experiment file; both ends of what is searched are checked before anything is computed.
+
+    Args:
+        path: the experiment file, with a section ``[tune]``; paths in it are relative to its folder.
+        out: the folder that notes every rollout, made if need be.
+        chunk: how many rollouts are simulated together at most.
+        resume: go on with the tuning in ``out``, if there is one.
+        progress: show a bar with the time left on standard error when it takes longer than two seconds.
+
+    Raises:
+        ExperimentError: the file is invalid.
+        InputError: ``out`` holds a sweep or a tuning and ``resume`` is not asked for, or it holds another one.
+        MissingExtraError: the extra ``tune`` or ``sweep`` is not installed.
+    """
+    section = load_experiment(path).tune
+    try:
+        if section is None:
+            raise ExperimentError("tune: missing; add a section [tune] with parameters and objectives")
+        varied = {"parameters": section.parameters, "scenarios": section.scenarios}
+        build = SweptExperiment(of_samples(read_toml(path)), Path(path).parent.absolute(), varied, "tune")
+        space = _space(section)
+        with keyed("tune"):
+            scenarios = None if section.scenarios is None else Space.given(section.scenarios)
+        _check(build, space, scenarios)
+    except ExperimentError as error:
+        raise invalid(path, [str(error)]) from error
+    options = section.arguments(float) | {"scenarios": scenarios, "out": out}
+    options = {name: value for name, value in options.items() if name != "parameters"}
+    return tune(build, space, chunk=chunk, resume=resume, progress=progress, **options)
+
+
+def _space(section: TuneSection) -> Space:
+    for key, given in section.parameters.items():
+        if "normal" in given:
+            raise ExperimentError(f"tune.parameters.{key}: normal has no ends to search between; give uniform = [a, b]")
+    values = {key: values_of(f"tune.parameters.{key}", given) for key, given in section.parameters.items()}
+    with keyed("tune.parameters"):
+        return Space.random(values, 1)
+
+
+def _check(build: SweptExperiment, space: Space, scenarios: Space | None) -> None:
+    """The least and the largest values, in every scenario, are valid experiments."""
+    design = {} if scenarios is None else scenarios.design()
+    count = 1 if scenarios is None else scenarios.samples
+    ends = space.at(np.repeat([[0.0], [1.0]], space.width, axis=1))
+    build.check(
+        {name: np.repeat(values, count, axis=0) for name, values in ends.items()}
+        | {name: np.concatenate([values] * 2) for name, values in design.items()}
+    )
