@@ -75,7 +75,7 @@ def measure_of(wanted: Sequence[str] | Measure | None) -> Measure:
 def _some(values: Mapping[str, ArrayLike], wanted: Sequence[str]) -> dict[str, ArrayLike]:
     missing = [name for name in wanted if name not in values]
     if missing:
-        raise UnknownNameError(f"metrics = {missing}: not defined for this task; leave it out")
+        raise UnknownNameError(f"metrics = {missing}: not defined for these runs; leave it out")
     return {name: values[name] for name in wanted}
 
 

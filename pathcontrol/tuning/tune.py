@@ -87,19 +87,18 @@ def tune(
     if both := set(design) & set(space.names):
         raise InputError(f"{', '.join(sorted(both))}: both searched and in the scenarios; call one of them otherwise")
     count = 1 if several is None else several.samples
-    store = None
-    if out is not None:
-        parameters = space.describe()["parameters"] | ({} if several is None else several.describe()["parameters"])
-        definition = {
-            "build": told(build),
-            "space": {"parameters": parameters},
-            "scenarios_sha256": digest(list(design.values())),
-            "metrics": told(wanted) if callable(wanted) else wanted,
-            "population": population,
-            "seed": seed,
-        }
-        definition |= terms.describe()
-        store = opened(Path(out), population * generations * count, json.loads(json.dumps(definition)), resume)
+    described = space.describe()["parameters"] | ({} if several is None else several.describe()["parameters"])
+    definition = terms.describe() | {
+        "build": told(build),
+        "space": {"parameters": described},
+        "scenarios_sha256": digest(list(design.values())),
+        "metrics": told(wanted) if callable(wanted) else wanted,
+        "population": population,
+        "generations": generations,
+        "seed": seed,
+    }
+    total = population * generations * count
+    store = None if out is None else opened(Path(out), total, json.loads(json.dumps(definition)), resume)
     known = {} if store is None else store.columns()
     cases = Cases(build, design, count, measure_of(wanted), chunk, store, known)
     tables: list[xr.Dataset] = []
