@@ -38,6 +38,8 @@ from pathcontrol.view.figures.words import legend, plain
 
 _FRONT: Look = {"color": ORANGE, "linewidth": 1.2, "zorder": 2.5}
 _BEYOND: Look = {"marker": "o", "linestyle": "none", "markersize": 2.2, "color": "#D5D5D5", "mew": 0, "zorder": 1.5}
+_KEPT: Look = {"marker": "o", "linestyle": "none", "markersize": 2.2, "color": BLUE, "alpha": 0.5, "mew": 0}
+_VECTORS = 5000  # points from which they are an image inside an SVG
 _DECADES = 30.0  # ratio of the largest to the smallest value from which a scale is logarithmic
 
 
@@ -138,14 +140,15 @@ def _draw_points(
     figure: Figure, axes: Axes, at: tuple[Array, Array], kept: Array, colour: tuple[str, xr.Dataset] | None
 ) -> None:
     right, up = at
-    axes.plot(right[~kept], up[~kept], **_BEYOND)
+    many: Look = {"rasterized": len(right) > _VECTORS}
+    axes.plot(right[~kept], up[~kept], **_BEYOND, **many)
     if colour is None:
-        axes.plot(right[kept], up[kept], marker="o", linestyle="none", markersize=2.2, color=BLUE, alpha=0.5, mew=0)
+        axes.plot(right[kept], up[kept], **_KEPT, **many)
         return
     name, table = colour
     shade = column_of_parameter(table, name)[kept]
     norm = LogNorm() if _wide(shade) else None
-    points = axes.scatter(right[kept], up[kept], c=shade, s=7, lw=0, cmap=error_colours(), norm=norm, zorder=2)
+    points = axes.scatter(right[kept], up[kept], c=shade, s=7, lw=0, cmap=error_colours(), norm=norm, zorder=2, **many)
     figure.colorbar(points, ax=axes, label=plain(name)).outline.set_visible(False)
 
 
