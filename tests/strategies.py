@@ -17,9 +17,12 @@ class Wobble(PathTask):
         self.cosines, self.sines = cosines, sines  # (harmonics, n)
 
     def _terms(self, s, cos, sin, order):
-        k = np.arange(1, len(self.cosines) + 1)
-        angle = k * np.asarray(s)[..., None]
-        return (k**order * cos(angle)) @ self.cosines + (k**order * sin(angle)) @ self.sines
+        # one term after the other: a matrix product would be rounded differently in another batch
+        terms = [np.zeros((*np.shape(s), self.cosines.shape[1]))]
+        for k, (a, b) in enumerate(zip(self.cosines, self.sines, strict=True), 1):
+            angle = k * np.asarray(s)[..., None]
+            terms.append(k**order * (cos(angle) * a + sin(angle) * b))
+        return sum(terms)
 
     def q_d(self, s):
         return self._terms(s, np.cos, np.sin, 0)

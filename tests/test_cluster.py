@@ -75,8 +75,11 @@ def workers():
         yield started
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def address(workers):
+    until = time.monotonic() + 60
+    while len(workers.scheduler.workers) < 2 and time.monotonic() < until:
+        time.sleep(0.05)  # one that was killed before is on its way
     return workers.scheduler_address
 
 
