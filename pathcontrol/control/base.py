@@ -166,8 +166,8 @@ class Controller(ABC):
 
 def _phi(x: Array) -> tuple[Array, Array]:
     """φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x, by their series where x is small."""
-    small = np.abs(x) < 1e-3
-    if not np.count_nonzero(small):
+    small = abs(x) < 1e-3
+    if not (small.any() if x.ndim else small):
         phi_1 = np.expm1(x) / x
         return phi_1, (phi_1 - 1) / x
     safe = np.where(small, 1.0, x)

@@ -50,28 +50,37 @@ class Plant:
 
     def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
         """(q, q̇) one step later under the constant torque ``tau``; all (N, n)."""
-        drive = tau - self._damping * qd
-        middle_qd = self._push(q, qd, qd, drive, self._half)
+        drive, dry = tau - self._damping * qd, self._dry(qd)
+        middle_qd, turned = self._push(q, qd, qd, drive, dry, self._half)
+        if turned or self._steady is None:  # else it is what it was
+            dry = self._dry(middle_qd)
         middle_q = q + self._quarter * (qd + middle_qd)
-        next_qd = self._push(middle_q, middle_qd, qd, drive, self._whole)
+        next_qd, _ = self._push(middle_q, middle_qd, qd, drive, dry, self._whole)
         return q + self._half * (qd + next_qd), next_qd
 
-    def _push(self, q: Array, qd: Array, start: Array, drive: Array, duration: Array) -> Array:
-        """P(start + duration a(q, q̇)): dry friction keeps the direction of q̇, unless that proves wrong."""
+    def _dry(self, qd: Array) -> tuple[Array, Array, Array]:
+        """Dry friction of forward and of backward motion, and in the direction of q̇, or any where that is 0."""
         forward, backward = self._steady or self._levels_at(qd)
-        friction = np.where(qd > _ZERO, forward, backward)  # whatever a joint at rest gets, it is taken back below
+        return forward, backward, np.where(qd > _ZERO, forward, backward)
+
+    def _push(
+        self, q: Array, qd: Array, start: Array, drive: Array, dry: tuple[Array, Array, Array], duration: Array
+    ) -> tuple[Array, bool]:
+        """P(start + duration a(q, q̇)), and whether a joint turned or stuck: else dry friction keeps its direction."""
+        forward, backward, friction = dry
         forward_dynamics = self._of_one if len(q) == 1 else self._inertia.forward_dynamics
         v = start + duration * forward_dynamics(q, qd, drive - friction)
         turned = v * qd <= _ZERO
         if not np.count_nonzero(turned):
-            return v
+            return v, False
         # a diverged arm must not be taken for one that sticks
         turned &= np.isfinite(v) & (forward > backward)
         if not np.count_nonzero(turned):
-            return v
+            return v, True
         rows = _ONLY if len(v) == 1 else np.flatnonzero(turned.any(-1))
+        # whatever friction a joint at rest got, it is taken back here
         M, impulse = self._mass_matrix(q[rows], rows), duration * friction[rows]
         momentum = np.einsum("kij,kj->ki", M, v[rows]) + impulse
         low, high = (duration * (level if len(level) == 1 else level[rows]) for level in (backward, forward))
         v[rows] = stick_slip(M, momentum, low, high, guess=np.where(turned[rows], _ZERO, qd[rows]))
-        return v
+        return v, True
