@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from benchmarks.cases import Case
 from benchmarks.contest import Contender
-from benchmarks.plain_loop import plain_run
+from benchmarks.plain_loop import PlainLaw, plain_run
 from pathcontrol import simulate
 
 
@@ -64,20 +64,26 @@ def pinocchio_alone(case: Case, rollouts: int, ticks: int, threads: int = 1) -> 
     return Contender(run, rollouts, ticks)
 
 
-def control_tick(case: Case, repeats: int = 5000) -> tuple[float, float]:
-    """Median time [µs] of one law and step of its state, as on hardware, and of one raw RNEA, called in turn."""
+def control_tick(case: Case, repeats: int = 5000) -> tuple[float, float, float]:
+    """Median time [µs] of one law and step of its state, as on hardware, of the plain one, and of one raw RNEA."""
     law, period = case.law(), case.loop.period
     q, qd = case.start, np.zeros(case.robot.n)
     z = law.start(q, qd)
-    model, data = case.robot.pinocchio_model, case.robot.pinocchio_model.createData()
+    model, data, plain_law = case.robot.pinocchio_model, case.robot.pinocchio_model.createData(), PlainLaw(case)
 
     def tick() -> None:
         nonlocal z
         z = law.advance(z, law.law(0.0, q, qd, z), period)
 
-    times = np.array([(_time(tick), _time(lambda: pin.rnea(model, data, q, qd, qd))) for _ in range(repeats)])
-    tick_time, rnea_time = 1e6 * np.median(times, axis=0)
-    return float(tick_time), float(rnea_time)
+    def plain_tick() -> None:
+        plain_law(float(z[0]), q, qd)
+
+    def rnea() -> None:
+        pin.rnea(model, data, q, qd, qd)
+
+    times = np.array([[_time(function) for function in (tick, plain_tick, rnea)] for _ in range(repeats)])
+    ours_time, plain_time, rnea_time = 1e6 * np.median(times, axis=0)
+    return float(ours_time), float(plain_time), float(rnea_time)
 
 
 def _time(function: Callable[[], object]) -> float:

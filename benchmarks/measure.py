@@ -49,8 +49,9 @@ def measure() -> Results:
     ratios |= {
         f"seven_joints_{name}": value for name, value in (others | joined).items() if name != "batch1000_1thread"
     }
-    tick, rnea = control_tick(paper())
+    tick, plainly, rnea = control_tick(paper())
     ratios |= {"control_tick_us": tick, "rnea_us": rnea, "control_tick_over_rnea": tick / rnea}
+    ratios["plain_tick_over_rnea"] = plainly / rnea
     return Results(ratios, [*rows, *more], _growth(paper()))
 
 
