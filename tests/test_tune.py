@@ -15,6 +15,7 @@ import pathcontrol as pc
 from pathcontrol.errors import InputError, MissingExtraError, UnknownNameError
 from pathcontrol.sweeps.goals import excess
 from pathcontrol.tuning.terms import Terms
+from pathcontrol.view.figures.style import INK
 
 pytest.importorskip("pymoo")
 
@@ -282,3 +283,10 @@ def test_the_figure_of_a_tuning_is_that_of_its_objective_and_its_limit():
     [stairs] = [line for line in axes.lines if line.get_drawstyle() == "steps-post"]
     np.testing.assert_array_equal(np.sort(stairs.get_ydata()), np.sort(found.trade("tau_noise")["tau_noise"]))
     assert any(np.array_equal(line.get_ydata(), [2.0, 2.0]) for line in axes.lines)
+
+
+def test_the_figure_of_a_tuning_marks_its_best_candidate():
+    found = quick(limits={"tau_noise": 10.0})
+    lines = pc.pareto_figure(found).axes[0].lines
+    [mark] = [line for line in lines if line.get_marker() == "o" and line.get_markerfacecolor() == INK]
+    assert list(mark.get_ydata()) == [found.best().metrics["tau_noise"]]

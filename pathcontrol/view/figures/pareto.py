@@ -65,7 +65,7 @@ def pareto_figure(
     """Two metrics of all samples and the Pareto front of these two as a staircase; degrees for radians.
 
     Samples beyond a limit of another metric are grey and never on the front; limits of the two themselves are lines,
-    beyond which the front goes on, as that is what it costs to keep them.
+    beyond which the front goes on, as that is what it costs to keep them. Of a tuning its best candidate is marked too.
 
     Args:
         sweep: a sweep, a tuning, or the table of one.
@@ -89,8 +89,10 @@ def pareto_figure(
     rows = np.searchsorted(table["sample"], best["sample"])
     if not len(rows):
         raise InputError(f"no sample has {names[0]} and {names[1]} and keeps the limits; there is no front to be drawn")
-    marked = _spread([_scaled(values)[rows] for values in (right, up)], labelled)
+    chosen = _best(sweep, choice.x, best) if labelled else []
+    marked = sorted({*_spread([_scaled(values)[rows] for values in (right, up)], labelled), *chosen})
     words = [f"{letter}  {_told(best, i)}" for letter, i in zip(ascii_uppercase, marked, strict=False)]
+    words = [line + ", best" * (i in chosen) for line, i in zip(words, marked, strict=False)]
     with style():
         figure = new_figure(COLUMN, 2.7 + 0.14 * len(words))
         axes = dressed(figure.add_subplot())
@@ -101,7 +103,7 @@ def pareto_figure(
         axes.plot(right[rows], up[rows], drawstyle="steps-post", marker="o", markersize=2.6, **_FRONT)
         _draw_limits(axes, table, choice)
         for letter, i in zip(ascii_uppercase, marked, strict=False):
-            _mark(axes, letter, (right[rows[i]], up[rows[i]]), choice)
+            _mark(axes, letter, (right[rows[i]], up[rows[i]]), choice, INK if i in chosen else "white")
         axes.set(xlabel=label(choice.x, x_unit), ylabel=label(choice.y, y_unit))
         figure.supxlabel("\n".join(plain(line, 1.1 * COLUMN) for line in words), fontsize=SMALL, ha="left", x=0.02)
         legend(figure, _entries(choice, bool((~kept & np.isfinite(right * up)).any()), colour is None))
@@ -159,9 +161,15 @@ def _draw_limits(axes: Axes, table: xr.Dataset, choice: _Choice) -> None:
                 draw(end * readable_factor(table, name)[0], **LIMIT_LOOK)
 
 
-def _mark(axes: Axes, letter: str, at: tuple[float, float], choice: _Choice) -> None:
+def _best(sweep: Any, objective: str, front: xr.Dataset) -> list[int]:
+    """The row of a front that is the best candidate of a tuning, if it is one of them."""
+    best = sweep.best(objective) if isinstance(sweep, Tuning) and objective in sweep.objectives else None
+    return [] if best is None else np.flatnonzero(front["sample"].to_numpy() == best.number).tolist()
+
+
+def _mark(axes: Axes, letter: str, at: tuple[float, float], choice: _Choice, fill: str) -> None:
     """A letter beside a point of the front, on the side where no sample is."""
-    axes.plot(*at, marker="o", markersize=4.5, markerfacecolor="white", color=INK, zorder=3)
+    axes.plot(*at, marker="o", markersize=4.5, markerfacecolor=fill, color=INK, zorder=3)
     sides = {"min": -5.5, "max": 5.5}
     away = (sides[choice.goals.get(choice.x, "min")], sides[choice.goals.get(choice.y, "min")])
     axes.annotate(
