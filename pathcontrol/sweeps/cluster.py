@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import socket
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -60,18 +62,37 @@ def _address(cluster: Any) -> Any:
 
 def _client(address: Any) -> Client:
     from distributed import Client
-    from distributed.comm.addressing import parse_address, parse_host_port
 
     try:
-        if isinstance(address, str):  # a client that cannot connect takes long, and long again to be closed
-            host = parse_host_port(parse_address(address)[1])
-            socket.create_connection(host, timeout=_PATIENCE).close()
+        if isinstance(address, str):  # a client that cannot connect takes long, or waits forever for what says nothing
+            _check_scheduler(address)
         return Client(address, timeout=_PATIENCE, set_as_default=False)
     except Exception as error:  # what answers may be anything
         raise ClusterError(
-            f"cluster = {address!r}: no Dask scheduler answers ({error}); start one with `dask scheduler`, and give "
-            "its address, as tcp://host:8786, or its scheduler file"
+            f"cluster = {address!r}: no Dask scheduler answers ({str(error) or 'it says nothing'}); start one with "
+            "`dask scheduler`, and give its address, as tcp://host:8786, or its scheduler file"
         ) from error
+
+
+def _check_scheduler(address: str) -> None:
+    """Whoever is at the address says that it is a scheduler.
+
+    Raises:
+        Exception: of any kind, for instance as nobody is there.
+    """
+    from distributed.comm.addressing import parse_address, parse_host_port
+    from distributed.core import rpc
+    from distributed.security import Security
+
+    async def asked() -> str:
+        async with rpc(address, timeout=_PATIENCE, connection_args=Security().get_connection_args("client")) as there:
+            return (await asyncio.wait_for(there.identity(), _PATIENCE))["type"]
+
+    socket.create_connection(parse_host_port(parse_address(address)[1]), timeout=_PATIENCE).close()  # refused at once
+    with ThreadPoolExecutor(1) as thread:  # as this one may be in a loop of its own, such as that of a notebook
+        kind = thread.submit(lambda: asyncio.run(asked())).result()
+    if kind != "Scheduler":
+        raise OSError(f"it is a {kind}")
 
 
 def _check_workers(client: Client) -> None:
