@@ -392,19 +392,22 @@ def test_a_parcel_needs_nothing_of_where_it_comes_from(experiment, tmp_path):
 
 def test_whole_paths_are_found_too(experiment, tmp_path):
     text = experiment.read_text().replace("../robots/arm.urdf", str(tmp_path / "home/robots/arm.urdf"))
+    text = text.replace('"even_more.txt"', f'"{experiment.parent}/even_more.txt"')
     experiment.write_text(text.replace('"mine.py', f'"{experiment.parent}/mine.py'))
     build = swept_experiment(experiment)
     luggage = build.luggage()
     assert luggage.home == tmp_path / "home"
     assert {"experiments/mine.py", "experiments/tables/numbers.csv", "robots/arm.urdf"} < set(luggage.files)
-    assert set(build.describe()["files_sha256"]) >= {f"{experiment.parent}/mine.py:Mine", "even_more.txt"}
+    assert set(build.describe()["files_sha256"]) >= {f"{experiment.parent}/mine.py:Mine", "more.txt"}
     copy = tmp_path / "copy"
     for place, inside in luggage.files.items():
         (copy / place).parent.mkdir(parents=True, exist_ok=True)
         (copy / place).write_bytes(inside)
     shutil.move(tmp_path / "home", tmp_path / "away")
     unpacked = luggage.unpack(copy)
-    [(_, arguments)] = unpacked({"controller.k_p": np.array([500.0])}, np.array([0]))
+    varied = {"controller.k_p": [500.0], "task.parameters.table": [f"{experiment.parent}/even_more.txt"]}
+    [(_, arguments)] = unpacked({name: np.array(values) for name, values in varied.items()}, np.array([0]))
+    assert arguments["controller"].task.radius == 1.2
     assert arguments["controller"].robot.source.base_dir == copy / "robots"
 
 
@@ -436,6 +439,30 @@ def test_where_nobody_answers_nothing_is_begun(wrong, message, tmp_path):
         swept(tmp_path / "out", cluster=wrong.format(port=free_port()))
     assert time.monotonic() - began < 3
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("says", [b"", b"SSH-2.0-OpenSSH_9.6\r\n"], ids=["nothing", "something else"])
+def test_what_is_no_scheduler_is_told(says, tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster_module, "_PATIENCE", 0.5)
+    there = []
+
+    def listen(listener):
+        while True:
+            there.append(listener.accept()[0])
+            there[-1].sendall(says)
+
+    listener = socket.create_server(("127.0.0.1", 0))
+    threading.Thread(target=listen, args=[listener], daemon=True).start()
+    began = time.monotonic()
+    with pytest.raises(ClusterError, match=r"no Dask scheduler answers .*start one with `dask scheduler`"):
+        swept(tmp_path / "out", cluster=f"tcp://127.0.0.1:{listener.getsockname()[1]}")
+    assert time.monotonic() - began < 5
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_worker_is_no_scheduler(address, workers, tmp_path):
+    with pytest.raises(ClusterError, match=r"no Dask scheduler answers \(it is a Worker\)"):
+        swept(tmp_path / "out", cluster=next(iter(workers.scheduler.workers)))
 
 
 def test_the_command_tells_what_is_wrong_with_the_cluster(experiment):

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from functools import partial
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -33,7 +33,8 @@ from pathcontrol.sweeps.luggage import Luggage
 
 _GAIN = re.compile(r"controller\.(K_p|K_v|k|k_p|Lambda|K_d)(\[\d+\])?")
 _TOGETHER = re.compile(r"(start|plant|task)\.")  # what may differ from rollout to rollout of a batch, as gains may
-_STEP = re.compile(r"([^\[\]]+)|\[(\d+)\]")
+_KEY = re.compile(r"[^\[\].]+(\[\d+\])*(\.[^\[\].]+(\[\d+\])*)*")
+_STEP = re.compile(r"([^\[\].]+)|\[(\d+)\]")
 _REMEMBERED = 16  # groups whose task and arm are kept from chunk to chunk
 
 
@@ -49,6 +50,7 @@ class SweptExperiment:
         base_dir: the folder that the paths in it are relative to.
         varied: what the samples may have instead, in which files may be named too.
         section: the one that says what varies, for messages.
+        moved: where files are, relative to ``base_dir``, that samples name by whole paths which are not here.
     """
 
     def __init__(
@@ -57,8 +59,9 @@ class SweptExperiment:
         base_dir: Path,
         varied: Mapping[str, Any] = MappingProxyType({}),
         section: str = "sweep",
+        moved: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        self._data, self._base_dir, self._varied = data, base_dir, dict(varied)
+        self._data, self._base_dir, self._varied, self._moved = data, base_dir, dict(varied), dict(moved)
         self._where = f"{section}.parameters"
         self._built: dict[str, tuple[Setup, RobotModel, RobotModel]] = {}
 
@@ -72,17 +75,19 @@ class SweptExperiment:
         base, *paths = (Path(os.path.abspath(path)) for path in (self._base_dir, *dict(self._files()).values()))
         home = Path(os.path.commonpath([base, *paths]))
         files = {str(path.relative_to(home)): path.read_bytes() for path in paths}
-        return Luggage(home, files, partial(_unpacked, relative(self._data, base), base.relative_to(home)))
+        moved = {name: relative(name, base) for name, _ in self._files() if os.path.isabs(name)}
+        return Luggage(home, files, partial(_unpacked, relative(self._data, base), moved, base.relative_to(home)))
 
     def _files(self) -> Iterator[tuple[str, Path]]:
         return named_files([self._data, self._varied], self._base_dir)
 
     def check(self, design: Mapping[str, Array]) -> None:
-        """Every sample is a valid experiment with gains greater than 0, and the first one can be built.
+        """No key is a part of another, every sample is valid with gains greater than 0, and the first can be built.
 
         Raises:
             ExperimentError: one is not.
         """
+        _check_keys(list(design), self._where)
         count = len(next(iter(design.values())))
         for i in range(count):
             _check_gains(self._experiment(design, i, i), i, self._where)
@@ -125,7 +130,7 @@ class SweptExperiment:
         values = {name: column[row].tolist() for name, column in parameters.items()}
         data = deepcopy(self._data)
         for name, value in values.items():
-            put(data, name, value, self._where)
+            put(data, name, self._moved.get(value, value) if isinstance(value, str) else value, self._where)
         try:
             return Experiment.model_validate(data)
         except ValidationError as error:
@@ -142,8 +147,8 @@ class SweptExperiment:
         return self._built[key]
 
 
-def _unpacked(data: dict[str, Any], inside: Path, folder: Path) -> SweptExperiment:
-    return SweptExperiment(data, folder / inside)
+def _unpacked(data: dict[str, Any], moved: Mapping[str, str], inside: Path, folder: Path) -> SweptExperiment:
+    return SweptExperiment(data, folder / inside, moved=moved)
 
 
 def put(data: dict[str, Any], key: str, value: Any, where: str = "sweep.parameters") -> None:
@@ -152,7 +157,7 @@ def put(data: dict[str, Any], key: str, value: Any, where: str = "sweep.paramete
     Raises:
         ExperimentError: there is no such table or entry.
     """
-    steps = [name or int(index) for part in key.split(".") for name, index in _STEP.findall(part)]
+    steps = _steps(key, where)
     inside: Any = data
     for step, after in pairwise(steps):
         if isinstance(step, str) and isinstance(inside, dict) and isinstance(after, str):
@@ -162,6 +167,21 @@ def put(data: dict[str, Any], key: str, value: Any, where: str = "sweep.paramete
     if not isinstance(inside, dict):
         _entry(inside, steps[-1], f"{where}: {key}")
     inside[steps[-1]] = value
+
+
+def _steps(key: str, where: str) -> list[str | int]:
+    if not _KEY.fullmatch(key):
+        raise ExperimentError(f"{where}: {key!r}, expected a key of this file, such as 'controller.k' or 'start.q[0]'")
+    return [name or int(index) for name, index in _STEP.findall(key)]
+
+
+def _check_keys(keys: list[str], where: str) -> None:
+    for one, other in combinations(sorted(keys, key=lambda key: len(_steps(key, where))), 2):
+        outer = _steps(one, where)
+        if _steps(other, where)[: len(outer)] == outer:
+            raise ExperimentError(
+                f"{where}: {other!r} is a part of what {one!r} sets, so that one of them would not count; vary one only"
+            )
 
 
 def _entry(inside: Any, step: str | int, key: str) -> Any:
