@@ -291,6 +291,7 @@ def test_other_versions_are_noted(tmp_path):
         ({"space": {"k": [1]}}, InputError, "expected a Space, such as Space.grid"),
         ({"keep": 3}, InputError, "keep = 3, expected a Keep"),
         ({"keep": pc.Keep(worst=1, by="error")}, UnknownNameError, "keep.by = 'error', expected a metric"),
+        ({"keep": pc.Keep(worst=1, by="status")}, UnknownNameError, "keep.by = 'status', expected a metric: e_p_peak"),
         ({"metrics": ["error"]}, UnknownNameError, "expected a list of e_p_peak"),
         ({"metrics": lambda run: {"k": run.finish_time}}, InputError, "k: both a parameter and a metric"),
         ({"metrics": lambda run: {"one": 1.0}}, InputError, r"the metric one has shape \(\), expected \(14,\)"),
@@ -307,7 +308,18 @@ def test_bad_arguments_are_refused(change, error, message, tmp_path):
     arguments = {"build": circle, "space": SPACE} | change
     with pytest.raises(error, match=message):
         pc.sweep(out=tmp_path / "out", progress=False, **arguments)
-    assert not list(tmp_path.rglob("*.parquet"))
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_else_is_in_the_folder_stays(tmp_path):
+    (tmp_path / ".git").mkdir()
+    others = [tmp_path / ".gitignore", tmp_path / ".git/config", tmp_path / "runs.md"]
+    for file in others:
+        file.write_text("mine")
+    one = pc.Space.given({"K_p": [800.0], "k": [20.0], "q": [[0.7, 1.2]]})
+    for resume in (False, True):
+        pc.sweep(circle, one, tmp_path, resume=resume, progress=False)
+        assert [file.read_text() for file in others] == ["mine"] * 3
 
 
 def test_the_extra_is_named_where_it_is_missing(tmp_path, monkeypatch):

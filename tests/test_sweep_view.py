@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -43,6 +44,14 @@ def test_histories_are_named_by_their_parameters_the_worst_first(kept):
         assert run.config["sweep"]["sample"] == number
         assert f"K_p = {float(table['K_p'][number]):.3g}" in name
     assert list(kept.histories(worst=1)) == list(histories)[:1]
+
+
+def test_what_a_killed_process_left_behind_is_not_shown(kept, tmp_path):
+    shutil.copytree(kept.folder, tmp_path / "killed")
+    left = pc.SweepResult(tmp_path / "killed")
+    for name in (".000000005-0123abcd.nc", "000000006.nc"):
+        shutil.copy(kept.history(kept.kept[0]), left.folder / "runs" / name)
+    assert list(left.histories()) == list(kept.histories())
 
 
 def test_parameters_are_told_by_the_last_part_of_their_keys():

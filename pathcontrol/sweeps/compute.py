@@ -183,8 +183,9 @@ def _candidates(
     values: Mapping[str, Array], samples: NDArray[np.int64], keep: Keep, at_random: NDArray[np.intp]
 ) -> list[int]:
     """The rows that may have to be kept, whatever the other samples are."""
-    if keep.worst and keep.by not in values:
-        raise UnknownNameError(f"keep.by = {keep.by!r}, expected a metric: {', '.join(set(values) - set(OUTCOME))}")
+    if keep.worst and (keep.by not in values or values[keep.by].dtype.kind not in "fiu"):
+        known = [name for name in values if name not in OUTCOME]
+        raise UnknownNameError(f"keep.by = {keep.by!r}, expected a metric: {', '.join(known)}")
     by = values[keep.by] if keep.worst else np.full(len(samples), np.nan)
     chosen = keep.chosen(samples, by, values["status"] == "diverged") | set(at_random.tolist())
     return [row for row, sample in enumerate(samples.tolist()) if sample in chosen]

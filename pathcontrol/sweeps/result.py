@@ -79,10 +79,10 @@ class SweepResult:
         Raises:
             InputError: none is kept.
         """
-        kept = self.kept
+        columns = self._store.columns(["sample", "status", self.kept_by])
+        kept = [i for i in self.kept if i in columns["sample"]]  # a killed process may leave one without its numbers
         if not kept:
             raise InputError(f"the sweep in {str(self.folder)!r} keeps no histories; give it keep=Keep(worst=3)")
-        columns = self._store.columns(["sample", "status", self.kept_by])
         rows = np.searchsorted(columns["sample"], kept)
         badness = columns.get(self.kept_by, np.zeros(len(columns["sample"])))[rows]
         order = np.argsort(np.where(columns["status"][rows] == "diverged", -np.inf, -badness), kind="stable")

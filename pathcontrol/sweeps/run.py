@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -84,15 +84,16 @@ def sweep(
         design = space.design(seed)
         job = Job(build, measure, keep, keep.at_random(space.samples, seed))
         computed = partial(_computed_here, job) if client is None else Desk(client, job).chunks
-        store = opened(Path(out), space.samples, _definition(build, space, design, metrics, keep, seed), resume)
-        store.tidy(keep, job.at_random)
-        missing, done = store.missing(chunk), 0
-        pieces = (({name: values[samples] for name, values in design.items()}, samples) for samples in missing)
-        with closing(computed(pieces)) as chunks, progress_bar("sweep", sum(map(len, missing)), progress) as update:
-            for finished in chunks:
-                store.write(finished, keep, job.at_random)
-                done += len(finished.columns["sample"])
-                update(done)
+        definition = _definition(build, space, design, metrics, keep, seed)
+        with opened(Path(out), space.samples, definition, resume) as store:
+            store.tidy(keep, job.at_random)
+            missing, done = store.missing(chunk), 0
+            pieces = (({name: values[samples] for name, values in design.items()}, samples) for samples in missing)
+            with closing(computed(pieces)) as chunks, progress_bar("sweep", sum(map(len, missing)), progress) as update:
+                for finished in chunks:
+                    store.write(finished, keep, job.at_random)
+                    done += len(finished.columns["sample"])
+                    update(done)
     return SweepResult(out)
 
 
@@ -101,13 +102,18 @@ def _computed_here(job: Job, pieces: Iterable[Piece]) -> Generator[Chunk]:
         yield job(parameters, samples)
 
 
-def opened(folder: Path, samples: int, definition: Mapping[str, Any], resume: bool) -> Store:
-    """The folder of a new sweep, or with ``resume`` that of one which was begun."""
+@contextmanager
+def opened(folder: Path, samples: int, definition: Mapping[str, Any], resume: bool) -> Iterator[Store]:
+    """The folder of a new sweep, or with ``resume`` that of one which was begun; gone if nothing came of it."""
     if not resume or not (folder / MANIFEST).exists():
-        return Store.begin(folder, samples, definition)
-    store = Store(folder)
-    store.resume(definition)
-    return store
+        store = Store.begin(folder, samples, definition)
+    else:
+        store = Store(folder)
+        store.resume(definition)
+    try:
+        yield store
+    finally:
+        store.free_if_empty()
 
 
 def _definition(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
@@ -25,6 +26,8 @@ from pathcontrol.sweeps.keep import Keep
 
 FORMAT, FORMAT_VERSION = "pathcontrol sweep", 1
 MANIFEST = "manifest.json"
+_HEX = "[0-9a-f]" * 8
+_UNFINISHED = (f".manifest-{_HEX}.json", f"chunks/.*-{_HEX}.parquet", f"runs/.*-{_HEX}.nc")  # as whole_file has them
 PACKAGES = ("pathcontrol", "pin", "numpy", "scipy")
 
 
@@ -95,6 +98,15 @@ class Store:
             self.manifest["versions"].append(versions())
             _write_json(self.folder / MANIFEST, self.manifest)
 
+    def free_if_empty(self) -> None:
+        """Leave no folder behind that holds no number: another sweep may be begun there."""
+        if self._files():
+            return
+        (self.folder / MANIFEST).unlink(missing_ok=True)
+        with suppress(OSError):  # something else is there
+            for folder in (self.folder / "chunks", self.folder / "runs", self.folder):
+                folder.rmdir()
+
     def missing(self, chunk: int) -> list[NDArray[np.int64]]:
         """The samples that have no numbers yet, at most ``chunk`` neighbours together."""
         done = np.zeros(self.samples, dtype=bool)
@@ -125,8 +137,9 @@ class Store:
 
     def tidy(self, keep: Keep, at_random: NDArray[np.intp]) -> None:
         """Remove the histories that need not be kept, and what a killed process left behind."""
-        for left in (*self.folder.glob(".*"), *self.folder.glob("chunks/.*"), *self.folder.glob("runs/.*")):
-            left.unlink()
+        for place in _UNFINISHED:
+            for left in self.folder.glob(place):
+                left.unlink()
         self._remove_others(self._chosen(keep, at_random))
 
     def _chosen(self, keep: Keep, at_random: NDArray[np.intp], more: Mapping[str, Array] | None = None) -> set[int]:
@@ -154,7 +167,7 @@ class Store:
 
     def kept(self) -> list[int]:
         """The samples whose history is there."""
-        return sorted(int(file.stem) for file in self.folder.glob("runs/*.nc"))
+        return sorted(int(file.stem) for file in self.folder.glob("runs/*.nc") if file.stem.isdecimal())
 
     def run_file(self, sample: int) -> Path:
         """Where the history of a sample is, or would be."""

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 import xarray as xr
 
+from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.sweeps.compute import OUTCOME, Build, Measure, measure_of
 from pathcontrol.sweeps.goals import Limits, Objectives, check_limits, check_objectives
+from pathcontrol.sweeps.keep import Keep
 from pathcontrol.sweeps.result import dataset
 from pathcontrol.sweeps.run import opened, told
 from pathcontrol.sweeps.space import Space, check_seed, check_whole, digest
+from pathcontrol.sweeps.store import Store
 from pathcontrol.tuning.cases import Cases
 from pathcontrol.tuning.result import Tuning
 from pathcontrol.tuning.search import Search
@@ -97,12 +101,11 @@ def tune(
         "generations": generations,
         "seed": seed,
     }
-    total = population * generations * count
-    store = None if out is None else opened(Path(out), total, json.loads(json.dumps(definition)), resume)
-    known = {} if store is None else store.columns()
-    cases = Cases(build, design, count, measure_of(wanted), chunk, store, known)
+    total, measure = population * generations * count, measure_of(wanted)
+    folder = nullcontext() if out is None else opened(Path(out), total, json.loads(json.dumps(definition)), resume)
     tables: list[xr.Dataset] = []
-    with progress_bar("tune", generations, progress) as update:
+    with folder as store, progress_bar("tune", generations, progress) as update:
+        cases = Cases(build, design, count, measure, chunk, store, _noted(store))
         try:
             for _ in range(generations):
                 tables.append(_generation(search, space, cases, terms, sum(table.sizes["sample"] for table in tables)))
@@ -111,6 +114,14 @@ def tune(
             if not tables:
                 raise
     return Tuning(xr.concat(tables, "sample"), terms, count, (len(tables), generations))
+
+
+def _noted(store: Store | None) -> Mapping[str, Array]:
+    """What was noted before, by column."""
+    if store is None:
+        return {}
+    store.tidy(Keep(), np.zeros(0, dtype=np.intp))
+    return store.columns()
 
 
 def _generation(search: Search, space: Space, cases: Cases, terms: Terms, first: int) -> xr.Dataset:
