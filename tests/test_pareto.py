@@ -105,7 +105,9 @@ def test_objectives_are_checked(wrong):
         check_objectives(wrong)
 
 
-@pytest.mark.parametrize("wrong", ["a", None, (2, 1), (None, None), (1, 2, 3), np.nan, [np.nan, 1]])
+@pytest.mark.parametrize(
+    "wrong", ["a", "0.5", None, (2, 1), (None, None), (1, 2, 3), np.nan, [np.nan, 1], [1.0, [2.0]], True]
+)
 def test_limits_are_checked(wrong):
     with pytest.raises(InputError, match=r"limits: b = .*, expected the largest value allowed"):
         check_limits({"b": wrong})

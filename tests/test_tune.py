@@ -210,6 +210,14 @@ class Stopped:
         return {"name": "circle"}
 
 
+@pytest.mark.parametrize("objectives", ["settling_time", ["e_p_rms", "settling_time"], ["settling_time", "e_p_rms"]])
+def test_an_objective_that_is_never_finite_is_told(objectives):
+    found = quick(space={"K_p": [100.0, 200.0], "k": [1.0, 2.0]}, objectives=objectives, generations=1)
+    assert found.feasible().sizes["sample"] == 6
+    assert "settling time of ‖e_p‖ is not finite for any candidate within the limits" in str(found)
+    assert ("least ‖e_p‖ RMS" in str(found)) == (objectives != "settling_time")
+
+
 def test_after_ctrl_c_whole_generations_are_kept():
     whole = quick()
     found = quick(Stopped(after=15), chunk=3)
@@ -258,9 +266,10 @@ def test_what_is_noted_is_not_computed_again(tmp_path):
         ({"metrics": lambda run: {"f": run.finish_time}}, UnknownNameError, "metric 'e_p_rms': expected one of f"),
     ],
 )
-def test_bad_arguments_are_refused(change, error, message):
+def test_bad_arguments_are_refused(change, error, message, tmp_path):
     with pytest.raises(error, match=message):
-        quick(**change)
+        quick(out=tmp_path / "out", **change)
+    assert change.get("metrics") or not list(tmp_path.iterdir())
 
 
 def test_the_extra_is_named_where_it_is_missing(monkeypatch):

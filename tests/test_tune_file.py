@@ -69,11 +69,20 @@ def test_the_command_tells_what_it_found_and_draws_it(experiment, tmp_path):
     assert pc.SweepResult(out).finished == 20
 
 
+def test_a_front_that_is_not_there_is_not_drawn(experiment, tmp_path):
+    file = experiment(BASE + TUNE.replace('"e_p_rms"', '["e_p_rms", "settling_time"]'))
+    done = CliRunner().invoke(main, ["tune", str(file), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    assert "settling time of ‖e_p‖ is not finite" in done.stdout
+    assert "figure" not in done.stdout
+
+
 @pytest.mark.parametrize(
     ("section", "message"),
     [
         ("", r"tune: missing; add a section \[tune\]"),
         (TUNE.replace('objectives = "e_p_rms"\n', ""), "tune.objectives: missing"),
+        (TUNE.replace('"e_p_rms"', "5"), "tune.objectives = 5, expected the name of a metric, a list of them, or"),
         (TUNE.replace("log_uniform = [100.0, 1e4]", "normal = [100.0, 1.0]"), "normal has no ends to search between"),
         (
             TUNE.replace("[100.0, 1e4]", "[1e4, 100.0]"),

@@ -34,7 +34,7 @@ def command(file: Path, out: Path | None, resume: bool, chunk: int, as_json: boo
     out = Path("results") / file.stem if out is None else out
     tuning = run_tune(file, out, chunk=chunk, resume=resume)
     figures = []
-    if len(tuning.directions) > 1 and tuning.best() is not None:
+    if len(tuning.directions) > 1 and tuning.front().sizes["sample"]:
         figures = [str(path) for path in save_figure(pareto_figure(tuning), out / "front")]
     if as_json:
         click.echo(json.dumps(_content(tuning) | {"out": str(out), "figures": figures}))

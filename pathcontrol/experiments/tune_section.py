@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from pydantic import PlainValidator
 
 from pathcontrol.experiments.section import Section
 from pathcontrol.experiments.sweep_section import Varied
-from pathcontrol.experiments.values import Text, Whole
+from pathcontrol.experiments.values import Text, Whole, expected
+
+
+def _objectives(value: Any) -> Any:
+    """Names of metrics, or what is to become of each; which ones there are, :func:`pathcontrol.tune` knows."""
+    texts = [*value, *value.values()] if isinstance(value, dict) else value if isinstance(value, list) else [value]
+    if not texts or not all(isinstance(text, str) for text in texts):
+        raise expected('the name of a metric, a list of them, or { name = "min" } or "max"')
+    return value
 
 
 class TuneSection(Section):
@@ -27,7 +37,7 @@ class TuneSection(Section):
     """
 
     parameters: Varied
-    objectives: Text | list[Text] | dict[str, Text]
+    objectives: Annotated[str | list[str] | dict[str, str], PlainValidator(_objectives)]
     limits: dict[str, Any] | None = None
     scenarios: dict[str, list[Any]] | None = None
     reduce: Literal["worst", "mean"] | None = None

@@ -44,8 +44,11 @@ def check_limits(limits: Limits | None) -> dict[str, tuple[float, float]]:
 
 
 def _ends(name: str, given: Any) -> tuple[float, float]:
-    ends = (None, given) if np.ndim(given) == 0 else tuple(given)
+    listed = given.tolist() if isinstance(given, np.ndarray) else given
+    ends = tuple(listed) if isinstance(listed, list | tuple) else (None, listed)
     try:
+        if any(isinstance(end, str | bool) for end in ends):
+            raise TypeError
         low, high = (otherwise if e is None else float(e) for e, otherwise in zip(ends, (-np.inf, np.inf), strict=True))
     except (TypeError, ValueError):
         low = high = np.nan

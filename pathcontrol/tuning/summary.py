@@ -24,16 +24,18 @@ def summary(tuning: Tuning) -> str:
         + f": {tuning.feasible().sizes['sample']} within the limits"
         + (f", {lost} diverged" if lost else "")
     ]
-    return "\n".join(lines + (_missed(tuning) if tuning.best() is None else _found(tuning)))
+    return "\n".join(lines + (_found(tuning) if tuning.feasible().sizes["sample"] else _missed(tuning)))
 
 
 def _found(tuning: Tuning) -> list[str]:
     lines = []
     for objective, goal in tuning.objectives.items():
         best = tuning.best(objective)
-        assert best is not None
+        if best is None:
+            lines += ["", f"{_label(objective)} is not finite for any candidate within the limits"]
+            continue
         lines += ["", f"{'least' if goal == 'min' else 'largest'} {_label(objective)}", *_candidate(tuning, best)]
-        lines += _limits(tuning, objective)
+        lines += _limits(tuning, objective, best)
     knee = tuning.knee()
     if knee is not None:
         lines += ["", "knee of the front", *_candidate(tuning, knee)]
@@ -47,16 +49,13 @@ def _candidate(tuning: Tuning, one: Candidate) -> list[str]:
     return [f"  {numbers}", f"  candidate {one.number}: {readable_parameters(one.parameters)}"]
 
 
-def _limits(tuning: Tuning, objective: str) -> list[str]:
-    active = tuning.activity(objective)
-    best = tuning.best(objective)
-    assert best is not None
-    lines = []
+def _limits(tuning: Tuning, objective: str, best: Candidate) -> list[str]:
+    active, lines = tuning.activity(objective), []
     for name, found in active.items():
         change = found.bought / best.metrics[objective] - 1 if best.metrics[objective] else 0.0
         gain = f"changes it by {100 * change:+.1f} % at least" if change else "was not found to change it"
         value = f"{_label(name)} {_number(name, found.value)}, limit {_ends(tuning, name)}"
-        lines.append(f"  {value}: {100 * found.share:.0f} % used; 10 % looser {gain}")
+        lines.append(f"  {value}: {100 * max(found.share, 0.0):.0f} % used; 10 % looser {gain}")
     return lines
 
 
