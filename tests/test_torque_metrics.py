@@ -37,6 +37,16 @@ def test_noise_on_a_smooth_signal_is_found_again(seed):
     np.testing.assert_allclose(coloured, np.sqrt(5 / 3), rtol=0.06)
 
 
+def test_what_one_task_of_a_batch_lacks_is_nan_for_its_rollouts():
+    tasks = [pc.Circle(1.0, 2.0), pc.Circle(0.5, 2.0)]
+    law = pc.ExtendedMotionPlan(pc.load_robot("cicese_2dof"), pc.TaskBatch(tasks), 800.0, [45.0, 100.0], 20.0)
+    run = pc.simulate(law, [START] * 2, duration=0.05, loop=pc.SampledLoop(encoders=True), progress=False)
+    exact = run.data["q_measured"].where(run.data["rollout"] != 1, run.data["q"])
+    found = pc.metrics(run.with_data(run.data.assign(q_measured=exact)))["noise_amplification"]
+    assert found[0] == pc.metrics(run)["noise_amplification"][0] > 0
+    assert np.isnan(found[1])
+
+
 def test_too_few_samples_say_nothing():
     assert np.isnan(noise_deviation(np.zeros((2, 2, 3)))).all()
 

@@ -171,7 +171,7 @@ def metrics(
     values: dict[str, Array] = {}
     for part, own, rows in by_task(run, known_task(run, task)):
         for name, value in _metrics(part, own, fraction, band, only).items():
-            values.setdefault(name, np.empty(run.rollouts))[rows] = value
+            values.setdefault(name, np.full(run.rollouts, np.nan))[rows] = value
     return {name: value.tolist() for name, value in values.items()}
 
 
