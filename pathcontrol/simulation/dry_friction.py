@@ -15,6 +15,9 @@ operations on the same numbers in the same order, and so the same result to the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import reduce
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -50,7 +53,7 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array, guess: Array | None 
     """
     guess = np.sign(p if guess is None else guess).astype(np.int8)
     if len(p) <= _FEW:
-        return np.array([_alone(row, M, p, low, high, guess) for row in range(len(p))]).reshape(p.shape)
+        return np.array([_alone(row, M, p, low, high, guess) for row in range(len(p))]).reshape(p.shape) + 0.0
     columns = _Columns(*(np.ascontiguousarray(np.moveaxis(a, 0, -1)) for a in (M, p, low, high)))
     v = columns.velocities(states := columns.possible(list(guess.T)))
     wrong = np.flatnonzero(sum(a != b for a, b in zip(columns.wanted(v, states), states, strict=True)))
@@ -59,7 +62,7 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array, guess: Array | None 
     else:
         for row in wrong.tolist():
             v[:, row] = _alone(row, M, p, low, high, guess)
-    return v.T.copy()
+    return np.add(v.T, 0.0, order="C")  # which makes 0 of −0, whose sign would depend on the number of rows
 
 
 def _alone(row: int, *arrays: Array) -> list[float]:
@@ -136,11 +139,11 @@ class _Numbers:
         """The states that the velocities, and the impulses where joints stick, call for."""
         products = [[m * x for m, x in zip(row, v, strict=True)] for row in self.M]
         # p − Mv may be a small difference of large terms: allow for their rounding, and not for more
-        terms = max(sum(map(abs, row)) for row in products)
+        terms = max(_in_order([abs(term) for term in row]) for row in products)
         margin = _ROUNDING * max(map(abs, self.p)) + 8 * len(v) * _EPSILON * terms
         wanted = []
         for i, state in enumerate(states):
-            needed = self.p[i] - sum(products[i])
+            needed = self.p[i] - _in_order(products[i])
             released = (needed > self.high[i] + margin) - (needed < self.low[i] - margin)
             wanted.append(state if self.free[i] else (0 if v[i] * state < 0 else state) if state else released)
         return wanted
@@ -171,22 +174,19 @@ class _Columns(_Numbers):
         for k in reversed(range(len(v))):
             v[k] = b[k] / U[k, k] * slips[k]
             b[:k] -= U[:k, k] * v[k]
-        v[signs == 0] = 0.0  # and not −0
+        v[signs == 0] = 0.0
         return v
 
     def wanted(self, v: Array, states: _States) -> _States:
         signs, products = np.array(states), self.M * v
-        terms = _sum(np.abs(products)).max(0)
+        terms = _in_order(np.abs(products).swapaxes(0, 1)).max(0)
         margin = _ROUNDING * np.abs(self.p).max(0) + 8 * len(v) * _EPSILON * terms
-        needed = self.p - _sum(products)
+        needed = self.p - _in_order(products.swapaxes(0, 1))
         released = (needed > self.high + margin).astype(np.int8) - (needed < self.low - margin)
         wanted = np.where(signs == 0, released, np.where(v * signs < 0, 0, signs))
         return list(np.where(self.free, signs, wanted))
 
 
-def _sum(terms: Array) -> Array:
-    """The sums, (n, N), over the middle axis of (n, n, N), one term after the other."""
-    total = terms[:, 0]
-    for j in range(1, terms.shape[1]):
-        total = total + terms[:, j]
-    return total
+def _in_order(terms: Sequence[_Entry]) -> _Entry:
+    """Their sum, one after the other; ``sum`` of Python 3.12 rounds better, and so otherwise than arrays do."""
+    return reduce(add, terms)
