@@ -25,6 +25,8 @@ from pathcontrol import (
     simulate,
 )
 from pathcontrol.experiments.reproduce import paper_controllers
+from pathcontrol.simulation import recorder
+from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sampled import _periods_and_rest
 from pathcontrol.simulation.sensors import Sensors
 
@@ -397,3 +399,29 @@ def test_bad_loops(options, word):
 def test_bad_hardware(arm, circle, options, word):
     with pytest.raises(InputError, match=word):
         simulate(paper_law(arm, circle), START, duration=0.1, loop=SampledLoop(**options))
+
+
+# --- room for what is recorded ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("room", [1, 3000, 1 << 20])
+def test_a_run_is_the_same_however_often_its_room_grows(arm, circle, room, monkeypatch):
+    def run():
+        return simulate(paper_law(arm, circle), [START, START / 2], duration=0.3, progress=False)
+
+    plenty = run()
+    monkeypatch.setattr(recorder, "_ROOM", room)
+    for name in plenty.data.data_vars:
+        np.testing.assert_array_equal(run().array(name), plenty.array(name), err_msg=name)
+
+
+def test_a_run_that_ends_long_before_its_time_keeps_no_room_for_the_rest(arm, circle, monkeypatch):
+    recorders = []
+    monkeypatch.setattr(
+        "pathcontrol.simulation.sampled.Recorder", lambda *a: recorders.append(Recorder(*a)) or recorders[-1]
+    )
+    run = simulate(paper_law(arm, circle), START, duration=1e7, laps=1, progress=False)
+    assert run.finish_time[0] < 5
+    kept = sum(array.nbytes for array in recorders[0].arrays().values())
+    owned = sum(array.base.nbytes for array in recorders[0].arrays().values())
+    assert owned == kept < 1e6

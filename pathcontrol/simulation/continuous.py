@@ -74,10 +74,8 @@ class ContinuousArm:
         """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
         push = None if self._disturbance is None else _Push(self._disturbance, self._began)
         time = self._period * np.arange(max(1, round(duration / self._period)) + 1)
-        loop, recorder = (
-            ClosedLoop(controller, self._robot, self._mode, push),
-            Recorder(len(self.q), self._robot.n, len(time)),
-        )
+        loop = ClosedLoop(controller, self._robot, self._mode, push)
+        recorder = Recorder(len(self.q), self._robot.n, len(time))
         lost = self.divergence = Divergence(self.q, self.qd)
         start = np.concatenate([self.q, self.qd, controller.start(self.q, self.qd)], axis=-1)
         with progress_bar("integrating", duration, progress) as update:

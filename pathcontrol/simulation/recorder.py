@@ -45,8 +45,11 @@ class Recorder:
         self._samples += 1
 
     def arrays(self) -> dict[str, Array]:
-        """Everything stored, rollouts first."""
-        return {name: np.moveaxis(array[: self._samples], 0, 1) for name, array in self._arrays.items()}
+        """Everything stored, rollouts first; the room that was not needed is given back."""
+        self._room = self._samples
+        for array in self._arrays.values():
+            array.resize((self._samples, *array.shape[1:]), refcheck=False)
+        return {name: np.moveaxis(array, 0, 1) for name, array in self._arrays.items()}
 
     def _grow(self) -> None:
         """Twice the room; a run may end long before the time it was given."""
