@@ -127,6 +127,17 @@ def test_closed_paths_close(task):
     assert np.allclose(task.theta(s), task.theta(s + task.period), rtol=1e-10)
 
 
+@pytest.mark.parametrize("task", [Circle(0.5, 1.0), Ellipse((0.5, 0.3), 1.0), Lissajous([0.5, 0.8], [1, 2], 1.2)])
+def test_a_curve_takes_numbers_and_lists_too(task):
+    s = [0.3, 2.0]
+    for method in ("q_d", "dq_d", "ddq_d", "theta", "dtheta"):
+        function = getattr(task, method)
+        assert np.array_equal(function(s), function(np.array(s)))
+        assert np.array_equal(function(s[0]), function(np.array(s[0])))
+    for plain, array in zip(task.at(s), task.at(np.array(s)), strict=True):
+        assert np.array_equal(plain, array)
+
+
 @given(floats(0.2, 2), floats(0.1, 3), st.booleans(), vectors(5, 1.0))
 def test_circle_is_the_papers_and_fits_any_two_joints(radius, speed, clockwise, center):
     task = Circle(radius, speed, center=center, joints=(3, 1), clockwise=clockwise)

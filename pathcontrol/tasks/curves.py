@@ -122,10 +122,10 @@ class Circle(Ellipse, single=True):
         self._rate = np.array(self.speed / self.radius)
 
     def theta(self, s: Array) -> Array:
-        return np.zeros(s.shape) + self._rate
+        return np.zeros(np.shape(s)) + self._rate
 
     def dtheta(self, s: Array) -> Array:
-        return np.zeros(s.shape)
+        return np.zeros(np.shape(s))
 
     def at(self, s: Array) -> PathPoint:
         a, b, cos, sin = self._a, self._b, np.cos(s), np.sin(s)
