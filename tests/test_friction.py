@@ -422,6 +422,14 @@ def test_columns_and_numbers_agree_after_many_exchanges(patience, problem, seed,
     assert_optimal(M, p, low, high, columns)
 
 
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+@pytest.mark.parametrize("M", [[[1.0, 1.0], [1.0, 1.0]], [[0.0, 0.0], [0.0, 0.0]], [[2.0, 0.0], [0.0, 0.0]]])
+def test_a_singular_mass_matrix_gives_no_numbers_in_any_number_of_rows(M):
+    p, bound = np.array([[3.0, -5.0], [-2.0, 2.0]]), np.array([[1.0, 0.5]])
+    for v in by_columns_and_by_numbers(np.tile(M, (2, 1, 1)), p, -bound, bound):
+        assert not np.isfinite(v).all(-1).any()
+
+
 def test_columns_and_numbers_agree_on_which_side_of_the_edge_a_joint_is():
     """Bounds a few roundings around the momentum that just holds a joint: only sums in the same order agree there."""
     rng = np.random.default_rng(0)

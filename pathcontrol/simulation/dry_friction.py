@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import reduce
+from math import nan
 from operator import add
 from typing import Any
 
@@ -46,7 +47,7 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array, guess: Array | None 
         guess: the sign that v⁺ may have, (N, n), by default that of p; a good one saves time and changes nothing else.
 
     Returns:
-        v⁺, (N, n); exactly 0 for joints that stick.
+        v⁺, (N, n); exactly 0 for joints that stick, no finite numbers where M is singular.
 
     Raises:
         SimulationError: M is not positive definite.
@@ -68,7 +69,10 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array, guess: Array | None 
 def _alone(row: int, *arrays: Array) -> list[float]:
     """v⁺ of one row of M, p, low, high and the guess; there may be one row of these for all."""
     M, p, low, high, guess = (a[row if len(a) > 1 else 0].tolist() for a in arrays)
-    return _settled(_Numbers(M, p, low, high), guess)
+    try:
+        return _settled(_Numbers(M, p, low, high), guess)
+    except ZeroDivisionError:  # M is singular
+        return [nan] * len(p)
 
 
 def _settled(problem: _Numbers, guess: _States) -> Any:
