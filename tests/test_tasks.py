@@ -207,6 +207,7 @@ def broken(**methods):
         (broken(dq_d=lambda self, s: 2 * Circle.dq_d(self, s)), ["Broken.dq_d", "q_d changes at"]),
         (broken(dtheta=lambda self, s: 1.0 + s), ["Broken.dtheta", "theta changes at"]),
         (broken(q_d=lambda self, s: np.stack([math.cos(s), math.sin(s)], -1)), ["Broken.q_d fails", "np.cos"]),
+        (broken(theta=lambda self, s: 1.0 + 0.0 * s[..., :1].sum() + 0.0 * s), ["Broken.theta fails", "shape ()"]),
         (Still(), ["Still.dq_d", "standstill"]),
         (Circle, ["PathTask"]),
     ],

@@ -114,7 +114,7 @@ def _check_values(label: str, function: Callable[[Any], Any], s: Array, n: int |
             value = np.asarray(function(argument))
         except TaskError:
             raise
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, IndexError) as error:
             raise TaskError(
                 f"{label} fails for s of shape {np.shape(argument)}: {error}; work on arrays, with np.cos rather than "
                 "math.cos and np.where rather than if"
