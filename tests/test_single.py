@@ -12,6 +12,7 @@ from pathcontrol import (
     Controller,
     Ellipse,
     ExtendedMotionPlan,
+    InputError,
     Line,
     Lissajous,
     PathTask,
@@ -106,6 +107,30 @@ def test_what_does_not_say_so_is_asked_for_arrays(kind):
     q = np.deg2rad([40.0, 70.0])
     alone = simulate(law, q, duration=0.5, loop=LOOP, progress=False)
     assert_runs_equal(alone, simulate(law, [q, q], duration=0.5, loop=LOOP, progress=False))
+
+
+class WronglySingleLaw(ExtendedMotionPlan, single=True):
+    def law(self, t, q, qd, z):
+        out = super().law(t, q, qd, z)
+        return out._replace(tau=out.tau - q[:, :1])
+
+
+class WronglySingleTask(Circle, single=True):
+    def at(self, s):
+        return super().at(s)._replace(theta=np.array([2.0 for _ in s]))
+
+
+@pytest.mark.parametrize(
+    ("kind", "task", "said"),
+    [
+        (WronglySingleLaw, TASKS["circle"], "WronglySingleLaw.*too many indices.*single=True"),
+        (ExtendedMotionPlan, WronglySingleTask(1.0, 2.0), "WronglySingleTask.*iteration over a 0-d.*single=True"),
+    ],
+)
+def test_who_is_wrong_about_it_is_told_so(kind, task, said):
+    law = kind(ARM, task, 800.0, [45.0, 100.0], 20.0)
+    with pytest.raises(InputError, match=said):
+        simulate(law, [1.0, 0.0], duration=0.1, progress=False)
 
 
 @pytest.mark.parametrize("k", [20.0, [20.0], [[20.0]]])

@@ -10,6 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
+from pathcontrol.errors import InputError
 from pathcontrol.simulation.divergence import Divergence
 from pathcontrol.simulation.finish import Finish
 from pathcontrol.simulation.modes import Arm, Outside, SampledLoop, check_rows, torque_limits
@@ -141,10 +142,22 @@ class SampledArm:
 
 
 def _single(controller: Controller, q: Array, qd: Array, z: Array) -> bool:
-    """Whether there is one rollout only, (1, n), and the law can be asked for the torques of its state, (n,)."""
+    """Whether there is one rollout only, (1, n), and the law can be asked for the torques of its state, (n,).
+
+    Raises:
+        InputError: the law, or its task, says so and cannot.
+    """
     if len(q) > 1 or not controller.single:
         return False
-    return controller.law(0.0, q[0], qd[0], z[0]).tau.ndim == 1  # more where a gain has a row for each rollout
+    try:
+        tau = controller.law(0.0, q[0], qd[0], z[0]).tau
+    except (ValueError, IndexError, TypeError, AttributeError) as error:
+        names = f"{type(controller).__name__}.law with a {type(controller.task).__name__}"
+        raise InputError(
+            f"{names} fails for a single state, q of shape {q[0].shape}: {error}; one of them is made with single=True "
+            "and takes batches only, so leave that out"
+        ) from error
+    return tau.ndim == 1  # more where a gain has a row for each rollout
 
 
 def _periods_and_rest(delay: float, period: float) -> tuple[int, float]:
