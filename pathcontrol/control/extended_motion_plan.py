@@ -51,7 +51,7 @@ class ExtendedMotionPlan(Controller, single=True):
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         s = z[..., 0]
         point = self.point(s)
-        velocity, k = point.velocity, self.plan_gain(s)
+        velocity, k = point.velocity, np.asarray(self.plan_gain(s))[()]  # of (), the number
         e_p, e_v = point.q_d - q, velocity - qd
         free = point.theta - k * inner(e_p, point.dq_d)
         sdot = self.inside(s, free)
