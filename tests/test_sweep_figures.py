@@ -58,6 +58,27 @@ def test_over_a_distribution_every_sample_is_in_one_bin():
     assert (np.diff(figure.axes[0].lines[0].get_xdata()) > 0).all()
 
 
+def test_what_never_settles_is_shown():
+    data = table(lost=(0,))
+    data["e_p_peak"][[7, 8, 29]] = np.inf
+    crosses, circles = basin_figure(data, "q[0]", "q[1]", "e_p_peak").axes[0].lines
+    assert len(crosses.get_xdata()) == 1
+    np.testing.assert_array_equal(circles.get_xydata(), data["q"].to_numpy()[[7, 8, 29]])
+    spread = robustness_figure(data, "q[0]", "e_p_peak")
+    np.testing.assert_allclose(spread.axes[1].lines[0].get_ydata(), [20, 40, 0, 0, 0, 20])
+    assert np.isfinite(spread.axes[0].lines[1].get_ydata()).all()
+
+
+def test_wide_values_have_logarithmic_scales():
+    data = table()
+    data = data.assign_coords(k=("sample", np.geomspace(1.0, 1e4, 30)))
+    data["e_p_peak"] = ("sample", np.geomspace(1.0, 100.0, 30))
+    axes, bar = basin_figure(data, "k", "q[1]", "e_p_peak").axes
+    assert (axes.get_xscale(), axes.get_yscale(), bar.get_yscale()) == ("log", "linear", "log")
+    [axes] = robustness_figure(data, "k", "e_p_peak").axes
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+
+
 def test_what_is_not_there_is_told():
     with pytest.raises(UnknownNameError, match=r"parameter 'q': expected one of q\[0\], q\[1\], k"):
         basin_figure(table(), "q", "k", "e_p_peak")

@@ -65,16 +65,22 @@ def _tell(result: SweepResult, as_json: bool) -> None:
     click.echo(f"  {'':22} {'least':>12} {'median':>12} {'largest':>12}")
     for name, values in spread.items():
         if values["median"] is not None:
-            click.echo(f"  {name:22} " + " ".join(f"{v:12.5g}" for v in values.values()))
+            line = " ".join(f"{values[key]:12.5g}" for key in ("least", "median", "largest"))
+            click.echo(f"  {name:22} {line}" + (f"  and {values['never']} never" if values["never"] else ""))
     for sample in result.kept:
         click.echo(f"  history of sample {sample}: {result.history(sample)}")
 
 
 def _spread(values: Any) -> dict[str, float | None]:
-    """Least, median and largest of the values that are finite."""
+    """Least, median and largest of the values that are finite, and how many are infinite: what never settles."""
     import numpy as np
 
-    values = values[np.isfinite(values)]
-    if not values.size:
-        return {"least": None, "median": None, "largest": None}
-    return {"least": float(values.min()), "median": float(np.median(values)), "largest": float(values.max())}
+    known, never = values[np.isfinite(values)], int(np.isinf(values).sum())
+    if not known.size:
+        return {"least": None, "median": None, "largest": None, "never": never}
+    return {
+        "least": float(known.min()),
+        "median": float(np.median(known)),
+        "largest": float(known.max()),
+        "never": never,
+    }

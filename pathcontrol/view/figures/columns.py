@@ -14,6 +14,8 @@ from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.sweeps import goals
 from pathcontrol.sweeps.result import SweepResult
 
+_DECADES = 30.0  # ratio of the largest to the smallest value from which a scale is logarithmic
+
 
 def table_of(sweep: SweepResult | xr.Dataset) -> xr.Dataset:
     """The table of a sweep, or itself.
@@ -59,6 +61,22 @@ def readable_metric(table: xr.Dataset, name: str) -> tuple[Array, str]:
 def readable_factor(table: xr.Dataset, name: str) -> tuple[float, str]:
     """What a metric is multiplied by for a person to read it, and its unit then."""
     return reading(table[name].attrs.get("units", ""), goals.metric(table, name))
+
+
+def never(table: xr.Dataset, metric: str) -> Array:
+    """Samples whose metric is infinite, as the settling time of what never settles, (sample,)."""
+    return np.isinf(goals.metric(table, metric))
+
+
+def wide(values: Array) -> bool:
+    """Whether a scale of these values is logarithmic."""
+    known = values[np.isfinite(values)]
+    return bool(known.size and known.min() > 0 and known.max() > _DECADES * known.min())
+
+
+def scale(values: Array) -> str:
+    """The scale of an axis for these values."""
+    return "log" if wide(values) else "linear"
 
 
 def label(metric: str, unit: str) -> str:

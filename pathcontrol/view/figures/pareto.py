@@ -19,7 +19,15 @@ from pathcontrol.errors import InputError
 from pathcontrol.sweeps.goals import Limits, check_limits, front, within
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.tuning.result import Tuning
-from pathcontrol.view.figures.columns import column_of_parameter, label, readable_factor, readable_metric, table_of
+from pathcontrol.view.figures.columns import (
+    column_of_parameter,
+    label,
+    readable_factor,
+    readable_metric,
+    scale,
+    table_of,
+    wide,
+)
 from pathcontrol.view.figures.style import (
     BLUE,
     COLUMN,
@@ -28,6 +36,7 @@ from pathcontrol.view.figures.style import (
     LIMIT_LOOK,
     ORANGE,
     SMALL,
+    VECTORS,
     Look,
     dressed,
     error_colours,
@@ -39,8 +48,6 @@ from pathcontrol.view.figures.words import legend, plain
 _FRONT: Look = {"color": ORANGE, "linewidth": 1.2, "zorder": 2.5}
 _BEYOND: Look = {"marker": "o", "linestyle": "none", "markersize": 2.2, "color": "#D5D5D5", "mew": 0, "zorder": 1.5}
 _KEPT: Look = {"marker": "o", "linestyle": "none", "markersize": 2.2, "color": BLUE, "alpha": 0.5, "mew": 0}
-_VECTORS = 5000  # points from which they are an image inside an SVG
-_DECADES = 30.0  # ratio of the largest to the smallest value from which a scale is logarithmic
 
 
 class _Choice(NamedTuple):
@@ -97,7 +104,7 @@ def pareto_figure(
         figure = new_figure(COLUMN, 2.7 + 0.14 * len(words))
         axes = dressed(figure.add_subplot())
         kept = within(table, others)
-        axes.set(xscale="log" if _wide(right) else "linear", yscale="log" if _wide(up) else "linear")
+        axes.set(xscale=scale(right), yscale=scale(up))
         axes.margins(0.09)  # for letters at the ends
         _draw_points(figure, axes, (right, up), kept, None if colour is None else (colour, table))
         axes.plot(right[rows], up[rows], drawstyle="steps-post", marker="o", markersize=2.6, **_FRONT)
@@ -128,28 +135,22 @@ def _told(best: xr.Dataset, row: int) -> str:
     return f"{int(one['sample'])}: {readable_parameters(values)}"
 
 
-def _wide(values: Array) -> bool:
-    """Whether a scale of these values is logarithmic."""
-    known = values[np.isfinite(values)]
-    return bool(known.size and known.min() > 0 and known.max() > _DECADES * known.min())
-
-
 def _scaled(values: Array) -> Array:
-    return np.log(values) if _wide(values) else values
+    return np.log(values) if wide(values) else values
 
 
 def _draw_points(
     figure: Figure, axes: Axes, at: tuple[Array, Array], kept: Array, colour: tuple[str, xr.Dataset] | None
 ) -> None:
     right, up = at
-    many: Look = {"rasterized": len(right) > _VECTORS}
+    many: Look = {"rasterized": len(right) > VECTORS}
     axes.plot(right[~kept], up[~kept], **_BEYOND, **many)
     if colour is None:
         axes.plot(right[kept], up[kept], **_KEPT, **many)
         return
     name, table = colour
     shade = column_of_parameter(table, name)[kept]
-    norm = LogNorm() if _wide(shade) else None
+    norm = LogNorm() if wide(shade) else None
     points = axes.scatter(right[kept], up[kept], c=shade, s=7, lw=0, cmap=error_colours(), norm=norm, zorder=2, **many)
     figure.colorbar(points, ax=axes, label=plain(name)).outline.set_visible(False)
 

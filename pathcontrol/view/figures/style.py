@@ -24,6 +24,7 @@ BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY = "#0072B2", "#D55E00", "#009E73", "#CC7
 RUN_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY)
 #: what is desired, and what else a run is held against: limits, peaks, ϑ
 GREY, INK = "#9A9A9A", "#2B2B2B"
+VECTORS = 5000  # points from which they are an image inside an SVG
 DASHED = (0, (4, 2))
 
 #: how what is not a run looks

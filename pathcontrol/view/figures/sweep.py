@@ -5,22 +5,38 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
 from pathcontrol.sweeps.result import SweepResult
-from pathcontrol.view.figures.columns import column_of_parameter, label, readable_metric, table_of
-from pathcontrol.view.figures.style import BLUE, COLUMN, INK, ORANGE, Look, dressed, error_colours, new_figure, style
+from pathcontrol.view.figures.columns import column_of_parameter, label, never, readable_metric, scale, table_of, wide
+from pathcontrol.view.figures.style import (
+    BLUE,
+    COLUMN,
+    GREY,
+    INK,
+    ORANGE,
+    VECTORS,
+    Look,
+    dressed,
+    error_colours,
+    new_figure,
+    style,
+)
 from pathcontrol.view.figures.words import legend
 
 _LOST: Look = {"marker": "x", "color": INK, "linestyle": "none", "markersize": 3.5}
+_NEVER: Look = {"marker": "s", "color": GREY, "linestyle": "none", "mew": 0}
 _DIVERGED = "diverged"
 _BINS = 20  # of samples of a distribution, with as many samples each
 
 
 def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = "contour_error_peak") -> Figure:
     """A metric over two parameters, a point for each sample; what diverged is crossed out. Degrees for radians.
+
+    Samples whose metric is infinite, that never settled, are grey.
 
     Args:
         sweep: a sweep, or its table.
@@ -41,25 +57,39 @@ def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = 
         figure = new_figure(COLUMN, 2.9)
         axes = dressed(figure.add_subplot())
         known = np.isfinite(value)
-        side = 180.0 / np.sqrt(len(value))  # so that the points of a square grid nearly touch, in pt
+        side = min(180.0 / np.sqrt(len(value)), 12.0)  # so that the points of a square grid nearly touch, in pt
+        many: Look = {"rasterized": len(value) > VECTORS}
         points = axes.scatter(
-            right[known], up[known], c=value[known], s=min(side, 12.0) ** 2, marker="s", cmap=error_colours(), lw=0
+            right[known],
+            up[known],
+            c=value[known],
+            s=side**2,
+            marker="s",
+            cmap=error_colours(),
+            norm=LogNorm() if wide(value) else None,
+            lw=0,
+            **many,
         )
         bar = figure.colorbar(points, ax=axes, label=label(metric, unit))
         bar.outline.set_visible(False)
-        lost = (table["status"] == "diverged").to_numpy()
-        axes.plot(right[lost], up[lost], **_LOST)
-        axes.set(xlabel=x, ylabel=y)
-        if lost.any():
-            legend(figure, {_DIVERGED: Line2D([], [], **_LOST)})
+        lost = {
+            _DIVERGED: ((table["status"] == "diverged").to_numpy(), _LOST),
+            "never": (never(table, metric), _NEVER),
+        }
+        for (rows, look), size in zip(lost.values(), (min(side, 3.5), side), strict=True):
+            axes.plot(right[rows], up[rows], **(look | {"markersize": size}), **many)
+        axes.set(xlabel=x, ylabel=y, xscale=scale(right), yscale=scale(up))
+        if entries := {word: Line2D([], [], **look) for word, (rows, look) in lost.items() if rows.any()}:
+            legend(figure, entries)
     return figure
 
 
 def robustness_figure(sweep: SweepResult | xr.Dataset, parameter: str, metric: str = "contour_error_peak") -> Figure:
     """How a metric spreads over a parameter: median, the middle 80 % and the worst, and the share that diverged.
 
-    Values of a grid each for themselves; samples of a distribution in bins with as many samples each, drawn at their
-    medians. Degrees for radians.
+    Samples whose metric is infinite, that never settled, are counted below with those that diverged. Values of a grid
+    each for themselves; samples of a distribution in bins with as many samples each, drawn at their medians. Degrees
+    for radians.
 
     Args:
         sweep: a sweep, or its table.
@@ -71,20 +101,22 @@ def robustness_figure(sweep: SweepResult | xr.Dataset, parameter: str, metric: s
     """
     table = table_of(sweep)
     along, (value, unit) = column_of_parameter(table, parameter), readable_metric(table, metric)
-    lost = (table["status"] == "diverged").to_numpy()
+    lost, unsettled = (table["status"] == "diverged").to_numpy(), never(table, metric)
     bins = _bins(along)
     where = np.array([np.median(along[rows]) for rows in bins])
     low, middle, high, worst = np.array([_spread(value[rows]) for rows in bins]).T
     with style():
-        figure = new_figure(COLUMN, 3.2 if lost.any() else 2.4)
-        grid = figure.add_gridspec(2 if lost.any() else 1, 1, height_ratios=[3, 1][: 2 if lost.any() else 1])
+        below = bool((lost | unsettled).any())
+        figure = new_figure(COLUMN, 3.2 if below else 2.4)
+        grid = figure.add_gridspec(2 if below else 1, 1, height_ratios=[3, 1][: 2 if below else 1])
         axes = dressed(figure.add_subplot(grid[0]))
         axes.fill_between(where, low, high, color=BLUE, alpha=0.25, lw=0)
         axes.plot(where, middle, color=BLUE)
         axes.plot(where, worst, color=ORANGE)
-        axes.set_ylabel(label(metric, unit))
-        if lost.any():
-            axes = _draw_lost(dressed(figure.add_subplot(grid[1], sharex=axes)), where, lost, bins)
+        axes.set(ylabel=label(metric, unit), xscale=scale(where), yscale=scale(value))
+        if below:
+            axes = _draw_lost(dressed(figure.add_subplot(grid[1], sharex=axes)), where, lost | unsettled, bins)
+            axes.set_ylabel("diverged [%]" if not unsettled.any() else "diverged, never [%]")
         axes.set_xlabel(parameter)
         legend(figure, {"median, 10 to 90 %": Line2D([], [], color=BLUE), "worst": Line2D([], [], color=ORANGE)})
     return figure
@@ -92,7 +124,7 @@ def robustness_figure(sweep: SweepResult | xr.Dataset, parameter: str, metric: s
 
 def _draw_lost(axes: Axes, where: Array, lost: Array, bins: list[Array]) -> Axes:
     axes.plot(where, [100 * lost[rows].mean() for rows in bins], color=INK)
-    axes.set(ylabel="diverged [%]", ylim=(0, None))
+    axes.set(ylim=(0, None))
     return axes
 
 

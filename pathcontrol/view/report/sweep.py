@@ -9,7 +9,7 @@ import xarray as xr
 
 from pathcontrol.analysis.metrics import LABELS
 from pathcontrol.sweeps.result import SweepResult
-from pathcontrol.view.figures.columns import readable_metric
+from pathcontrol.view.figures.columns import never, readable_metric
 from pathcontrol.view.figures.overview import overview
 from pathcontrol.view.report.pictures import picture
 from pathcontrol.view.report.summary import Cell, Row
@@ -42,7 +42,8 @@ def _row(table: xr.Dataset, name: str) -> Row | None:
     values, unit = readable_metric(table, name)
     if np.isnan(values).all():
         return None
-    largest = int(np.nanargmax(values))
+    largest, endless = int(np.nanargmax(values)), int(never(table, name).sum())
     numbers = [np.nanmin(values), np.nanmedian(values), values[largest]]
-    cells = [*(f"{number:#.4g}".rstrip(".") for number in numbers), str(int(table["sample"][largest]))]
+    texts = (f"{number:#.4g}".rstrip(".") for number in numbers)
+    cells = [*texts, str(int(table["sample"][largest])), f"{endless} never" if endless else ""]
     return Row(LABELS.get(name, name), unit, tuple(map(Cell, cells)))
