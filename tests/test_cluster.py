@@ -7,6 +7,7 @@ import gc
 import json
 import os
 import pickle
+import platform
 import shutil
 import signal
 import socket
@@ -571,3 +572,23 @@ def test_a_module_that_workers_lack_is_named(address, tmp_path):
 
     with pytest.raises(ClusterError, match="a worker lacks the module 'not_installed_there'; install it there"):
         swept(tmp_path, build=lacking, cluster=address)
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc can be told")
+def test_workers_keep_freed_memory_for_the_next_arrays():
+    code = (
+        "import resource, numpy as np\n"
+        "from pathcontrol.sweeps.memory import keep_freed_memory\n"
+        "{told}\n"
+        "faults = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
+        "np.ones(100_000)\n"
+        "before = faults()\n"
+        "for _ in range(100):\n    np.ones(100_000)\n"
+        "print(faults() - before)"
+    )
+    pages = []
+    for told in ("keep_freed_memory()", ""):
+        environment = os.environ | {"MALLOC_TRIM_THRESHOLD_": "65536"}  # as Dask starts its workers
+        command = [sys.executable, "-c", code.format(told=told)]
+        pages.append(int(subprocess.run(command, env=environment, capture_output=True, check=True).stdout))
+    assert pages[0] < 1000 < pages[1]

@@ -21,6 +21,7 @@ from pathcontrol.simulation.origin import Origin
 from pathcontrol.simulation.run import Run
 from pathcontrol.sweeps.compute import Chunk, Job, Piece
 from pathcontrol.sweeps.luggage import Luggage
+from pathcontrol.sweeps.memory import keep_freed_memory
 
 _OURS = __name__.partition(".")[0]
 
@@ -71,6 +72,7 @@ class Parcel:
             scratch: a folder in which there may be one for the files.
         """
         if self._opened is None:
+            keep_freed_memory()
             self._opened = self._open(scratch)
         job, here, home = self._opened
         try:
