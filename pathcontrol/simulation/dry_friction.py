@@ -55,7 +55,7 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array, guess: Array | None 
     guess = np.sign(p if guess is None else guess).astype(np.int8)
     if len(p) <= _FEW:
         return np.array([_alone(row, M, p, low, high, guess) for row in range(len(p))]).reshape(p.shape) + 0.0
-    columns = _Columns(*(np.ascontiguousarray(np.moveaxis(a, 0, -1)) for a in (M, p, low, high)))
+    columns = _Columns(*map(np.ascontiguousarray, (M.transpose(1, 2, 0), p.T, low.T, high.T)))
     v = columns.velocities(states := columns.possible(list(guess.T)))
     wrong = np.flatnonzero(sum(a != b for a, b in zip(columns.wanted(v, states), states, strict=True)))
     if len(wrong) > _FEW:
