@@ -1,7 +1,7 @@
 """What a million rollouts cost, in one process and on worker processes, and how far the law of docs/cluster.md holds.
 
 The paper's first experiment, 10 s at 400 samples a second, from many postures and with many gains. Run it with:
-python -m benchmarks.cluster (three to four minutes on two cores).
+python -m benchmarks.cluster (two to four minutes on two cores).
 """
 
 from __future__ import annotations
