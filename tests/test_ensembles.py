@@ -21,6 +21,7 @@ from pathcontrol import (
     PathTask,
     PDPlus,
     Projection,
+    Push,
     Run,
     SampledLoop,
     SlotineLi,
@@ -84,5 +85,29 @@ def test_rollouts_with_gains_of_their_own_do_not_know_of_each_other(kind, task, 
 def test_gains_of_another_number_of_rollouts_are_refused(circle):
     with pytest.raises(InputError, match="fails at the initial states, of shape"):
         simulate(law("plan", circle, slice(0, N)), circle.q_d(np.zeros(4)), duration=0.1, progress=False)
-    with pytest.raises(InputError, match="gains that differ between rollouts need one row for each"):
-        simulate(law("plan", circle, slice(0, N)), circle.q_d(np.array(0.0)), duration=0.1, progress=False)
+
+
+@pytest.mark.parametrize("kind", ["plan", "projection", "sliding", "tracking", "pd"])
+def test_one_state_is_that_of_all_rollouts_of_gains(kind):
+    q, qd, settings = np.array([0.7, 1.2]), np.array([0.1, -0.2]), {"duration": 0.05, "progress": False}
+    one = simulate(law(kind, TASKS[0], slice(None)), q, qd, **settings)
+    every = simulate(law(kind, TASKS[0], slice(None)), np.tile(q, (N, 1)), qd, **settings)
+    assert one.rollouts == N
+    for name in every.data.data_vars:
+        assert_array_equal(one.array(name), every.array(name))
+
+
+@pytest.mark.parametrize(
+    "push", [Push(np.ones((4, 2)), [0.0, 0.01, 0.02, 0.03], 0.02), Push([5.0, 1.0], PLAN[:4], 0.1)]
+)
+def test_one_state_is_that_of_all_rollouts_of_a_disturbance(push):
+    plain = ExtendedMotionPlan(ARM, TASKS[0], 800.0, 60.0, 20.0)
+    one = simulate(plain, [0.7, 1.2], duration=0.05, disturbance=push, progress=False)
+    every = simulate(plain, np.tile([0.7, 1.2], (4, 1)), duration=0.05, disturbance=push, progress=False)
+    assert_array_equal(one.array("q"), every.array("q"))
+
+
+def test_rows_of_gains_and_of_a_disturbance_have_to_be_as_many():
+    gains = ExtendedMotionPlan(ARM, TASKS[0], HIGH[:3], LOW[:3], 20.0)
+    with pytest.raises(InputError, match="initial states"):
+        simulate(gains, [0.7, 1.2], duration=0.05, disturbance=Push(np.ones((4, 2))), progress=False)

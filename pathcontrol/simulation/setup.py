@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.metadata import version
 from typing import Any
@@ -107,6 +107,26 @@ def _check_equal(counts: Mapping[str, int]) -> None:
         raise InputError(", ".join(said.format(count) for said, count in counts.items()) + "; expected as many")
 
 
+def for_all_rows(q: Array, qd: Array, controller: Controller, disturbance: Disturbance | None) -> tuple[Array, Array]:
+    """One state (1, n), q and q̇, for each of the rollouts of which gains, or a disturbance, have a row."""
+    if len(q) > 1:
+        return q, qd
+    asked = [lambda: controller.law(0.0, q, qd, controller.start(q, qd)).tau]
+    if isinstance(disturbance, Disturbance):
+        asked.append(lambda: disturbance.torque(0.0, q, qd))
+    rows = max(map(_rows, asked))
+    return q.repeat(rows, axis=0), qd.repeat(rows, axis=0)
+
+
+def _rows(torque: Callable[[], Any]) -> int:
+    """How many rows a torque (N, n) has; what fails is told by the checks that follow."""
+    try:
+        shape = np.shape(torque())
+    except Exception:  # code of the user
+        return 1
+    return max(1, shape[0]) if len(shape) == 2 else 1
+
+
 def rollout_number(first: Any) -> int:
     """The number of the first rollout, a whole number from 0."""
     if isinstance(first, bool) or not isinstance(first, int | np.integer) or first < 0:
@@ -132,7 +152,7 @@ def check_law(controller: Controller, q: Array, qd: Array) -> None:
         if np.shape(value) != shape:
             raise InputError(
                 f"{name}.law gives {field} of shape {np.shape(value)} for initial states of shape {q.shape}, expected "
-                f"{shape}; gains that differ between rollouts need one row for each, and as many initial states"
+                f"{shape}; gains that differ between rollouts need one row for each, and as many initial states or one"
             )
         sound = np.isfinite(np.reshape(value, (len(q), -1))).all(-1)
         if not sound.any():  # where some are no numbers, those rollouts diverge

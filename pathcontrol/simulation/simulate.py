@@ -18,6 +18,7 @@ from pathcontrol.simulation.setup import (
     check_joints,
     check_law,
     checked_loop,
+    for_all_rows,
     joints_of,
     period_of,
     plant_of,
@@ -55,7 +56,8 @@ def simulate(
 
     Args:
         controller: the law, with its own model of the arm, and one task for all rollouts or a :class:`TaskBatch`.
-        q: initial joint positions [rad], (n,) or a batch (*batch, n); the run counts batches as rollouts.
+        q: initial joint positions [rad], (n,) or a batch (*batch, n); the run counts batches as rollouts. One state
+            does for all rollouts of which plants, tasks, gains or the disturbance say how many there are.
         qd: initial joint velocities [rad/s], broadcast against ``q``; default at rest.
         duration: longest simulated time [s], rounded to whole periods of the loop, one at least.
         laps: how many times a closed path is gone round, counted from where its plan starts.
@@ -77,7 +79,7 @@ def simulate(
     robot, first = plant_of(plant, controller), rollout_number(first_rollout)
     check_joints(controller, robot)
     loop = checked_loop(loop)
-    q0, qd0 = states_of_each(q, qd, robot, controller.task)
+    q0, qd0 = for_all_rows(*states_of_each(q, qd, robot, controller.task), controller, disturbance)
     period, finish = period_of(loop, duration), finish_of(controller.task, laps, until, len(q0))
     check_law(controller, q0, qd0)
     arm = simulated_arm(loop, robot, q0, qd0, Outside(disturbance, first))
