@@ -356,7 +356,6 @@ def test_a_task_may_carry_anything(ideal_arm):
         ({"qd": [[1.0, 2.0, 3.0]]}, ["qd has shape (1, 3)"]),
         ({"q": np.zeros((3, 2)), "qd": np.zeros((4, 2))}, ["(3, 2)", "(4, 2)"]),
         ({"q": np.zeros((4, 2)), "rows": 3}, ["shape (4, 2)"]),
-        ({"q": [0.0, 0.0], "rows": 3}, ["(1, 2)"]),
         ({"duration": 0.0}, ["duration = 0"]),
         ({"duration": np.inf}, ["duration = inf"]),
     ],

@@ -297,9 +297,9 @@ def test_other_versions_are_noted(tmp_path):
         ({"metrics": lambda run: {"one": 1.0}}, InputError, r"the metric one has shape \(\), expected \(14,\)"),
         ({"build": lambda p, i: circle(p, i) | {"progress": True}}, InputError, "progress, which the sweep sets"),
         (
-            {"build": lambda p, i: circle(p, i) | {"q": [[0.7, 1.2]]}},
+            {"build": lambda p, i: circle(p, i) | {"q": [[0.7, 1.2]] * 2}},
             InputError,
-            "samples 0 to 13: .*gains that differ",
+            r"samples 0 to 13: .*fails at the initial states, of shape \(2, 2\)",
         ),
         ({"build": lambda p, i: line({"K_p": p["K_p"][:2]}, i[:2])}, InputError, "2 rollouts for 14 samples"),
     ],
