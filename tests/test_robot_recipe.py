@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from strategies import floats
 
 from pathcontrol import Coulomb, FrictionLaw, InputError, Stribeck, UrdfError, Viscous, load_robot
+from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.friction import friction_of, no_friction
-from pathcontrol.robot.model import Actuation, Limits, UrdfSource
+from pathcontrol.robot.model import UrdfSource
 from pathcontrol.robot.recipe import recipe_of, robot_of
 
 FINGERS = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.02}

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from pathcontrol._arrays import Array
-from pathcontrol.robot.model import Limits
+from pathcontrol.robot.actuation import Limits
 
 _ATTRACTION = 0.1  # pull of the start posture
 _MARGIN = 0.3  # rad or m from a limit where it begins to push, but no more than …

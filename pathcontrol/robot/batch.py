@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array, as_slice, in_common
 from pathcontrol.errors import InputError
+from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.friction import FrictionLaw, friction_of_each
-from pathcontrol.robot.model import Actuation, Limits, RobotModel
+from pathcontrol.robot.model import RobotModel
 
 _FEW = 4  # rows of one rigid body, below which Pinocchio's batched call does not pay
 

@@ -12,8 +12,9 @@ from lxml import etree
 
 from pathcontrol._arrays import Array, readonly
 from pathcontrol.errors import InputError, MissingExtraError, UnknownNameError, UrdfError
+from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Viscous
-from pathcontrol.robot.model import Actuation, Limits, RobotModel, UrdfSource, build_model
+from pathcontrol.robot.model import RobotModel, UrdfSource, build_model
 from pathcontrol.robot.urdf import check_urdf, parse_urdf
 from pathcontrol.robot.urdf.extension import extension_values
 

@@ -15,8 +15,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly, scalar
+from pathcontrol._arrays import Array, as_array, finite, joint_array, scalar
 from pathcontrol.errors import InputError, UnknownNameError, UrdfError
+from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.friction import FrictionLaw, no_friction
 from pathcontrol.robot.rigid_body import RigidBody, together
 
@@ -31,34 +32,6 @@ class UrdfSource:
     base_dir: Path | None = None
     package_dirs: tuple[Path, ...] = ()
     name: str | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Limits:
-    """Joint limits, each (n,): position [rad or m], velocity [rad/s], effort [N m]; ±inf where there is none."""
-
-    lower: Array
-    upper: Array
-    velocity: Array
-    effort: Array
-
-    def select(self, joints: Sequence[int]) -> Limits:
-        """The limits of some of the joints."""
-        return Limits(*(readonly(a[list(joints)]) for a in (self.lower, self.upper, self.velocity, self.effort)))
-
-
-@dataclass(frozen=True, eq=False)
-class Actuation:
-    """What the joints are driven and measured with: limits, friction, encoder resolution [counts/rev] or None."""
-
-    limits: Limits
-    friction: FrictionLaw
-    encoder_counts: Array | None = None
-
-    def select(self, joints: Sequence[int]) -> Actuation:
-        """The actuation of some of the joints."""
-        counts = None if self.encoder_counts is None else readonly(self.encoder_counts[list(joints)])
-        return Actuation(self.limits.select(joints), self.friction.select(joints), counts)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

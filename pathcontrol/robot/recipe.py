@@ -12,9 +12,10 @@ import numpy as np
 
 from pathcontrol._arrays import Array, readonly
 from pathcontrol.errors import InputError, MissingExtraError, PathControlError, UnknownNameError
+from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.friction import FrictionLaw, friction_of, no_friction
 from pathcontrol.robot.loading import checked_model, find_urdf
-from pathcontrol.robot.model import Actuation, Limits, RobotModel, UrdfSource
+from pathcontrol.robot.model import RobotModel, UrdfSource
 
 _METHODS = ("reduced", "with_payload", "with_frame", "with_armature", "with_masses")
 _LIMITS = {"lower": -np.inf, "upper": np.inf, "velocity": np.inf, "effort": np.inf}  # null stands for these

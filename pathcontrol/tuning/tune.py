@@ -91,12 +91,7 @@ def tune(
     if both := set(design) & set(space.names):
         raise InputError(f"{', '.join(sorted(both))}: both searched and in the scenarios; call one of them otherwise")
     count = 1 if several is None else several.samples
-    described = space.describe()["parameters"] | ({} if several is None else several.describe()["parameters"])
-    definition = terms.describe() | {
-        "build": told(build),
-        "space": {"parameters": described},
-        "scenarios_sha256": digest(list(design.values())),
-        "metrics": told(wanted) if callable(wanted) else wanted,
+    definition = _definition(terms, build, (space, several), digest(list(design.values())), wanted) | {
         "population": population,
         "generations": generations,
         "seed": seed,
@@ -114,6 +109,23 @@ def tune(
             if not tables:
                 raise
     return Tuning(xr.concat(tables, "sample"), terms, count, (len(tables), generations))
+
+
+def _definition(
+    terms: Terms,
+    build: Build,
+    spaces: tuple[Space, Space | None],
+    scenarios: str,
+    metrics: Sequence[str] | Measure,
+) -> dict[str, Any]:
+    """What the numbers of a candidate depend on, with the digest of its ``scenarios``."""
+    described = [space.describe()["parameters"] for space in spaces if space is not None]
+    return terms.describe() | {
+        "build": told(build),
+        "space": {"parameters": {name: value for one in described for name, value in one.items()}},
+        "scenarios_sha256": scenarios,
+        "metrics": told(metrics) if callable(metrics) else metrics,
+    }
 
 
 def _noted(store: Store | None) -> Mapping[str, Array]:
