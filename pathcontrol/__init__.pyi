@@ -32,6 +32,7 @@ from .errors import ExperimentError as ExperimentError
 from .errors import InputError as InputError
 from .errors import MissingExtraError as MissingExtraError
 from .errors import PathControlError as PathControlError
+from .errors import PathControlWarning as PathControlWarning
 from .errors import SimulationError as SimulationError
 from .errors import TaskError as TaskError
 from .errors import ToolpathError as ToolpathError

@@ -1,4 +1,4 @@
-"""The errors this package raises: one root, leaves that are also the builtin a caller would expect.
+"""The errors and the warning of this package: one root, leaves that are also the builtin a caller would expect.
 
 Every message names the value, what was expected and what to try.
 """
@@ -11,6 +11,10 @@ from typing import Any
 
 class PathControlError(Exception):
     """Root of all errors raised on purpose by :mod:`pathcontrol`."""
+
+
+class PathControlWarning(UserWarning):
+    """Something is allowed but is likely a slip, or was passed over; the message says what, and what to do about it."""
 
 
 class InputError(PathControlError, ValueError):

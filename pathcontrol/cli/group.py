@@ -6,21 +6,23 @@ import contextlib
 import errno
 import signal
 import sys
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import click
 
-from pathcontrol.errors import PathControlError
+from pathcontrol.errors import PathControlError, PathControlWarning
 
 
 class Group(click.Group):
-    """Turns the library's errors into one message and exit code 2, and Ctrl-C into exit code 130."""
+    """Turn the library's errors into one message and exit code 2, warnings into one line, Ctrl-C into exit code 130."""
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
+            with warnings_in_one_line():
+                return super().invoke(ctx)
         except PathControlError as error:
             click.echo(f"error: {printable(str(error))}", err=True)
             sys.exit(2)
@@ -37,6 +39,23 @@ class Group(click.Group):
 def printable(message: str) -> str:
     """``message`` without the control characters that a file may have put into it, which a terminal would obey."""
     return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in message)
+
+
+@contextlib.contextmanager
+def warnings_in_one_line() -> Iterator[None]:
+    """Print each of the library's warnings once, as one line on stderr without the line of code that raised it."""
+    before = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+        if issubclass(category, PathControlWarning):
+            click.echo(f"warning: {printable(str(message))}", err=True)
+        else:
+            before(message, category, *where, **more)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("default", PathControlWarning)
+        warnings.showwarning = show
+        yield
 
 
 @contextlib.contextmanager

@@ -111,11 +111,13 @@ class Toolpath:
         contours: cuts and rapids.
         source: the file they come from.
         unit: the file's unit of length, as it is called there: ``"mm"``, ``"in"``, …
+        notes: what the reader passed over or took for granted, one sentence each; :func:`read_toolpath` warns of them.
     """
 
     contours: tuple[Contour, ...]
     source: str = ""
     unit: str = "m"
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.contours:

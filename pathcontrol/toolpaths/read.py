@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import inspect
+import warnings
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from pathcontrol.errors import InputError, ToolpathError
+from pathcontrol.errors import InputError, PathControlWarning, ToolpathError
 from pathcontrol.toolpaths.contour import Toolpath
 
 GCODE = (".ngc", ".nc", ".gcode", ".gc", ".tap", ".cnc")
@@ -42,7 +43,10 @@ def read_toolpath(path: str | Path, **options: Any) -> Toolpath:
         raise InputError(
             f"{Path(path).name!r} is read by {reader.__name__}, which takes {takes}, not {', '.join(unknown)}"
         )
-    return reader(path, **options)
+    toolpath = reader(path, **options)
+    for note in toolpath.notes:
+        warnings.warn(f"{Path(path).name}: {note}", PathControlWarning, stacklevel=2)
+    return toolpath
 
 
 def _reader(path: Path) -> Callable[..., Toolpath]:
