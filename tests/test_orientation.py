@@ -171,3 +171,42 @@ def test_bad_orientations(make, words):
     with pytest.raises(InputError) as error:
         make()
     assert all(word in str(error.value) for word in words), str(error.value)
+
+
+def compass(count: int = 4) -> np.ndarray:
+    """Axes all over the sphere, along the coordinate axes and between them too, (k, 3)."""
+    grid = np.stack(np.meshgrid(*[np.arange(-count, count + 1)] * 3), axis=-1).reshape(-1, 3)
+    grid = grid[(grid != 0).any(-1)].astype(float)
+    return grid / np.linalg.norm(grid, axis=-1, keepdims=True)
+
+
+@pytest.mark.parametrize("short_of_half", [0.0, 1e-13, 1e-10, 1e-7, 1e-4, 0.1, 0.46, 1.0, np.pi / 2, 3.0])
+def test_the_rotation_that_is_left_is_scipys_up_to_half_a_turn(short_of_half):
+    """SciPy goes by quaternions; of half a turn both directions of the axis are right."""
+    turns = (np.pi - short_of_half) * compass()
+    matrices = Rotation.from_rotvec(turns).as_matrix()
+    e, _ = FixedOrientation(np.eye(3)).error(CIRCLE, np.zeros(len(turns)), matrices)
+    expected = Rotation.from_matrix(matrices).as_rotvec()
+    same = np.linalg.norm(e - expected, axis=-1)
+    if short_of_half < 1e-12:  # the matrix does not know on which side of π it is
+        same = np.minimum(same, np.linalg.norm(e + expected, axis=-1))
+    assert same.max() < 1e-11
+    assert np.allclose(np.linalg.norm(e, axis=-1), np.pi - short_of_half, atol=1e-13)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_half_a_turn_about_a_coordinate_axis_is_exact(axis):
+    matrix = 2 * np.outer(np.eye(3)[axis], np.eye(3)[axis]) - np.eye(3)
+    e, _ = FixedOrientation(np.eye(3)).error(CIRCLE, np.zeros(1), matrix[None])
+    assert np.array_equal(e[0], np.pi * np.eye(3)[axis])
+
+
+@given(seeds)
+def test_a_tool_that_points_the_opposite_way_is_half_a_turn_off(seed):
+    """Whichever way the normal points, along an axis of the base too: ‖e‖ = π, not less."""
+    normals = np.concatenate([compass(1), Rotation.random(8, random_state=seed).as_matrix()[:, 0]])
+    for normal in normals:
+        orientation = NormalOrientation(normal)
+        wanted = orientation.frames(CURVE, S[:1])
+        e, _ = orientation.error(CURVE, S[:1], wanted @ np.diag([1.0, -1.0, -1.0]))
+        assert np.linalg.norm(e) == pytest.approx(np.pi, abs=1e-9)

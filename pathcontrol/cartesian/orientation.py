@@ -16,6 +16,8 @@ from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.curve import ToolCurve
 
 _PARALLEL = 1e-6  # sine of an angle that counts as none
+_NO_SINE = 1e-12  # what is left of the sine of no turn, or of half a turn, by rounding
+_WIDE = -0.9  # cosine of angles whose axis is better known from the symmetric part of the matrix
 
 
 class Orientation(ABC):
@@ -43,7 +45,10 @@ class Orientation(ABC):
             return _rotation_vector(rotation @ wanted.swapaxes(-1, -2)), np.broadcast_to(np.eye(3), wanted.shape)
         z, towards = rotation[..., :, 2], wanted[..., :, 2]
         across = wanted[..., :, :2].swapaxes(-1, -2)
-        turn = _scaled(np.cross(towards, z), (towards * z).sum(-1))
+        axis, cosine = np.cross(towards, z), (towards * z).sum(-1)
+        turn = _scaled(axis, cosine)
+        opposite = (np.linalg.norm(axis, axis=-1) <= _NO_SINE) & (cosine < 0)
+        turn[opposite] = np.pi * wanted[opposite, :, 0]  # half a turn, about any axis across z
         return (across @ turn[..., None])[..., 0], across
 
 
@@ -203,15 +208,31 @@ def _rotation_vector(rotation: Array) -> Array:
     """The rotation vector [rad] of rotation matrices (N, 3, 3), (N, 3)."""
     skew = 0.5 * (rotation - rotation.swapaxes(-1, -2))
     axis = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
-    return _scaled(axis, 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1))
+    cosine = 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1)
+    turn = _scaled(axis, cosine)
+    wide = cosine < _WIDE
+    if wide.any():
+        turn[wide] = _wide_turn(rotation[wide], axis[wide], cosine[wide])
+    return turn
+
+
+def _wide_turn(rotation: Array, axis: Array, cosine: Array) -> Array:
+    """The rotation vector [rad] of turns by nearly or exactly π, (N, 3).
+
+    R − Rᵀ vanishes there. The symmetric part has the axis a instead: ½(R + Rᵀ) = cos θ I + (1 − cos θ) a aᵀ. Of the two
+    that it leaves, the sign is that of ``axis`` (N, 3), a sin θ; for half a turn both are right.
+    """
+    square = 0.5 * (rotation + rotation.swapaxes(-1, -2)) - cosine[:, None, None] * np.eye(3)
+    largest = np.diagonal(square, axis1=-2, axis2=-1).argmax(-1)
+    direction = np.take_along_axis(square, largest[:, None, None], axis=-1)[..., 0]
+    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+    sign = np.where((direction * axis).sum(-1) < 0, -1.0, 1.0)
+    angle = np.arctan2(np.linalg.norm(axis, axis=-1), cosine)
+    return (sign * angle)[:, None] * direction
 
 
 def _scaled(axis: Array, cosine: Array) -> Array:
     """The rotation vector of an axis (N, 3) as long as the sine of the angle, whose ``cosine`` is given."""
     sine = np.linalg.norm(axis, axis=-1)
-    angle = np.arctan2(sine, cosine)
-    factor = np.divide(angle, sine, out=np.ones_like(sine), where=sine > 1e-12)
-    turn = factor[..., None] * axis
-    opposite = (sine <= 1e-12) & (cosine < 0)  # half a turn: about any axis
-    turn[opposite] = [np.pi, 0.0, 0.0]
-    return turn
+    factor = np.divide(np.arctan2(sine, cosine), sine, out=np.ones_like(sine), where=sine > _NO_SINE)
+    return factor[..., None] * axis

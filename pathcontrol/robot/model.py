@@ -221,7 +221,8 @@ class RobotModel:
         batch, rows = array.shape[:-1], array.reshape(-1, self.n)
         poses, jacobians = np.empty((len(rows), 4, 4)), np.empty((len(rows), 6, self.n))
         for k, qi in enumerate(rows):
-            jacobians[k] = pin.computeFrameJacobian(self.pinocchio_model, data, qi, i, _ALIGNED)
+            jacobian = pin.computeFrameJacobian(self.pinocchio_model, data, qi, i, _ALIGNED)
+            jacobians[k] = jacobian.reshape(6, self.n)  # that of a single joint comes as (6,)
             poses[k] = data.oMf[i].homogeneous  # which computeFrameJacobian leaves up to date
         return poses.reshape(*batch, 4, 4), jacobians.reshape(*batch, 6, self.n)
 
