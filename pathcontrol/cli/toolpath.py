@@ -19,18 +19,19 @@ from pathcontrol.cli.group import json_option, uninterrupted
 @click.option("--feed", type=float, metavar="M/S", help="Feed of contours for which the file gives none.")
 @click.option("--start", type=float, nargs=3, metavar="X Y Z", help="Where a G-code program finds the tool, in metres.")
 @click.option(
+    "--lenient", "unknown", flag_value="warn", help="Warn of what is not understood and cannot move the tool."
+)
+@click.option(
     "--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw it: writes this name as SVG and PNG."
 )
 @json_option
 def command(file: Path, layers: tuple[str, ...], plot: Path | None, as_json: bool, **options: Any) -> None:
     """Show what is in a toolpath FILE: CSV, G-code, SVG or DXF."""
     from pathcontrol.cli.tables import toolpath_table
-    from pathcontrol.toolpaths.read import GCODE, read_toolpath
+    from pathcontrol.toolpaths.read import read_toolpath
     from pathcontrol.toolpaths.summary import summary
 
     given = {name: value for name, value in (options | {"layers": list(layers) or None}).items() if value is not None}
-    if file.suffix.lower() in GCODE:  # which has feeds of its own, or is refused
-        given.pop("feed", None)
     read = read_toolpath(file, **given)
     content = summary(read)
     if plot is not None:

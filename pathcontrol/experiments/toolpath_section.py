@@ -24,12 +24,12 @@ class Workpiece(Section):
 class ToolpathSection(Section):
     """``toolpath``: see :func:`pathcontrol.read_toolpath` and :class:`pathcontrol.ToolpathTask`.
 
-    ``file`` is relative to the experiment file; ``unit``, ``layers`` and ``ppi`` are for its reader. Lengths are in
-    metres and metres per second, ``start`` is in ``angle_unit``.
+    ``file`` is relative to the experiment file; ``unit``, ``layers``, ``ppi`` and ``unknown`` are for its reader. Lengths
+    are in metres and metres per second, ``start`` is in ``angle_unit``.
     """
 
     angles = ("start",)
-    reader_options: ClassVar[tuple[str, ...]] = ("unit", "layers", "ppi")
+    reader_options: ClassVar[tuple[str, ...]] = ("unit", "layers", "ppi", "unknown")
     not_arguments: ClassVar[tuple[str, ...]] = ("type", "file", "workpiece", *reader_options)
     type: Literal["toolpath"] = "toolpath"
     file: Text
@@ -38,6 +38,7 @@ class ToolpathSection(Section):
     unit: Text | None = None
     layers: list[Text] | None = None
     ppi: Positive | None = None
+    unknown: Literal["refuse", "warn"] | None = None
     orientation: Literal["free", "down", "normals", "tangent"] | None = None
     feed: Positive | None = None
     rapid_speed: Positive | None = None
@@ -50,5 +51,5 @@ class ToolpathSection(Section):
     @property
     def reading(self) -> dict[str, Any]:
         """What the reader of the file is told."""
-        given = {name: getattr(self, name) for name in self.reader_options}
+        given = {name: getattr(self, name) for name in (*self.reader_options, "feed")}
         return {name: value for name, value in given.items() if value is not None}

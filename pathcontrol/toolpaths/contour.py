@@ -16,7 +16,7 @@ from pathcontrol.toolpaths.segments import Polyline, Segment
 _MEET = 1e-9  # m, how near the ends of neighbouring segments are
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Contour:
     """Segments one after another, the tool's way without lifting it [m].
 
@@ -47,6 +47,12 @@ class Contour:
             gap = max(gap, float(np.linalg.norm(ends[-1] - starts[0])))
         if gap > _MEET * (1 + np.abs(starts).max()):
             raise InputError(f"the segments of contour {self.name!r} do not meet: there is a gap of {gap:g} m")
+
+    def __repr__(self) -> str:
+        kind = "rapid" if self.rapid else "no feed" if self.feed is None else f"{self.feed:.4g} m/s"
+        closed = ", closed" if self.closed else ""
+        segments = f"{len(self.segments)} segment{'s' * (len(self.segments) > 1)}"
+        return f"Contour({self.name!r}; {segments}, {self.length:.4g} m, {kind}{closed})"
 
     @property
     def length(self) -> float:
@@ -103,7 +109,7 @@ class Contour:
         return np.array([s.last for s in self.segments]), np.array([s.first for s in self.segments])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Toolpath:
     """The contours of a file [m], in its order; iterating goes through them.
 
@@ -122,6 +128,12 @@ class Toolpath:
     def __post_init__(self) -> None:
         if not self.contours:
             raise InputError(f"there is no contour in {self.source or 'this toolpath'}")
+
+    def __repr__(self) -> str:
+        rapids = [contour for contour in self.contours if contour.rapid]
+        kinds = [("cut", self.cuts), ("rapid", rapids)]
+        counted = [_counted(name, contours) for name, contours in kinds if contours]
+        return f"Toolpath({'; '.join([repr(self.source), *counted, f'file in {self.unit}'])})"
 
     def __iter__(self) -> Iterator[Contour]:
         return iter(self.contours)
@@ -163,6 +175,12 @@ def rigid(name: str, pose: ArrayLike) -> Array:
     if not proper or not np.allclose(transform[3], [0, 0, 0, 1]):
         raise InputError(f"{name} is no rigid motion: its rotation is not orthonormal, or its last row not 0 0 0 1")
     return readonly(transform)
+
+
+def _counted(name: str, contours: Sequence[Contour]) -> str:
+    """``"2 cuts, 0.19 m"``."""
+    length = sum(contour.length for contour in contours)
+    return f"{len(contours)} {name}{'s' * (len(contours) > 1)}, {length:.4g} m"
 
 
 def _to_box(x: Array, lower: Array, upper: Array) -> Array:

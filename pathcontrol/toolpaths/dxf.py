@@ -21,6 +21,7 @@ from pathcontrol.toolpaths.dxf_blocks import Entities
 from pathcontrol.toolpaths.dxf_chain import Strand, chained
 from pathcontrol.toolpaths.dxf_entities import pieces
 from pathcontrol.toolpaths.dxf_layers import Layers
+from pathcontrol.toolpaths.passed import Passed
 from pathcontrol.toolpaths.pieces import Budget, contour_of
 from pathcontrol.toolpaths.segments import Segment
 from pathcontrol.toolpaths.text import read_text
@@ -50,6 +51,7 @@ def read_dxf(
     unit: str | None = None,
     layers: str | Sequence[str] | None = None,
     feed: float | None = None,
+    unknown: str = "refuse",
 ) -> Toolpath:
     """The contours of a DXF drawing's modelspace, in its order.
 
@@ -64,15 +66,17 @@ def read_dxf(
             names ($INSUNITS). It is never guessed.
         layers: which layers to read; by default all that are neither off nor frozen.
         feed: speed of the tool [m/s] along all contours, or None: DXF has none.
+        unknown: ``"refuse"`` what is not understood, or ``"warn"``, pass it over where it cannot change what is cut.
 
     Raises:
         ToolpathError: the file is no DXF drawing, names no unit, or holds what cannot be cut on the layers read: text,
             hatches, dimensions, solids. The message says which, and on which layers.
         UnknownNameError: there is no such unit or layer.
-        InputError: ``feed`` is not greater than 0.
+        InputError: ``feed`` is not greater than 0, ``unknown`` is no choice.
     """
     if feed is not None:
         scalar("feed", feed, positive=True)
+    passed = Passed(unknown)
     source = os.fspath(path)
     text = read_text(path, "a DXF drawing")
     document = _loaded(source, text)
@@ -82,7 +86,8 @@ def read_dxf(
     strands = _strands(source, entities, found, np.diag([UNITS[unit]] * 3 + [1.0]))
     if not strands:
         raise ToolpathError(f"{source} draws no outline on the layers read; its layers are {found.listed}")
-    return Toolpath(tuple(_contour(source, strand, feed) for strand in chained(strands)), source, unit)
+    contours = tuple(_contour(source, strand, feed) for strand in chained(strands))
+    return Toolpath(contours, source, unit, passed.notes)
 
 
 def _loaded(source: str, text: str) -> Any:

@@ -10,6 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Contour, Toolpath
+from pathcontrol.toolpaths.passed import Passed
 from pathcontrol.toolpaths.points_columns import CONTOUR, UNITS
 from pathcontrol.toolpaths.points_table import Rows, Table
 from pathcontrol.toolpaths.segments import Polyline
@@ -18,7 +19,9 @@ from pathcontrol.toolpaths.text import read_lines
 _NOTHING = 1e-9  # m, points nearer than this are the same, as are tool axes
 
 
-def read_csv(path: str | os.PathLike[str], unit: str | None = None, feed: float | None = None) -> Toolpath:
+def read_csv(
+    path: str | os.PathLike[str], unit: str | None = None, feed: float | None = None, unknown: str = "refuse"
+) -> Toolpath:
     """Contours from a table of points, a point a line: ``x y z``, or ``x y z i j k`` with the tool's axis.
 
     Semicolons, tabs, commas or blanks separate the values; the first line says which. It may name the columns, in any
@@ -32,15 +35,17 @@ def read_csv(path: str | os.PathLike[str], unit: str | None = None, feed: float 
         unit: unit of the coordinates: ``"m"``, ``"mm"`` or ``"in"``. By default the one that the first line names, else
             metres, as everywhere in this package.
         feed: speed of the tool along the contours [m/s], which a table does not give.
+        unknown: ``"refuse"`` or ``"warn"``, as for the other readers.
 
     Raises:
-        InputError: ``path``, ``unit`` or ``feed`` is none.
+        InputError: ``path``, ``unit``, ``feed`` or ``unknown`` is none.
         ToolpathError: the file cannot be used; the message says in which line and why.
     """
     if unit is not None and unit not in UNITS:
         raise InputError(f"unit = {unit!r}, expected one of {', '.join(UNITS)}, or None")
     if feed is not None:
         feed = scalar("feed", feed, positive=True)
+    passed = Passed(unknown)
     rows = Rows.of(read_lines(path, "a table of points"))
     try:
         columns = rows.columns()
@@ -49,7 +54,7 @@ def read_csv(path: str | os.PathLike[str], unit: str | None = None, feed: float 
         contours = [_contour(table, first, end, feed) for first, end in table.parts]
     except ToolpathError as error:
         raise ToolpathError(f"{os.fspath(path)}: {error}") from None
-    return Toolpath(tuple(contours), os.fspath(path), unit)
+    return Toolpath(tuple(contours), os.fspath(path), unit, passed.notes)
 
 
 def _contour(table: Table, first: int, end: int, feed: float | None) -> Contour:

@@ -12,11 +12,10 @@ from typing import Any
 from pathcontrol.errors import InputError, PathControlWarning, ToolpathError
 from pathcontrol.toolpaths.contour import Toolpath
 
-GCODE = (".ngc", ".nc", ".gcode", ".gc", ".tap", ".cnc")
 #: readers by the end of a file's name: the module of this package, and the function in it
 READERS = {
     (".csv", ".tsv", ".txt", ".xyz"): ("points", "read_csv"),
-    GCODE: ("gcode", "read_gcode"),
+    (".ngc", ".nc", ".gcode", ".gc", ".tap", ".cnc"): ("gcode", "read_gcode"),
     (".svg",): ("svg", "read_svg"),
     (".dxf",): ("dxf", "read_dxf"),
 }
@@ -27,9 +26,13 @@ def read_toolpath(path: str | Path, **options: Any) -> Toolpath:
 
     Args:
         path: the file.
-        options: what the reader for such files takes besides: :func:`read_csv` ``unit`` and ``feed``,
-            :func:`read_gcode` ``unit`` and ``start``, :func:`read_svg` ``ppi`` and ``feed``, :func:`read_dxf` ``unit``,
-            ``layers`` and ``feed``.
+        options: what the reader for such files takes besides, see :func:`read_csv`, :func:`read_gcode`,
+            :func:`read_svg` and :func:`read_dxf`. All take ``feed`` [m/s], for contours without one, and ``unknown``:
+            ``"refuse"``, what is not understood is an error, or ``"warn"``, where it cannot change what is cut it is
+            passed over, and each kind is told once with its count and lines.
+
+    What a reader passes over or takes for granted is warned of by :class:`PathControlWarning`, and is in
+    :attr:`Toolpath.notes`.
 
     Raises:
         ToolpathError: no reader knows such files, or the file cannot be used; the message says where and why.

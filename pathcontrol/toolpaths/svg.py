@@ -18,6 +18,7 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.contour import Contour, Toolpath
+from pathcontrol.toolpaths.passed import Passed
 from pathcontrol.toolpaths.pieces import Budget, contour_of
 from pathcontrol.toolpaths.svg_document import Document, tag_of
 from pathcontrol.toolpaths.svg_shapes import SHAPES, Attributes, subpaths
@@ -34,7 +35,9 @@ _MOST_USES = 64  # inside each other
 _MOST_ELEMENTS = 200_000
 
 
-def read_svg(path: str | os.PathLike[str], ppi: float = 96.0, feed: float | None = None) -> Toolpath:
+def read_svg(
+    path: str | os.PathLike[str], ppi: float = 96.0, feed: float | None = None, unknown: str = "refuse"
+) -> Toolpath:
     """The outlines that an SVG file draws, in its order: a contour for each subpath, named after the element's id.
 
     Lengths are those on the page, by its width and height (mm, cm, in, pt, pc, Q, px) and its viewBox. The drawing
@@ -46,20 +49,22 @@ def read_svg(path: str | os.PathLike[str], ppi: float = 96.0, feed: float | None
         path: the file.
         ppi: pixels per inch, 96 by CSS; some programs write 72 or 90.
         feed: speed of the tool [m/s] along all contours, or None: SVG has none.
+        unknown: ``"refuse"`` what is not understood, or ``"warn"``, pass it over where it cannot change what is cut.
 
     Raises:
         ToolpathError: the file is no SVG, defines entities, or holds what is not understood or cannot be cut: text,
             images, clipping, malformed attributes. The message says in which line and element.
-        InputError: ``ppi`` or ``feed`` is not greater than 0.
+        InputError: ``ppi`` or ``feed`` is not greater than 0, ``unknown`` is no choice.
     """
     scalar("ppi", ppi, positive=True)
     if feed is not None:
         scalar("feed", feed, positive=True)
+    passed = Passed(unknown)
     document = Document(path)
     contours = tuple(_Walk(document, feed).contours(ppi))
     if not contours:
         raise ToolpathError(f"{document.path} draws no outline; expected paths or shapes that are not hidden")
-    return Toolpath(contours, document.path, page_unit(document.attributes(document.root)))
+    return Toolpath(contours, document.path, page_unit(document.attributes(document.root)), passed.notes)
 
 
 class _Place(NamedTuple):

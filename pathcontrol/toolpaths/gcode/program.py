@@ -24,10 +24,11 @@ class Program:
     Args:
         unit: the unit in force at the beginning, or None.
         position: where the tool is at the beginning [m], (3,), NaN where that is not known.
+        feed: speed of cuts before the program says F [m/s], or None.
     """
 
-    def __init__(self, unit: Unit | None, position: Sequence[float]) -> None:
-        self.modes = Modes(unit)
+    def __init__(self, unit: Unit | None, position: Sequence[float], feed: float | None = None) -> None:
+        self.modes = Modes(unit, feed=feed)
         self.strokes = Strokes()
         self._position = list(position)
 
@@ -110,4 +111,6 @@ class Program:
                 f"G90 G0 {'… '.join(unknown)}…, or read the file with start=(x, y, z)"
             )
         if self.modes.feed is None:
-            raise ToolpathError("it cuts before there is a feed: write F, in units per minute")
+            raise ToolpathError(
+                "it cuts before there is a feed: write F, in units per minute, or read the file with feed="
+            )

@@ -9,16 +9,23 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import as_array, finite
+from pathcontrol._arrays import as_array, finite, scalar
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Toolpath
 from pathcontrol.toolpaths.gcode.program import Program
 from pathcontrol.toolpaths.gcode.units import UNITS
 from pathcontrol.toolpaths.gcode.words import PERCENT, PROGRAM_NAME, parse, without_comments
+from pathcontrol.toolpaths.passed import Passed
 from pathcontrol.toolpaths.text import MAX_COORDINATE, read_lines
 
 
-def read_gcode(path: str | os.PathLike[str], unit: str | None = None, start: ArrayLike | None = None) -> Toolpath:
+def read_gcode(
+    path: str | os.PathLike[str],
+    unit: str | None = None,
+    start: ArrayLike | None = None,
+    feed: float | None = None,
+    unknown: str = "refuse",
+) -> Toolpath:
     """Contours from a G-code program, RS274/NGC as LinuxCNC and most CAM programs write it.
 
     Cuts (G1, G2 and G3, one after another, at one feed) and rapids (G0, straight) are contours, called by their first
@@ -38,15 +45,20 @@ def read_gcode(path: str | os.PathLike[str], unit: str | None = None, start: Arr
         path: the file.
         unit: ``"mm"`` or ``"in"``, the unit before the program says G20 or G21; by default it must say it.
         start: where the tool is before the first move [m], (3,); by default that is not known.
+        feed: speed of the tool [m/s] along cuts before the program says F; by default it must say it.
+        unknown: ``"refuse"`` words that are not understood, or ``"warn"``, pass those over that cannot move the tool.
 
     Raises:
-        InputError: ``path``, ``unit`` or ``start`` is none.
+        InputError: ``path``, ``unit``, ``start``, ``feed`` or ``unknown`` is none.
         ToolpathError: the file cannot be used; the message says in which line and why.
     """
     if unit is not None and unit not in UNITS:
         raise InputError(f"unit = {unit!r}, expected one of {', '.join(UNITS)}, or None")
+    if feed is not None:
+        feed = scalar("feed", feed, positive=True)
+    passed = Passed(unknown)
     texts = [without_comments(line) for line in read_lines(path, "a G-code program")]
-    program = Program(None if unit is None else UNITS[unit], _start(start, texts))
+    program = Program(None if unit is None else UNITS[unit], _start(start, texts), feed)
     try:
         _run(program, texts)
         contours = program.strokes.contours()
@@ -54,7 +66,7 @@ def read_gcode(path: str | os.PathLike[str], unit: str | None = None, start: Arr
             raise ToolpathError("there is no move in it between places that it gives, expected G0, G1, G2 or G3")
     except ToolpathError as error:
         raise ToolpathError(f"{os.fspath(path)}: {error}") from None
-    return Toolpath(contours, os.fspath(path), program.modes.known_unit("the program").name)
+    return Toolpath(contours, os.fspath(path), program.modes.known_unit("the program").name, passed.notes)
 
 
 def _start(start: ArrayLike | None, texts: list[str]) -> list[float]:

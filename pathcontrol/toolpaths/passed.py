@@ -1,0 +1,76 @@
+"""What a reader of toolpaths passes over: refused, or gathered and told, each kind once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from pathcontrol.errors import InputError, ToolpathError
+
+#: what may be done with what a reader does not understand and what cannot move the tool
+UNKNOWN = ("refuse", "warn")
+_MOST_KINDS, _MOST_PLACES = 50, 8
+
+
+@dataclass
+class _Kind:
+    """How often something was passed over, and the first places of it."""
+
+    count: int = 0
+    places: list[str] = field(default_factory=list)
+
+
+class Passed:
+    """Gathers what is passed over, and what is to be told of a file, for :attr:`Toolpath.notes`.
+
+    Args:
+        unknown: ``"refuse"``, what is not understood is an error; ``"warn"``, it is passed over and told.
+
+    Raises:
+        InputError: ``unknown`` is neither.
+    """
+
+    def __init__(self, unknown: str = "refuse") -> None:
+        if unknown not in UNKNOWN:
+            raise InputError(f"unknown = {unknown!r}, expected one of {', '.join(map(repr, UNKNOWN))}")
+        self.lenient = unknown == "warn"
+        self._kinds: dict[str, _Kind] = {}
+        self._sentences: dict[str, None] = {}
+
+    def over(self, kind: str, place: int | str) -> None:
+        """Count one thing of a kind that was passed over in a line, given by its number, or at another place."""
+        found = self._kinds.setdefault(kind, _Kind())
+        found.count += 1
+        text = str(place)
+        if len(found.places) <= _MOST_PLACES and text not in found.places:
+            found.places.append(text)
+
+    def unless_refused(self, kind: str, place: int | str, reason: str) -> None:
+        """Pass over what is not understood.
+
+        Use it only for what cannot move the tool.
+
+        Raises:
+            ToolpathError: it is to be refused; the message is ``reason`` with the way to pass it over.
+        """
+        if not self.lenient:
+            raise ToolpathError(f"{reason}; or pass it over with unknown='warn'")
+        self.over(kind, place)
+
+    def tell(self, sentence: str) -> None:
+        """Put a sentence of another sort among the notes, once."""
+        self._sentences[sentence] = None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A sentence for each kind, with its count and places, after those that were told."""
+        kinds = list(self._kinds.items())
+        more = [f"{len(kinds) - _MOST_KINDS} more kinds were passed over"] if len(kinds) > _MOST_KINDS else []
+        return (*self._sentences, *(_sentence(*kind) for kind in kinds[:_MOST_KINDS]), *more)
+
+
+def _sentence(name: str, kind: _Kind) -> str:
+    """``"M62 was passed over 2 times: lines 3, 5"``."""
+    times = "once" if kind.count == 1 else f"{kind.count} times"
+    lines = "line " if len(kind.places) == 1 else "lines "
+    shown = ", ".join(kind.places[:_MOST_PLACES]) + (", …" if len(kind.places) > _MOST_PLACES else "")
+    return f"{name} was passed over {times}: {lines if kind.places[0].isdigit() else ''}{shown}"
