@@ -24,8 +24,8 @@ class Workpiece(Section):
 class ToolpathSection(Section):
     """``toolpath``: see :func:`pathcontrol.read_toolpath` and :class:`pathcontrol.ToolpathTask`.
 
-    ``file`` is relative to the experiment file; ``unit``, ``layers``, ``ppi`` and ``unknown`` are for its reader. Lengths
-    are in metres and metres per second, ``start`` is in ``angle_unit``.
+    ``file`` is relative to the experiment file; ``unit``, ``layers``, ``ppi`` and ``unknown`` are for its
+    reader. Lengths are in metres and metres per second, ``start`` is in ``angle_unit``.
     """
 
     angles = ("start",)
