@@ -53,21 +53,32 @@ class ToolConstraint:
         """
         postures = spread_postures(tool.robot, _SAMPLES)
         jacobian = tool.kinematics(postures).jacobian
-        moving = (np.abs(jacobian) > _NO_RANK * np.abs(jacobian).max()).any((0, 1))
+        unranked = cls(tool, curve, orientation, tolerance)
+        moving = (np.abs(jacobian) > _NO_RANK * np.abs(jacobian).max()).any((0, 1)) & ~unranked.frozen
         if not moving.any():
             raise InputError(f"no joint of {tool.robot.name} moves the frame {tool.frame!r}; name one at its tool")
         linear, angular = (np.sqrt((jacobian[:, rows] ** 2).mean()) for rows in (slice(3), slice(3, 6)))
         length = float(linear / angular) if linear > 0 and angular > 0 else 1.0
-        unranked = cls(tool, curve, orientation, tolerance, length)
+        unranked = replace(unranked, length=length)
         _, slopes = unranked.at(postures, np.linspace(curve.s0, curve.s_end, _SAMPLES))
         values = np.linalg.svd(slopes, compute_uv=False)
         rank = int((values > _NO_RANK * values.max()).sum(-1).max())
         return replace(unranked, rank=rank, moving=moving)
 
     @property
+    def frozen(self) -> Array:
+        """Which joints have no room between their limits, (n,); they count as locked."""
+        return self.tool.robot.limits.lower >= self.tool.robot.limits.upper
+
+    @property
     def freedom(self) -> int:
         """How many ways the joints can move without moving the tool: n − rank."""
         return self.tool.robot.n - self.rank
+
+    @property
+    def bases(self) -> tuple[tuple[int, int], tuple[int, int]]:
+        """Shapes (m, r) and (r, n) of bases of the ranges of ∂f/∂q and of its transpose."""
+        return (3 + self.orientation.rows, self.rank), (self.rank, self.tool.robot.n)
 
     def seeds(self, count: int) -> Array:
         """Postures (count, n) spread over the joint range; joints that do not move the tool are at 0 or next to it."""
@@ -80,7 +91,8 @@ class ToolConstraint:
         position, rotation, jacobian = self.tool.kinematics(q)
         turn, slope = self.orientation.error(self.curve, s, rotation)
         f = np.concatenate([(position - self.curve.position(s)) / self.length, turn], axis=-1)
-        return f, np.concatenate([jacobian[:, :3] / self.length, slope @ jacobian[:, 3:]], axis=-2)
+        rows = np.concatenate([jacobian[:, :3] / self.length, slope @ jacobian[:, 3:]], axis=-2)
+        return f, np.where(self.frozen, 0.0, rows)
 
     def deviation(self, f: Array) -> tuple[Array, Array]:
         """Distance [m] and angle [rad] that f (N, m) stands for, each (N,)."""

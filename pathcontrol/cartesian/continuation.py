@@ -10,7 +10,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.correction import Corrected, correct
+from pathcontrol.cartesian.correction import Corrected, branch_at, correct
 from pathcontrol.cartesian.postures import outside, share_to_limits
 from pathcontrol.cartesian.redundancy import PostureCost
 
@@ -30,7 +30,7 @@ class Stop(IntEnum):
     NONE = 0
     LOST = 1  # Newton's method does not converge, or far from where it should
     LIMIT = 2  # a joint would pass its limit
-    SINGULAR = 3  # the tool cannot move in some direction
+    SINGULAR = 3  # the tool cannot move in some direction, here or just before
 
 
 @dataclass
@@ -57,8 +57,8 @@ def follow(
 ) -> list[Trail]:
     """Trails from the postures ``start`` (N, n) on the curve at s0 to s_end, by prediction and correction.
 
-    The prediction is the secant through the last two postures. A step is cut in four where the correction fails or is
-    large, and doubled where it is small. A choice of postures is made for the least motion, away from limits and gently
+    The prediction is the secant through the last two postures. A step is cut in four where the correction fails, is
+    large or comes to the other side of a singularity, and doubled where it is small. A choice of postures is made for the least motion, away from limits and gently
     towards the start, or given a curve of postures q_rest(s) for the one nearest to it.
     """
     walk = _Walk(constraint, start, s0, s_end, rest)
@@ -84,6 +84,7 @@ class _Walk:
         self.longest = min(constraint.curve.length / _PIECES, _REACH * constraint.length)
         self.smallest = _SMALLEST * constraint.curve.length
         self.step = np.full(len(start), self.longest)
+        self.branch = branch_at(constraint, start, self.s)
         self.trails = [Trail([s0], [row]) for row in start]
         self.going = np.full(len(start), s0 < s_end)
 
@@ -98,9 +99,10 @@ class _Walk:
         found = correct(self.constraint, self._cost(rows, s), guess, s)
         drift = np.abs(found.q - guess).max(-1)
         far = (drift > _DRIFT) | (np.abs(found.q - self.q[rows]).max(-1) > _LEAP)
-        reasons = np.where(far, Stop.LOST, verdicts(self.constraint, found))
+        beyond = self.branch.rows(rows).differs(found.branch)
+        reasons = np.select([far, beyond], [Stop.LOST, Stop.SINGULAR], verdicts(self.constraint, found))
         good = reasons == Stop.NONE
-        self._accept(rows[good], s[good], Corrected(*(part[good] for part in found)), drift[good])
+        self._accept(rows[good], s[good], found.rows(good), drift[good])
         self._refuse(rows[~good], reasons[~good], found.q[~good])
         return True
 
@@ -121,6 +123,7 @@ class _Walk:
         comfort = comforts(self.constraint, found)
         self.slope[rows] = (found.q - self.q[rows]) / (s - self.s[rows])[:, None]
         self.s[rows], self.q[rows] = s, found.q
+        self.branch.left[rows], self.branch.right[rows] = found.branch
         self.step[rows] = np.minimum(np.where(drift < _DRIFT / 4, 2.0, 1.0) * self.step[rows], self.longest)
         self.going[rows] = s < self.s_end
         for i, row in enumerate(rows):

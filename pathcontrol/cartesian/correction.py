@@ -7,9 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.cartesian.branch import Branch
 from pathcontrol.cartesian.constraint import ToolConstraint
 from pathcontrol.cartesian.redundancy import PostureCost
 
+KEPT = 0.5  # of the tolerance, by which the tool may be off at the postures themselves
 _STEPS = 12
 _ARRIVED = 1e-9  # rad; the next step would be its square
 _LONGEST = 0.3  # rad, longest step of a joint
@@ -25,26 +27,34 @@ class Corrected(NamedTuple):
         q: the postures [rad].
         converged: whether Newton's method converged, to half the tolerance at least.
         conditioning: smallest singular value of ∂f/∂q, of those that are not zero everywhere.
+        branch: on which side of singularities they are.
     """
 
     q: Array
     converged: Array
     conditioning: Array
+    branch: Branch
+
+    def rows(self, chosen: Array) -> Corrected:
+        """Some of the postures."""
+        return Corrected(self.q[chosen], self.converged[chosen], self.conditioning[chosen], self.branch.rows(chosen))
 
 
 class _Linear(NamedTuple):
-    """f (N, m) at postures, ∂f/∂q (N, m, n), its inverse (N, n, m), and rows that span its null space (N, k, n)."""
+    """f (N, m) and ∂f/∂q (N, m, n) at postures, its inverse (N, n, m), rows that span its null space (N, k, n)."""
 
     f: Array
     slope: Array
     inverse: Array
     free: Array
     conditioning: Array
+    branch: Branch
 
 
 def correct(constraint: ToolConstraint, cost: PostureCost, q: Array, s: Array) -> Corrected:
     """Postures that satisfy the constraint at s (N,) and minimise H, by Newton's method from q (N, n)."""
-    out = Corrected(q.copy(), np.zeros(len(q), dtype=bool), np.zeros(len(q)))
+    bases = Branch(*(np.zeros((len(q), *shape)) for shape in constraint.bases))
+    out = Corrected(q.copy(), np.zeros(len(q), dtype=bool), np.zeros(len(q)), bases)
     moving = np.arange(len(q))
     for _ in range(_STEPS):
         linear = _linearised(constraint, out.q[moving], s[moving])
@@ -54,8 +64,9 @@ def correct(constraint: ToolConstraint, cost: PostureCost, q: Array, s: Array) -
         size = np.abs(step).max(-1)
         out.q[moving] += step * np.minimum(1.0, _LONGEST / np.maximum(size, _LONGEST))[:, None]
         out.conditioning[moving] = linear.conditioning
+        bases.left[moving], bases.right[moving] = linear.branch
         arrived = size < _ARRIVED
-        out.converged[moving[arrived]] = constraint.excess(linear.f[arrived]) < 0.5
+        out.converged[moving[arrived]] = constraint.excess(linear.f[arrived]) < KEPT
         moving = moving[~arrived]
         if not moving.size:
             break
@@ -68,7 +79,12 @@ def _linearised(constraint: ToolConstraint, q: Array, s: Array) -> _Linear:
     rank = constraint.rank
     used, rows = values[:, :rank], v[:, :rank]
     inverse = (rows.swapaxes(1, 2) * (used / (used**2 + _DAMPING**2))[:, None]) @ u[:, :, :rank].swapaxes(1, 2)
-    return _Linear(f, slope, inverse, v[:, rank:], used[:, -1])
+    return _Linear(f, slope, inverse, v[:, rank:], used[:, -1], Branch(u[:, :, :rank], rows))
+
+
+def branch_at(constraint: ToolConstraint, q: Array, s: Array) -> Branch:
+    """On which side of singularities postures q (N, n) at s (N,) are."""
+    return _linearised(constraint, q, s).branch
 
 
 def _null_step(

@@ -12,7 +12,7 @@ from scipy.interpolate import PchipInterpolator
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.constraint import ToolConstraint
 from pathcontrol.cartesian.continuation import Stop, follow, verdicts
-from pathcontrol.cartesian.correction import correct
+from pathcontrol.cartesian.correction import branch_at, correct
 from pathcontrol.cartesian.redundancy import PostureCost
 from pathcontrol.cartesian.refusal import refusal
 
@@ -42,12 +42,17 @@ class InverseKinematics:
     constraint: ToolConstraint
     rest: Callable[[Array], Array]
 
-    def near(self, s: Array, guess: Array) -> tuple[Array, Array]:
-        """Postures (N, n) at s (N,) by Newton's method, and which of them are fit and near their ``guess``, (N,)."""
+    def near(self, s: Array, known: Samples) -> tuple[Array, Array]:
+        """Postures (N, n) at s (N,) by Newton's method from interpolated ones, and which of them are fit, (N,).
+
+        Fit are those near to the interpolation, and on the same side of singularities as the ``known`` one before.
+        """
+        guess, before = PchipInterpolator(known.s, known.q)(s), np.searchsorted(known.s, s) - 1
         cost = PostureCost.nearest(self.rest(s), self.constraint.tool.robot.limits)
         found = correct(self.constraint, cost, guess, s)
         near = np.abs(found.q - guess).max(-1) < _NEAR
-        return found.q, near & (verdicts(self.constraint, found) == Stop.NONE)
+        hops = found.branch.differs(branch_at(self.constraint, known.q[before], known.s[before]))
+        return found.q, near & ~hops & (verdicts(self.constraint, found) == Stop.NONE)
 
     def fill(self, known: Samples, s: Array) -> Samples:
         """Postures at the increasing parameters s (N,), between those of ``known`` postures.
@@ -59,7 +64,7 @@ class InverseKinematics:
         """
         missing = np.setdiff1d(s, known.s)
         while missing.size:
-            q, good = self.near(missing, PchipInterpolator(known.s, known.q)(missing))
+            q, good = self.near(missing, known)
             if good.any():
                 known, missing = known.with_more(missing[good], q[good]), missing[~good]
             else:

@@ -45,8 +45,13 @@ def outside(robot: RobotModel, q: Array) -> Array:
 
 
 def distance_to_limits(robot: RobotModel, q: Array) -> Array:
-    """Distance of each joint to the nearer of its limits, (*batch, n); negative outside, inf where there is none."""
-    return np.minimum(q - robot.limits.lower, robot.limits.upper - q)
+    """Distance of each joint to the nearer of its limits, (*batch, n); negative outside, inf where there is none.
+
+    A joint that has no room between its limits counts as locked there: inf too, unless it is elsewhere.
+    """
+    lower, upper = robot.limits.lower, robot.limits.upper
+    distance = np.minimum(q - lower, upper - q)
+    return np.where((lower >= upper) & (distance >= -_ROUNDING), np.inf, distance)
 
 
 def share_to_limits(robot: RobotModel, q: Array) -> Array:

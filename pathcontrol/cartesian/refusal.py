@@ -9,6 +9,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.constraint import ToolConstraint
 from pathcontrol.cartesian.continuation import Stop, Trail
+from pathcontrol.cartesian.correction import KEPT
 from pathcontrol.cartesian.orientation import FreeOrientation
 from pathcontrol.cartesian.postures import distance_to_limits
 from pathcontrol.cartesian.reach import nearest_postures
@@ -17,6 +18,7 @@ from pathcontrol.errors import TaskError
 _SEEDS = 64
 _AHEAD = np.array([1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0])  # parts of the curve
 _REGULAR = 0.02  # singular values above this are none that stops an arm
+_NOTHING = 1e-3  # share of a displacement that is not worth saying
 _NEXT = 4  # of those ahead; out of reach in one of them is why the arm does not go on
 
 
@@ -111,7 +113,7 @@ def _out_of_reach(constraint: ToolConstraint, trail: Trail) -> str | None:
     ahead = np.unique(np.minimum(trail.s[-1] + _AHEAD * curve.length, curve.s_end))
     seeds = np.concatenate([trail.q[-1][None], constraint.seeds(_SEEDS)])
     excess = constraint.excess(constraint.at(nearest_postures(constraint, seeds, ahead), ahead)[0])
-    if (excess[:_NEXT] <= 1).all():
+    if (excess[:_NEXT] <= KEPT).all():  # the share of the tolerance that stopped it
         return None
     worst = float(ahead[np.argmax(excess)])
     return f"from there on it is out of reach; at {place(constraint, worst)}, {_gap(constraint, seeds, worst)}"
@@ -126,11 +128,24 @@ def _gap(constraint: ToolConstraint, seeds: Array, s: float) -> str:
         position, _ = _miss(replace(constraint, orientation=FreeOrientation()), seeds, s)
         if np.linalg.norm(position) <= constraint.tolerance[0]:
             return (
-                f"{text}, but the position alone is in reach: turn the tool, leave its orientation (partly) free, or "
-                "move the curve"
+                f"{text}, but the position alone is in reach: {_unfrozen(constraint)}turn the tool, leave its "
+                "orientation (partly) free, or move the curve"
             )
-    x, y, z = position
-    return f"{text}; move the curve by ({x:.3f}, {y:.3f}, {z:.3f}) m there, or more"
+    x, y, z = np.where(np.abs(position) > _NOTHING * np.linalg.norm(position), position, 0.0)
+    return f"{text}; {_unfrozen(constraint)}move the curve by ({x:.3g}, {y:.3g}, {z:.3g}) m there, or more"
+
+
+def _unfrozen(constraint: ToolConstraint) -> str:
+    """Advice for arms some of whose joints have no room to move."""
+    robot = constraint.tool.robot
+    held = [
+        f"{name} cannot move, since both of its limits are {value:g} {unit} (in a URDF that leaves them out they are 0)"
+        for name, value, unit, frozen in zip(
+            robot.joint_names, robot.limits.lower, robot.position_units, constraint.frozen, strict=True
+        )
+        if frozen
+    ]
+    return f"{' and '.join(held)}: give room between lower and upper, or " if held else ""
 
 
 def _miss(constraint: ToolConstraint, seeds: Array, s: float) -> tuple[Array, float]:

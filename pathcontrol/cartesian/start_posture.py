@@ -7,7 +7,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.constraint import ToolConstraint
 from pathcontrol.cartesian.continuation import Stop, Trail, comforts, verdicts
-from pathcontrol.cartesian.correction import Corrected, correct
+from pathcontrol.cartesian.correction import KEPT, Corrected, correct
 from pathcontrol.cartesian.postures import distance_to_limits, unwound
 from pathcontrol.cartesian.reach import reach
 from pathcontrol.cartesian.redundancy import PostureCost
@@ -34,7 +34,7 @@ def search_starts(constraint: ToolConstraint) -> Array:
     stops = verdicts(constraint, found)
     fit = stops == Stop.NONE
     if not fit.any():
-        raise _no_start(constraint, found, stops)
+        raise _no_start(constraint, found)
     return found.q[_comfortable_and_different(found.q, np.where(fit, comforts(constraint, found), 0.0))]
 
 
@@ -51,11 +51,13 @@ def rewound_starts(constraint: ToolConstraint, trails: list[Trail]) -> Array:
     return np.array(starts).reshape(-1, robot.n)
 
 
-def _no_start(constraint: ToolConstraint, found: Corrected, stops: Array) -> TaskError:
-    singular = np.flatnonzero(stops == Stop.SINGULAR)
-    if not singular.size:
-        return unreached(constraint)
-    return refusal(constraint, Trail([constraint.curve.s0], [found.q[singular[0]]], stop=Stop.SINGULAR))
+def _no_start(constraint: ToolConstraint, found: Corrected, start: Array | None = None) -> TaskError:
+    """Why none of the postures is a start: singular where the tool is on the first point, else not there at all."""
+    s = np.full(len(found.q), constraint.curve.s0)
+    there = np.flatnonzero(constraint.excess(constraint.at(found.q, s)[0]) <= KEPT)
+    if not there.size:
+        return unreached(constraint, start)
+    return refusal(constraint, Trail([constraint.curve.s0], [found.q[there[0]]], stop=Stop.SINGULAR))
 
 
 def moved_start(constraint: ToolConstraint, start: Array) -> Array:
@@ -67,7 +69,7 @@ def moved_start(constraint: ToolConstraint, start: Array) -> Array:
     found = _placed(constraint, _reached(constraint, start[None]))
     stop = Stop(verdicts(constraint, found)[0])
     if stop is Stop.LOST:
-        raise unreached(constraint, start)
+        raise _no_start(constraint, found, start)
     if stop is not Stop.NONE:
         raise refusal(constraint, Trail([constraint.curve.s0], [found.q[0]], stop=stop, beyond=found.q[0]))
     return found.q
