@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, joint_array, scalar
+from pathcontrol.control.ending import Ending
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.batch import TaskBatch
 from pathcontrol.tasks.closest_point import ClosestPoint, Curve
+from pathcontrol.tasks.sequence import PathSequence
 
 
 def distance_to_gamma(
-    task: PathTask, q: ArrayLike, qd: ArrayLike, weight: float = 1.0, return_s: bool = False
+    task: PathTask, q: ArrayLike, qd: ArrayLike, weight: float = 1.0, return_s: bool = False, *, braking: bool = False
 ) -> Array | tuple[Array, Array]:
     """dist([q; q̇], Γ) = min over s of √(‖q_d(s) − q‖² + w²‖q_d'(s)ϑ(s) − q̇‖²), a global minimum.
 
-    Γ is a curve in state space, so this is the closest-point problem of the path on [q_d; w q_d'ϑ].
+    Γ is a curve in state space, so this is the closest-point problem of the path on [q_d; w q_d'ϑ]. It has a corner
+    wherever ϑ' jumps, as at the knots of a table; the search begins by cutting it there.
 
     Args:
         task: path and velocity profile; its path ends or repeats.
@@ -25,8 +30,12 @@ def distance_to_gamma(
         qd: joint velocities [rad/s], (*batch, n).
         weight: w [s], how much a velocity counts beside a position; 1 as in the paper, 0 for the path alone.
         return_s: also return the path parameter of the nearest point of Γ.
+        braking: take ϑ as the controllers do at the end of an open path, where their plan comes to rest, see
+            :class:`~pathcontrol.control.ending.Ending`; an arm that does exactly what the plan asks for is then at
+            distance 0 to the last. Closed paths have nothing to brake for.
 
-    A :class:`TaskBatch` takes q and q̇ of shape (*batch, N, n).
+    A :class:`TaskBatch` takes q and q̇ of shape (*batch, N, n). Of a :class:`PathSequence` the nearest of its paths
+    counts.
 
     Returns:
         The distance [rad], (*batch,), and with ``return_s`` the parameter, (*batch,).
@@ -39,25 +48,62 @@ def distance_to_gamma(
     if q.shape != qd.shape:
         raise InputError(f"q has shape {q.shape} and qd {qd.shape}, expected the same")
     if isinstance(task, TaskBatch):
-        each = [distance_to_gamma(one, q[..., i, :], qd[..., i, :], w, True) for i, one in enumerate(task)]
+        each = [_nearest(one, q[..., i, :], qd[..., i, :], w, braking) for i, one in enumerate(task)]
         distance, s = (np.stack(parts, axis=-1) for parts in zip(*each, strict=True))
-        return (distance, s) if return_s else distance
-    state, gamma = np.concatenate([q, w * qd], axis=-1), gamma_curve(task, w)
-    lower, upper = task.one_traverse
-    s = ClosestPoint(gamma, lower, upper, task.closed, task.knots)(state)
-    distance = np.linalg.norm(gamma.p(s) - state, axis=-1)
+    else:
+        distance, s = _nearest(task, q, qd, w, braking)
     return (distance, s) if return_s else distance
 
 
-def gamma_curve(task: PathTask, weight: float = 1.0) -> Curve:
+def _nearest(task: PathTask, q: Array, qd: Array, weight: float, braking: bool) -> tuple[Array, Array]:
+    """Distance and parameter, (*batch,) each, for one task."""
+    if isinstance(task, PathSequence):
+        return _nearest_of(task, q, qd, weight, braking)
+    ending = Ending.of(task) if braking else None
+    state, gamma = np.concatenate([q, weight * qd], axis=-1), _curve(_planned(task, ending), weight)
+    lower, upper = task.one_traverse
+    s = ClosestPoint(gamma, lower, upper, task.closed, task.knots, _kinks(task, ending))(state)
+    return np.linalg.norm(gamma.p(s) - state, axis=-1), s
+
+
+def _nearest_of(sequence: PathSequence, q: Array, qd: Array, weight: float, braking: bool) -> tuple[Array, Array]:
+    """The nearest of the paths of a sequence: Γ jumps from one to the next."""
+    each = [_nearest(path, q, qd, weight, braking) for path in sequence]
+    shifts = [start - path.s0 for start, path in zip(sequence.starts, sequence, strict=False)]
+    distances = np.stack([distance for distance, _ in each])
+    parameters = np.stack([s + shift for (_, s), shift in zip(each, shifts, strict=True)])
+    best = distances.argmin(0)[None]
+    return np.take_along_axis(distances, best, 0)[0], np.take_along_axis(parameters, best, 0)[0]
+
+
+def planned_rate(task: PathTask, s: Array) -> Array:
+    """The rate ϑ(s) [1/s], (*batch,), at which controllers take a path: at the end of an open one, with its braking."""
+    return _planned(task, Ending.of(task))(s).theta
+
+
+def _planned(task: PathTask, ending: Ending | None) -> Callable[[Array], PathPoint]:
+    """The task at s, with the ending of the controllers' plan where there is one."""
+    if ending is None:
+        return task.at
+    return lambda s: ending.braked(task.at(np.clip(s, task.s0, task.s_end)), s)
+
+
+def _kinks(task: PathTask, ending: Ending | None) -> Array | None:
+    if ending is None:
+        return task.profile_knots
+    begin = np.array([ending.s_end - ending.braking])
+    return begin if task.profile_knots is None else np.union1d(begin, task.profile_knots)
+
+
+def _curve(at: Callable[[Array], PathPoint], weight: float) -> Curve:
     """Γ as a curve s ↦ [q_d(s); w r(s)] in R²ⁿ, r = q_d'ϑ, with its derivative."""
 
     def p(s: Array) -> Array:
-        point = task.at(s)
+        point = at(s)
         return np.concatenate([point.q_d, weight * point.velocity], axis=-1)
 
     def dp(s: Array) -> Array:
-        point = task.at(s)
+        point = at(s)
         return np.concatenate([point.dq_d, weight * point.velocity_slope], axis=-1)
 
     return Curve(p, dp)

@@ -28,6 +28,13 @@ class Ramp(NamedTuple):
         v, slope = self.curve.speed(distance)
         return np.where(over, np.inf, v), np.where(over, 0.0, slope)
 
+    def distance_at(self, speed: float) -> float:
+        """The distance at which the curve reaches a ``speed`` that it begins below; 0 where it never does."""
+        most = float(self.curve.length)
+        if not float(self.curve.speed(np.asarray(most))[0]) > speed:
+            return 0.0
+        return float(brentq(lambda d: float(self.curve.speed(np.asarray(d))[0]) - speed, 0.0, most, xtol=1e-15))
+
 
 class Course(NamedTuple):
     """A profile between two ramps: speed v(s), distance σ(s) covered, at increasing parameters ``s`` (m,)."""

@@ -86,6 +86,16 @@ class SmoothStartStop(VelocityProfile):
             dtheta = np.where(slower, slope - theta * relative_growth, dtheta)
         return theta, dtheta
 
+    def knots(self, path: Path) -> Array | None:
+        """Where the ramps meet the profile, and that profile's own knots."""
+        total = float(self._distance(self._distance.x[-1]))
+        ends = [self._start.until, total - self._stop.until, total - self._stop.distance_at(self._least)]
+        met = np.array(ends)
+        inside = np.sort(met[(met > 0) & (met < total)])
+        meetings = np.array([float(self._distance.solve(d, extrapolate=False)[0]) for d in inside])
+        inner = self.profile.knots(path)
+        return meetings if inner is None else np.union1d(meetings, inner)
+
     def describe(self) -> dict[str, Any]:
         return super().describe() | {"motion": str(self.motion), "around": self.profile.describe()}
 

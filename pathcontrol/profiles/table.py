@@ -44,6 +44,9 @@ class TabulatedProfile(VelocityProfile):
     def at(self, dq_d: Array, ddq_d: Array, path: Path, s: Array) -> tuple[Array, Array]:
         return self._both(s)
 
+    def knots(self, path: Path) -> Array | None:
+        return self.s
+
     @property
     def traversal_time(self) -> float:
         """Time [s] from the first knot to the last: Σ 2Δs/(ϑ_i + ϑ_{i+1})."""

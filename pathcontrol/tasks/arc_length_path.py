@@ -72,6 +72,10 @@ class ArcLengthPath(DerivedPath):
     def knots(self) -> Array | None:
         return None if self.path.knots is None else self._length(self.path.knots)
 
+    @property
+    def profile_knots(self) -> Array | None:
+        return None if self.path.profile_knots is None else self._length(self.path.profile_knots)
+
     def _parameter(self, s: Array) -> Array:
         """The parameter u of the path underneath."""
         s = np.asarray(s, dtype=np.float64)

@@ -140,6 +140,14 @@ class PathTask(ABC):
         return None
 
     @property
+    def profile_knots(self) -> Array | None:
+        """Where ϑ' may jump, increasing, (J,); ``None`` for a smooth profile.
+
+        The distance to Γ is searched between them, as Γ has a corner there.
+        """
+        return None
+
+    @property
     def sampled_interval(self) -> tuple[float, float]:
         """A finite part of the domain that stands for the whole."""
         end = self.s_end if self.period is None else self.s0 + self.period
@@ -258,6 +266,10 @@ class Reprofiled(PathTask):
     @property
     def knots(self) -> Array | None:
         return self.path.knots
+
+    @property
+    def profile_knots(self) -> Array | None:
+        return self.profile.knots(self.path)
 
     def describe(self) -> dict[str, Any]:
         return self.path.describe() | self.profile.describe()

@@ -86,9 +86,17 @@ class ConcatenatedPath(PathTask):
 
     @property
     def knots(self) -> Array:
+        return self._of_pieces("knots")
+
+    @property
+    def profile_knots(self) -> Array:
+        return self._of_pieces("profile_knots")
+
+    def _of_pieces(self, which: str) -> Array:
+        """Where the pieces meet, and the knots of each of them."""
         ends = [np.append(self._starts, self.s_end)]
         for piece in self._pieces:
-            knots = piece.path.knots
+            knots = getattr(piece.path, which)
             if knots is not None:
                 within = knots[(knots > piece.first) & (knots < piece.last)]
                 ends.append(piece.start + (within - piece.first) / piece.rate)

@@ -51,6 +51,10 @@ class VelocityProfile(ABC):
         """ϑ and ϑ' where q_d' and q_d'' are known already. Override where that saves evaluating the path again."""
         return self.theta(path, s), self.dtheta(path, s)
 
+    def knots(self, path: Path) -> Array | None:
+        """Where ϑ' may jump, increasing, (J,); ``None`` for a smooth profile."""
+        return None
+
     def describe(self) -> dict[str, Any]:
         """Name and parameters, for the record of a run."""
         return {"profile": type(self).__name__} | plain_attributes(self)

@@ -41,6 +41,9 @@ class RecordedProfile(VelocityProfile):
     def dtheta(self, path: Path, s: Array) -> Array:
         return self._rate(self._within(s), 1)[..., 0]
 
+    def knots(self, path: Path) -> Array | None:
+        return self.s
+
     def describe(self) -> dict[str, Any]:
         return {"profile": "RecordedProfile", "samples": len(self.s)}
 
@@ -141,6 +144,10 @@ class RecordedPath(PathTask):
     @property
     def knots(self) -> Array | None:
         return self._knots
+
+    @property
+    def profile_knots(self) -> Array | None:
+        return self.profile.knots(self)
 
     def q_d(self, s: Array) -> Array:
         return self._curves[0](self._within(s))

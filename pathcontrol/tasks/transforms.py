@@ -57,7 +57,13 @@ class ReversedPath(DerivedPath):
 
     @property
     def knots(self) -> Array | None:
-        knots = self.path.knots
+        return self._mirrored(self.path.knots)
+
+    @property
+    def profile_knots(self) -> Array | None:
+        return self._mirrored(self.path.profile_knots)
+
+    def _mirrored(self, knots: Array | None) -> Array | None:
         return None if knots is None else self._mirror - knots[::-1] + (self.period or 0.0)
 
 
@@ -96,6 +102,10 @@ class _MovedPath(DerivedPath):
     @property
     def knots(self) -> Array | None:
         return self.path.knots
+
+    @property
+    def profile_knots(self) -> Array | None:
+        return self.path.profile_knots
 
 
 class ShiftedPath(_MovedPath):
@@ -163,7 +173,14 @@ class PathSection(DerivedPath):
 
     @property
     def knots(self) -> Array | None:
-        knots = self.path.knots
+        return self._within(self.path.knots)
+
+    @property
+    def profile_knots(self) -> Array | None:
+        return self._within(self.path.profile_knots)
+
+    def _within(self, knots: Array | None) -> Array | None:
+        """Knots of the path that lie in the stretch, those of a closed one in each lap, and its ends."""
         if knots is None:
             return None
         if self.path.period is not None:

@@ -4,7 +4,8 @@ Each cell is looked at once more inside, at an irregular place, and is cut there
 the way from end to end. A curve that says where its pieces meet begins with these pieces, each of which is simple. Any
 other begins with 512 equal cells, and the neighbours of a cell that turns too much are cut too, since a detail that
 repeats may hide from one cell but not from several. What is smaller than a cell and does not show in its tangents
-there is not resolved, nor is what asks for more than 2^19 cells.
+there is not resolved, nor is what asks for more than 2^19 cells. Where the curve says that its tangent may jump, a cell
+of next to no length lies across the jump, so that no other cell has to be cut for it.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ _MAX_TURN = 0.5  # rad over a cell
 _FIRST_CELLS, _MAX_CELLS = 512, 1 << 19
 _NEIGHBOURS = 4  # cut with a cell on either side
 _NARROWEST = 1e-10  # of the whole curve
+_KINK = 1e-12  # of the whole curve, on either side of a jump of the tangent
 _GOLDEN = (5**0.5 - 1) / 2  # spreads the places inside the cells irregularly, so that no period of the curve meets them
 _BLOCK = 1 << 15  # parameters evaluated at once
 
@@ -46,13 +48,16 @@ class Cells(NamedTuple):
     turn: Array
 
     @classmethod
-    def cut(cls, curve: Curve, interval: Interval, knots: Array | None = None) -> Cells:
-        """The cells of ``curve``, whose pieces meet at ``knots`` where it has any.
+    def cut(cls, curve: Curve, interval: Interval, knots: Array | None = None, kinks: Array | None = None) -> Cells:
+        """The cells of ``curve``, whose pieces meet at ``knots`` and whose tangent jumps at ``kinks``, if it has any.
 
         Raises:
             TaskError: the curve is not finite somewhere.
         """
-        s, turn = _resolved(curve, _first_ends(interval, knots), 0 if knots is not None else _NEIGHBOURS)
+        ends = _first_ends(interval, knots)
+        if kinks is not None:
+            ends = np.union1d(ends, _around(kinks, interval))
+        s, turn = _resolved(curve, ends, 0 if knots is not None else _NEIGHBOURS)
         p, middle = _points(curve, s), _points(curve, (s[:-1] + s[1:]) / 2)
         # an arc whose tangent stays within ±φ/2 of a direction is no longer than its chord over cos φ/2
         stretch = 1 / np.cos(np.minimum(turn, 2.0) / 2)
@@ -83,6 +88,13 @@ def _first_ends(interval: Interval, knots: Array | None) -> Array:
     return np.unique(np.concatenate([[interval.lower], inside, [interval.upper]]))
 
 
+def _around(kinks: Array, interval: Interval) -> Array:
+    """The ends of the cells that lie across ``kinks``, as far as they are inside the interval."""
+    margin = _KINK * interval.length
+    ends = np.concatenate([kinks - margin, kinks + margin])
+    return ends[(ends > interval.lower) & (ends < interval.upper)]
+
+
 def _resolved(curve: Curve, s: Array, neighbours: int) -> tuple[Array, Array]:
     """The ends of the cells, cut until the tangent turns little over each, and its turn [rad] there."""
     tangent, turn = _tangents(curve, s), np.zeros(len(s) - 1)
@@ -92,7 +104,8 @@ def _resolved(curve: Curve, s: Array, neighbours: int) -> tuple[Array, Array]:
         middle = s[cells] + share * (s[cells + 1] - s[cells])
         between = _tangents(curve, middle)
         turn[cells] = _angle(tangent[cells], between) + _angle(between, tangent[cells + 1])
-        chosen = _widened(turn[cells] > _MAX_TURN, neighbours) & (s[cells + 1] - s[cells] > narrowest)
+        wide = s[cells + 1] - s[cells] > narrowest
+        chosen = _widened((turn[cells] > _MAX_TURN) & wide, neighbours) & wide
         chosen = _worst(chosen, turn[cells], _MAX_CELLS - len(turn))
         cut = cells[chosen]
         s, tangent = np.insert(s, cut + 1, middle[chosen]), np.insert(tangent, cut + 1, between[chosen], axis=0)

@@ -35,6 +35,7 @@ class ClosestPoint:
         upper: where it ends.
         closed: whether it repeats.
         knots: where its pieces meet, increasing, (K,); ``None`` for a curve that is all of one piece.
+        kinks: where its tangent may jump, increasing, (J,); ``None`` for a smooth curve.
     """
 
     curve: Curve
@@ -42,6 +43,7 @@ class ClosestPoint:
     upper: float
     closed: bool
     knots: Array | None = None
+    kinks: Array | None = None
 
     def __call__(self, x: ArrayLike, near: ArrayLike | None = None) -> Array:
         """Parameter (*batch,) of the point nearest to x (*batch, m); see :meth:`PathTask.sigma_bar`."""
@@ -80,7 +82,7 @@ class ClosestPoint:
 
     @cached_property
     def _cells(self) -> Cells:
-        return Cells.cut(self.curve, self._interval, self.knots)
+        return Cells.cut(self.curve, self._interval, self.knots, self.kinks)
 
     @cached_property
     def _everywhere(self) -> Everywhere:
