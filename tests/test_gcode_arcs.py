@@ -138,7 +138,7 @@ def test_a_chord_a_little_longer_than_the_diameter_is_a_semicircle():
     [
         ("G2 X1 Y1", "the plane of G17 with no centre, expected I or J, or R, in the line of each arc"),
         ("G2 X1 Y1 K1", "the plane of G17 with K, expected I or J"),
-        ("G18 G2 X1 Z1 I1 J1", "the plane of G18 with I and J, expected K or I"),
+        ("G18 G2 X1 Z1 I1 J1", "J1 leads out of the plane of G18"),
         ("G19 G2 I1", "the plane of G19 with I, expected J or K"),
         ("G90.1 G2 X1 I1", "expected I and J, or R"),
         ("G2 X1 I1 R1", "with R and with I, J or K"),

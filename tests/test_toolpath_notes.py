@@ -36,7 +36,7 @@ def test_a_million_things_are_a_short_text():
 
 
 def test_what_is_not_understood_is_refused_by_default():
-    with pytest.raises(ToolpathError, match="it is odd; or pass it over with unknown='warn'"):
+    with pytest.raises(ToolpathError, match="it is odd, or pass it over with unknown='warn'"):
         Passed().unless_refused("it", 3, "it is odd")
 
 

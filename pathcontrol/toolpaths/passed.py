@@ -53,7 +53,7 @@ class Passed:
             ToolpathError: it is to be refused; the message is ``reason`` with the way to pass it over.
         """
         if not self.lenient:
-            raise ToolpathError(f"{reason}; or pass it over with unknown='warn'")
+            raise ToolpathError(f"{reason}, or pass it over with unknown='warn'")
         self.over(kind, place)
 
     def tell(self, sentence: str) -> None:

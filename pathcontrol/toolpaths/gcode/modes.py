@@ -24,6 +24,9 @@ class Modes:
         plane: code of the plane of arcs times ten, G17 to G19.
         absolute: whether coordinates are absolute, G90, and not relative to where the tool is, G91.
         absolute_centers: whether centres of arcs are absolute, G90.1, and not relative to the start, G91.1.
+        return_level: code of where cycles return to, times ten: the level before them, G98, or R, G99.
+        stopped: whether G80 ended a motion, so that there is none until the next.
+        arc_tolerance: how much the radii at the ends of an arc may differ [m], or None for LinuxCNC's rule.
     """
 
     unit: Unit | None = None
@@ -32,6 +35,9 @@ class Modes:
     plane: int = 170
     absolute: bool = True
     absolute_centers: bool = False
+    return_level: int = 980
+    stopped: bool = False
+    arc_tolerance: float | None = None
 
     def update(self, block: Block, codes: dict[str, int]) -> None:
         """Put into force what the block says, given its code of each group."""
@@ -44,6 +50,8 @@ class Modes:
             if not 0 < self.feed < math.inf:
                 raise ToolpathError(f"F{block.words['F']:g} is no feed, expected a number greater than 0")
         self.motion = codes.get("motion", None if "end of motion" in codes else self.motion)
+        self.stopped = self.motion is None and (self.stopped or "end of motion" in codes)
+        self.return_level = codes.get("return level", self.return_level)
         self.plane = codes.get("plane", self.plane)
         self.absolute = codes.get("distance", 900 if self.absolute else 910) == 900
         self.absolute_centers = codes.get("arc centre", 901 if self.absolute_centers else 911) == 901

@@ -6,70 +6,115 @@ import math
 from collections.abc import Sequence
 
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.arc import Arc
-from pathcontrol.toolpaths.gcode.arcs import arc
+from pathcontrol.toolpaths.gcode.arcs import arcs
 from pathcontrol.toolpaths.gcode.codes import PROGRAM_END, check_letters, groups
+from pathcontrol.toolpaths.gcode.cycles import DRILLING, Drilling
+from pathcontrol.toolpaths.gcode.frame import Frame
+from pathcontrol.toolpaths.gcode.harmless import without_codes, without_letters
 from pathcontrol.toolpaths.gcode.modes import Modes
 from pathcontrol.toolpaths.gcode.strokes import Strokes
-from pathcontrol.toolpaths.gcode.units import Unit
 from pathcontrol.toolpaths.gcode.words import Block
+from pathcontrol.toolpaths.passed import Passed
 
-_RAPID, _LINE, _CLOCKWISE = 0, 10, 20
+_RAPID, _LINE, _CLOCKWISE, _COUNTER_CLOCKWISE = 0, 10, 20, 30
 _DWELL, _MACHINE = 40, 530
+_SHIFT, _NO_SHIFT = 920, 921
 
 
 class Program:
     """A machine that carries out blocks.
 
     Args:
-        unit: the unit in force at the beginning, or None.
+        modes: the modes in force at the beginning.
         position: where the tool is at the beginning [m], (3,), NaN where that is not known.
-        feed: speed of cuts before the program says F [m/s], or None.
+        passed: what is passed over is counted there.
     """
 
-    def __init__(self, unit: Unit | None, position: Sequence[float], feed: float | None = None) -> None:
-        self.modes = Modes(unit, feed=feed)
+    def __init__(self, modes: Modes, position: Sequence[float], passed: Passed) -> None:
+        self.modes = modes
         self.strokes = Strokes()
         self._position = list(position)
+        self._passed = passed
+        self._frame = Frame(passed)
+        self._drilling: Drilling | None = None
 
-    def carry_out(self, block: Block, name: str) -> bool:
-        """Do what the block called ``name`` says, in the order of RS274/NGC; whether the program goes on after it.
+    def carry_out(self, block: Block, line: int) -> bool:
+        """Do what the block in a line says, in the order of RS274/NGC; whether the program goes on after it.
 
         Raises:
             ToolpathError: it is not understood.
         """
+        name = block.label or f"line {line}"
+        block = without_codes(block, self._turning(block), line, self._passed)
         codes = groups(block)
+        block = without_letters(block, line, self._passed)
         self.modes.update(block, codes)
+        self._frame.select(codes.get("coordinate system"))
         elsewhere = codes.get("elsewhere")
         if elsewhere is None:
-            self._move(block, codes, name)
+            self._move(
+                self._frame.without_rotary(block, self.modes.absolute, self.strokes.begun, line), codes, line, name
+            )
         elif elsewhere == _DWELL:
-            check_letters(block, "P")
-            if not block.words.get("P", -1.0) >= 0:
-                raise ToolpathError("G4 needs a time to wait, P, that is not negative")
+            _check_dwell(block)
+        elif elsewhere in (_SHIFT, _NO_SHIFT):
+            self._shift(block, elsewhere)
         else:
             self._leave(block, codes, name)
         return PROGRAM_END.isdisjoint(block.m)
 
-    def _move(self, block: Block, codes: dict[str, int], name: str) -> None:
+    def _turning(self, block: Block) -> bool:
+        """Whether the motion of a block is an arc or a cycle."""
+        motion = next((code for code in block.g if code in (_RAPID, _LINE, 800)), self.modes.motion)
+        return any(code in (_CLOCKWISE, _COUNTER_CLOCKWISE, *DRILLING) for code in (motion, *block.g))
+
+    def _move(self, block: Block, codes: dict[str, int], line: int, name: str) -> None:
         """The motion in force, if the block has words for it."""
-        motion = self.modes.motion
-        turns = motion is not None and motion > _LINE
-        letters = "" if motion is None else "XYZIJKR" if turns else "XYZ"
+        motion = self._motion(block, line)
+        letters = _letters(motion)
         options = ("PQ" if codes.get("path control") == 640 else "") + ("H" if codes.get("tool length") == 430 else "")
         check_letters(block, letters + options)
-        if block.words.keys().isdisjoint(letters):
+        if motion not in DRILLING:
+            self._drilling = None
+        if motion is None or block.words.keys().isdisjoint("XYZIJKR" if motion in DRILLING else letters):
             return
+        self._frame.used = True
+        if motion in DRILLING:
+            self._drill(block, motion, name)
+        elif motion == _RAPID:
+            self._rapid(self._target(block), name)
+        else:
+            self._cut(block, motion, name)
+
+    def _motion(self, block: Block, line: int) -> int | None:
+        """The motion in force; before the first, places are rapids, as grbl and others begin."""
+        motion = self.modes.motion
+        if motion is None and not self.modes.stopped and not block.words.keys().isdisjoint("XYZ"):
+            self._passed.tell(f"line {line}: it moves before G0 or G1 is said; that is taken for rapids, as grbl does")
+            self.modes.motion = motion = _RAPID
+        return motion
+
+    def _cut(self, block: Block, motion: int, name: str) -> None:
         target = self._target(block)
-        if motion == _RAPID:
-            self._rapid(target, name)
-            return
         self._check_cut(target)
-        way: Sequence[float] | Arc = target
-        if turns:
-            way = arc(self._position, target, block.words, self.modes, clockwise=motion == _CLOCKWISE)
-        self.strokes.move(self._position, way, self.modes.feed, name)
+        if motion == _LINE:
+            self.strokes.move(self._position, target, self.modes.feed, name)
+        else:
+            for arc in arcs(self._position, target, block.words, self.modes, clockwise=motion == _CLOCKWISE):
+                self.strokes.move(self._position, arc, self.modes.feed, name)
         self._position = target
+
+    def _drill(self, block: Block, motion: int, name: str) -> None:
+        """The moves of a cycle."""
+        if self.modes.plane != 170:
+            raise ToolpathError(f"{DRILLING[motion]} is supported in the plane XY only, G17")
+        self._check_cut(self._position)
+        if self._drilling is None or self._drilling.code != motion:
+            initial = self._position[2] if self._drilling is None else self._drilling.initial
+            self._drilling = Drilling(motion, initial)
+        for cuts, target in self._drilling.moves(self._position, block.words, self.modes):
+            self.strokes.move(self._position, target, self.modes.feed if cuts else None, name)
+            self._position = list(target)
 
     def _target(self, block: Block) -> list[float]:
         target = list(self._position)
@@ -86,11 +131,24 @@ class Program:
             self.strokes.move(self._position, target, None, name)
         self._position = target
 
+    def _shift(self, block: Block, code: int) -> None:
+        """G92 says what the place of the tool is called."""
+        check_letters(block, "XYZ" if code == _SHIFT else "")
+        if code == _NO_SHIFT:
+            self._frame.unshift()
+            return
+        named = {axis: letter for axis, letter in enumerate("XYZ") if letter in block.words}
+        place = list(self._position)
+        for axis, letter in named.items():
+            place[axis] = self.modes.length(letter, block.words[letter])
+        self._frame.shift(self._position, place, self.strokes.begun)
+        self._position = place
+
     def _leave(self, block: Block, codes: dict[str, int], name: str) -> None:
         """G28, G30 and G53 lead to places of the machine: after them, its axes are where the file does not say."""
         check_letters(block, "XYZ")
         if codes["elsewhere"] == _MACHINE:
-            if self.modes.motion != _RAPID:
+            if self.modes.motion not in (_RAPID, None) or self.modes.stopped:
                 raise ToolpathError("G53 cuts in the machine's coordinates, which the file does not give: only G0 may")
         elif "motion" in codes:
             raise ToolpathError("G28 or G30 and a motion exclude each other in one line")
@@ -101,7 +159,7 @@ class Program:
             if letter in block.words or block.words.keys().isdisjoint("XYZ"):
                 self._position[axis] = math.nan
 
-    def _check_cut(self, target: list[float]) -> None:
+    def _check_cut(self, target: Sequence[float]) -> None:
         """Raise if it is not known where to cut, or how fast."""
         ends = zip("XYZ", self._position, target, strict=True)
         unknown = [letter for letter, start, end in ends if math.isnan(start + end)]
@@ -114,3 +172,20 @@ class Program:
             raise ToolpathError(
                 "it cuts before there is a feed: write F, in units per minute, or read the file with feed="
             )
+
+
+def _letters(motion: int | None) -> str:
+    """The letters that belong to a motion."""
+    if motion is None:
+        return ""
+    if motion in DRILLING:
+        return "XYZRQPL"
+    return "XYZ" if motion <= _LINE else "XYZIJKRP"
+
+
+def _check_dwell(block: Block) -> None:
+    """Raise if G4 does not say how long: by P, or as Fanuc, Siemens and printers do by X, U or S."""
+    check_letters(block, "PXUS")
+    times = [block.words[letter] for letter in "PXUS" if letter in block.words]
+    if not times or min(times) < 0:
+        raise ToolpathError("G4 needs a time to wait, P, that is not negative")

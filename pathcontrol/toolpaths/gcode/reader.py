@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import as_array, finite, scalar
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Toolpath
+from pathcontrol.toolpaths.gcode.modes import Modes
 from pathcontrol.toolpaths.gcode.program import Program
+from pathcontrol.toolpaths.gcode.remarks import without_remarks
 from pathcontrol.toolpaths.gcode.units import UNITS
 from pathcontrol.toolpaths.gcode.words import PERCENT, PROGRAM_NAME, parse, without_comments
 from pathcontrol.toolpaths.passed import Passed
@@ -24,6 +26,7 @@ def read_gcode(
     unit: str | None = None,
     start: ArrayLike | None = None,
     feed: float | None = None,
+    arc_tolerance: float | None = None,
     unknown: str = "refuse",
 ) -> Toolpath:
     """Contours from a G-code program, RS274/NGC as LinuxCNC and most CAM programs write it.
@@ -46,21 +49,26 @@ def read_gcode(
         unit: ``"mm"`` or ``"in"``, the unit before the program says G20 or G21; by default it must say it.
         start: where the tool is before the first move [m], (3,); by default that is not known.
         feed: speed of the tool [m/s] along cuts before the program says F; by default it must say it.
+        arc_tolerance: how much the radii at the ends of an arc may differ [m], for programs whose numbers are rounded
+            to 2 or 3 decimals; by default what LinuxCNC allows.
         unknown: ``"refuse"`` words that are not understood, or ``"warn"``, pass those over that cannot move the tool.
 
     Raises:
-        InputError: ``path``, ``unit``, ``start``, ``feed`` or ``unknown`` is none.
+        InputError: ``path``, ``unit``, ``start``, ``feed``, ``arc_tolerance`` or ``unknown`` is none.
         ToolpathError: the file cannot be used; the message says in which line and why.
     """
     if unit is not None and unit not in UNITS:
         raise InputError(f"unit = {unit!r}, expected one of {', '.join(UNITS)}, or None")
     if feed is not None:
         feed = scalar("feed", feed, positive=True)
+    if arc_tolerance is not None:
+        arc_tolerance = scalar("arc_tolerance", arc_tolerance, positive=True)
     passed = Passed(unknown)
     texts = [without_comments(line) for line in read_lines(path, "a G-code program")]
-    program = Program(None if unit is None else UNITS[unit], _start(start, texts), feed)
+    modes = Modes(None if unit is None else UNITS[unit], feed=feed, arc_tolerance=arc_tolerance)
+    program = Program(modes, _start(start, texts), passed)
     try:
-        _run(program, texts)
+        _run(program, texts, passed)
         contours = program.strokes.contours()
         if not contours:
             raise ToolpathError("there is no move in it between places that it gives, expected G0, G1, G2 or G3")
@@ -82,7 +90,7 @@ def _start(start: ArrayLike | None, texts: list[str]) -> list[float]:
     return position.tolist()
 
 
-def _run(program: Program, texts: Sequence[str]) -> None:
+def _run(program: Program, texts: Sequence[str], passed: Passed) -> None:
     """Carry out the lines, each an error by its number, until the program ends."""
     began = False
     for number, text in enumerate((text.strip(" \t") for text in texts), 1):
@@ -93,10 +101,9 @@ def _run(program: Program, texts: Sequence[str]) -> None:
             elif PROGRAM_NAME.fullmatch(text):
                 if began:
                     raise ToolpathError("a second program begins before the first ended with M2, M30 or %")
-            elif text:
+            elif text := without_remarks(text, number, passed):
                 began = True
-                block = parse(text)
-                if not program.carry_out(block, block.label or f"line {number}"):
+                if not program.carry_out(parse(text), number):
                     return
         except ToolpathError as error:
             raise ToolpathError(f"line {number}: {error}") from None

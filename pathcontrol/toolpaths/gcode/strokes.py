@@ -21,6 +21,11 @@ class Strokes:
         self._name = ""
         self._moves = 0
 
+    @property
+    def begun(self) -> bool:
+        """Whether there was a move."""
+        return self._moves > 0
+
     def move(self, start: Sequence[float], way: Sequence[float] | Arc, feed: float | None, name: str) -> None:
         """Go from ``start`` [m], (3,), along an arc or straight to a point at ``feed`` [m/s], or None for a rapid."""
         self._moves += 1

@@ -9,11 +9,15 @@ from pathcontrol.errors import ToolpathError
 
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
 _NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
+#: the exponent that Python and printf write, e and a sign: it is never tried as a word of its own, an E word
+_EXPONENT = r"(?:e[-+][0-9]+|(?!e[-+][0-9]))"
 #: the line that only marks a program's beginning or its end, and the one that only names it
 PERCENT, PROGRAM_NAME = re.compile(r"%[ \t]*[0-9]*"), re.compile(r"[Oo:][ \t]*[0-9]+")
 
-_WORD = re.compile(rf"([A-Z])[ \t]*({_NUMBER})")
-_BLOCK = re.compile(rf"[ \t]*(?:[A-Za-z][ \t]*{_NUMBER}[ \t]*)*")  # unambiguous, so that matching takes linear time
+_WORD = re.compile(rf"([A-Za-z])[ \t]*({_NUMBER}{_EXPONENT})")
+_BLOCK = re.compile(
+    rf"[ \t]*(?:[A-Za-z][ \t]*{_NUMBER}{_EXPONENT}[ \t]*)*"
+)  # unambiguous, so that matching takes linear time
 
 #: what the first character that fits into no word stands for
 _REASONS = {
@@ -50,6 +54,11 @@ def without_comments(line: str) -> str:
     return _COMMENT.sub(" ", line) if "(" in line or ";" in line else line
 
 
+def are_words(text: str) -> bool:
+    """Whether a text is nothing but words."""
+    return bool(_BLOCK.fullmatch(text))
+
+
 def parse(text: str) -> Block:
     """The words of a line without comments.
 
@@ -59,7 +68,10 @@ def parse(text: str) -> Block:
     if not _BLOCK.fullmatch(text):
         raise _mistake(text)
     block = Block([], [], {}, "")
-    for letter, digits in _WORD.findall(text.upper()):
+    for spelled, digits in _WORD.findall(text):
+        letter = spelled.upper()
+        if "e" in digits and (spelled.islower() or letter in "GMNO"):
+            raise ToolpathError(_two_readings(spelled + digits))
         if letter == "G":
             block.g.append(_code(letter, digits, 10))
         elif letter == "M":
@@ -73,6 +85,14 @@ def parse(text: str) -> Block:
         else:
             block.words[letter] = float(digits)
     return block
+
+
+def _two_readings(word: str) -> str:
+    """What is wrong with a number that has an exponent, or is followed by a word E."""
+    return (
+        f"{word[:30]} may be a number with an exponent, which G-code does not have, or two words, the second an "
+        "extruder's: write the number out, or a blank before E"
+    )
 
 
 def _code(letter: str, digits: str, tenths: int) -> int:
