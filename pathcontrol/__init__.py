@@ -6,4 +6,13 @@ listed in ``__init__.pyi`` and load what they need on first use, so that importi
 
 import lazy_loader as _lazy
 
-__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)
+_public, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)
+
+
+def __getattr__(name):  # type: ignore[no-untyped-def]
+    """Return a public name, imported now, or ``__version__``, read from the installed package when asked for."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version(__name__)
+    return _public(name)

@@ -288,7 +288,7 @@ def test_other_versions_are_noted(tmp_path):
     [
         ({"chunk": 0}, InputError, "chunk = 0, expected a whole number from 1"),
         ({"seed": -1}, InputError, "seed = -1, expected a whole number from 0"),
-        ({"space": {"k": [1]}}, InputError, "expected a Space, such as Space.grid"),
+        ({"space": {"k": [1]}}, InputError, "expected a Space: Space.grid"),
         ({"keep": 3}, InputError, "keep = 3, expected a Keep"),
         ({"keep": pc.Keep(worst=1, by="error")}, UnknownNameError, "keep.by = 'error', expected a metric"),
         ({"keep": pc.Keep(worst=1, by="status")}, UnknownNameError, "keep.by = 'status', expected a metric: e_p_peak"),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol.analysis.known import known_toolpath, where_known
 from pathcontrol.analysis.metrics import peak, rms
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
@@ -21,7 +22,9 @@ def tool_positions(run: Run, robot: RobotModel | None = None, frame: str | None 
 
     By default of the run's own robot, and of the frame that follows its toolpath.
     """
+    expect("run", run, Run)
     arm = run.robot if robot is None else robot
+    expect("robot", arm, RobotModel)
     name = known_toolpath(run, None).frame if frame is None else frame
     return where_known(lambda q: arm.frame_pose(q, name)[..., :3, 3], run.array("q"))
 

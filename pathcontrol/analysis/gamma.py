@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, joint_array, scalar
+from pathcontrol._expect import expect
 from pathcontrol.control.ending import Ending
-from pathcontrol.errors import InputError
+from pathcontrol.errors import InputError, TaskError
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.batch import TaskBatch
 from pathcontrol.tasks.closest_point import ClosestPoint, Curve
@@ -43,6 +44,7 @@ def distance_to_gamma(
     Raises:
         TaskError: the path goes on for ever without repeating.
     """
+    expect("task", task, PathTask, error=TaskError)
     w = scalar("weight", weight, least=0.0)
     q, qd = joint_array("q", q, task.n), joint_array("qd", qd, task.n)
     if q.shape != qd.shape:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
@@ -21,9 +22,11 @@ def known_task(run: Run, task: PathTask | None) -> PathTask:
     Raises:
         InputError: neither is known.
     """
+    expect("run", run, Run)
     task = run.task if task is None else task
     if task is None:
         raise InputError("the run does not know its path, as it holds data only; give task=…")
+    expect("task", task, PathTask)
     return task
 
 

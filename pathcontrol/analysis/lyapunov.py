@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.projection import Projection
@@ -52,6 +53,8 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
 
     V is evaluated at the errors of the run; V̇ is what the theorem gives there, not a difference of V.
     """
+    expect("controller", controller, Controller)
+    expect("run", run, Run)
     e_p, e_v = run.array("e_p"), run.array("e_v")
     if isinstance(controller, ExtendedMotionPlan):
         s, K_p, K_v = run.array("s").T, _over_time(controller.K_p), _over_time(controller.K_v)

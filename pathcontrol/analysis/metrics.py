@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
+from pathcontrol._expect import expect
 from pathcontrol.analysis.gamma import distance_to_gamma
 from pathcontrol.analysis.known import by_task, known_task, of_rollouts, where_known
 from pathcontrol.analysis.torque import torque_metrics
@@ -61,6 +62,7 @@ LABELS = {
 
 def steady_state(run: Run, fraction: float = 0.5) -> Run:
     """The last ``fraction`` of a run; the paper's peaks are those of the second half."""
+    expect("run", run, Run)
     fraction = scalar("fraction", fraction, positive=True)
     if fraction > 1:
         raise InputError(f"fraction = {fraction:g}, expected a number from 0 to 1")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, readonly, scalar
+from pathcontrol._expect import expect
 from pathcontrol.cartesian.constraint import ToolConstraint
 from pathcontrol.cartesian.orientation import FixedOrientation, FreeOrientation, Orientation
 from pathcontrol.cartesian.solve import posture, solve
@@ -76,6 +77,7 @@ class CartesianPath(SplinePath):
         tool: ArrayLike | None = None,
         closed: bool | None = None,
     ) -> None:
+        expect("robot", robot, RobotModel)
         self.frame = frame
         self.curve = curve if isinstance(curve, ToolCurve) else ToolCurve.spline(as_array("curve", curve))
         self.tolerance = scalar("tolerance", tolerance, least=_FINEST)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, scalar
+from pathcontrol._expect import expect
 from pathcontrol.cartesian.contour_paths import ContourPaths, Held
 from pathcontrol.cartesian.links import linked
 from pathcontrol.cartesian.orientation import Orientation
@@ -72,6 +73,8 @@ class ToolpathTask(PathSequence):
         clearance: float = 0.01,
         start: ArrayLike | None = None,
     ) -> None:
+        expect("robot", robot, RobotModel)
+        expect("toolpath", toolpath, Toolpath)
         pose = rigid("workpiece", np.eye(4) if workpiece is None else workpiece)
         _check_feeds(toolpath, feed)
         self.frame, self.workpiece, self.feed = frame, pose, feed

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly
+from pathcontrol._expect import expect
 from pathcontrol.control.ending import Ending
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.model import RobotModel
@@ -76,6 +77,7 @@ class Controller(ABC):
     ) -> None:
         _check_choice("friction", friction, get_args(FrictionCompensation))
         _check_choice("start", start, get_args(Start))
+        expect("robot", robot, RobotModel)
         check_task(task, robot.n)
         self.robot, self.task, self.friction, self.start_at = robot, task, friction, start
         self.ending = Ending.of(task)
@@ -177,22 +179,64 @@ def _phi(x: Array) -> tuple[Array, Array]:
 
 
 def diagonal_gain(name: str, value: ArrayLike, n: int) -> Array:
-    """Diagonal of a positive definite gain matrix: a scalar for all joints, or (*batch, n)."""
-    array = finite(name, as_array(name, value))
+    """Return the diagonal of a diagonal, positive definite gain matrix.
+
+    Args:
+        name: what the gain is called in errors.
+        value: a number for all joints, the diagonal (n,), or the matrix itself, (n, n), as ``np.diag([800, 600])``;
+            (N, n) has a row for each rollout. Where N = n, an array with zeros, or one that is symmetric and in which
+            the diagonal exceeds the rest of each row, is a matrix, and any other has rows; (N, 1, n) always has rows.
+        n: number of joints.
+
+    Raises:
+        InputError: it has another shape, is not positive, or is a matrix that is not diagonal.
+    """
+    array = _without_matrix(name, finite(name, as_array(name, value)), n)
     if array.ndim and array.shape[-1] not in (1, n):
-        raise InputError(f"{name} has shape {array.shape}, expected a scalar or its diagonal, ({n},)")
+        raise InputError(
+            f"{name} has shape {array.shape}, expected a scalar, its diagonal ({n},) or a diagonal matrix ({n}, {n})"
+        )
     return _positive(name, array)
 
 
 def scalar_gain(name: str, value: ArrayLike) -> Array:
-    """A gain that must be the same for all joints: a scalar, or (*batch, 1) with one for each rollout."""
+    """Return a gain that is the same for all joints: a number k, the matrix kI, or (N, 1) with one for each rollout.
+
+    Raises:
+        InputError: it has another shape, is not positive, or is a matrix other than kI.
+    """
     array = finite(name, as_array(name, value))
+    array = _without_matrix(name, array, array.shape[-1] if array.ndim > 1 else 1)
+    if np.ndim(value) > 1 and array.ndim == 1 and (array == array[0]).all():
+        array = array[:1]
     if array.ndim and array.shape[-1] != 1:
         raise InputError(
             f"{name} = {np.asarray(value).tolist()}, expected a scalar: the Lyapunov function (42) is for one "
             f"gain; give one {name}, or weigh the joints with K_v"
         )
     return _positive(name, array)
+
+
+def _without_matrix(name: str, array: Array, n: int) -> Array:
+    """``array`` with the diagonal in the place of a matrix (n, n), and (N, n) in that of (N, 1, n)."""
+    if array.ndim == 3 and array.shape[1:] == (1, n):
+        return array[:, 0]
+    if n < 2 or array.shape != (n, n) or not _is_matrix(array):
+        return array
+    diagonal = array.diagonal()
+    if np.count_nonzero(array - np.diag(diagonal)):
+        raise InputError(
+            f"{name} = {array.tolist()} is a matrix that is not diagonal; the theorems ask for diagonal gains, with "
+            f"which V falls: give its diagonal, as {name} = {diagonal.tolist()} (gains of {n} rollouts are rows, "
+            f"({n}, 1, {n}))"
+        )
+    return diagonal
+
+
+def _is_matrix(array: Array) -> bool:
+    """Whether a square array is one gain matrix, not a row of gains for each of n rollouts, which are never zero."""
+    off = np.abs(array - np.diag(array.diagonal())).sum(-1)
+    return bool((array == 0).any() or ((array == array.T).all() and (array.diagonal() > off).all()))
 
 
 def _positive(name: str, array: Array) -> Array:

@@ -204,12 +204,12 @@ def _check_gains(experiment: Experiment, sample: int, where: str) -> None:
 
 
 def _rows(name: str, experiments: list[Experiment]) -> Array:
-    """A gain of one number for all, (), or of all rollouts, (N, 1), (N, n), and (N,) of the gain k."""
+    """A gain of one number for all, (), or of all rollouts, (N, 1), (N, 1, n), and (N,) of the gain k."""
     values = [getattr(experiment.controller, name) for experiment in experiments]
     if all(value == values[0] for value in values):
         return np.asarray(values[0], dtype=np.float64)
     rows = np.asarray(values, dtype=np.float64)
-    return rows if rows.ndim == 2 or name == "k" else rows[:, None]
+    return rows if name == "k" else rows[:, None]
 
 
 def _arguments(

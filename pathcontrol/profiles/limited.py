@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import scalar
+from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.demands import Demands
 from pathcontrol.profiles.grid import below, edges, quarters, refined
@@ -13,6 +14,7 @@ from pathcontrol.profiles.motion_limit import MotionLimit
 from pathcontrol.profiles.sweeps import largest
 from pathcontrol.profiles.table import TabulatedProfile
 from pathcontrol.profiles.tangential import all_steps
+from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.profile import Path
 
 
@@ -46,6 +48,9 @@ def limited(
         InputError: a value is not positive, or nothing limits the speed somewhere.
         TaskError: the path neither ends nor closes, or leaves a tool standing whose tangential acceleration is limited.
     """
+    expect("path", path, PathTask)
+    for i, limit in enumerate(limits):
+        expect(f"limits[{i}]", limit, MotionLimit)
     cells = edges(path, int(scalar("points", points, least=1)))
     demands = Demands(path, limits, velocity, start_rate)
     s = refined(demands.resolved, cells)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.profile import Path
 
@@ -53,6 +54,7 @@ class ToolMotion(Motion):
     frame: str
 
     def __post_init__(self) -> None:
+        expect("robot", self.robot, RobotModel)
         self.robot.frame_pose(np.zeros(self.robot.n), self.frame)  # refuses a frame that does not exist
 
     def __str__(self) -> str:

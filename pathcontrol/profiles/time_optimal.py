@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array, readonly, scalar
+from pathcontrol._expect import expect
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.profiles.table import TabulatedProfile
 from pathcontrol.profiles.topp.along import sample, torques
 from pathcontrol.profiles.topp.limits import LimitChoice, joint_limits
 from pathcontrol.profiles.topp.solve import Demand, fastest
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.profile import Path
 
 _BINDING = 0.999
@@ -99,6 +101,8 @@ def time_optimal(
         TaskError: the path neither ends nor closes or is for another number of joints; or the demand cannot be met: the
             message says which limit of which joint is in the way, at which s and posture.
     """
+    expect("robot", robot, RobotModel)
+    expect("path", path, PathTask)
     limits = joint_limits(robot, velocity, acceleration, torque, margin)
     ends = _ends(path, start_rate=start_rate, end_rate=end_rate, end_time=end_time)
     samples = sample(path, _knots(path, points), robot.n)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array, as_slice, in_common
+from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.friction import FrictionLaw, friction_of_each
@@ -35,7 +36,12 @@ class RobotBatch:
     """
 
     def __init__(self, robots: Sequence[RobotModel], friction: FrictionLaw | None = None) -> None:
-        self.robots, first = tuple(robots), robots[0]
+        self.robots = (robots,) if isinstance(robots, RobotModel) else tuple(robots)
+        if not self.robots:
+            raise InputError("robots is an empty list, expected a RobotModel for each rollout")
+        for i, robot in enumerate(self.robots):
+            expect(f"robots[{i}]", robot, RobotModel)
+        first = self.robots[0]
         for i, robot in enumerate(self.robots):
             if robot is not first and robot.joint_names != first.joint_names:
                 raise InputError(f"plant[{i}] has the joints {robot.joint_names}, plant[0] {first.joint_names}")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.profile import plain_attributes
@@ -134,6 +135,7 @@ class FrameForce(_Timed):
         duration: ArrayLike = np.inf,
     ) -> None:
         super().__init__(start, duration)
+        expect("robot", robot, RobotModel)
         robot.frame_pose(np.zeros(robot.n), frame)  # there is such a frame
         self._robot, self.frame = robot, frame
         self.force = readonly(finite("force", as_array("force", force)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.dry_friction import stick_slip
@@ -29,6 +30,7 @@ class Plant:
     """
 
     def __init__(self, robot: RobotModel | RobotBatch, step: float) -> None:
+        expect("robot", robot, RobotModel, RobotBatch)
         self.robot, self.step = robot, step
         # rows, (1, n), and numbers as arrays, (), which NumPy joins to those of a single rollout far faster than others
         self._damping = np.atleast_2d(robot.friction.viscous)

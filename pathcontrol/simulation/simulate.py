@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import scalar
+from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.disturbance import Disturbance
@@ -75,6 +76,7 @@ def simulate(
         InputError: an argument has the wrong shape or value.
         SimulationError: all rollouts diverged, as a single one does; its ``run`` holds what happened until then.
     """
+    expect("controller", controller, Controller)
     duration = scalar("duration", duration, positive=True)
     robot, first = plant_of(plant, controller), rollout_number(first_rollout)
     check_joints(controller, robot)

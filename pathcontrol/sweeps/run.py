@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol._progress import progress_bar
 from pathcontrol.errors import InputError
 from pathcontrol.sweeps.cluster import connected
@@ -73,8 +74,7 @@ def sweep(
             one of another definition.
         MissingExtraError: the extra ``sweep`` or, for a cluster, ``cluster`` is not installed.
     """
-    if not isinstance(space, Space):
-        raise InputError(f"space = {space!r}, expected a Space, such as Space.grid({{'k': [1.0, 2.0]}})")
+    expect("space", space, Space)
     if isinstance(chunk, bool) or not isinstance(chunk, int) or chunk < 1:
         raise InputError(f"chunk = {chunk!r}, expected a whole number from 1")
     keep, measure, seed = Keep() if keep is None else keep, measure_of(metrics), check_seed(seed)

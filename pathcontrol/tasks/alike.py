@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.together import by_identity
@@ -25,8 +26,7 @@ def listed(tasks: Any) -> tuple[PathTask, ...]:
     if not found:
         raise InputError("tasks is an empty list, expected a task for each rollout")
     for i, task in enumerate(found):
-        if not isinstance(task, PathTask):
-            raise InputError(f"tasks[{i}] = {task!r}, expected an instance of a PathTask subclass")
+        expect(f"tasks[{i}]", task, PathTask)
     return found
 
 

@@ -7,6 +7,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite
+from pathcontrol._expect import expect
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.tasks.base import PathTask
 
@@ -134,6 +135,7 @@ def arc_length(task: PathTask, s0: ArrayLike | None = None, s_end: ArrayLike | N
         InputError: an end is outside an open path, or left out where there is none; the shapes do not fit.
         TaskError: the path stands still somewhere.
     """
+    expect("task", task, PathTask, error=TaskError)
     if s_end is None and not np.isfinite(last(task)):
         raise InputError(f"{type(task).__name__} neither ends nor repeats, so s_end is needed")
     start = _inside(task, "s0", task.s0 if s0 is None else s0)
@@ -154,6 +156,7 @@ def curvature(task: PathTask, s: ArrayLike) -> Array:
 
     ‖a ∧ b‖ is the area that a and b span; divided by ‖a‖ it is the part of b normal to a.
     """
+    expect("task", task, PathTask, error=TaskError)
     s = as_array("s", s)
     return np.linalg.norm(curvature_vector(task.dq_d(s), task.ddq_d(s)), axis=-1)
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import described, expect
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import TaskBatch
@@ -25,10 +26,10 @@ def check_task(task: PathTask, n: int) -> None:
     if isinstance(task, TaskBatch):
         _check_each(task, n)
         return
+    if isinstance(task, list | tuple):
+        raise TaskError(f"task {described(task)}, expected a PathTask, or TaskBatch([...]) of one for each rollout")
+    expect("task", task, PathTask, error=TaskError)
     name = type(task).__name__
-    if not isinstance(task, PathTask):
-        several = ", or TaskBatch([...]) for a task of each rollout" if isinstance(task, list | tuple) else ""
-        raise TaskError(f"the task is {task!r:.80}, expected an instance of a PathTask subclass{several}")
     _check_domain(task, name)
     lower, upper = task.sampled_interval
     s = np.linspace(lower, upper, _SAMPLES)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
+from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.arc_length import ArcLength
 from pathcontrol.tasks.base import PathPoint, PathTask
@@ -183,8 +184,7 @@ def _checked(paths: Sequence[PathTask]) -> list[PathTask]:
     if len(checked) < 2:
         raise InputError(f"{len(checked)} paths are given, expected two or more")
     for i, path in enumerate(checked):
-        if not isinstance(path, PathTask):
-            raise InputError(f"paths[{i}] = {path!r}, expected a PathTask")
+        expect(f"paths[{i}]", path, PathTask)
         refuse_batch(f"paths[{i}]", path)
         if path.closed or path.s_end == np.inf:
             kind = "is closed" if path.closed else "has no end"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, readonly
+from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import refuse_batch
@@ -41,6 +42,7 @@ class PathSequence(PathTask):
         if not self.paths:
             raise InputError("a sequence needs at least one path")
         for i, path in enumerate(self.paths):
+            expect(f"paths[{i}]", path, PathTask)
             refuse_batch(f"path {i} of the sequence", path)
             if path.closed or not np.isfinite(path.s_end):
                 raise InputError(

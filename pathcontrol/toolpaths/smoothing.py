@@ -9,6 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
+from pathcontrol._expect import expect
 from pathcontrol.errors import UnknownNameError
 from pathcontrol.toolpaths.bends import regular
 from pathcontrol.toolpaths.blends import Arm, Junction, blend_length
@@ -60,6 +61,7 @@ def smooth(contour: Contour, tolerance: float = 1e-4, corner: Corners = "blend")
         InputError: the tolerance is not positive, or a segment cannot be resolved to 1 nm.
         UnknownNameError: ``corner`` is neither.
     """
+    expect("contour", contour, Contour)
     tolerance = scalar("tolerance", tolerance, positive=True)
     if corner not in get_args(Corners):
         raise UnknownNameError(f"corner = {corner!r}, expected one of {', '.join(map(repr, get_args(Corners)))}")

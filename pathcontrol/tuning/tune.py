@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol._progress import progress_bar
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.sweeps.compute import OUTCOME, Build, Measure, measure_of
@@ -156,6 +157,7 @@ def _generation(search: Search, space: Space, cases: Cases, terms: Terms, first:
 
 
 def _space(given: Space | Mapping[str, Any], method: str) -> Space:
+    expect("space", given, Space, Mapping)
     return given if isinstance(given, Space) else Space(given, method, None if method == "given" else 1)
 
 

@@ -17,6 +17,7 @@ from threading import Event
 from typing import IO, TYPE_CHECKING, Any, NamedTuple, cast
 
 from pathcontrol._arrays import scalar
+from pathcontrol._expect import expect
 from pathcontrol._files import whole_file
 from pathcontrol._progress import progress_bar
 from pathcontrol.errors import InputError, MissingExtraError, PathControlError
@@ -76,6 +77,9 @@ def save_video(
         MissingExtraError: a package or a browser is missing.
         PathControlError: the browser cannot draw the page, or FFmpeg cannot write the video.
     """
+    from pathcontrol.view.film.animation import Animation
+
+    expect("animation", animation, Animation)
     path = Path(path)
     if path.suffix != ".mp4":
         raise InputError(f"path = {str(path)!r}, expected the name of a file that ends with .mp4")

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol.analysis.metrics import LABELS
 from pathcontrol.analysis.readable import reading
 from pathcontrol.errors import InputError, UnknownNameError
@@ -23,8 +24,9 @@ def table_of(sweep: SweepResult | xr.Dataset) -> xr.Dataset:
     Raises:
         InputError: it is something else, or empty.
     """
+    expect("sweep", sweep, SweepResult, xr.Dataset)
     table = sweep.table() if isinstance(sweep, SweepResult) else sweep
-    if not isinstance(table, xr.Dataset) or "sample" not in table.dims:
+    if "sample" not in table.dims:
         raise InputError(f"sweep = {sweep!r}, expected a SweepResult or its table")
     if not table.sizes["sample"]:
         raise InputError("the sweep has no finished samples yet")

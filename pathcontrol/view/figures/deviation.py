@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol.analysis.deviation import tool_deviation, tool_positions
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
@@ -72,6 +73,7 @@ def _toolpath(runs: Sequence[Shown]) -> ToolpathTask:
 def _measured(one: Shown, robot: RobotModel | None) -> tuple[Array, Array, Array]:
     """The tool's way (k, 3) in the workpiece's frame, its distance from the drawing (k,) [m], and whether it cuts."""
     task, robot = one.task, one.run.robot if robot is None else robot
+    expect("robot", robot, RobotModel)
     assert isinstance(task, ToolpathTask)
     way = (tool_positions(one.run, robot, task.frame)[0] - task.workpiece[:3, 3]) @ task.workpiece[:3, :3]
     distance = drawable(tool_deviation(one.run, robot, task.frame, task.contours)[0])

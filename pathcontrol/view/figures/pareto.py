@@ -87,8 +87,8 @@ def pareto_figure(
         InputError: ``x`` or ``y`` is left out, or there is no sample to be drawn.
         UnknownNameError: there is no such metric or parameter.
     """
-    choice = _choice(sweep, x, y, goals, limits)
     table = table_of(sweep.table() if isinstance(sweep, Tuning) else sweep)
+    choice = _choice(sweep, x, y, goals, limits)
     names = (choice.x, choice.y)
     (right, x_unit), (up, y_unit) = (readable_metric(table, name) for name in names)
     others = {name: ends for name, ends in choice.limits.items() if name not in names}

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.robot.model import RobotModel
@@ -68,8 +69,12 @@ def shown(run: Runs, task: PathTask | None = None, rollout: int | None = None) -
     """
     named = run if isinstance(run, Mapping) else {"": run}
     if not named or not all(isinstance(one, Run) for one in named.values()):
+        if not isinstance(run, Mapping):
+            expect("run", run, Run)
         raise InputError(f"run = {run!r:.80}, expected a Run, or some by their names, as {{'path control': run}}")
     several = isinstance(run, Mapping)
+    if task is not None:
+        expect("task", task, PathTask)
     if rollout is not None and task is not None:
         task = rows_of(task, np.array([rollout]))
     chosen = {name: one if rollout is None else one.rollout(rollout) for name, one in named.items()}

@@ -14,6 +14,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from pathcontrol._expect import expect
 from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError
 from pathcontrol.view.figures.ticks import SpacedLocator
@@ -134,6 +135,7 @@ def save_figure(figure: Figure, path: str | Path, formats: Sequence[str] = ("svg
     Raises:
         InputError: a format is not known, or a file cannot be written there.
     """
+    expect("figure", figure, Figure)
     stem, wanted = Path(path), [formats] if isinstance(formats, str) else list(formats)
     if stem.suffix[1:] in FORMATS:
         stem, wanted = stem.with_suffix(""), [*wanted, stem.suffix[1:]]

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathTask
@@ -151,6 +152,7 @@ def wide_axes(points: Sequence[Array]) -> tuple[int, int]:
 
 def _way(one: Shown, robot: RobotModel | None, tool: str | None) -> Way:
     robot = one.run.robot if robot is None else robot
+    expect("robot", robot, RobotModel)
     frame = default_tool(robot, one.task) if tool is None else tool
     q = drawable(one.run.array("q")[0])
     some = slice(None, None, -(-len(q) // _MOST_POSES))

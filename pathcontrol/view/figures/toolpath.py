@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.corners import corners
 from pathcontrol.toolpaths.segments import Polyline
@@ -21,6 +22,7 @@ _AXES = "xyz"
 
 def toolpath_figure(toolpath: Toolpath) -> Figure:
     """The contours in order, seen against the axis along which they extend least: cuts, rapids, starts and corners."""
+    expect("toolpath", toolpath, Toolpath)
     with style():
         figure, (axes,), (i, j) = plan_figure(toolpath)
         for contour in toolpath:

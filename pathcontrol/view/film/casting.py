@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.record import table
 from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import rows_of
 from pathcontrol.view.bodies.sticks import stick_figure
 from pathcontrol.view.bodies.visuals import LinkVisual, link_visuals
@@ -18,8 +21,7 @@ from pathcontrol.view.film.take import Take
 from pathcontrol.view.tool import default_tool
 
 if TYPE_CHECKING:
-    from pathcontrol.robot.model import RobotModel, UrdfSource
-    from pathcontrol.tasks.base import PathTask
+    from pathcontrol.robot.model import UrdfSource
 
 FINENESS = 1.5e-4  # of the arm's reach: where a picture shows it whole, a small part of a pixel
 
@@ -38,7 +40,13 @@ def cast_takes(
     """
     runs = {controller_name(run): run} if isinstance(run, Run) else run
     if not isinstance(runs, Mapping) or not runs or not all(isinstance(one, Run) for one in runs.values()):
+        if not isinstance(run, Mapping):
+            expect("run", run, Run)
         raise InputError(f"run = {runs!r}, expected a Run, or several by name: {{'name': run, …}}")
+    if robot is not None:
+        expect("robot", robot, RobotModel)
+    if task is not None:
+        expect("task", task, PathTask)
     looks: dict[UrdfSource, list[LinkVisual]] = {}
     takes = []
     for i, (name, one) in enumerate(runs.items()):

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pathcontrol._expect import expect
 from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
@@ -61,6 +62,8 @@ def _named(runs: Any) -> dict[str, Run]:
     if isinstance(runs, Run):
         return {"run": runs}
     if not isinstance(runs, Mapping) or not runs or not all(isinstance(run, Run) for run in runs.values()):
+        if not isinstance(runs, Mapping):
+            expect("runs", runs, Run)
         raise InputError(f"runs = {runs!r}, expected a Run or several by name, as {{'first': run}}")
     return {str(name): run for name, run in runs.items()}
 

@@ -1,0 +1,85 @@
+"""Arguments of the wrong kind, told with what was given, what was expected and what to call."""
+
+from __future__ import annotations
+
+import reprlib
+from os import PathLike
+from typing import Any
+
+from pathcontrol.errors import InputError, PathControlError
+
+_LONGEST = 80
+
+#: how one gets an instance, by the name of its class: the kinds of things that calls of this package pass around
+_SOURCES = {
+    "RobotModel": "load_robot(NAME or FILE) gives one",
+    "PathTask": "Circle(radius, speed) and the other tasks, or a subclass of your own, are some",
+    "Controller": "Projection(robot, task, k_p, K_v) and the other control laws are some",
+    "Run": "simulate(controller, q, duration=…) gives one, and Run.load(FILE)",
+    "Figure": "path_figure(run), error_figure(run) and the other figures are some",
+    "Animation": "record(run) gives one",
+    "Toolpath": "read_toolpath(FILE) gives one",
+    "ToolpathTask": "ToolpathTask(robot, frame, toolpath) makes one",
+    "Contour": "those of a toolpath are some: toolpath.contours",
+    "MotionLimit": "MotionLimit(ToolMotion(robot, frame), speed) makes one",
+    "Space": "Space.grid(…) and Space.random(…) make one",
+    "SweepResult": "sweep(…) gives one, and SweepResult(FOLDER)",
+}
+#: what to write instead, by what was given and what was expected
+_INSTEAD = {
+    ("text", "RobotModel"): "load_robot({value!r}) gives one",
+    ("text", "Run"): "Run.load({value!r}) gives one",
+    ("text", "Toolpath"): "read_toolpath({value!r}) gives one",
+    ("text", "SweepResult"): "SweepResult({value!r}) gives one",
+    ("Controller", "RobotModel"): "a control law has one: controller.robot",
+    ("Controller", "PathTask"): "a control law has one: controller.task",
+    ("Run", "RobotModel"): "a run has one: run.robot",
+    ("Run", "PathTask"): "a run has one: run.task",
+    ("Run", "Animation"): "record(run) gives one",
+    ("SweepResult", "Run"): "sweep.histories() gives those that a sweep has kept",
+    ("Toolpath", "PathTask"): "ToolpathTask(robot, frame, toolpath) makes one",
+    ("Animation", "Figure"): "an animation is written by its own save(FILE)",
+}
+
+
+def expect(name: str, value: Any, *kinds: type, error: type[PathControlError] = InputError) -> None:
+    """Check that the argument ``name`` is of one of the ``kinds``, the usual one first.
+
+    Raises:
+        PathControlError: it is not; of the class ``error``.
+    """
+    if isinstance(value, kinds):
+        return
+    given, wanted = _family(value), kinds[0].__name__
+    advice = _INSTEAD.get((given, wanted), _SOURCES.get(wanted, "")).format(value=_text(value))
+    if isinstance(value, type):
+        advice = f"make an instance: {value.__name__}(…)" if issubclass(value, kinds) else advice
+    if given in _SOURCES and given != wanted:
+        advice += "; are arguments swapped?"
+    raise error(f"{name} {described(value)}, expected {_article(wanted)} {wanted}" + (f": {advice}" if advice else ""))
+
+
+def described(value: Any) -> str:
+    """Return what follows the name of an argument: ``= 'x'``, ``is a Circle, which is a PathTask``."""
+    if isinstance(value, type):
+        return f"is the class {value.__name__}"
+    family, name = _family(value), type(value).__name__
+    if family not in _SOURCES:
+        return f"= {reprlib.repr(_text(value))[:_LONGEST]}"
+    return f"is {_article(name)} {name}" + ("" if family == name else f", which is {_article(family)} {family}")
+
+
+def _article(word: str) -> str:
+    """``a`` or ``an``."""
+    return "an" if word[0] in "AEIO" else "a"
+
+
+def _family(value: Any) -> str:
+    """The kind of a value as the tables above have it, or an empty text."""
+    if isinstance(value, str | PathLike):
+        return "text"
+    return next((kind.__name__ for kind in type(value).__mro__ if kind.__name__ in _SOURCES), "")
+
+
+def _text(value: Any) -> Any:
+    return str(value) if isinstance(value, PathLike) else value
