@@ -449,7 +449,7 @@ class Stuck(Figure):
     [
         ([], "empty"),
         (SHARED, "expected a list of tasks"),
-        ([SHARED, Circle], r"tasks\[1\] = .*expected an instance"),
+        ([SHARED, Circle], r"tasks\[1\] is the class Circle, expected a PathTask: make an instance"),
         ([SHARED, TaskBatch([SHARED])], r"tasks\[1\] is a TaskBatch of 1 tasks, expected one task"),
         ([SHARED, SHARED, WAY], r"tasks\[2\], a WaypointPath, is open, but tasks\[0\], a Circle, is closed"),
         ([SHARED, Endless(1.0, 1.0)], r"tasks\[1\], a Endless, neither ends nor repeats; give it a finite s_end"),
