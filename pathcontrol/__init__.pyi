@@ -48,12 +48,12 @@ from .profiles.time_optimal import TimeOptimal as TimeOptimal
 from .profiles.time_optimal import time_optimal as time_optimal
 from .profiles.tool_speed import ToolSpeed as ToolSpeed
 from .robot.batch import RobotBatch as RobotBatch
+from .robot.catalogue import known_robots as known_robots
 from .robot.friction import Coulomb as Coulomb
 from .robot.friction import FrictionLaw as FrictionLaw
 from .robot.friction import Stribeck as Stribeck
 from .robot.friction import Viscous as Viscous
 from .robot.friction import no_friction as no_friction
-from .robot.loading import known_robots as known_robots
 from .robot.loading import load_robot as load_robot
 from .robot.model import RobotModel as RobotModel
 from .robot.urdf import check_urdf as check_urdf

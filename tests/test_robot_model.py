@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pathcontrol.errors import InputError, UnknownNameError, UrdfError
+from pathcontrol.robot.catalogue import known_robots
 from pathcontrol.robot.friction import Coulomb, Viscous
-from pathcontrol.robot.loading import known_robots, load_robot
+from pathcontrol.robot.loading import load_robot
 
 EPS = np.finfo(float).eps
 G = 9.81

@@ -83,6 +83,14 @@ def import_all() -> None:
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, nothing else.")
 open_option = click.option("--open", "opened", is_flag=True, help="Show the page in the default browser at the end.")
 
+package_option = click.option(
+    "--package-dir",
+    multiple=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="FOLDER",
+    help="A folder that holds the packages of meshes, or is one; repeat for more.",
+)
+
 
 def open_page(path: Path) -> None:
     """Show a page in the default browser; where there is none, say which file to open."""

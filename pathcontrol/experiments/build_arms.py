@@ -10,7 +10,8 @@ from pathcontrol.experiments.build_friction import with_friction
 from pathcontrol.experiments.keyed import keyed
 from pathcontrol.experiments.placement import pose_of
 from pathcontrol.experiments.schema import Experiment
-from pathcontrol.robot.loading import find_urdf, load_robot
+from pathcontrol.robot.catalogue import find_urdf
+from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.robot.urdf import parse_urdf
 

@@ -13,8 +13,9 @@ import numpy as np
 from pathcontrol._arrays import Array, readonly
 from pathcontrol.errors import InputError, MissingExtraError, PathControlError, UnknownNameError
 from pathcontrol.robot.actuation import Actuation, Limits
+from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.friction import FrictionLaw, friction_of, no_friction
-from pathcontrol.robot.loading import checked_model, find_urdf
+from pathcontrol.robot.loading import checked_model
 from pathcontrol.robot.model import RobotModel, UrdfSource
 
 _METHODS = ("reduced", "with_payload", "with_frame", "with_armature", "with_masses")

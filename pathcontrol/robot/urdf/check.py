@@ -15,7 +15,7 @@ from pathcontrol.robot.urdf.extension import check_extension
 from pathcontrol.robot.urdf.finding import Finding, Level, UrdfReport
 from pathcontrol.robot.urdf.form import check_form
 from pathcontrol.robot.urdf.inertia import check_inertials, check_inertias, check_mass_matrix, check_masses
-from pathcontrol.robot.urdf.parse import parse_urdf
+from pathcontrol.robot.urdf.parse import parse_and_mend
 from pathcontrol.robot.urdf.shapes import check_meshes, check_shapes
 from pathcontrol.robot.urdf.values import (
     check_axes,
@@ -62,10 +62,10 @@ def check_urdf(
         The names in the robot and the findings.
     """
     try:
-        root = parse_urdf(text)
+        root, mended = parse_and_mend(text)
     except UrdfError as error:
         return UrdfReport("", (), (), (Finding("error", "unreadable", "file", str(error)),))
-    findings = list(check_form(root))
+    findings = [*mended, *check_form(root)]
     if not any(finding.level == "error" for finding in findings):
         arm = read_arm(root, allow_mimic)
         findings += [finding for check in VALUE_CHECKS for finding in check(arm)]

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from lxml import etree
 
 from pathcontrol.errors import UrdfError
-from pathcontrol.robot.urdf.finding import shown
+from pathcontrol.robot.urdf.finding import Finding, shown
+from pathcontrol.robot.urdf.mending import mended, parser
 
 MAX_BYTES = 64 * 2**20
 
 # only the prolog can hold a DOCTYPE, so this sees every one before the parser does
 _DOCTYPE = re.compile(r"\ufeff?(?:\s|<\?.*?\?>|<!--.*?-->)*+<!DOCTYPE", re.DOTALL)
+_NO_DOCTYPE = "a DOCTYPE may define entities and is refused; expected none, remove it"
 _RUN_XACRO = "run xacro first and load what it prints"
+
+
+class Parsed(NamedTuple):
+    """The ``<robot>`` element of a URDF, and what in its XML was put right."""
+
+    root: etree._Element
+    findings: tuple[Finding, ...]
 
 
 def parse_urdf(text: str) -> etree._Element:
@@ -32,13 +42,22 @@ def parse_urdf(text: str) -> etree._Element:
     Raises:
         UrdfError: If the text is empty, too long, not XML, has a DOCTYPE or another root, or is a xacro file.
     """
+    return parse_and_mend(text).root
+
+
+def parse_and_mend(text: str) -> Parsed:
+    """Do as :func:`parse_urdf` does, and say what in the XML was put right."""
     data = _encoded(text)
     if _DOCTYPE.match(text):
-        raise UrdfError("a DOCTYPE may define entities and is refused; expected none, remove it")
-    root = _parsed(data)
-    _refuse_xacro(root)
+        raise UrdfError(_NO_DOCTYPE)
+    root, findings = _parsed(text, data)
+    if root.getroottree().docinfo.doctype:
+        raise UrdfError(_NO_DOCTYPE)
     _refuse_other_roots(root)
-    return root
+    findings += _without_stray_xacro(root)
+    _refuse_xacro(root)
+    findings += _without_old_version(root)
+    return Parsed(root, tuple(findings))
 
 
 def _encoded(text: str) -> bytes:
@@ -54,14 +73,56 @@ def _encoded(text: str) -> bytes:
     return data
 
 
-def _parsed(data: bytes) -> etree._Element:
-    parser = etree.XMLParser(encoding="utf-8", resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
+def _parsed(text: str, data: bytes) -> tuple[etree._Element, list[Finding]]:
     try:
-        return etree.fromstring(data, parser)
+        return etree.fromstring(data, parser()), []
     except etree.XMLSyntaxError as error:
-        reason = str(error.msg).splitlines()[0]
-        advice = _RUN_XACRO if "xacro" in reason else "correct that line"
-        raise UrdfError(f"line {error.lineno}: not XML: {reason}; {advice}") from None
+        better, findings = mended(text)
+        if not findings:
+            raise _not_xml(error) from None
+    try:
+        return etree.fromstring(better.encode(), parser()), findings
+    except etree.XMLSyntaxError as error:
+        raise _not_xml(error) from None
+
+
+def _not_xml(error: etree.XMLSyntaxError) -> UrdfError:
+    reason = str(error.msg).splitlines()[0]
+    advice = _RUN_XACRO if "xacro" in reason else "correct that line"
+    return UrdfError(f"line {error.lineno}: not XML: {reason}; {advice}")
+
+
+def _without_stray_xacro(root: etree._Element) -> list[Finding]:
+    """Take out definitions of xacro that nothing in the robot uses, as other readers pass over them."""
+    if any(map(_uses_xacro, _own_elements(root))):
+        return []
+    stray = [child for child in root.iterchildren(etree.Element) if _is_definition(child)]
+    for element in stray:
+        root.remove(element)  # what is between it and the next one goes too, which is blank
+    if not stray:
+        return []
+    lines = f"line {stray[0].sourceline}" + (f" and {len(stray) - 1} more" if len(stray) > 1 else "")
+    message = f"{lines}: <xacro:{etree.QName(stray[0]).localname}> is passed over, as nothing uses it; remove it"
+    return [Finding("warning", "xml-xacro", "file", message)]
+
+
+def _is_definition(element: etree._Element) -> bool:
+    name = etree.QName(element)
+    return "xacro" in (name.namespace or "") and name.localname in ("property", "arg")
+
+
+def _uses_xacro(element: etree._Element) -> bool:
+    return any("${" in value for value in element.attrib.values())
+
+
+def _without_old_version(root: etree._Element) -> list[Finding]:
+    """Take out a version of URDF below the first, which some exporters write and readers pass over."""
+    version = root.get("version", "")
+    if re.fullmatch(r"0(\.\d{1,9})?", version) is None:
+        return []
+    del root.attrib["version"]
+    message = f"line {root.sourceline}: there is no URDF version {shown(version)}, read as 1.0; remove it"
+    return [Finding("warning", "xml-version", "file", message)]
 
 
 def _refuse_xacro(root: etree._Element) -> None:
@@ -69,7 +130,7 @@ def _refuse_xacro(root: etree._Element) -> None:
     for element in root.iter(etree.Element):
         name = etree.QName(element)
         is_macro = "xacro" in (name.namespace or "")
-        if is_macro or (element in ours and any("${" in value for value in element.attrib.values())):
+        if is_macro or (element in ours and _uses_xacro(element)):
             raise UrdfError(f"line {element.sourceline}: <{name.localname}> is xacro, not URDF; {_RUN_XACRO}")
 
 

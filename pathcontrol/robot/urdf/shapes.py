@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
 from lxml import etree
 
 from pathcontrol.robot.urdf.elements import place_of
 from pathcontrol.robot.urdf.finding import Finding, shown
-from pathcontrol.robot.urdf.mesh_files import LOCAL_SCHEMES, mesh_candidates
+from pathcontrol.robot.urdf.mesh_files import (
+    A_POINTER,
+    ADD_FOLDER,
+    find_mesh_file,
+    is_local,
+    is_pointer,
+    mesh_candidates,
+)
 from pathcontrol.robot.urdf.numbers import POSE, read_numbers
 
 _SHAPES: dict[str, dict[str, int]] = {
@@ -31,17 +38,38 @@ def check_shapes(root: etree._Element) -> Iterator[Finding]:
 
 
 def check_meshes(root: etree._Element, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Finding]:
-    """Every mesh is a file that can be found; nothing is fetched."""
+    """Every mesh that is drawn is a file that can be found; nothing is fetched. The others are counted."""
+    problem = cache(lambda name: _mesh_problem(name, base_dir, package_dirs))
+    yield from _check_drawn(root, problem)
+    names = dict.fromkeys(mesh.get("filename", "") for mesh in root.iterfind("link/collision/geometry/mesh"))
+    missing = [name for name in names if problem(name)]
+    if missing:
+        count = f"{len(missing)} of {len(names)} collision meshes"
+        message = f"{count} cannot be read, {shown(missing[0])} first; they are never drawn or needed"
+        yield Finding("note", "collision-mesh-missing", "robot", message)
+
+
+def _check_drawn(root: etree._Element, problem: Callable[[str], str | None]) -> Iterator[Finding]:
     for link in root.iterfind("link"):
-        for name in dict.fromkeys(mesh.get("filename", "") for mesh in link.iterfind("*/geometry/mesh")):
-            scheme = name.rpartition("://")[0]
-            paths = mesh_candidates(name, base_dir, package_dirs)
-            if scheme not in LOCAL_SCHEMES:
+        for name in dict.fromkeys(mesh.get("filename", "") for mesh in link.iterfind("visual/geometry/mesh")):
+            if not is_local(name):
                 message = f"mesh {shown(name)} is not fetched; expected package://, file:// or a relative path"
                 yield Finding("warning", "mesh-remote", place_of(link), message)
-            elif name and paths and not any(map(os.path.isfile, paths)):
-                message = f"mesh {shown(name)} is not found; expected a file, add the folder of its package"
-                yield Finding("warning", "mesh-missing", place_of(link), message)
+            elif name and (reason := problem(name)):
+                yield Finding("warning", "mesh-missing", place_of(link), f"mesh {shown(name)} {reason}")
+
+
+def _mesh_problem(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> str | None:
+    """Why a mesh cannot be read, ``None`` if it can."""
+    if next(mesh_candidates(name, base_dir, package_dirs), None) is None:
+        return None  # a robot given as text, without any folder to look in
+    path = find_mesh_file(name, base_dir, package_dirs)
+    try:
+        if path is None:
+            return f"is not found; {ADD_FOLDER}"
+        return f"is {A_POINTER}" if is_pointer(path) else None
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"
 
 
 def _shape_problems(holder: etree._Element) -> Iterator[str]:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
 from pathcontrol.errors import UrdfError
-from pathcontrol.robot.urdf.mesh_files import LOCAL_SCHEMES, mesh_candidates
+from pathcontrol.robot.meshes import Part, load_parts
+from pathcontrol.robot.urdf.mesh_files import ADD_FOLDER, find_mesh_file, is_local
 from pathcontrol.view.bodies.shapes import Color, Mesh
-from pathcontrol.view.bodies.thinning import rounded, thinned
+from pathcontrol.view.bodies.thinning import clustered, rounded, thinned
 
+MOST_TRIANGLES = 100_000  # of one colour: a picture shows no more
+_FARTHEST = 1e6  # m
 SHARP = np.deg2rad(40.0)  # faces that meet at more than this show an edge
 
 
@@ -23,19 +25,18 @@ def find_mesh(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) ->
 
     Args:
         name: a relative or absolute path, ``file://…``, or ``package://…``.
-        base_dir: folder of the URDF; see :func:`mesh_candidates`.
+        base_dir: folder of the URDF; see :func:`find_mesh_file`.
         package_dirs: folders that hold packages.
 
     Raises:
         UrdfError: there is no such file.
     """
-    scheme = name.rpartition("://")[0]
-    if scheme not in LOCAL_SCHEMES:
-        raise UrdfError(f"{scheme}:// is not fetched; give a relative path, package:// or file://")
-    for path in mesh_candidates(name, base_dir, package_dirs):
-        if path.is_file():
-            return path
-    raise UrdfError("there is no such file; give the folder that holds it, or its package, in package_dirs")
+    if not is_local(name):
+        raise UrdfError("it is not fetched; give a relative path, package:// or file://")
+    path = find_mesh_file(name, base_dir, package_dirs)
+    if path is None:
+        raise UrdfError(f"there is no such file; {ADD_FOLDER}")
+    return path
 
 
 def read_mesh(path: Path, scale: ArrayLike = 1.0, detail: float = 0.0) -> list[tuple[Mesh, Color | None]]:
@@ -49,46 +50,34 @@ def read_mesh(path: Path, scale: ArrayLike = 1.0, detail: float = 0.0) -> list[t
     Raises:
         UrdfError: the file cannot be read, or has no triangles.
     """
-    try:
-        scene = trimesh.load_scene(path)
-        factor = np.asarray(scale, dtype=np.float64) * _metres(scene.units)
-        parts = _by_color(part for part in scene.dump() if isinstance(part, trimesh.Trimesh))
-    except Exception as error:  # the readers of a dozen formats raise whatever they like
-        raise UrdfError(f"it cannot be read: {type(error).__name__}: {error}") from error
-    meshes = [(_shaded(np.concatenate(triangles) * factor, detail), color) for color, triangles in parts.items()]
+    factor = np.asarray(scale, dtype=np.float64)
+    found: dict[Color | None, list[Part]] = {}
+    for part in load_parts(path):
+        found.setdefault(part.color, []).append(part)
+    joined = [(color, _joined(found[color], factor)) for color in sorted(found, key=lambda color: color or ())]
+    meshes = [(_shaded(mesh, detail), color) for color, mesh in joined]
     meshes = [(mesh, color) for mesh, color in meshes if len(mesh.faces)]
     if not meshes:
         raise UrdfError("it has no triangles")
     return meshes
 
 
-def _metres(units: str | None) -> float:
-    """Only Collada says its unit; the files of other formats are in metres by the convention of URDF."""
-    return trimesh.units.unit_conversion(units, "meters") if units and units.endswith("* meters") else 1.0
+def _joined(parts: Sequence[Part], factor: np.ndarray) -> Mesh:
+    """Parts of one colour as one mesh."""
+    offsets = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
+    faces = [part.faces + offset for part, offset in zip(parts, offsets, strict=True)]
+    vertices = np.concatenate([part.vertices for part in parts]) * factor
+    if not (np.abs(vertices) < _FARTHEST).all():
+        raise UrdfError(f"it has vertices that are not finite, or {_FARTHEST:g} m away and more; check its scale")
+    return Mesh(vertices, np.concatenate(faces))
 
 
-def _by_color(parts: Iterator[Any]) -> dict[Color | None, list[np.ndarray]]:
-    found: dict[Color | None, list[np.ndarray]] = {}
-    for part in parts:
-        found.setdefault(_color(part.visual), []).append(part.triangles)
-    return dict(sorted(found.items(), key=lambda item: item[0] or ()))
-
-
-def _color(visual: Any) -> Color | None:
-    if not visual.defined:
-        return None
-    rgba = np.asarray(getattr(visual, "material", visual).main_color, dtype=np.float64) / 255
-    return float(rgba[0]), float(rgba[1]), float(rgba[2]), float(rgba[3])
-
-
-def _shaded(triangles: np.ndarray, detail: float) -> Mesh:
+def _shaded(mesh: Mesh, detail: float) -> Mesh:
     """A mesh with vertices shared across smooth edges only, so that averaged normals keep the sharp ones."""
-    soup = np.arange(3 * len(triangles)).reshape(-1, 3)
-    mesh = trimesh.Trimesh(triangles.reshape(-1, 3), soup, process=True)
-    mesh.update_faces(mesh.nondegenerate_faces())
-    if not np.isfinite(mesh.vertices).all():
-        raise UrdfError("it has vertices that are not finite")
-    coarse = thinned(Mesh(np.asarray(mesh.vertices), np.asarray(mesh.faces)), detail)
+    few = clustered(mesh, MOST_TRIANGLES)
+    whole = trimesh.Trimesh(few.vertices[few.faces].reshape(-1, 3), np.arange(few.faces.size).reshape(-1, 3))
+    whole.update_faces(whole.nondegenerate_faces())
+    coarse = thinned(Mesh(np.asarray(whole.vertices), np.asarray(whole.faces)), detail)
     if not len(coarse.faces):
         return coarse
     smooth = trimesh.graph.smooth_shade(trimesh.Trimesh(coarse.vertices, coarse.faces, process=False), angle=SHARP)

@@ -10,6 +10,32 @@ from pathcontrol.view.bodies.shapes import Mesh
 _ROUNDING = 1 / 16  # of the detail: far below a pixel, and numbers with fewer digits are packed into less room
 
 
+def clustered(mesh: Mesh, most: int) -> Mesh:
+    """A mesh with at most ``most`` triangles, in time and memory proportional to those that it has.
+
+    Vertices in one cell of a grid become their mean, and triangles that lose their area go (Rossignac and Borrel,
+    1993); the cells are doubled in size until few enough are left. A mesh that has no more is left alone.
+    """
+    if len(mesh.faces) <= most:
+        return mesh
+    extent = float(np.ptp(mesh.vertices, axis=0).max())
+    cell = extent / np.sqrt(most)
+    while cell and len(mesh.faces) > most:
+        mesh, cell = _in_cells(mesh, cell), 2 * cell
+    return mesh
+
+
+def _in_cells(mesh: Mesh, cell: float) -> Mesh:
+    """A mesh whose vertices in one cell of a grid are one."""
+    index = np.floor((mesh.vertices - mesh.vertices.min(axis=0)) / cell).astype(np.int64)
+    key = np.ravel_multi_index(tuple(index.T), tuple(index.max(axis=0) + 1))
+    _, which, count = np.unique(key, return_inverse=True, return_counts=True)
+    sums = [np.bincount(which, weights=x) for x in mesh.vertices.T]
+    faces = which[mesh.faces]
+    kept = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    return Mesh(np.stack(sums, axis=-1) / count[:, None], faces[kept])
+
+
 def thinned(mesh: Mesh, detail: float) -> Mesh:
     """A mesh that shares its vertices, with fewer triangles: its surface moves by no more than ``detail`` [m].
 

@@ -1,0 +1,126 @@
+"""Mesh files of a robot, read within bounds: whatever the file is, reading it takes little time and memory."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import trimesh
+
+from pathcontrol._arrays import Array
+from pathcontrol._files import read_bounded
+from pathcontrol.errors import UrdfError
+from pathcontrol.robot.urdf.mesh_files import A_POINTER, is_pointer
+
+#: the kinds of mesh files that are read
+FORMATS = (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf")
+MAX_BYTES = 128 << 20
+#: most triangles of a mesh, counted as often as they are placed
+MAX_TRIANGLES = 5_000_000
+
+_BESIDE = (".mtl", ".bin")  # what else is read of a mesh: materials and buffers, but no pictures
+
+
+class Part(NamedTuple):
+    """Triangles of one material.
+
+    Attributes:
+        vertices: their corners [m], (k, 3).
+        faces: three indices into them each, (m, 3).
+        color: red, green, blue and opacity, each from 0 to 1; ``None`` if the file says none.
+    """
+
+    vertices: Array
+    faces: np.ndarray
+    color: tuple[float, float, float, float] | None
+
+
+def load_parts(path: Path) -> list[Part]:
+    """The triangles of an STL, OBJ, PLY, Collada or glTF file, by material.
+
+    Raises:
+        UrdfError: the file is of another kind, too large, cannot be read, or holds no triangles.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise UrdfError(f"it ends in {path.suffix or 'nothing'!r}, expected one of {', '.join(FORMATS)}")
+    data = read_bounded(path, MAX_BYTES, "a mesh", UrdfError)
+    if is_pointer(path):
+        raise UrdfError(f"it is {A_POINTER}")
+    try:
+        parts = _parts(data, path)
+    except UrdfError:
+        raise
+    except Exception as error:  # the readers of a handful of formats raise whatever they like
+        raise UrdfError(f"it cannot be read: {type(error).__name__}: {error}") from error
+    if not parts:
+        raise UrdfError("it has no triangles")
+    return parts
+
+
+def _parts(data: bytes, path: Path) -> list[Part]:
+    kind = path.suffix.lower().removeprefix(".")
+    if kind in ("glb", "gltf"):
+        _check_accessors(data, kind)
+    scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, resolver=_Beside(path.parent), process=False)
+    placed = [(transform, scene.geometry[name]) for transform, name in map(scene.graph.get, scene.graph.nodes_geometry)]
+    shapes = [(transform, shape) for transform, shape in placed if isinstance(shape, trimesh.Trimesh)]
+    triangles = sum(len(shape.faces) for _, shape in shapes)
+    if triangles > MAX_TRIANGLES:
+        raise UrdfError(f"it has {triangles} triangles, expected at most {MAX_TRIANGLES}; thin it out")
+    metres = _metres(scene.units)
+    return [_placed(shape, transform, metres) for transform, shape in shapes if len(shape.faces)]
+
+
+def _placed(shape: trimesh.Trimesh, transform: Array, metres: float) -> Part:
+    """A shape where its file puts it; a mirrored one is turned inside out again."""
+    turn, vertices = metres * transform[:3, :3], np.asarray(shape.vertices)
+    if not np.array_equal(turn, np.eye(3)) or transform[:3, 3].any():
+        vertices = vertices @ turn.T + metres * transform[:3, 3]
+    faces = np.asarray(shape.faces)
+    return Part(vertices, faces[:, ::-1] if np.linalg.det(turn) < 0 else faces, _color(shape.visual))
+
+
+def _metres(units: str | None) -> float:
+    """Only Collada says its unit; the files of other formats are in metres by the convention of URDF."""
+    return trimesh.units.unit_conversion(units, "meters") if units and units.endswith("* meters") else 1.0
+
+
+def _color(visual: Any) -> tuple[float, float, float, float] | None:
+    if not visual.defined:
+        return None
+    rgba = np.asarray(getattr(visual, "material", visual).main_color, dtype=np.float64) / 255
+    return float(rgba[0]), float(rgba[1]), float(rgba[2]), float(rgba[3])
+
+
+def _check_accessors(data: bytes, kind: str) -> None:
+    """Nothing in a glTF file announces more numbers than a mesh may have: room for them would be made at once."""
+    if kind == "glb":
+        data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
+    counts = [accessor.get("count", 0) for accessor in json.loads(data).get("accessors", [])]
+    if sum(counts) > 6 * MAX_TRIANGLES:
+        raise UrdfError(f"it announces {sum(counts)} vertices and faces, expected at most {6 * MAX_TRIANGLES}")
+
+
+class _Beside(trimesh.resolvers.Resolver):
+    """The files that a mesh names, in its own folder: materials and buffers, within the bounds of a mesh."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder.resolve()
+
+    def get(self, key: str) -> bytes:
+        path = (self._folder / key).resolve()
+        if path.suffix.lower() not in _BESIDE or not path.is_relative_to(self._folder):
+            raise UrdfError(f"{key!r} is not read, expected files in its folder that end in {', '.join(_BESIDE)}")
+        return read_bounded(path, MAX_BYTES, "a part of a mesh", UrdfError)
+
+    def keys(self) -> list[str]:
+        return []
+
+    def namespaced(self, namespace: str) -> _Beside:
+        return _Beside(self._folder / namespace)
+
+    def write(self, name: str, data: bytes) -> None:
+        raise UrdfError(f"nothing is written to a mesh: {name!r}")

@@ -1,0 +1,59 @@
+"""From the bytes of a URDF file to its text."""
+
+from __future__ import annotations
+
+import codecs
+import re
+import warnings
+
+from pathcontrol.errors import PathControlWarning, UrdfError
+
+_DECLARED = re.compile(rb"""\s*<\?xml[^>]{0,200}?encoding\s*=\s*["']([A-Za-z0-9._-]{1,40})["']""")
+_MARKS = {
+    codecs.BOM_UTF8: "utf-8-sig",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+
+
+def decoded(data: bytes, name: str) -> str:
+    """The text of the file ``name``: in UTF-8 or UTF-16, else in the encoding it declares, else in ISO-8859-1.
+
+    What is not Unicode is taken with a warning that names the first line that is not.
+
+    Raises:
+        UrdfError: it is no text.
+    """
+    for mark, encoding in _MARKS.items():
+        if data.startswith(mark):
+            return _strictly(data, encoding, name)
+    if b"\0" in data:
+        raise UrdfError(f"{name!r} holds NUL bytes and is no text; expected a URDF, saved as UTF-8")
+    try:
+        return data.decode()
+    except UnicodeDecodeError as error:
+        text, encoding = _in_another(data)
+        warnings.warn(
+            f"{name}: line {data[: error.start].count(10) + 1}: this is not UTF-8 and is read as {encoding}; "
+            "save the file as UTF-8",
+            PathControlWarning,
+            stacklevel=2,
+        )
+        return text
+
+
+def _strictly(data: bytes, encoding: str, name: str) -> str:
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError as error:
+        raise UrdfError(f"{name!r} is not a text file in {encoding.upper()[:6]}: {error}") from error
+
+
+def _in_another(data: bytes) -> tuple[str, str]:
+    """The text in the encoding that is declared, or in ISO-8859-1, which any bytes are; and which it is."""
+    found = _DECLARED.match(data)
+    declared = "ISO-8859-1" if found is None else found[1].decode()
+    try:
+        return data.decode(declared), declared
+    except (LookupError, UnicodeError):
+        return data.decode("iso-8859-1"), "ISO-8859-1"

@@ -1,0 +1,132 @@
+"""XML that is not quite well-formed, as most readers of URDF take it: mended in the text, told with the line.
+
+Every line of the mended text is the same line of the text that was given.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from lxml import etree
+
+from pathcontrol.robot.urdf.finding import Finding, shown
+
+_DECLARATION = re.compile(r"(?P<before>\ufeff?(?:\s|<!--.*?-->)*+)<\?xml\s(?P<inside>.*?)\?>", re.DOTALL)
+_VERSION = re.compile(r"""version\s*=\s*["']([^"']*)["']""")
+_ROOT = re.compile(r"<[A-Za-z_][^\s/>]*")
+_PREFIX = re.compile(r"Namespace prefix (\S+) (?:for \S+ )?on \S+ is not defined")
+_MOST_PREFIXES = 50
+
+_UNDECLARED = "undeclared:"  # the namespace that a prefix without one is put into
+
+
+def mended(text: str) -> tuple[str, list[Finding]]:
+    """The text with what is wrong in its declaration, comments and prefixes put right, and what that was."""
+    findings: list[Finding] = []
+    for mend in (_without_declaration, _without_comments, _with_prefixes):
+        text, found = mend(text)
+        findings += found
+    return text, findings
+
+
+def parser(*, recover: bool = False) -> etree.XMLParser:
+    """A parser that touches neither the network, nor any other file, nor any entity."""
+    return etree.XMLParser(
+        encoding="utf-8", resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, recover=recover
+    )
+
+
+def _without_declaration(text: str) -> tuple[str, list[Finding]]:
+    found = _DECLARATION.match(text)
+    if found is None:
+        return text, []
+    line = _line(text, found.start("inside"))
+    said = []
+    if found["before"].strip("\ufeff") or found["before"].count("\ufeff") != len(found["before"]):
+        said.append(f"line {line}: <?xml ...?> is not at the very start of the file; remove what stands before it")
+    version = _VERSION.search(found["inside"])
+    if version is not None and version[1] not in ("1.0", "1.1"):
+        said.append(f"line {line}: there is no XML version {shown(version[1])}; write 1.0")
+    end = found.end()
+    blank = found["before"] + _blank(text[len(found["before"]) : end])
+    return blank + text[end:], [_finding("xml-declaration", message) for message in said]
+
+
+def _without_comments(text: str) -> tuple[str, list[Finding]]:
+    comments = list(_comments(text))
+    bad = [start for start, end in comments if "--" in text[start + 4 : end - 2]]  # also where it ends in --->
+    if not bad:
+        return text, []
+    where = f"line {_line(text, bad[0])}{_and_others(len(bad) - 1)}"
+    message = f"{where}: '--' inside of a comment, which XML forbids; write '- -'"
+    pieces, position = [], 0
+    for start, end in comments:
+        pieces += [text[position:start], _blank(text[start:end])]
+        position = end
+    return "".join([*pieces, text[position:]]), [_finding("xml-comment", message)]
+
+
+def _comments(text: str) -> Iterator[tuple[int, int]]:
+    """Where each comment begins and ends."""
+    start = text.find("<!--")
+    while start >= 0 and (end := text.find("-->", start + 4)) >= 0:
+        yield start, end + 3
+        start = text.find("<!--", end + 3)
+
+
+def _with_prefixes(text: str) -> tuple[str, list[Finding]]:
+    """The text with a namespace for each prefix that has none."""
+    findings, root = [], _ROOT.search(text, _prolog(text))
+    while root is not None and len(findings) < _MOST_PREFIXES:
+        new = dict(_undeclared(text))
+        if not new:
+            break
+        declared = "".join(f' xmlns:{prefix}="{_UNDECLARED}{prefix}"' for prefix in new)
+        text = text[: root.end()] + declared + text[root.end() :]
+        findings += [_prefix(prefix, line) for prefix, line in new.items()]
+    return text, findings
+
+
+def _prolog(text: str) -> int:
+    """Where the comments before the first element end."""
+    end = 0
+    for start, after in _comments(text):
+        if _ROOT.search(text, end, start):
+            break
+        end = after
+    return end
+
+
+def _undeclared(text: str) -> Iterator[tuple[str, int]]:
+    """Prefixes without a namespace and the line of each, as many as the parser tells of at once; the first counts."""
+    reading = parser(recover=True)
+    try:
+        etree.fromstring(text.encode(), reading)
+    except etree.XMLSyntaxError:  # nothing could be recovered
+        return
+    for error in reversed(reading.error_log):
+        if found := _PREFIX.match(error.message):
+            yield found[1], error.line
+
+
+def _prefix(prefix: str, line: int) -> Finding:
+    message = f"line {line}: the prefix {shown(prefix + ':')} is declared nowhere; add xmlns:{prefix}=... to <robot>"
+    return _finding("xml-prefix", message)
+
+
+def _finding(code: str, message: str) -> Finding:
+    return Finding("warning", code, "file", message)
+
+
+def _blank(text: str) -> str:
+    """As many lines, and at least one space."""
+    return "\n" * text.count("\n") or " "
+
+
+def _line(text: str, position: int) -> int:
+    return text.count("\n", 0, position) + 1
+
+
+def _and_others(count: int) -> str:
+    return f" and {count} more" if count else ""
