@@ -58,7 +58,8 @@ def follow(
     """Trails from the postures ``start`` (N, n) on the curve at s0 to s_end, by prediction and correction.
 
     The prediction is the secant through the last two postures. A step is cut in four where the correction fails, is
-    large or comes to the other side of a singularity, and doubled where it is small. A choice of postures is made for the least motion, away from limits and gently
+    large or comes to the other side of a singularity, and doubled where it is small. A choice of postures is made for
+    the least motion, away from limits and gently
     towards the start, or given a curve of postures q_rest(s) for the one nearest to it.
     """
     walk = _Walk(constraint, start, s0, s_end, rest)
