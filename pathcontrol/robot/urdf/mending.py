@@ -77,7 +77,8 @@ def _comments(text: str) -> Iterator[tuple[int, int]]:
 
 def _with_prefixes(text: str) -> tuple[str, list[Finding]]:
     """The text with a namespace for each prefix that has none."""
-    findings, root = [], _ROOT.search(text, _prolog(text))
+    findings: list[Finding] = []
+    root = _ROOT.search(text, _prolog(text))
     while root is not None and len(findings) < _MOST_PREFIXES:
         new = dict(_undeclared(text))
         if not new:
