@@ -9,13 +9,14 @@ from __future__ import annotations
 import io
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
-from pathcontrol.errors import InputError, ToolpathError, UnknownNameError
+from pathcontrol.errors import InputError, PathControlError, ToolpathError, UnknownNameError
 from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.dxf_blocks import Entities
 from pathcontrol.toolpaths.dxf_chain import Strand, chained
@@ -77,13 +78,14 @@ def read_dxf(
     if feed is not None:
         scalar("feed", feed, positive=True)
     passed = Passed(unknown)
-    source = os.fspath(path)
     text = read_text(path, "a DXF drawing")
-    document = _loaded(source, text)
-    unit = _unit(source, unit, document.units if "$INSUNITS" in text else 0)
-    found = Layers(document, [layers] if isinstance(layers, str) else layers)
-    entities = Entities(source, document, found.frozen)
-    strands = _strands(source, entities, found, np.diag([UNITS[unit]] * 3 + [1.0]))
+    source = os.fspath(path)
+    with _readable(source):
+        document = _loaded(source, text)
+        unit = _unit(source, unit, document.units if "$INSUNITS" in text else 0)
+        found = Layers(document, [layers] if isinstance(layers, str) else layers)
+        entities = Entities(source, document, found.frozen)
+        strands = _strands(source, entities, found, np.diag([UNITS[unit]] * 3 + [1.0]))
     if not strands:
         raise ToolpathError(f"{source} draws no outline on the layers read; its layers are {found.listed}")
     contours = tuple(_contour(source, strand, feed) for strand in chained(strands))
@@ -103,10 +105,22 @@ def _loaded(source: str, text: str) -> Any:
         )
     if max(map(len, lines)) > _LONGEST_LINE:
         raise ToolpathError(f"{source} has a line of more than {_LONGEST_LINE} characters; is it a DXF drawing?")
+    return read(io.StringIO(text))
+
+
+@contextmanager
+def _readable(source: str) -> Iterator[None]:
+    """Name the file where ezdxf raises whatever its parts raise on a malformed one: also in entities, read late."""
     try:
-        return read(io.StringIO(text))
-    except Exception as error:  # ezdxf raises whatever its parts raise on a malformed file
-        raise ToolpathError(f"{source} is no DXF drawing that can be read: {error}; save it again as DXF") from error
+        with np.errstate(all="ignore"):  # what is not finite is refused where it is drawn
+            yield
+    except PathControlError:
+        raise
+    except Exception as error:
+        reason = f"{error}".strip() or type(error).__name__
+        if isinstance(error, LookupError):
+            reason = f"it has no {reason}"
+        raise ToolpathError(f"{source} is no DXF drawing that can be read: {reason}; save it again as DXF") from error
 
 
 def _unit(source: str, unit: str | None, code: int) -> str:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import InputError, ToolpathError
+from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.dxf_values import common, layer_of, number, object_axes, vector
 
 _MOST_INSERTS = 64  # inside each other
@@ -52,7 +52,7 @@ class Entities:
         """Errors inside say at which entity they arose."""
         try:
             yield
-        except (InputError, ToolpathError) as error:
+        except Exception as error:  # ezdxf raises whatever its parts raise on malformed entities
             name = f"{entity.dxftype()} {entity.dxf.get('handle') or ''}".strip()
             raise ToolpathError(f"{self._source}, {name} on layer {layer!r}: {error}") from error
 

@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.dxf_polylines import light_polyline, polyline
 from pathcontrol.toolpaths.dxf_splines import b_spline, through
-from pathcontrol.toolpaths.dxf_values import given, number, object_axes, vector
+from pathcontrol.toolpaths.dxf_values import given, number, object_axes, turned, vector
 from pathcontrol.toolpaths.pieces import EllipticArc, Lines, Piece
 
 _CLOSED = 1
@@ -47,9 +47,8 @@ def _around(entity: Any, start: float, end: float) -> EllipticArc:
     radius, axes = number(entity, "radius"), object_axes(entity)
     if radius <= 0:
         raise ToolpathError(f"its radius is {radius:g}, expected more than 0")
-    sweep = np.radians((end - start) % 360.0 or 360.0)
-    center = axes @ vector(entity, "center")
-    return EllipticArc(center, radius * axes[:, 0], radius * axes[:, 1], float(np.radians(start)), float(sweep))
+    center, first = axes @ vector(entity, "center"), float(np.radians(start))
+    return EllipticArc(center, radius * axes[:, 0], radius * axes[:, 1], first, turned(first, float(np.radians(end))))
 
 
 def _ellipse(entity: Any) -> list[Piece]:
@@ -57,8 +56,7 @@ def _ellipse(entity: Any) -> list[Piece]:
     major, ratio = vector(entity, "major_axis"), number(entity, "ratio")
     minor = ratio * np.cross(object_axes(entity)[:, 2], major)
     start, end = number(entity, "start_param"), number(entity, "end_param")
-    sweep = float((end - start) % (2 * np.pi) or 2 * np.pi)
-    return [EllipticArc(vector(entity, "center"), major, minor, start, sweep)]
+    return [EllipticArc(vector(entity, "center"), major, minor, start, turned(start, end))]
 
 
 def _spline(entity: Any) -> list[Piece]:

@@ -14,6 +14,7 @@ from pathcontrol.toolpaths.pieces import Curve, Lines, Piece
 
 _HIGHEST_DEGREE = 15
 _LIGHTEST = 1e-9  # of the largest weight
+_SHORTEST_CHORD = 1e-13  # of the length through all fit points, which it is added up to
 
 
 def b_spline(degree: int, knots: Array, points: Array, weights: Array | None) -> list[Piece]:
@@ -47,6 +48,11 @@ def through(points: Array, tangents: tuple[Array, Array] | None, closed: bool) -
     ring = np.concatenate([points, points[:1]]) if closed else points
     chords = np.linalg.norm(np.diff(ring, axis=0), axis=-1)
     ring, chords = ring[np.append(True, chords > 0)], chords[chords > 0]
+    if not (chords.size and chords.min() > _SHORTEST_CHORD * chords.sum()):
+        raise ToolpathError(
+            f"its fit points are {chords.tolist()[:3]} … apart, on a length of {chords.sum():g}: expected finite "
+            "distances that can be told from rounding"
+        )
     if len(ring) == 2 and tangents is None:
         return [Lines(ring)]
     ends: object = "natural"

@@ -9,6 +9,9 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
 
+_WHOLE = 1e-4  # rad, how near a whole turn a sweep is one: programs write its end with few digits
+_NO_ARC = 2e-6  # rad, a sweep up to this comes from ends a whole turn apart of which one was reduced
+
 
 def common(entity: Any, name: str, default: Any) -> Any:
     """What all entities have, such as a layer, also of those that ezdxf does not know."""
@@ -36,6 +39,16 @@ def number(entity: Any, name: str) -> float:
     if value is None or not np.isfinite(value):
         raise ToolpathError(f"its {name} is {value}, expected a finite number")
     return float(value)
+
+
+def turned(start: float, end: float) -> float:
+    """Sweep of an arc that runs counterclockwise from one angle to the other [rad], more than 0 up to 2π.
+
+    Ends that are the same but for rounding are a whole turn apart: 0 and 6.2831855, 270° and 270°, 90° and 450.0001°.
+    """
+    sweep = (end - start) % (2 * np.pi)
+    beyond = _NO_ARC if 0 <= end - start < np.pi else _WHOLE  # an arc may be short, but not one of several turns
+    return 2 * np.pi if sweep <= beyond or 2 * np.pi - sweep <= _WHOLE else sweep
 
 
 def vector(entity: Any, name: str) -> Array:

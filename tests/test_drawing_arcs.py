@@ -1,0 +1,97 @@
+"""Arcs and ellipses of DXF whose ends are nearly a whole turn apart, and those that only seem to be."""
+
+from __future__ import annotations
+
+import ezdxf
+import numpy as np
+import pytest
+from drawings import dxf_reader
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pathcontrol.errors import ToolpathError
+from pathcontrol.toolpaths.arc import Arc
+from pathcontrol.toolpaths.dxf import read_dxf
+
+TURN = 2 * np.pi
+
+
+@pytest.fixture(scope="module")
+def read(tmp_path_factory):
+    return dxf_reader(tmp_path_factory.mktemp("dxf"))
+
+
+def whole(contour) -> bool:
+    (segment,) = contour.segments
+    return contour.closed and isinstance(segment, Arc) and abs(segment.sweep) == pytest.approx(TURN, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("start", "end"),
+    [(0, 360), (0, 360.0001), (0, 359.9999), (90, 450.0001), (270, 270), (270.0001, 270), (-90, 269.9999), (0, 720)]
+    + [(90, 90.00005), (360, 0), (1e-9, 0), (0, 359.9999999), (180, -180), (180, -180.0001)],
+)
+def test_an_arc_within_1e_4_of_a_whole_turn_is_one(read, start, end):
+    (contour,) = read(lambda m: m.add_arc((1, 2), 0.01, start, end))
+    assert whole(contour)
+    assert contour.length == pytest.approx(TURN * 0.01, rel=1e-12)
+
+
+@given(st.floats(-TURN, 2 * TURN), st.floats(-1e-4, 1e-4), st.integers(1, 2))
+def test_an_ellipse_within_1e_4_of_a_whole_turn_is_one(read, start, off, turns):
+    (contour,) = read(lambda m: m.add_ellipse((1, 2), (0.02, 0.01), 0.4, start, start + turns * TURN + 0.99 * off))
+    assert whole(contour)
+
+
+@pytest.mark.parametrize("end", [6.28318530718, 6.2831855, 6.283185, 6.2832])
+def test_ellipses_as_programs_write_them(read, end):
+    (contour,) = read(lambda m: m.add_ellipse((0, 0), (0.05, 0), 0.5, 0, end))
+    assert whole(contour)
+
+
+@given(st.floats(-400, 400), st.floats(-4.9, -2).map(lambda e: 10**e))
+def test_short_arcs_and_arcs_with_a_gap_stay_what_they_are(read, start, sweep):
+    """Not near a whole turn by more than 1e-4 rad, or short without having been reduced by a turn."""
+    degrees = float(np.rad2deg(sweep))
+    (short,) = read(lambda m: m.add_arc((0, 0), 1, start, start + degrees))
+    assert short.length == pytest.approx(sweep, rel=1e-6)
+    if sweep > 1.01e-4:
+        (gap,) = read(lambda m: m.add_arc((0, 0), 1, start, start - degrees))
+        assert gap.length == pytest.approx(TURN - sweep)
+        assert not gap.closed
+
+
+def test_a_bulge_of_nearly_a_whole_turn_is_drawn(read):
+    """tan(Δφ/4) of 2π − 1e-4 over the chord that belongs to it."""
+    sweep, radius = TURN - 1e-4, 0.01
+    ends = [(radius, 0), (radius * np.cos(1e-4), -radius * np.sin(1e-4))]
+    bulges = [(*ends[0], np.tan(sweep / 4)), (*ends[1], 0)]
+    (contour,) = read(lambda m: m.add_lwpolyline(bulges, format="xyb"))
+    assert contour.length == pytest.approx(radius * sweep, rel=1e-6)
+
+
+FIT = "0\nSPLINE\n8\n0\n100\nAcDbEntity\n100\nAcDbSpline\n70\n8\n71\n3\n72\n0\n73\n0\n74\n3\n"
+
+
+@pytest.mark.parametrize("values", ["-1e+308", "1e308", "1e200", "-1e20"])
+def test_fit_points_that_are_far_away_are_refused_with_the_name_of_the_spline(tmp_path, values):
+    points = "".join(f"11\n{x}\n21\n{y}\n31\n{z}\n" for x, y, z in ((0, 0, 0), (1, 2, values), (3, 3, 0)))
+    path = tmp_path / "drawing.dxf"
+    path.write_text(f"0\nSECTION\n2\nENTITIES\n{FIT}{points}0\nENDSEC\n0\nEOF\n")
+    with pytest.raises(ValueError, match=r"drawing\.dxf.*SPLINE"):
+        read_dxf(path, unit="mm")
+
+
+@pytest.mark.parametrize("old", ["Model", "*Model_Space", "AcDbLayout", "LAYER", "*Paper_Space"])
+def test_drawings_with_a_part_renamed_are_read_or_refused_with_their_name(tmp_path, old):
+    document = ezdxf.new("R2010", units=4)
+    document.modelspace().add_line((0, 0), (1, 1))
+    document.saveas(tmp_path / "whole.dxf")
+    text = (tmp_path / "whole.dxf").read_text()
+    path = tmp_path / "renamed.dxf"
+    for count in range(1, 4):
+        path.write_text(text.replace(f"\n{old}\n", "\nelse\n", count))
+        try:
+            assert len(read_dxf(path)) == 1
+        except ToolpathError as error:
+            assert "renamed.dxf" in str(error)
