@@ -28,8 +28,10 @@ def whole(contour) -> bool:
 
 @pytest.mark.parametrize(
     ("start", "end"),
-    [(0, 360), (0, 360.0001), (0, 359.9999), (90, 450.0001), (270, 270), (270.0001, 270), (-90, 269.9999), (0, 720)]
-    + [(90, 90.00005), (360, 0), (1e-9, 0), (0, 359.9999999), (180, -180), (180, -180.0001)],
+    [
+        *[(0, 360), (0, 360.0001), (0, 359.9999), (90, 450.0001), (270, 270), (270.0001, 270), (-90, 269.9999)],
+        *[(0, 720), (90, 90.00005), (360, 0), (1e-9, 0), (0, 359.9999999), (180, -180), (180, -180.0001)],
+    ],
 )
 def test_an_arc_within_1e_4_of_a_whole_turn_is_one(read, start, end):
     (contour,) = read(lambda m: m.add_arc((1, 2), 0.01, start, end))
@@ -91,7 +93,9 @@ def test_drawings_with_a_part_renamed_are_read_or_refused_with_their_name(tmp_pa
     path = tmp_path / "renamed.dxf"
     for count in range(1, 4):
         path.write_text(text.replace(f"\n{old}\n", "\nelse\n", count))
+        refused = None
         try:
             assert len(read_dxf(path)) == 1
         except ToolpathError as error:
-            assert "renamed.dxf" in str(error)
+            refused = str(error)
+        assert refused is None or "renamed.dxf" in refused

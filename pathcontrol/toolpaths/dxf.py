@@ -16,15 +16,17 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
-from pathcontrol.errors import InputError, PathControlError, ToolpathError, UnknownNameError
-from pathcontrol.toolpaths.contour import Contour, Toolpath
+from pathcontrol.errors import PathControlError, ToolpathError, UnknownNameError
+from pathcontrol.toolpaths.chains import Strand, chained, checked_gap
+from pathcontrol.toolpaths.contour import Toolpath
+from pathcontrol.toolpaths.doubled import tell_doubled
 from pathcontrol.toolpaths.dxf_blocks import Entities
-from pathcontrol.toolpaths.dxf_chain import Strand, chained
-from pathcontrol.toolpaths.dxf_entities import pieces
+from pathcontrol.toolpaths.dxf_entities import DRAWN, pieces
 from pathcontrol.toolpaths.dxf_layers import Layers
 from pathcontrol.toolpaths.passed import Passed
-from pathcontrol.toolpaths.pieces import Budget, contour_of
+from pathcontrol.toolpaths.pieces import Budget
 from pathcontrol.toolpaths.segments import Segment
+from pathcontrol.toolpaths.skip import names_of, skipped
 from pathcontrol.toolpaths.text import read_text
 
 #: units of length by name [m]
@@ -53,43 +55,56 @@ def read_dxf(
     layers: str | Sequence[str] | None = None,
     feed: float | None = None,
     unknown: str = "refuse",
+    skip: str | Sequence[str] = (),
+    gap: float | None = None,
 ) -> Toolpath:
     """The contours of a DXF drawing's modelspace, in its order.
 
     LINE, ARC, CIRCLE, ELLIPSE, LWPOLYLINE, POLYLINE, SPLINE and HELIX are read, and the blocks that INSERT places.
-    Splines become exact Bézier curves, bulges arcs. Loose curves of one layer that meet end to end, within 1 µm or
-    0.01 % of the drawing's diagonal if that is less, are chained into one contour, in the place and direction of the
-    first of them; where more than two meet, chains end. Widths, colours and line types are not looked at.
+    Splines become exact Bézier curves, bulges arcs; arcs within 1e-4 rad of a whole turn are whole. Loose curves of one
+    layer that meet end to end are chained into one contour, in the place and direction of the first of them; where more
+    than two meet, chains end. Widths and colours are not looked at. The notes tell what is not seen or not plotted and
+    therefore left out, what is dashed, edges drawn twice, and gaps up to 50 µm that stay open.
 
     Args:
         path: the file.
         unit: unit of its lengths: m, dm, cm, mm, um, nm, km, in, ft, yd, mil or uin; by default the one that the file
             names ($INSUNITS). It is never guessed.
-        layers: which layers to read; by default all that are neither off nor frozen.
+        layers: which layers to read; by default all that are seen and plotted: neither off, frozen, Defpoints, nor
+            marked as not to be plotted.
         feed: speed of the tool [m/s] along all contours, or None: DXF has none.
         unknown: ``"refuse"`` what is not understood, or ``"warn"``, pass it over where it cannot change what is cut.
+        skip: what to leave out: ``"text"``, ``"image"``, ``"point"``, ``"dimension"``, ``"hatch"``, ``"solid"``, or
+            types of DXF such as ``"CIRCLE"``.
+        gap: how far apart ends are that meet [m]; by default 1 µm, or 0.01 % of the drawing's diagonal if that is less.
 
     Raises:
         ToolpathError: the file is no DXF drawing, names no unit, or holds what cannot be cut on the layers read: text,
             hatches, dimensions, solids. The message says which, and on which layers.
-        UnknownNameError: there is no such unit or layer.
-        InputError: ``feed`` is not greater than 0, ``unknown`` is no choice.
+        UnknownNameError: there is no such unit, layer or kind.
+        InputError: ``feed`` is not greater than 0, ``gap`` is less than 0, ``unknown`` is no choice.
     """
     if feed is not None:
         scalar("feed", feed, positive=True)
+    gap, names = checked_gap(gap), names_of("layers", layers)
     passed = Passed(unknown)
     text = read_text(path, "a DXF drawing")
     source = os.fspath(path)
     with _readable(source):
         document = _loaded(source, text)
         unit = _unit(source, unit, document.units if "$INSUNITS" in text else 0)
-        found = Layers(document, [layers] if isinstance(layers, str) else layers)
-        entities = Entities(source, document, found.frozen)
-        strands = _strands(source, entities, found, np.diag([UNITS[unit]] * 3 + [1.0]))
-    if not strands:
-        raise ToolpathError(f"{source} draws no outline on the layers read; its layers are {found.listed}")
-    contours = tuple(_contour(source, strand, feed) for strand in chained(strands))
-    return Toolpath(contours, source, unit, passed.notes)
+        found = Layers(document, names, passed)
+        left_out = skipped(skip, [*DRAWN, *found.types])
+        entities = Entities(source, document, found.frozen, passed)
+        strands = _strands(entities, found, left_out, np.diag([UNITS[unit]] * 3 + [1.0]), passed)
+        contours = [strand.contour(source, feed) for strand in chained(strands, gap, passed)] if strands else []
+        if not contours:
+            raise ToolpathError(
+                f"{source} draws no outline on the layers read; its layers are {found.listed}"
+                + "".join(f"; {note}" for note in passed.notes)
+            )
+        tell_doubled(contours, passed)
+    return Toolpath(tuple(contours), source, unit, passed.notes)
 
 
 def _loaded(source: str, text: str) -> Any:
@@ -136,34 +151,35 @@ def _unit(source: str, unit: str | None, code: int) -> str:
     return _BY_CODE[code]
 
 
-def _strands(source: str, entities: Entities, layers: Layers, scale: Array) -> list[Strand]:
+def _strands(entities: Entities, layers: Layers, skip: frozenset[str], scale: Array, passed: Passed) -> list[Strand]:
     """What each entity draws that has a length [m]."""
     strands: list[Strand] = []
     refused: Counter[tuple[str, str]] = Counter()
     budget = Budget()
     for entity, layer, matrix in entities:
-        if not layers.read(layer):
+        if entity.dxftype().lower() in skip or not layers.read(layer):
             continue
         with entities.at(entity, layer):
             segments = _segments(entity, scale @ matrix, budget)
-        if segments is None:
+        name = f"{layer}: {entity.dxftype()} {entity.dxf.get('handle') or ''}".strip()
+        if segments is None and passed.lenient:
+            passed.over(entity.dxftype(), f"layer {layer!r}")
+        elif segments is None:
             refused[entity.dxftype(), layer] += 1
-        elif segments:
-            name = f"{layer}: {entity.dxftype()} {entity.dxf.get('handle') or ''}".strip()
+        elif not segments:
+            passed.over("a curve without length", name)
+        else:
+            if linetype := layers.dashes(entity, layer):
+                passed.over(f"a curve of line type {linetype}, which is cut solid,", name, "was found")
             strands.append(Strand(name, layer.lower(), len(strands), segments))
     if refused:
         what = ", ".join(f"{count} {kind} on layer {layer!r}" for (kind, layer), count in refused.most_common(8))
+        kinds = ", ".join(dict.fromkeys(repr(kind) for (kind, _), _ in refused.most_common(8)))
         raise ToolpathError(
-            f"{source} holds what cannot be cut: {what}; take it away, or choose layers= without it of {layers.listed}"
+            f"{entities.source} holds what cannot be cut: {what}; take it away, leave it out with skip=[{kinds}], pass "
+            f"it over with unknown='warn', or choose layers= without it of {layers.listed}"
         )
     return strands
-
-
-def _contour(source: str, strand: Strand, feed: float | None) -> Contour:
-    try:
-        return contour_of(strand.segments, feed, strand.name)
-    except InputError as error:
-        raise ToolpathError(f"{source}, {strand.name}: {error}") from error
 
 
 def _segments(entity: Any, matrix: Array, budget: Budget) -> list[Segment] | None:

@@ -11,6 +11,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.dxf_values import common, layer_of, number, object_axes, vector
+from pathcontrol.toolpaths.passed import Passed
 
 _MOST_INSERTS = 64  # inside each other
 _MOST_ENTITIES = 200_000
@@ -38,10 +39,12 @@ class Entities:
         source: the file, for errors.
         document: the drawing.
         frozen: whether nothing on a layer is drawn, not even the inserts on it.
+        passed: takes note of entities that are marked as invisible.
     """
 
-    def __init__(self, source: str, document: Any, frozen: Callable[[str], bool]) -> None:
-        self._source, self._document, self._frozen = source, document, frozen
+    def __init__(self, source: str, document: Any, frozen: Callable[[str], bool], passed: Passed) -> None:
+        self.source = source
+        self._document, self._frozen, self._passed = document, frozen, passed
         self._count = 0
 
     def __iter__(self) -> Iterator[Drawn]:
@@ -54,14 +57,17 @@ class Entities:
             yield
         except Exception as error:  # ezdxf raises whatever its parts raise on malformed entities
             name = f"{entity.dxftype()} {entity.dxf.get('handle') or ''}".strip()
-            raise ToolpathError(f"{self._source}, {name} on layer {layer!r}: {error}") from error
+            raise ToolpathError(f"{self.source}, {name} on layer {layer!r}: {error}") from error
 
     def _inside(self, layout: Any, matrix: Array, parent: str | None, depth: int) -> Iterator[Drawn]:
         for entity in layout:
             self._counted()
             layer = layer_of(entity)
             layer = parent if layer == "0" and parent is not None else layer
-            if common(entity, "invisible", 0) or (entity.dxftype() == "ATTDEF" and depth):
+            if entity.dxftype() == "ATTDEF" and depth:
+                continue
+            if common(entity, "invisible", 0):
+                self._passed.over("an invisible entity", f"{entity.dxftype()} on layer {layer!r}")
                 continue
             if entity.dxftype() != "INSERT":
                 yield Drawn(entity, layer, matrix)
@@ -93,7 +99,7 @@ class Entities:
     def _counted(self) -> None:
         self._count += 1
         if self._count > _MOST_ENTITIES:
-            raise ToolpathError(f"{self._source} draws more than {_MOST_ENTITIES} entities; split the drawing")
+            raise ToolpathError(f"{self.source} draws more than {_MOST_ENTITIES} entities; split the drawing")
 
 
 def _places(insert: Any, base: Array) -> Iterator[Array]:

@@ -88,5 +88,9 @@ _DRAW: dict[str, Callable[[Any], list[Piece] | None]] = {
 }
 
 
+#: types of entities that are read
+DRAWN = frozenset(_DRAW)
+
+
 def _points(vertices: Any) -> Array:
     return np.array([tuple(vertex) for vertex in vertices], dtype=np.float64).reshape(-1, 3)

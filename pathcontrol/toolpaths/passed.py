@@ -33,12 +33,15 @@ class Passed:
         if unknown not in UNKNOWN:
             raise InputError(f"unknown = {unknown!r}, expected one of {', '.join(map(repr, UNKNOWN))}")
         self.lenient = unknown == "warn"
-        self._kinds: dict[str, _Kind] = {}
+        self._kinds: dict[tuple[str, str], _Kind] = {}
         self._sentences: dict[str, None] = {}
 
-    def over(self, kind: str, place: int | str) -> None:
-        """Count one thing of a kind that was passed over in a line, given by its number, or at another place."""
-        found = self._kinds.setdefault(kind, _Kind())
+    def over(self, kind: str, place: int | str, fate: str = "was passed over") -> None:
+        """Count one thing of a kind that was passed over in a line, given by its number, or at another place.
+
+        Where something else became of it than being passed over, ``fate`` says so.
+        """
+        found = self._kinds.setdefault((kind, fate), _Kind())
         found.count += 1
         text = str(place)
         if len(found.places) <= _MOST_PLACES and text not in found.places:
@@ -65,12 +68,12 @@ class Passed:
         """A sentence for each kind, with its count and places, after those that were told."""
         kinds = list(self._kinds.items())
         more = [f"{len(kinds) - _MOST_KINDS} more kinds were passed over"] if len(kinds) > _MOST_KINDS else []
-        return (*self._sentences, *(_sentence(*kind) for kind in kinds[:_MOST_KINDS]), *more)
+        return (*self._sentences, *(_sentence(*names, kind) for names, kind in kinds[:_MOST_KINDS]), *more)
 
 
-def _sentence(name: str, kind: _Kind) -> str:
+def _sentence(name: str, fate: str, kind: _Kind) -> str:
     """``"M62 was passed over 2 times: lines 3, 5"``."""
     times = "once" if kind.count == 1 else f"{kind.count} times"
     lines = "line " if len(kind.places) == 1 else "lines "
     shown = ", ".join(kind.places[:_MOST_PLACES]) + (", …" if len(kind.places) > _MOST_PLACES else "")
-    return f"{name} was passed over {times}: {lines if kind.places[0].isdigit() else ''}{shown}"
+    return f"{name} {fate} {times}: {lines if kind.places[0].isdigit() else ''}{shown}"

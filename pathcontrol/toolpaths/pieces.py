@@ -86,14 +86,15 @@ class EllipticArc:
         return replace(self, center=_mapped(self.center, matrix), x=x, y=y)
 
     def segments(self) -> list[Segment]:
-        _near(self._at(self.start + self.sweep * np.linspace(0.0, 1.0, 9)))
+        _near(self.at(self.start + self.sweep * np.linspace(0.0, 1.0, 9)))
         vectors = _near(np.stack([self.x, self.y]), _LARGEST_RADIUS, "a radius of")
         directions, axes, _ = np.linalg.svd(vectors.T, full_matrices=False)
         if axes[0] * abs(self.sweep) <= NOTHING or axes[1] <= NOTHING:
-            return Lines(self._at(self._turns(directions[:, 0]))).segments()
+            return Lines(self.at(self._turns(directions[:, 0]))).segments()
         return [Arc(self.center, self.x, self.y, self.start, self.sweep)]
 
-    def _at(self, angle: Array) -> Array:
+    def at(self, angle: Array) -> Array:
+        """Points at angles (k,), (k, 3)."""
         with np.errstate(over="ignore", invalid="ignore"):
             return self.center + np.outer(np.cos(angle), self.x) + np.outer(np.sin(angle), self.y)
 

@@ -13,6 +13,7 @@ from pathcontrol.toolpaths.svg_style import StyleSheet
 from pathcontrol.toolpaths.text import read_text
 
 _NAMESPACES = ("", "http://www.w3.org/2000/svg")
+_MOST_ELEMENTS = 1_000_000
 _HREF = ("href", "{http://www.w3.org/1999/xlink}href")
 
 
@@ -34,12 +35,15 @@ class Document:
         self._targets: dict[str, Any] = {}
         self._sheet = StyleSheet()
         self._styles: dict[Any, dict[str, str]] = {}
-        for element in self.root.iter("*"):
+        for count, element in enumerate(self.root.iter("*")):
+            if count == _MOST_ELEMENTS:
+                raise ToolpathError(f"{self.path} has more than {_MOST_ELEMENTS} elements; split it into several files")
             if element.get("id") is not None:
                 self._targets.setdefault(element.get("id"), element)
             if tag_of(element) == "style" and element.get("type") in (None, "", "text/css"):
                 with self.at(element):
-                    self._sheet.add(_rules(element))
+                    self._sheet.add("".join(element.itertext()), element.get("media") or "all")
+        self._sheet.match(self.root)
 
     @contextmanager
     def at(self, element: Any) -> Iterator[None]:
@@ -47,14 +51,12 @@ class Document:
         try:
             yield
         except (InputError, ToolpathError) as error:
-            identity = element.get("id")
-            label = tag_of(element) if identity is None else f"{tag_of(element)} {identity!r}"
-            raise ToolpathError(f"{self.path}, line {element.sourceline}, {label}: {error}") from error
+            raise ToolpathError(f"{self.path}, line {element.sourceline}, {label_of(element)}: {error}") from error
 
     def style(self, element: Any) -> dict[str, str]:
         """The properties of an element that have a say in the geometry."""
         if element not in self._styles:
-            self._styles[element] = self._sheet.of(element, tag_of(element) or "")
+            self._styles[element] = self._sheet.of(element)
         return self._styles[element]
 
     def attributes(self, element: Any) -> Attributes:
@@ -64,7 +66,10 @@ class Document:
 
     def target(self, element: Any) -> Any:
         """The element that a use element refers to."""
-        link = next((element.get(name) for name in _HREF if element.get(name) is not None), "")
+        return self.linked(next((element.get(name) for name in _HREF if element.get(name) is not None), ""))
+
+    def linked(self, link: str) -> Any:
+        """The element of this file that ``#id`` stands for."""
         if link.startswith("#") and link[1:] in self._targets:
             return self._targets[link[1:]]
         raise ToolpathError(f"it refers to {link[:60]!r}, expected # and the id of an element in this file")
@@ -107,6 +112,7 @@ def tag_of(element: Any) -> str | None:
     return name if namespace in _NAMESPACES else None
 
 
-def _rules(element: Any) -> str:
-    text, media = "".join(element.itertext()), element.get("media") or "all"
-    return text if media in ("all", "screen") else f"@media {media} {{{text}}}"
+def label_of(element: Any) -> str:
+    """An element's tag and its id, if it has one, for messages."""
+    identity = element.get("id")
+    return f"{tag_of(element)}" if identity is None else f"{tag_of(element)} {identity[:60]!r}"

@@ -7,12 +7,10 @@ from collections.abc import Callable
 
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.svg_pen import Pen, Subpath
-from pathcontrol.toolpaths.svg_values import COMMA, NUMBER, excerpt, number, numbers
+from pathcontrol.toolpaths.svg_values import arcs, numbers
 
 _COMMAND = re.compile("([MmZzLlHhVvCcSsQqTtAa])")
 _TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7}
-_ARC = rf"({NUMBER}){COMMA}({NUMBER}){COMMA}({NUMBER}){COMMA}([01]){COMMA}([01]){COMMA}({NUMBER}){COMMA}({NUMBER})"
-_ARCS = re.compile(rf"\s*+(?:{_ARC}(?:{COMMA}{_ARC})*+)?+\s*+")
 
 
 def parse_path(data: str) -> list[Subpath]:
@@ -38,7 +36,7 @@ def _draw(pen: Pen, letter: str, arguments: str) -> None:
             raise ToolpathError(f"path data has {arguments.strip()[:20]!r} after {letter}, expected a command")
         pen.close()
         return
-    values, size = _values(letter, arguments), _TAKES[name]
+    values, size = (arcs if name == "A" else numbers)(arguments, f"path data after {letter}"), _TAKES[name]
     if not values or len(values) % size:
         raise ToolpathError(
             f"path data has {len(values)} numbers after {letter}, expected {size} or a multiple: {arguments[:30]!r}"
@@ -47,15 +45,6 @@ def _draw(pen: Pen, letter: str, arguments: str) -> None:
         origin = pen.at if relative else 0j
         _STROKES[name](pen, origin, *values[i : i + size])
         name = "L" if name == "M" else name
-
-
-def _values(letter: str, arguments: str) -> list[float]:
-    if letter not in "Aa":
-        return numbers(arguments, f"path data after {letter}")
-    if not _ARCS.fullmatch(arguments):
-        expected = "radii, rotation, two flags 0 or 1, x and y"
-        raise ToolpathError(f"path data after {letter} has {excerpt(arguments, _ARCS)}, expected {expected}")
-    return [number(text) for arc in re.findall(_ARC, arguments) for text in arc]
 
 
 def _cubic(pen: Pen, o: complex, *v: float) -> None:

@@ -10,14 +10,15 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
 
-# atomic groups, (?>…), and possessive *+ keep hostile text from being matched in more than one way
-NUMBER = r"(?>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
-COMMA = r"(?>\s*,?\s*)"
-_NUMBER = re.compile(NUMBER)
-_LIST = re.compile(rf"\s*+(?:{NUMBER}(?:{COMMA}{NUMBER})*+)?+\s*+")
-_LENGTH = re.compile(rf"\s*+({NUMBER})\s*+([a-zA-Z]*+|%)\s*+")
-_TRANSFORM = re.compile(r"[\s,]*+([a-zA-Z0-9]++)\s*+\(([^()]*+)\)")
-_ANGLE_OR_PX = re.compile(r"(?<=[\d.])(?:deg|px)\b")
+# each pattern matches in one way only: no possessive quantifiers, which early releases of Python 3.11 get wrong
+_BLANKS = r"[ \t\n\r\f]*"
+_NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+_START, _AFTER = re.compile(_BLANKS), f"{_BLANKS}(,?){_BLANKS}"
+_FIGURE, _FLAG = re.compile(f"({_NUMBER}){_AFTER}"), re.compile(f"([01]){_AFTER}")
+_ARC = (_FIGURE, _FIGURE, _FIGURE, _FLAG, _FLAG, _FIGURE, _FIGURE)
+_LENGTH = re.compile(f"{_BLANKS}({_NUMBER})")
+_FUNCTION = re.compile(r"[ \t\n\r\f,]*([a-zA-Z0-9]+)[ \t\n\r\f]*\(([^()]*)")
+_ANGLE_OR_PX = re.compile(r"(?<=[0-9.])(?:deg|px)\b")
 _LARGEST = 1e15
 _PER_INCH = {"in": 1.0, "mm": 25.4, "cm": 2.54, "q": 101.6, "pt": 72.0, "pc": 6.0}
 _TAKES = {"matrix": (6,), "translate": (1, 2), "scale": (1, 2), "rotate": (1, 3), "skewx": (1,), "skewy": (1,)}
@@ -33,15 +34,40 @@ def number(text: str) -> float:
 
 def numbers(text: str, what: str) -> list[float]:
     """Numbers separated by blanks or commas."""
-    if not _LIST.fullmatch(text):
-        raise ToolpathError(f"{what} has {excerpt(text, _LIST)}, expected numbers")
-    return [number(found) for found in _NUMBER.findall(text)]
+    start = _START.match(text)
+    assert start is not None
+    found, at, comma = [], start.end(), ""
+    for match in _FIGURE.finditer(text, at):
+        if match.start() != at:
+            break
+        figure, comma = match.groups()
+        found.append(figure)
+        at = match.end()
+    if at < len(text) or comma:
+        raise ToolpathError(f"{what} has {_excerpt(text, at)}, expected numbers")
+    return [number(figure) for figure in found]
 
 
-def excerpt(text: str, good: re.Pattern[str]) -> str:
-    """The beginning of what in ``text`` comes after its longest good start, for errors."""
-    match = good.match(text)
-    rest = text[match.end() :] if match else text
+def arcs(text: str, what: str) -> list[float]:
+    """The seven numbers of each arc in path data; its flags need nothing between them: ``1 1 0 0110 10``."""
+    start = _START.match(text)
+    assert start is not None
+    found, at, comma = [], start.end(), ""
+    while at < len(text) or comma:
+        for pattern in _ARC:
+            match = pattern.match(text, at)
+            if match is None:
+                expected = "radii, rotation, two flags 0 or 1, x and y"
+                raise ToolpathError(f"{what} has {_excerpt(text, at)}, expected {expected}")
+            figure, comma = match.groups()
+            found.append(number(figure))
+            at = match.end()
+    return found
+
+
+def _excerpt(text: str, at: int) -> str:
+    """What comes from a place on, shortened; the end of the text where that is nothing."""
+    rest = text[at : at + 21]
     return repr(rest[:20] or text[-20:]) + ("…" if len(rest) > 20 else "")
 
 
@@ -66,8 +92,8 @@ class Viewport:
             text: a number with a unit.
             what: the attribute, which decides what per cent are of.
         """
-        match = _LENGTH.fullmatch(text)
-        unit = match[2].lower() if match else None
+        match = _LENGTH.match(text)
+        unit = text[match.end() :].strip().lower() if match else None
         if match is None or (unit not in ("", "px", "%") and unit not in _PER_INCH):
             raise ToolpathError(f"{what} = {text[:30]!r}, expected a length in px, mm, cm, in, pt, pc or %")
         value = number(match[1])
@@ -88,12 +114,12 @@ def transform(text: str) -> Array:
     total, end = np.eye(4), 0
     if text.strip() in ("", "none"):
         return total
-    while match := _TRANSFORM.match(text, end):
-        name, end = match[1].lower(), match.end()
+    while (match := _FUNCTION.match(text, end)) and text[match.end() : match.end() + 1] == ")":
+        name, end = match[1].lower(), match.end() + 1
         values = numbers(_ANGLE_OR_PX.sub("", match[2]), f"{match[1]}(…)")
         if len(values) not in _TAKES.get(name, ()):
             known = "matrix(6 numbers), translate(1 or 2), scale(1 or 2), rotate(1 or 3), skewX(1), skewY(1)"
-            raise ToolpathError(f"transform has {match[0].strip()[:60]!r}, expected {known}")
+            raise ToolpathError(f"transform has {match[0].strip()[:59] + ')'!r}, expected {known}")
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused where it is drawn
             total = total @ _plane(*_matrix(name, values))
     if text[end:].strip():

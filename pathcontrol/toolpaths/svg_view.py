@@ -12,7 +12,7 @@ from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.svg_shapes import Attributes
 from pathcontrol.toolpaths.svg_values import Viewport, numbers
 
-_ASPECT = re.compile(r"\s*+(?:(none)|x(Min|Mid|Max)Y(Min|Mid|Max))(?:\s++(meet|slice))?+\s*+")
+_ALIGN = re.compile("none|x(Min|Mid|Max)Y(Min|Mid|Max)")
 _SHARE = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
 _INCH = 0.0254  # m
 
@@ -101,14 +101,15 @@ def _fitted(box: list[float] | None, viewport: Viewport, get: Attributes) -> Vie
     if box is None:
         return View(viewport, matrix)
     text = get("preserveAspectRatio") or "xMidYMid"
-    aspect = _ASPECT.fullmatch(text)
-    if aspect is None:
+    word, *fit = text.split() or [""]
+    aspect = _ALIGN.fullmatch(word)
+    if aspect is None or fit not in ([], ["meet"], ["slice"]):
         raise ToolpathError(f"preserveAspectRatio = {text[:60]!r}, expected none or such as xMidYMid meet")
     size = np.array([viewport.width, viewport.height])
     scale = size / box[2:]
-    if not aspect[1]:
-        scale[:] = scale.max() if aspect[4] == "slice" else scale.min()
-    share = [0.0 if aspect[1] else _SHARE[align] for align in (aspect[2] or "Min", aspect[3] or "Min")]
+    if word != "none":
+        scale[:] = scale.max() if fit == ["slice"] else scale.min()
+    share = [_SHARE[align or "Min"] for align in aspect.groups()]
     matrix[[0, 1], [0, 1]] = scale
     matrix[:2, 3] = share * (size - scale * box[2:]) - scale * box[:2]
     return View(Viewport(box[2], box[3], viewport.ppi), matrix)

@@ -14,6 +14,16 @@ MAX_CONTOURS = 100_000
 #: largest coordinate, radius or length [m]: what lies further is a mistake in the unit, or an attack
 MAX_COORDINATE = 1e4
 
+#: beginnings of other files that end like toolpaths, and what to do about them
+_OTHERS = {
+    b"AutoCAD Binary DXF": "a binary DXF drawing, which is not read: save it as DXF in ASCII, R2000 or later",
+    b"AC10": "a DWG drawing, which is not read: save it as DXF in ASCII, R2000 or later",
+    b"\x1f\x8b": "compressed by gzip, as SVGZ is: unpack it first",
+    b"PK\x03\x04": "a ZIP archive, as XLSX and 3MF are: unpack it, or export it as the text that is read here",
+    b"%PDF": "a PDF document: export its drawing as SVG or DXF",
+    b"\x89PNG": "a PNG image, which has no outlines: trace it, and save it as SVG",
+    b"\xff\xd8\xff": "a JPEG image, which has no outlines: trace it, and save it as SVG",
+}
 _MAX_BYTES = 64 << 20
 _MAX_LINES = 2 * MAX_SEGMENTS
 _MAX_LINE_LENGTH = 100_000
@@ -31,6 +41,9 @@ def read_text(path: str | os.PathLike[str], what: str = "a toolpath") -> str:
         ToolpathError: there is no such regular file, it cannot be read, is larger than 64 MiB, or holds NUL bytes.
     """
     data = _read_bytes(path, what)
+    for beginning, kind in _OTHERS.items():
+        if data.startswith(beginning):
+            raise ToolpathError(f"{os.fspath(path)} is {kind}")
     if b"\0" in data:
         raise ToolpathError(
             f"{os.fspath(path)} holds NUL bytes and is no text, expected {what}; if it is UTF-16, save it as UTF-8"

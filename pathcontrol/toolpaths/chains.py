@@ -11,13 +11,17 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, scalar
+from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.arc import Arc
 from pathcontrol.toolpaths.bezier import Bezier
-from pathcontrol.toolpaths.pieces import NOTHING, ends_of
+from pathcontrol.toolpaths.contour import Contour
+from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.pieces import NOTHING, contour_of, distinct, ends_of
 from pathcontrol.toolpaths.segments import Polyline, Segment
 
 _NEAR, _NEAR_SHARE = 1e-6, 1e-4  # m and of the drawing's diagonal, how near ends that belong together lie
+_WIDEST_TOLD = 5e-5  # m, gaps up to this are told if they stay open
 
 
 class Strand(NamedTuple):
@@ -40,25 +44,92 @@ class Strand(NamedTuple):
         """First and last point [m], each (3,)."""
         return ends_of(self.segments[0])[0], ends_of(self.segments[-1])[1]
 
+    @property
+    def extent(self) -> float:
+        """Size of a box around all that its curves are made of [m]."""
+        return _size([self])
 
-def chained(strands: Sequence[Strand]) -> list[Strand]:
+    def contour(self, source: str, feed: float | None) -> Contour:
+        """The contour of a file.
+
+        Raises:
+            ToolpathError: its segments make none.
+        """
+        try:
+            return contour_of(self.segments, feed, self.name)
+        except InputError as error:
+            raise ToolpathError(f"{source}, {self.name}: {error}") from error
+
+
+def checked_gap(gap: float | None) -> float | None:
+    """Check the option ``gap`` [m], not less than 0 or None, and return it.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if gap is not None and scalar("gap", gap) < 0:
+        raise InputError(f"gap = {gap!r} m, expected a length not less than 0")
+    return gap
+
+
+def chained(strands: Sequence[Strand], gap: float | None, passed: Passed) -> list[Strand]:
     """The strands with those joined whose ends meet, each chain in the place and direction of its first strand.
 
-    Ends meet if they lie within 1 µm of each other, or 0.01 % of the drawing's diagonal if that is less, and of no
-    third one. Where they do not coincide both are moved half-way: the end of a line alone, a curve as a whole by an
-    amount that fades towards its other end. A closed chain begins where its first strand does.
+    Ends meet if they lie within the gap of each other and of no third one. Where they do not coincide both are moved
+    half-way: the end of a line alone, a curve as a whole by an amount that fades towards its other end. A closed chain
+    begins where its first strand does. Crumbs, smaller than the gap and 1 µm, are left out.
+
+    Args:
+        strands: the curves.
+        gap: [m]; by default 1 µm, or 0.01 % of the drawing's diagonal if that is less.
+        passed: takes note of crumbs, and of gaps up to 50 µm that stay open.
     """
-    tolerance = min(_NEAR, _NEAR_SHARE * _diagonal(strands))
+    tolerance = max(min(_NEAR, _NEAR_SHARE * _size(strands)) if gap is None else gap, NOTHING)
     loose: dict[str, list[Strand]] = {}
     done = []
     for strand in strands:
         start, end = strand.ends
-        if np.linalg.norm(end - start) > NOTHING:
+        apart = float(np.linalg.norm(end - start))
+        extent = strand.extent if apart <= tolerance else np.inf
+        if extent <= min(tolerance, _NEAR):
+            passed.over(f"a curve shorter than {1e6 * min(tolerance, _NEAR):.3g} µm", strand.name, "was left out")
+        elif apart > NOTHING and extent > tolerance:
             loose.setdefault(strand.layer, []).append(strand)
         else:
             done.append(strand)
-    done += [chain for layer in loose.values() for chain in _chains(layer, max(tolerance, NOTHING))]
-    return sorted(done, key=lambda strand: strand.place)
+    chains = [chain for layer in loose.values() for chain in _chains(layer, tolerance)]
+    _tell_gaps(chains, tolerance, passed)
+    return sorted([*done, *chains], key=lambda strand: strand.place)
+
+
+def _tell_gaps(chains: Sequence[Strand], tolerance: float, passed: Passed) -> None:
+    """Note the gaps, up to 50 µm, that are left open, with the option that closes them."""
+    layers: dict[str, list[tuple[Array, Array]]] = {}
+    for chain in chains:
+        start, end = chain.ends
+        if np.linalg.norm(end - start) > NOTHING:
+            layers.setdefault(chain.layer, []).append((start, end))
+    gaps = [gap for ends in layers.values() for gap in _open_gaps(np.array(ends).reshape(-1, 3), tolerance)]
+    if gaps:
+        unit = 10.0 ** np.floor(np.log10(max(gaps)) - 1)
+        suffices = float(f"{unit * np.ceil(1.001 * max(gaps) / unit):.2g}")
+        passed.tell(
+            f"{len(gaps)} gap{'s' * (len(gaps) > 1)} between ends of contours, of up to {1e6 * max(gaps):.3g} µm, "
+            f"stay{'s' * (len(gaps) == 1)} open: gap={suffices:g} closes gaps up to {1e6 * suffices:.3g} µm"
+        )
+
+
+def _open_gaps(ends: Array, tolerance: float) -> list[float]:
+    """Widths [m] of the gaps between ends (2n, 3) that a larger tolerance, up to 50 µm, would close."""
+    apart = cKDTree(ends).query(ends, k=2, distance_upper_bound=_WIDEST_TOLD)[0][:, 1]
+    apart = apart[(apart > tolerance) & np.isfinite(apart)]
+    for larger in (apart.max(initial=0.0), apart.min(initial=np.inf)):
+        if tolerance < larger < np.inf:
+            meets = _meets(ends, min(1.05 * larger, _WIDEST_TOLD))
+            first = np.flatnonzero(meets > np.arange(len(meets)))
+            if len(first):
+                return np.linalg.norm(ends[first] - ends[meets[first]], axis=-1).tolist()
+    return []
 
 
 def _chains(strands: Sequence[Strand], tolerance: float) -> list[Strand]:
@@ -128,8 +199,8 @@ def _joined(parts: list[list[Segment]], closed: bool) -> list[Segment]:
     return [segment for part in parts for segment in part]
 
 
-def _diagonal(strands: Sequence[Strand]) -> float:
-    """Size of the drawing [m], roughly: of a box around all that its curves are made of."""
+def _size(strands: Sequence[Strand]) -> float:
+    """Diagonal of a box around all that the curves are made of [m]."""
     corners = np.concatenate([_frame(segment) for strand in strands for segment in strand.segments])
     return float(np.linalg.norm(np.ptp(corners, axis=0)))
 
@@ -147,7 +218,8 @@ def _shifted(segment: Segment, start: Array, end: Array) -> Segment:
         points = segment.points.copy()
         points[0] += start
         points[-1] += end
-        return Polyline(points)
+        points = distinct(points)
+        return Polyline(points) if len(points) > 1 else segment  # whose gap the contour then refuses by name
     if isinstance(segment, Arc):
         return replace(segment, center=segment.center + start, rise=segment.rise + end - start)
     assert isinstance(segment, Bezier)

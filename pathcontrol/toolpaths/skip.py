@@ -1,0 +1,73 @@
+"""Kinds of things in drawings that are left out when asked, by the same names for SVG and DXF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from pathcontrol.errors import InputError, UnknownNameError
+
+#: names for several kinds at once: tags of SVG and types of DXF, in lower case
+KINDS = {
+    "text": ("text", "tspan", "flowroot", "mtext", "attrib", "attdef", "rtext", "arcalignedtext"),
+    "image": (
+        "image",
+        "foreignobject",
+        "wipeout",
+        "oleframe",
+        "ole2frame",
+        "pdfunderlay",
+        "dwfunderlay",
+        "dgnunderlay",
+    ),
+    "point": ("point",),
+    "dimension": (
+        "dimension",
+        "arc_dimension",
+        "large_radial_dimension",
+        "leader",
+        "mleader",
+        "multileader",
+        "tolerance",
+    ),
+    "hatch": ("hatch", "mpolygon"),
+    "solid": ("solid", "trace", "3dface", "3dsolid", "body", "region", "surface", "mesh"),
+}
+
+
+def names_of(option: str, names: str | Sequence[str] | None) -> tuple[str, ...] | None:
+    """Check that an option is a name or several, and return them; None where it is None.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if names is None:
+        return None
+    found = (names,) if isinstance(names, str) else tuple(names) if isinstance(names, Iterable) else (names,)
+    wrong = [name for name in found if not isinstance(name, str)]
+    if wrong:
+        raise InputError(f"{option} = {names!r}, expected a name or several, such as ['a', 'b']")
+    return found
+
+
+def skipped(names: str | Sequence[str] | None, known: Iterable[str]) -> frozenset[str]:
+    """Return the kinds, in lower case, that these names stand for.
+
+    Args:
+        names: ``"text"`` and the other names of :data:`KINDS`, or single kinds.
+        known: the kinds that there are.
+
+    Raises:
+        UnknownNameError: a name stands for none.
+        InputError: ``names`` are no names.
+    """
+    single = {kind.lower() for kind in known} | {kind for kinds in KINDS.values() for kind in kinds}
+    found: set[str] = set()
+    for name in names_of("skip", names) or ():
+        kinds = KINDS.get(name.lower(), (name.lower(),))
+        if not single.issuperset(kinds):
+            raise UnknownNameError(
+                f"skip: {name[:60]!r} is no kind of thing in this drawing, expected some of "
+                f"{', '.join(map(repr, KINDS))}, or a type such as {', '.join(map(repr, sorted(single)[:12]))}"
+            )
+        found.update(kinds)
+    return frozenset(found)
