@@ -136,8 +136,11 @@ def _convex(pieces: Sequence[Piece], matrix: Array) -> Iterator[Array]:
     """The polygon (k, 2), counterclockwise, inside an outline of pieces, if it is convex."""
     points = np.concatenate([_outline(piece) for piece in pieces])
     plane = (points @ matrix[:3, :3].T + matrix[:3, 3])[:, :2]
-    plane = plane[(plane != np.roll(plane, 1, axis=0)).any(1)]
-    if len(plane) < 3 or not np.isfinite(plane).all():
+    if not np.isfinite(plane).all():
+        return
+    apart = np.abs(plane - np.roll(plane, 1, axis=0)).max(1)
+    plane = plane[apart > 1e-9 * np.ptp(plane)]
+    if len(plane) < 3:
         return
     edges = np.roll(plane, -1, axis=0) - plane
     turns = _cross(edges, np.roll(edges, -1, axis=0))
