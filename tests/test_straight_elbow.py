@@ -1,4 +1,4 @@
-"""Curves past a nearly straight elbow keep their branch; those that leave the reach are refused for that reason."""
+"""Curves past a nearly straight elbow keep their branch; those that leave the reach are refused, for that reason."""
 
 from __future__ import annotations
 
@@ -64,7 +64,8 @@ def test_a_circle_that_leaves_the_reach_is_told_so_and_where(beyond, seed):
 
 def test_a_line_through_the_shoulder_is_refused_as_singular():
     """There the elbow is folded; on the other side the arm could go on only with a jump of half a turn."""
-    line = ToolCurve.line(np.add(SHOULDER, [0.3, 0.0, 0.1]), np.subtract(SHOULDER, [0.3, 0.0, 0.1]))
+    half = np.array([0.3, 0.0, 0.1])
+    line = ToolCurve.line(SHOULDER + half, SHOULDER - half)
     with pytest.raises(TaskError, match="singularity"):
         CartesianPath(load_robot("cicese_2dof"), "tool", line, speed=0.1)
 

@@ -93,7 +93,7 @@ def test_a_sharp_tip_that_is_stopped_at_may_be_anywhere_on_a_closed_contour(arm)
     tip = drawn([[0.01, 0.02, 0], [0.08, 0.02, 0], [0.01, 0.03, 0], [0.01, 0.02, 0]], feed=0.05)
     after = drawn([[0.04, 0.05, 0], [0.06, 0.05, 0]], feed=0.05)
     task = ToolpathTask(arm, "tool", Toolpath((tip, after)), BOARD, clearance=0.0)
-    assert [contour.rapid for contour in task.contours] == [False, True, False]
+    assert [contour.rapid for contour in task.contours] == [False, False, True, False]  # from its start, by the tip
 
 
 # --- the paths ----------------------------------------------------------------------------------------------

@@ -59,8 +59,8 @@ def follow(
 
     The prediction is the secant through the last two postures. A step is cut in four where the correction fails, is
     large or comes to the other side of a singularity, and doubled where it is small. A choice of postures is made for
-    the least motion, away from limits and gently
-    towards the start, or given a curve of postures q_rest(s) for the one nearest to it.
+    the least motion, away from limits and gently towards the start, or given a curve of postures q_rest(s) for the one
+    nearest to it.
     """
     walk = _Walk(constraint, start, s0, s_end, rest)
     for _ in range(_TRIES):

@@ -1,8 +1,9 @@
-"""Ways from the end of one contour to the start of the next, where a file gives none."""
+"""From contours to curves that follow one another, with ways in between where a file gives none."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,20 +20,30 @@ def linked(
 ) -> list[tuple[Contour, Smoothed]]:
     """The contours with the curves that stand for them, and rapids in between where those do not meet.
 
-    A rapid goes ``clearance`` [m] above the higher of its ends, along ``up``, across and down again; straight where the
+    Each begins and ends as :func:`from_end_to_end` says, so that the tool is not lifted where contours meet. A rapid
+    goes ``clearance`` [m] above the higher of its ends, along ``up``, across and down again; straight where the
     clearance is 0, for arms that move in a plane.
     """
     done: list[tuple[Contour, Smoothed]] = []
     for contour in contours:
-        curves = smooth(contour, tolerance, corner)
+        curves = from_end_to_end(contour, tolerance, corner)
         if done:
             last, first = done[-1][1].curves[-1], curves.curves[0]
             way = _way(last.position(last.s_end), first.position(first.s0), clearance, up)
             if way is not None:
                 rapid = Contour((Polyline(way),), rapid=True, name=f"rapid to {contour.name or 'the next contour'}")
-                done.append((rapid, smooth(rapid, tolerance, corner)))
+                done.append((rapid, from_end_to_end(rapid, tolerance, corner)))
         done.append((contour, curves))
     return done
+
+
+def from_end_to_end(contour: Contour, tolerance: float, corner: Corners) -> Smoothed:
+    """Curves that begin and end exactly where the contour does, a closed one too: the arm rests there.
+
+    The corner of a closed contour at its start is not blended: where the tool enters and leaves the material is up to
+    the file.
+    """
+    return smooth(replace(contour, closed=False), tolerance, corner)
 
 
 def _way(start: Array, end: Array, clearance: float, up: Array) -> Array | None:

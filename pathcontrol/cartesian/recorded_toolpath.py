@@ -8,11 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.cartesian.links import from_end_to_end
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour, Toolpath, rigid
-from pathcontrol.toolpaths.smoothing import Corners, Smoothed, smooth
+from pathcontrol.toolpaths.smoothing import Corners, Smoothed
 
 
 class RecordedToolpath(ToolpathTask):
@@ -67,4 +68,4 @@ class RecordedToolpath(ToolpathTask):
     @cached_property
     def smoothed(self) -> tuple[Smoothed, ...]:  # type: ignore[override]
         """For each contour how it is smoothed."""
-        return tuple(smooth(contour, self.tolerance, self.corner) for contour in self._placed)
+        return tuple(from_end_to_end(contour, self.tolerance, self.corner) for contour in self._placed)

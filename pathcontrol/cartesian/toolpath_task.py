@@ -25,9 +25,10 @@ class ToolpathTask(PathSequence):
     """The contours of a toolpath in their order, as paths of the joints with the feeds of the file.
 
     Contours are placed by the workpiece's frame, linked by rapids where they do not meet, and smoothed within a
-    tolerance; the arm comes to rest between contours, and at corners that are stopped at. Each curve is followed as by
-    a :class:`CartesianPath`, at the feed, or slower where the acceleration of the tool asks for it. It begins at once
-    with the speed that the acceleration builds up in 0.1 s, so that dry friction cannot hold the arm at the start.
+    tolerance; the arm comes to rest between contours, each of which it begins and ends exactly where the file does, and
+    at corners that are stopped at. Each curve is followed as by a :class:`CartesianPath`, at the feed, or slower where
+    the acceleration of the tool asks for it. It begins at once with the speed that the acceleration builds up in 0.1 s,
+    so that dry friction cannot hold the arm at the start.
 
     Args:
         robot: the arm.

@@ -53,8 +53,7 @@ def corners(contour: Contour, angle: float = SHARP) -> list[Corner]:
 def split(contour: Contour, angle: float) -> list[Contour]:
     """The contour cut at the corners that turn by more than ``angle`` [rad].
 
-    A closed contour with such corners becomes open pieces, the first of which begins where it began if that is a
-    corner, else at the first corner.
+    A closed contour with such corners becomes open pieces from where it begins to where it ends.
     """
     places = corners(contour, angle)
     if not places:
@@ -70,8 +69,6 @@ def split(contour: Contour, angle: float) -> list[Contour]:
                 current = _Piece(contour)
     if current.segments:
         pieces.append(current.done())
-        if contour.closed:  # the last piece goes on into the first
-            pieces[0] = _joined(pieces.pop(), pieces[0]) if len(pieces) > 1 else pieces[0]
     return pieces
 
 
@@ -118,18 +115,6 @@ def _parts(segment: Segment, vertices: list[int]) -> list[tuple[Segment, int, in
         (Polyline(segment.points[a : b + 1]), a, last)
         for a, b, last in zip(bounds[:-1], bounds[1:], lasts, strict=True)
     ]
-
-
-def _joined(first: Contour, second: Contour) -> Contour:
-    """Two open pieces, the second beginning where the first ends."""
-    a, b = first.segments[-1], second.segments[0]
-    if not (isinstance(a, Polyline) and isinstance(b, Polyline)):
-        return replace(first, segments=first.segments + second.segments)
-    middle = Polyline(np.concatenate([a.points, b.points[1:]]))
-    normals = None
-    if first.normals is not None and second.normals is not None:
-        normals = np.concatenate([first.normals, second.normals[1:]])
-    return replace(first, segments=(*first.segments[:-1], middle, *second.segments[1:]), normals=normals)
 
 
 def _tangent(segment: Segment, u: Array) -> Array:

@@ -34,7 +34,7 @@ class Smoothed:
         curves: one after another; more than one where the tool stops at corners.
         deviation: largest distance between contour and curves [m], on both.
         corners: the corners that were blended or stopped at.
-        stops: how often the tool stops at a corner.
+        stops: how often the tool stops on its way, at corners; round a closed contour at its start too.
         normals: for each curve the tool axes given with the contour, as (s, unit vectors), or None.
     """
 
@@ -50,7 +50,8 @@ def smooth(contour: Contour, tolerance: float = 1e-4, corner: Corners = "blend")
 
     Junctions where the tangent or the curvature jumps are replaced by quintic blends. Corners that turn by more than
     5° are blended as well, or else end one curve and begin the next; those that turn by more than 150° always do.
-    Curves are parametrised nearly by arc length, 0.5 ≤ ‖p'‖ ≤ 2, and a closed one begins where its contour does.
+    Curves are parametrised nearly by arc length, 0.5 ≤ ‖p'‖ ≤ 2, and begin where their contour does: an open one or one
+    with stops exactly, a closed one in the middle of the blend there.
 
     Args:
         contour: what is to be followed.
