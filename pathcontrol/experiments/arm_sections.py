@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import PlainValidator, model_validator
 
-from pathcontrol.experiments.section import Section
+from pathcontrol.experiments.section import Section, Units
 from pathcontrol.experiments.values import Number, Numbers, Text, expected
 
 
 class Payload(Section):
     """A point mass [kg] carried by ``frame``, at ``com`` [m] in it."""
 
+    units: ClassVar[Units] = {"mass": "kg", "com": "m"}
     mass: Number
     frame: Text
     com: Numbers | None = None
@@ -21,6 +22,7 @@ class Payload(Section):
 class ToolFrame(Section):
     """A frame ``name`` more, at ``position`` [m] and ``rpy``, in ``angle_unit``, in ``frame``."""
 
+    units: ClassVar[Units] = {"position": "m", "rpy": "rad"}
     angles = ("rpy",)
     frame: Text
     position: Numbers | None = None
@@ -31,6 +33,7 @@ class ToolFrame(Section):
 class Robot(Section):
     """The arm as the controller knows it. ``lock`` is in ``angle_unit``, and in metres for sliding joints."""
 
+    units: ClassVar[Units] = {"lock": ("rad", "m")}
     source: Text
     lock: dict[str, Number] | None = None
     package_dirs: list[Text] | None = None
@@ -41,6 +44,7 @@ class Robot(Section):
 class Directions(Section):
     """Coulomb levels [N m] by the direction of motion, one for each joint."""
 
+    units: ClassVar[Units] = {"positive": "N m", "negative": "N m"}
     positive: Numbers
     negative: Numbers
 
@@ -48,6 +52,7 @@ class Directions(Section):
 class StribeckFriction(Section):
     """Dry friction that falls from ``static`` to ``coulomb`` [N m] at ``velocity``, one for each joint."""
 
+    units: ClassVar[Units] = {"coulomb": "N m", "static": "N m", "velocity": "rad/s"}
     angles = ("velocity",)
     coulomb: Numbers
     static: Numbers
@@ -65,6 +70,7 @@ def _levels(value: Any) -> Any:
 class FrictionTable(Section):
     """The sum of the friction laws given."""
 
+    units: ClassVar[Units] = {"viscous": "N m s/rad", "coulomb": "N m"}
     viscous: Numbers | None = None
     coulomb: Annotated[list[float] | Directions, PlainValidator(_levels)] | None = None
     stribeck: StribeckFriction | None = None

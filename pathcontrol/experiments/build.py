@@ -19,7 +19,7 @@ from pathcontrol.experiments.build_arms import build_arms
 from pathcontrol.experiments.build_duration import build_duration
 from pathcontrol.experiments.build_task import build_task
 from pathcontrol.experiments.controller_sections import ContinuousSection
-from pathcontrol.experiments.keyed import keyed, users_code
+from pathcontrol.experiments.keyed import keyed, refuse_unit, users_code
 from pathcontrol.experiments.schema import Experiment, Output
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.modes import ContinuousTime, SampledLoop, torque_limits
@@ -150,6 +150,9 @@ def _state(experiment: Experiment, controller: Controller) -> tuple[Array, Array
         begin = controller.task.q_d(np.array(controller.task.s0))
         q = finite("q", joint_array("q", given.get("q", begin), n))
         qd = finite("qd", joint_array("qd", given.get("qd", np.zeros(n)), n))
+    for name, per in (("q", ""), ("qd", "/s")):
+        for i, (value, unit) in enumerate(zip(given.get(name, ()), controller.robot.position_units, strict=False)):
+            refuse_unit(f"start.{name}[{i}]", value, unit + per)
     with users_code("controller", f"{type(controller).__name__} at the start"):
         controller.law(0.0, q, qd, controller.start(q, qd))
     return q, qd

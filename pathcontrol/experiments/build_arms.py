@@ -7,9 +7,10 @@ from pathlib import Path
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.arm_sections import Payload
 from pathcontrol.experiments.build_friction import with_friction
-from pathcontrol.experiments.keyed import keyed
+from pathcontrol.experiments.keyed import keyed, refuse_unit
 from pathcontrol.experiments.placement import pose_of
 from pathcontrol.experiments.schema import Experiment
+from pathcontrol.experiments.section import converted
 from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel
@@ -53,14 +54,18 @@ def _load(experiment: Experiment, base_dir: Path) -> RobotModel:
     with keyed("robot.source"):
         source = _source(section.source, base_dir)
         urdf = find_urdf(source, tuple(package_dirs))
-        sliding = _sliding_joints(urdf.text) if experiment.angle_unit == "deg" else set()
+        needed = section.lock or experiment.angle_unit == "deg"
+        sliding = _sliding_joints(urdf.text) if needed else set()
     lock = {
-        joint: value if joint in sliding else experiment.to_radians(value)
+        joint: value if joint in sliding else converted(value, experiment.to_radians)
         for joint, value in (section.lock or {}).items()
     }
+    for joint, value in lock.items():
+        refuse_unit(f"robot.lock.{joint}", value, "m" if joint in sliding else "rad")
     with keyed("robot", ("lock",)):
         robot = load_robot(source, lock=lock, package_dirs=package_dirs)
-    _refuse_degrees(robot, sliding)
+    if experiment.angle_unit == "deg":
+        _refuse_degrees(robot, sliding)
     return robot
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import PlainValidator
 
-from pathcontrol.experiments.section import Section, chooser
+from pathcontrol.experiments.section import Section, Units, chooser
 from pathcontrol.experiments.values import FlagOrLimits, Gain, Number, Positive, Whole
 
 
@@ -20,6 +20,7 @@ class ControllerSection(Section):
 class ExtendedMotionPlanController(ControllerSection):
     """``extended_motion_plan``: see :class:`pathcontrol.ExtendedMotionPlan`."""
 
+    units: ClassVar[Units] = {"K_p": "1/s^2", "K_v": "1/s", "k": "1/rad^2/s"}
     type: Literal["extended_motion_plan"] = "extended_motion_plan"
     K_p: Gain
     K_v: Gain
@@ -29,6 +30,7 @@ class ExtendedMotionPlanController(ControllerSection):
 class ProjectionController(ControllerSection):
     """``projection``: see :class:`pathcontrol.Projection`."""
 
+    units: ClassVar[Units] = {"k_p": "1/s^2", "K_v": "1/s", "capture": "rad"}
     angles = ("capture",)
     type: Literal["projection"] = "projection"
     k_p: Gain
@@ -40,6 +42,7 @@ class ProjectionController(ControllerSection):
 class ComputedTorqueController(ControllerSection):
     """``computed_torque``: see :class:`pathcontrol.ComputedTorque`."""
 
+    units: ClassVar[Units] = {"K_p": "1/s^2", "K_v": "1/s"}
     type: Literal["computed_torque"] = "computed_torque"
     K_p: Gain
     K_v: Gain
@@ -48,6 +51,7 @@ class ComputedTorqueController(ControllerSection):
 class PDPlusController(ControllerSection):
     """``pd_plus``: see :class:`pathcontrol.PDPlus`."""
 
+    units: ClassVar[Units] = {"K_p": "N m/rad", "K_v": "N m s/rad"}
     type: Literal["pd_plus"] = "pd_plus"
     K_p: Gain
     K_v: Gain
@@ -56,6 +60,7 @@ class PDPlusController(ControllerSection):
 class SlotineLiController(ControllerSection):
     """``slotine_li``: see :class:`pathcontrol.SlotineLi`."""
 
+    units: ClassVar[Units] = {"Lambda": "1/s", "K_d": "N m s/rad"}
     type: Literal["slotine_li"] = "slotine_li"
     Lambda: Gain
     K_d: Gain
@@ -64,6 +69,7 @@ class SlotineLiController(ControllerSection):
 class SampledSection(Section):
     """``sampled``: see :class:`pathcontrol.SampledLoop`."""
 
+    units: ClassVar[Units] = {"period": "s", "filter_hz": "Hz", "torque_limits": ("N m", "N"), "delay": "s"}
     mode: Literal["sampled"] = "sampled"
     period: Positive | None = None
     substeps: Whole | None = None
@@ -77,6 +83,7 @@ class SampledSection(Section):
 class ContinuousSection(Section):
     """``continuous``: see :class:`pathcontrol.ContinuousTime`."""
 
+    units: ClassVar[Units] = {"output_period": "s", "friction_width": "rad/s", "torque_limits": ("N m", "N")}
     angles = ("friction_width",)
     mode: Literal["continuous"] = "continuous"
     output_period: Positive | None = None

@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterable, Iterator
+from typing import Any
 
+from pathcontrol._units import Quantity, offered
 from pathcontrol.errors import ExperimentError, PathControlError
 
 
@@ -36,6 +38,16 @@ def users_code(key: str, doing: str, fields: Iterable[str] = ()) -> Iterator[Non
         raise
     except Exception as error:
         raise ExperimentError(f"{key}: {doing} raised {told(error)}") from error
+
+
+def refuse_unit(key: str, value: Any, unit: str) -> None:
+    """Refuse a quantity that was given with a ``unit`` of another dimension, as an angle for a sliding joint.
+
+    Raises:
+        ExperimentError: it was.
+    """
+    if isinstance(value, Quantity) and value.unit != unit:
+        raise ExperimentError(f"{key} was given in {value.unit}, expected {offered([unit])}: so the joint moves")
 
 
 def told(error: BaseException) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import stat
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,6 +14,11 @@ from pydantic import ValidationError
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.schema import Experiment
 from pathcontrol.experiments.values import shown
+
+_LONGEST = 2_000_000  # bytes
+_DEEPEST = 100  # parts of a key
+_MOST_TOLD = 20  # findings
+_LONGEST_KEY = 200
 
 
 def load_experiment(path: str | Path) -> Experiment:
@@ -31,7 +38,9 @@ def load_experiment(path: str | Path) -> Experiment:
 
 def invalid(path: str | Path, findings: Iterable[str]) -> ExperimentError:
     """The error that lists what is wrong in the file ``path``."""
-    lines = "\n".join(findings).replace("\n", "\n  ")
+    told = list(findings)
+    more = ["and more"] if len(told) > _MOST_TOLD else []
+    lines = "\n".join([*told[:_MOST_TOLD], *more]).replace("\n", "\n  ")
     return ExperimentError(f"{str(path)!r} is not a valid experiment:\n  {lines}")
 
 
@@ -41,23 +50,59 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     Raises:
         ExperimentError: the file is missing, or is not TOML.
     """
+    text = read_text(path)
+    _refuse_deep_keys(path, text)
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # integers of thousands of digits are a ValueError
+        raise invalid(path, [f"it cannot be read as TOML: {error}"]) from error
+
+
+def read_text(path: str | Path) -> str:
+    """Return the text of an experiment file, of which no more is read than an experiment can be long.
+
+    Raises:
+        ExperimentError: the file is missing, is no regular file, is too long or is no text in UTF-8.
+    """
     path = Path(path)
     try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
+        data = _read(path)
+        return data.decode("utf-8-sig").replace("\r\n", "\n")
     except FileNotFoundError as error:
         raise ExperimentError(
             f"there is no experiment file {str(path)!r}; `pathcontrol run --example` prints one to start from"
         ) from error
     except UnicodeDecodeError as error:
-        raise invalid(path, [f"it is not a text file in UTF-8: {error}"]) from error
-    except (OSError, ValueError, RecursionError) as error:  # integers of thousands of digits are a ValueError
-        raise invalid(path, [f"it cannot be read as TOML: {error}"]) from error
+        line, byte = data[: error.start].count(b"\n") + 1, data[error.start]
+        raise invalid(path, [f"line {line} has the byte 0x{byte:02x}, expected text in UTF-8; save it so"]) from error
+    except (OSError, ValueError) as error:  # a null character in the name is a ValueError
+        raise invalid(path, [f"it cannot be read: {error}"]) from error
+
+
+def _refuse_deep_keys(path: str | Path, text: str) -> None:
+    """Refuse keys of very many parts, ``a.a.a…``: the time to parse one grows with their square."""
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.count(".") > _DEEPEST and max(part.count(".") for part in re.split(r"[=,\[\]{}]", line)) > _DEEPEST:
+            raise invalid(path, [f"line {number} has a key of more than {_DEEPEST} parts, expected a few"])
+
+
+def _read(path: Path) -> bytes:
+    """The bytes of a regular file; of a pipe or a device nothing is read, as it may never end."""
+    mode = path.stat().st_mode
+    if not stat.S_ISREG(mode):
+        kind = "a folder" if stat.S_ISDIR(mode) else "a pipe, a socket or a device"
+        raise invalid(path, [f"it is {kind}, expected a file"])
+    with path.open("rb") as file:
+        data = file.read(_LONGEST + 1)
+    if len(data) > _LONGEST:
+        raise invalid(path, [f"it is longer than {_LONGEST // 1_000_000} MB, expected an experiment file"])
+    return data
 
 
 def finding(error: Any) -> str:
     """One line: the key path, and what is wrong with it."""
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error["loc"]).lstrip(".")
+    key = key if len(key) <= _LONGEST_KEY else f"{key[:_LONGEST_KEY]}…"
     if error["type"] == "explained":
         return key + error["ctx"]["text"]
     return f"{key} = {shown(error['input'])}, expected {error['msg']}"

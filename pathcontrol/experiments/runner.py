@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.build import Setup, build
-from pathcontrol.experiments.load import invalid, load_experiment
+from pathcontrol.experiments.load import invalid, load_experiment, read_text
 from pathcontrol.experiments.outputs import check_folder, measured, write_outputs
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.sequence import simulate_sequence
@@ -42,7 +42,7 @@ def run_experiment(path: str | Path, out_dir: str | Path, progress: bool = True)
         InputError: ``out_dir`` cannot be written to.
         SimulationError: the simulation diverged.
     """
-    setup, text, out_dir = load_setup(path), Path(path).read_text(encoding="utf-8"), Path(out_dir)
+    setup, text, out_dir = load_setup(path), read_text(path), Path(out_dir)
     check_folder(out_dir, setup.output)
     run = _simulated(setup, progress)
     run.config["experiment"] = text

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import PurePath
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import PlainValidator
 
 from pathcontrol.experiments.arm_sections import Plant, Robot
 from pathcontrol.experiments.controller_sections import Law, Loop, SampledSection
-from pathcontrol.experiments.section import Section
+from pathcontrol.experiments.section import Section, Units
 from pathcontrol.experiments.sweep_section import SweepSection
 from pathcontrol.experiments.task_sections import Task
 from pathcontrol.experiments.tune_section import TuneSection
@@ -21,6 +21,7 @@ from pathcontrol.experiments.values import Numbers, Positive, Whole, expected
 class Start(Section):
     """``[start]``: the initial state, in ``angle_unit``; at rest at the beginning of the path unless told."""
 
+    units: ClassVar[Units] = {"q": ("rad", "m"), "qd": ("rad/s", "m/s")}
     angles = ("q", "qd")
     q: Numbers | None = None
     qd: Numbers | None = None
@@ -80,6 +81,7 @@ class Experiment(Section):
         tune: keys that are searched, for :func:`run_tune`; likewise.
     """
 
+    units: ClassVar[Units] = {"duration": "s"}
     angle_unit: Literal["rad", "deg"] = "rad"
     duration: Positive | None = None
     laps: Whole | None = None

@@ -9,9 +9,15 @@ from typing import Any, ClassVar, Self
 from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from pathcontrol._units import Quantity, quantity
+from pathcontrol.errors import InputError
 from pathcontrol.experiments.values import did_you_mean, expected, shown
 
+#: the SI unit of each field that is a quantity, or several
+Units = Mapping[str, str | tuple[str, ...]]
 _EXPLAINED = "explained"
+_MOST_TOLD = 21  # errors of a section: one more than a message has
+_Wrong = dict[tuple[int | str, ...], InitErrorDetails]
 
 
 class Section(BaseModel):
@@ -19,11 +25,14 @@ class Section(BaseModel):
 
     Attributes:
         angles: names of the fields that the file's ``angle_unit`` applies to.
+        units: SI units of the fields that are quantities, which may be texts, as ``"50 mm/s"``; where a field
+            has several units, of the dimension of one of them.
         not_arguments: names of the fields that are no arguments.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     angles: ClassVar[tuple[str, ...]] = ()
+    units: ClassVar[Units] = {}
     not_arguments: ClassVar[tuple[str, ...]] = ("type", "mode")
 
     def arguments(self, to_radians: Callable[[float], float]) -> dict[str, Any]:
@@ -35,13 +44,24 @@ class Section(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _explain(cls, value: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Say in every error what to write instead; here the valid keys are known."""
+        """Read texts with units, and say in every error what to write instead; here the valid keys are known."""
+        wrong: _Wrong = {}
+        if isinstance(value, dict):
+            value = {key: in_si((key,), v, cls.units_of(value).get(key, ()), wrong) for key, v in value.items()}
         try:
-            return handler(value)
+            made = handler(value)
         except ValidationError as error:
-            raise ValidationError.from_exception_data(
-                cls.__name__, [_detail(cls, e) for e in error.errors(include_url=False)]
-            ) from None
+            errors = [e for e in error.errors(include_url=False) if not _told(e["loc"], wrong)]
+            found = [_detail(cls, e) for e in errors[:_MOST_TOLD]]
+            raise ValidationError.from_exception_data(cls.__name__, [*wrong.values(), *found]) from None
+        if wrong:
+            raise ValidationError.from_exception_data(cls.__name__, [*wrong.values()])
+        return made
+
+    @classmethod
+    def units_of(cls, given: Mapping[str, Any]) -> Units:
+        """Return :attr:`units`, where they depend on what else the table says."""
+        return cls.units
 
 
 def chooser(
@@ -63,8 +83,33 @@ def chooser(
     return choose
 
 
+def in_si(at: tuple[int | str, ...], value: Any, units: str | tuple[str, ...], wrong: _Wrong) -> Any:
+    """Return ``value`` with each text in it read as a quantity; what is none goes to ``wrong``, by where it is."""
+    if not units or isinstance(value, int | float):
+        return value
+    if isinstance(value, list):
+        return [in_si((*at, i), item, units, wrong) for i, item in enumerate(value)]
+    if isinstance(value, dict):
+        return {key: in_si((*at, key), item, units, wrong) for key, item in value.items()}
+    if isinstance(value, str):
+        try:
+            if len(wrong) > _MOST_TOLD:
+                return value
+            return quantity(value, *((units,) if isinstance(units, str) else units))
+        except InputError as error:
+            wrong[at] = _explained(at, value, f" = {shown(value)}, {error}")
+    return value
+
+
+def _told(at: tuple[int | str, ...], wrong: _Wrong) -> bool:
+    """Whether something is wrong at a key that is ``at``, in it, or around it."""
+    return any(all(a == b for a, b in zip(at, other, strict=False)) for other in wrong)
+
+
 def converted(value: Any, function: Callable[[float], float]) -> Any:
-    """``value`` with ``function`` applied to each number in it."""
+    """``value`` with ``function`` applied to each number in it that was given without a unit."""
+    if isinstance(value, Quantity):
+        return value
     if isinstance(value, dict):
         return {key: converted(item, function) for key, item in value.items()}
     return [converted(item, function) for item in value] if isinstance(value, list) else function(value)

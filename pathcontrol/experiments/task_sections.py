@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, PlainValidator
 
 from pathcontrol.experiments.profile_sections import Profile
-from pathcontrol.experiments.section import Section, chooser
+from pathcontrol.experiments.section import Section, Units, chooser
 from pathcontrol.experiments.toolpath_section import ToolpathSection
 from pathcontrol.experiments.values import Flag, Numbers, Positive, Positives, Wholes, expected
 
@@ -25,6 +25,7 @@ class TaskSection(Section):
 class EllipseTask(TaskSection):
     """``ellipse``: see :class:`pathcontrol.Ellipse`."""
 
+    units: ClassVar[Units] = {"semi_axes": "rad", "speed": "rad/s", "center": "rad"}
     angles = ("semi_axes", "speed", "center")
     type: Literal["ellipse"] = "ellipse"
     semi_axes: Positives
@@ -37,6 +38,7 @@ class EllipseTask(TaskSection):
 class CircleTask(TaskSection):
     """``circle``: see :class:`pathcontrol.Circle`."""
 
+    units: ClassVar[Units] = {"radius": "rad", "speed": "rad/s", "center": "rad"}
     angles = ("radius", "speed", "center")
     type: Literal["circle"] = "circle"
     radius: Positive
@@ -49,6 +51,7 @@ class CircleTask(TaskSection):
 class LissajousTask(TaskSection):
     """``lissajous``: see :class:`pathcontrol.Lissajous`."""
 
+    units: ClassVar[Units] = {"amplitudes": "rad", "speed": "rad/s", "phases": "rad", "center": "rad"}
     angles = ("amplitudes", "speed", "phases", "center")
     type: Literal["lissajous"] = "lissajous"
     amplitudes: Numbers
@@ -61,6 +64,7 @@ class LissajousTask(TaskSection):
 class LineTask(TaskSection):
     """``line``: see :class:`pathcontrol.Line`."""
 
+    units: ClassVar[Units] = {"start": "rad", "end": "rad", "speed": "rad/s"}
     angles = ("start", "end", "speed")
     type: Literal["line"] = "line"
     start: Numbers

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Literal
 
-from pathcontrol.experiments.section import Section
+from pathcontrol.experiments.section import Section, Units
 from pathcontrol.experiments.values import NotNegative, Numbers, Positive, Text
 
 
@@ -16,6 +16,7 @@ class Workpiece(Section):
         rpy: roll, pitch and yaw, in ``angle_unit``: turned about the base frame's x, then y, then z, as in a URDF.
     """
 
+    units: ClassVar[Units] = {"position": "m", "rpy": "rad"}
     angles = ("rpy",)
     position: Numbers | None = None
     rpy: Numbers | None = None
@@ -28,6 +29,14 @@ class ToolpathSection(Section):
     reader. Lengths are in metres and metres per second, ``start`` is in ``angle_unit``.
     """
 
+    units: ClassVar[Units] = {
+        "feed": "m/s",
+        "rapid_speed": "m/s",
+        "acceleration": "m/s^2",
+        "tolerance": "m",
+        "clearance": "m",
+        "start": ("rad", "m"),
+    }
     angles = ("start",)
     reader_options: ClassVar[tuple[str, ...]] = ("unit", "layers", "ppi", "unknown")
     not_arguments: ClassVar[tuple[str, ...]] = ("type", "file", "workpiece", *reader_options)

@@ -21,6 +21,7 @@ from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.setup import (
     check_joints,
     check_law,
+    check_length,
     checked_loop,
     initial_state,
     joints_of,
@@ -92,6 +93,7 @@ def simulate_sequence(
     durations, loop = _durations(duration, len(laws)), checked_loop(loop)
     q0, qd0 = _one_state(q, qd, robot.n)
     period, ends = period_of(loop, durations.min()), [_finish(law, laps) for law in laws]
+    check_length(float(durations.sum()), loop, 1, robot.n, ends=True)
     whole = _whole(laws, laps) if task is None else _checked_whole(task, laws, laps)
     for law in laws:
         check_joints(law, robot)

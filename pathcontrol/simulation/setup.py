@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
@@ -21,6 +22,7 @@ from pathcontrol.simulation.described import in_short
 from pathcontrol.simulation.disturbance import Disturbance, check_disturbance
 from pathcontrol.simulation.modes import Arm, ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.sampled import SampledArm
+from pathcontrol.simulation.variables import bytes_of_sample
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import TaskBatch
 
@@ -41,6 +43,33 @@ def period_of(loop: Loop, duration: float) -> float:
     if duration < period:
         raise InputError(f"duration = {duration:g} s is less than one period of {period:g} s; both are in seconds")
     return period
+
+
+def check_length(duration: float, loop: Loop, rollouts: int, joints: int, ends: bool) -> None:
+    """Check that what is recorded fits into memory, before room is made for it.
+
+    A run that ``ends`` by itself in a sampled loop may be given any time that can be counted in periods.
+
+    Raises:
+        InputError: it does not.
+    """
+    sampled = isinstance(loop, SampledLoop)
+    name, period = ("period", loop.period) if isinstance(loop, SampledLoop) else ("output_period", loop.output_period)
+    if isinstance(loop, SampledLoop) and loop.delay > duration:
+        raise InputError(f"delay = {loop.delay:g} s, expected at most duration = {duration:g} s; both are in seconds")
+    needed, most = duration / period * rollouts * bytes_of_sample(joints), _memory()
+    if needed <= most or (ends and sampled and duration / period < 2**53):
+        return
+    raise InputError(
+        f"duration = {duration:g} s with {name} = {period:g} s makes {duration / period:.3g} samples of {rollouts} "
+        f"rollouts, {needed / 1e9:.3g} GB, but this machine has {most / 1e9:.3g} GB; shorten duration, lengthen {name}"
+        + (", or take fewer rollouts at a time" if rollouts > 1 else "")
+    )
+
+
+def _memory() -> int:
+    """Bytes of memory of this machine."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
 def plant_of(plant: RobotModel | Sequence[RobotModel] | None, controller: Controller) -> Arm:

@@ -18,6 +18,7 @@ from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.setup import (
     check_joints,
     check_law,
+    check_length,
     checked_loop,
     for_all_rows,
     joints_of,
@@ -83,6 +84,7 @@ def simulate(
     loop = checked_loop(loop)
     q0, qd0 = for_all_rows(*states_of_each(q, qd, robot, controller.task), controller, disturbance)
     period, finish = period_of(loop, duration), finish_of(controller.task, laps, until, len(q0))
+    check_length(duration, loop, len(q0), robot.n, finish is not None and finish.ends_run)
     check_law(controller, q0, qd0)
     arm = simulated_arm(loop, robot, q0, qd0, Outside(disturbance, first))
     settings = {"duration": duration, "laps": laps, "until": until, "first_rollout": first}

@@ -20,6 +20,13 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     ),
     "regular": (("rollout", "time"), "1", "0 where the path parameter was undefined and the last one kept"),
 }
+
+
+def bytes_of_sample(joints: int) -> int:
+    """Return how much memory one sample of one rollout of an arm with ``joints`` takes."""
+    return sum(8 * (joints if "joint" in dims else 1) for dims, _, _ in VARIABLES.values())
+
+
 #: what a run says about how it went: (dimensions, unit, meaning); coordinates of its data
 OUTCOMES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "status": (("rollout",), "", "finished, diverged, or running when the time was up"),

@@ -13,6 +13,8 @@ from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.profile import ConstantSpeed
 
+_HIGHEST = 1000  # frequency: from there on a path is not resolved by the samples that search and check it
+
 
 class JointCurve(PathTask):
     """A curve given by closed forms of q_d, q_d' and q_d'', at the path speed ``speed`` = ‖q_d'‖ϑ [rad/s]."""
@@ -173,6 +175,11 @@ class Lissajous(JointCurve, single=True):
         whole = self.frequencies == np.round(self.frequencies)
         if not whole.all() or (self.frequencies < 0).any() or not self.frequencies.any():
             raise InputError(f"frequencies = {self.frequencies.tolist()}, expected whole numbers ≥ 0, not all 0")
+        if self.frequencies.max() > _HIGHEST:
+            raise InputError(
+                f"frequencies = {self.frequencies.tolist()}, expected whole numbers up to {_HIGHEST}: no samples are "
+                "as dense as such a path; divide them by a common factor, or lower them"
+            )
         self.period = 2 * np.pi / float(np.gcd.reduce(self.frequencies.astype(int)))
         slowest = np.linalg.norm(self.dq_d(np.linspace(0, self.period, 4097)), axis=-1).min()
         if slowest < 1e-6 * np.abs(self.amplitudes * self.frequencies).max():

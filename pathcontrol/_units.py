@@ -1,0 +1,136 @@
+"""Quantities given with their unit, as ``"50 mm/s"``, read into SI units and radians.
+
+A table of some twenty units is all that experiment files and options need; a library of units would bring thousands,
+with names that mean something else to people of other fields.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from pathcontrol.errors import InputError
+
+_INCH = 0.0254
+
+
+class _Unit(NamedTuple):
+    """A unit as a multiple of one made of m, kg, s and rad with these exponents."""
+
+    factor: float
+    m: int = 0
+    kg: int = 0
+    s: int = 0
+    rad: int = 0
+
+
+_UNITS = {
+    **{name: _Unit(factor, m=1) for name, factor in {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}.items()},
+    **{name: _Unit(factor, m=1) for name, factor in {"μm": 1e-6, "in": _INCH, "inch": _INCH, "ft": 12 * _INCH}.items()},
+    **{name: _Unit(factor, s=1) for name, factor in {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}.items()},
+    **{name: _Unit(factor, s=1) for name, factor in {"μs": 1e-6, "min": 60.0, "h": 3600.0}.items()},
+    **{name: _Unit(factor, s=-1) for name, factor in {"Hz": 1.0, "kHz": 1e3}.items()},
+    **{name: _Unit(factor, rad=1) for name, factor in {"rad": 1.0, "mrad": 1e-3}.items()},
+    **{name: _Unit(math.pi / 180, rad=1) for name in ("deg", "°")},
+    "rev": _Unit(2 * math.pi, rad=1),
+    "rpm": _Unit(2 * math.pi / 60, s=-1, rad=1),
+    **{name: _Unit(factor, kg=1) for name, factor in {"kg": 1.0, "g": 1e-3}.items()},
+    **{name: _Unit(factor, m=1, kg=1, s=-2) for name, factor in {"N": 1.0, "kN": 1e3}.items()},
+    "Nm": _Unit(1.0, m=2, kg=1, s=-2),
+}
+#: what to offer beside the SI unit itself
+_OTHERS = {
+    "m": "mm, cm, um, in, ft",
+    "m/s": "mm/s, m/min, mm/min, in/min",
+    "m/s^2": "mm/s^2",
+    "s": "ms, us, min",
+    "1/s": "1/min, Hz",
+    "Hz": "kHz, 1/s",
+    "rad": "deg, mrad, rev",
+    "rad/s": "deg/s, mrad/s, rpm",
+    "rad/s^2": "deg/s^2",
+    "kg": "g",
+    "N m": "Nm",
+}
+_POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*")
+_TERM = re.compile(r"([*·/]?)(1|[^\W\d_]+|°)(?:(?:\^|\*\*)?(-?\d))?")
+_LONGEST = 60
+
+
+class Quantity(float):
+    """A number in SI units and radians that was given with a unit.
+
+    Attributes:
+        unit: the SI unit that it is in.
+    """
+
+    unit: str
+
+    def __new__(cls, value: float, unit: str) -> Quantity:
+        quantity = super().__new__(cls, value)
+        quantity.unit = unit
+        return quantity
+
+    def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]
+        return float(self), self.unit
+
+
+def quantity(text: str, *units: str) -> Quantity:
+    """Return ``text``, a number and a unit, in that of the SI ``units`` which is of its dimension.
+
+    Raises:
+        InputError: it is no number with a unit, or the unit is not known or of another dimension.
+    """
+    match = _QUANTITY.fullmatch(text) if len(text) <= _LONGEST else None
+    if match is None:
+        raise InputError(f"expected a number with a unit, {offered(units)}")
+    if not match[2]:
+        raise InputError(f"expected a unit after the number, {offered(units)}, or the number without quotes")
+    given = _unit(match[2], units)
+    for unit in units:
+        if _dimension(given) == _dimension(_unit(unit, units)) or _without_angle(given, unit, units):
+            value = _scaled(float(match[1]), given.factor)
+            if not math.isfinite(value):
+                break
+            return Quantity(value, unit)
+    raise InputError(f"expected a finite quantity in {offered(units)}")
+
+
+def _scaled(value: float, factor: float) -> float:
+    """``value`` times ``factor``, to the last bit as a person would write it: ``5 mm`` is 0.005."""
+    inverse = 1 / factor
+    return value / inverse if inverse.is_integer() else value * factor
+
+
+def offered(units: Iterable[str]) -> str:
+    """Return the units that a person may write where ``units`` are meant."""
+    return " or ".join(f"{unit} ({_OTHERS[unit]})" if unit in _OTHERS else unit for unit in units)
+
+
+def _unit(text: str, wanted: Iterable[str]) -> _Unit:
+    """The product of the units in ``text``, as ``N m s/rad`` or ``mm/s²``: a slash is for the next unit only."""
+    compact = re.sub(r"\s*([*·/^]+)\s*", r"\1", text.translate(_POWERS))
+    total, end = _Unit(1.0), 0
+    for term in _TERM.finditer(re.sub(r"\s+", "·", compact)):
+        unit = _Unit(1.0) if term[2] == "1" else _UNITS.get(term[2])
+        if term.start() != end or unit is None:
+            break
+        power = int(term[3] or 1) * (-1 if term[1] == "/" else 1)
+        exponents = (a + power * b for a, b in zip(total[1:], unit[1:], strict=True))
+        total, end = _Unit(total.factor * unit.factor**power, *exponents), term.end()
+    if end != len(compact):
+        raise InputError(f"unknown unit {text!r}, expected {offered(wanted)}")
+    return total
+
+
+def _dimension(unit: _Unit) -> tuple[int, ...]:
+    return unit[1:]
+
+
+def _without_angle(given: _Unit, unit: str, wanted: Iterable[str]) -> bool:
+    """Whether a torque over an angle, or the like, is given as it is often written, without the angle: ``N m s``."""
+    meant = _unit(unit, wanted)
+    return meant.kg != 0 and given.rad == 0 and _dimension(given)[:3] == _dimension(meant)[:3]
