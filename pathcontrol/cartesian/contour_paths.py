@@ -81,7 +81,7 @@ class ContourPaths:
         if orientation is None and self.held != "free":
             orientation = NormalOrientation(self.up)
         try:
-            found = CartesianPath(self.robot, self.frame, tour, orientation, speed=1.0)
+            found = CartesianPath(self.robot, self.frame, tour, orientation, speed=self.rapid_speed)
         except (TaskError, InputError):
             return None  # the contours themselves may still be in reach
         return found.start_posture

@@ -14,12 +14,15 @@ from pathcontrol.cartesian.orientation import FixedOrientation, FreeOrientation,
 from pathcontrol.cartesian.solve import posture, solve
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.errors import InputError
+from pathcontrol.robot.extent import question_length, question_speed
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.spline import SplinePath
 from pathcontrol.toolpaths.curve import ToolCurve
 
 _SAME = 1e-6  # rad
+_COARSEST = 0.1  # share of the reach, as a tolerance
+_LOOKED_AT = 33  # points of a curve
 _FINEST = 1e-9  # m and rad; smaller tolerances are lost in rounding
 
 
@@ -84,6 +87,7 @@ class CartesianPath(SplinePath):
         self.angle_tolerance = scalar("angle_tolerance", angle_tolerance, least=_FINEST)
         speed, closed = scalar("speed", speed, positive=True), _closed(self.curve, closed)
         carried, first = Tool(robot, frame, tool), None if start is None else posture(robot, start)
+        self._question(speed, carried)
         self.orientation = _orientation(orientation, carried, first)
         _check_closing(self.curve, self.orientation, closed)
         tolerances = (self.tolerance, self.angle_tolerance)
@@ -105,6 +109,14 @@ class CartesianPath(SplinePath):
         kind, length = type(self.orientation).__name__, self.curve.length
         found = {name: getattr(self.report, name) for name in ("position_deviation", "angle_deviation", "knots")}
         return super().describe() | {"orientation": kind, "curve_length": length} | found
+
+    def _question(self, speed: float, tool: Tool) -> None:
+        """Warn of a feed, a tolerance or a curve that is far beyond the arm."""
+        robot, frame = tool.robot, self.frame
+        question_speed("the speed of the tool", speed, robot, frame)
+        question_length("tolerance", self.tolerance, robot, frame, share=_COARSEST)
+        points = self.curve.position(np.linspace(self.curve.s0, self.curve.s_end, _LOOKED_AT))
+        question_length("the largest distance of the curve", float(np.linalg.norm(points, axis=-1).max()), robot, frame)
 
     def _feed(self, s: Array) -> tuple[Array, Array]:
         """ϑ = v/‖p'‖ and ϑ' = −v p'ᵀp''/‖p'‖³."""

@@ -13,6 +13,7 @@ from pathcontrol.cartesian.contour_paths import ContourPaths, Held
 from pathcontrol.cartesian.links import linked
 from pathcontrol.cartesian.orientation import Orientation
 from pathcontrol.errors import InputError
+from pathcontrol.robot.extent import question_length
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour, Toolpath, rigid
@@ -83,6 +84,8 @@ class ToolpathTask(PathSequence):
         self.acceleration = scalar("acceleration", acceleration, positive=True)
         self.tolerance, self.corner = scalar("tolerance", tolerance, positive=True), corner
         height = scalar("clearance", clearance, least=0.0)
+        question_length("clearance", height, robot, frame, share=1.0)
+        question_length("tolerance", self.tolerance, robot, frame, share=0.1)
         whole = linked(toolpath.placed(pose).contours, height, pose[:3, 2], self.tolerance, corner)
         self.smoothed = tuple(smoothed for _, smoothed in whole)
         back = np.linalg.inv(pose)

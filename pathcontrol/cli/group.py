@@ -44,10 +44,13 @@ def printable(message: str) -> str:
 @contextlib.contextmanager
 def warnings_in_one_line() -> Iterator[None]:
     """Print each of the library's warnings once, as one line on stderr without the line of code that raised it."""
-    before = warnings.showwarning
+    before, told = warnings.showwarning, set()
 
     def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+        if issubclass(category, PathControlWarning) and str(message) in told:
+            return  # from another place
         if issubclass(category, PathControlWarning):
+            told.add(str(message))
             click.echo(f"warning: {printable(str(message))}", err=True)
         else:
             before(message, category, *where, **more)

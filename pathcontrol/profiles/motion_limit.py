@@ -8,7 +8,8 @@ import numpy as np
 
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import InputError
-from pathcontrol.profiles.motion import JointMotion, Motion, growth
+from pathcontrol.profiles.motion import JointMotion, Motion, ToolMotion, growth
+from pathcontrol.robot.extent import question_speed
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,8 @@ class MotionLimit:
             raise InputError(f"this MotionLimit limits nothing; give at least one of {', '.join(names)}")
         for name, value in {**given, "control_period": self.control_period}.items():
             scalar(name, value, positive=True)
+        if isinstance(self.motion, ToolMotion) and self.speed is not None:
+            question_speed("the speed of the tool", self.speed, self.motion.robot, self.motion.frame)
 
     def ceiling(self, dp: Array, ddp: Array) -> Array:
         """The largest ϑ² [1/s²] that speed and curvature allow with p' and p'', (*batch,); ``inf`` where any."""

@@ -7,6 +7,7 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import TaskError
 from pathcontrol.profiles.motion import ToolMotion, growth
+from pathcontrol.robot.extent import question_speed
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.profile import Path, VelocityProfile
 
@@ -34,6 +35,7 @@ class ToolSpeed(VelocityProfile):
     def __init__(self, robot: RobotModel, frame: str, speed: float) -> None:
         self.motion, self.frame = ToolMotion(robot, frame), frame
         self.speed = scalar("speed", speed, positive=True)
+        question_speed("speed", self.speed, robot, frame)
 
     def theta(self, path: Path, s: Array) -> Array:
         return self.at(path.dq_d(s), path.ddq_d(s), path, s)[0]

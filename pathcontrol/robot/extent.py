@@ -1,0 +1,63 @@
+"""What an arm can do at most with a tool, to question speeds and lengths that are far beyond it."""
+
+from __future__ import annotations
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+
+from pathcontrol.errors import PathControlWarning
+from pathcontrol.robot.model import RobotModel
+
+_POSTURES = 32
+_USUAL = 4 * np.pi  # rad/s, or m/s of sliding joints, where the robot states no limit of velocity
+_MARGIN = 1.5  # times what the postures tried can do
+_FAR = 3.0  # times the reach
+
+
+class Extent(NamedTuple):
+    """What a frame of an arm can do at most, over random postures.
+
+    Attributes:
+        reach: how far its origin is from the base's [m].
+        speed: how fast it is when all joints move at their limits of velocity [m/s].
+    """
+
+    reach: float
+    speed: float
+
+
+def extent(robot: RobotModel, frame: str) -> Extent:
+    """Return how far and how fast a frame of an arm can be."""
+    limits = robot.limits
+    lower, upper = np.maximum(limits.lower, -np.pi), np.minimum(limits.upper, np.pi)
+    share = np.random.default_rng(0).random((_POSTURES, robot.n))
+    pose, jacobian = robot.frame_kinematics(lower + share * (upper - lower), frame)
+    known = np.isfinite(limits.velocity) & (limits.velocity > 0) & (limits.velocity < 1e3)
+    each = np.linalg.norm(jacobian[:, :3], axis=1) @ np.where(known, limits.velocity, _USUAL)
+    return Extent(float(np.linalg.norm(pose[:, :3, 3], axis=1).max()), float(each.max()))
+
+
+def question_speed(name: str, speed: float, robot: RobotModel, frame: str) -> None:
+    """Warn of a ``speed`` of a tool [m/s] that is far beyond the arm: it is likely in millimetres per second."""
+    most = extent(robot, frame).speed
+    if most > 0 and speed > _MARGIN * most:
+        warnings.warn(
+            f"{name} = {speed:g} m/s, but {frame!r} of {robot.name} does some {most:.2g} m/s with all joints at their "
+            f"limits; did you mean {speed:g} mm/s, which is {1e-3 * speed:g}?",
+            PathControlWarning,
+            stacklevel=3,
+        )
+
+
+def question_length(name: str, length: float, robot: RobotModel, frame: str, share: float = _FAR) -> None:
+    """Warn of a ``length`` [m] beyond a ``share`` of the reach of the arm: it is likely in millimetres."""
+    reach = extent(robot, frame).reach
+    if reach > 0 and length > share * reach:
+        warnings.warn(
+            f"{name} = {length:g} m, but {frame!r} of {robot.name} reaches some {reach:.2g} m; did you mean "
+            f"{length:g} mm, which is {1e-3 * length:g}?",
+            PathControlWarning,
+            stacklevel=3,
+        )
