@@ -105,6 +105,12 @@ def _scaled(value: float, factor: float) -> float:
     return value / inverse if inverse.is_integer() else value * factor
 
 
+def is_quantity(text: str) -> bool:
+    """Return whether ``text`` is a number followed by something, which is meant as its unit."""
+    match = _QUANTITY.fullmatch(text) if len(text) <= _LONGEST else None
+    return match is not None and bool(match[2])
+
+
 def offered(units: Iterable[str]) -> str:
     """Return the units that a person may write where ``units`` are meant."""
     return " or ".join(f"{unit} ({_OTHERS[unit]})" if unit in _OTHERS else unit for unit in units)

@@ -100,7 +100,7 @@ def test_a_file_with_a_byte_order_mark_and_line_ends_of_windows_is_read(tmp_path
         ("duration = 1.0", "a" + ".a" * 100_000 + " = 1", ["line 2 has a key of more than 100 parts"]),
         ("duration = 1.0", "\n".join(f"a{i} = 1" for i in range(50_000)), ["a0: unknown key", "and more"]),
         ("duration = 1.0", "a" * 1_000_000 + " = 1", ["unknown key"]),
-        ("[0.3, 0.2]", '["x m"' + ', "x m"' * 50_000 + "]", ["task.amplitudes[0] = 'x m'", "and more"]),
+        ("[0.3, 0.2]", '["1 x"' + ', "1 x"' * 50_000 + "]", ["task.amplitudes[0] = '1 x'", "and more"]),
     ],
 )
 def test_numbers_beyond_all_bounds_are_refused_by_their_key(tmp_path, old, new, words):

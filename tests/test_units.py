@@ -154,7 +154,11 @@ def test_an_experiment_with_units_is_the_one_without(tmp_path, angle_unit):
     ("old", "new", "words"),
     [
         ("duration = 2.0", 'duration = "2 m"', "duration = '2 m', expected a finite quantity in s (ms, us, min)"),
-        ("duration = 2.0", 'duration = "2"', "duration = '2', expected a unit after the number, s (ms, us, min)"),
+        (
+            "duration = 2.0",
+            'duration = "2"',
+            "duration = '2', expected a number greater than 0, or one with a unit: s (ms, us, min)",
+        ),
         ("speed = 90.0", 'speed = "50 mm/s"', "task.speed = '50 mm/s', expected a finite quantity in rad/s (deg/s"),
         ("semi_axes = [60.0, 30.0]", 'semi_axes = [1.0, "5 mm"]', "task.semi_axes[1] = '5 mm', expected"),
         ("speed = 0.05", 'speed = "5 deg/s"', "task.profile.speed = '5 deg/s', expected a finite quantity in m/s"),

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import re
 import signal
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import click
 
+from pathcontrol._advice import in_words_of, setting_in_words_of
 from pathcontrol.errors import PathControlError, PathControlWarning
 
 
@@ -21,10 +23,10 @@ class Group(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            with warnings_in_one_line():
+            with warnings_in_one_line(lambda: _chosen(ctx)):
                 return super().invoke(ctx)
         except PathControlError as error:
-            click.echo(f"error: {printable(str(error))}", err=True)
+            click.echo(f"error: {printable(in_options(str(error), _chosen(ctx)))}", err=True)
             sys.exit(2)
         except OSError as error:  # a full disk, a folder that nobody may write to
             if error.errno == errno.EPIPE:  # whom we tell has gone; click ends quietly
@@ -36,13 +38,39 @@ class Group(click.Group):
             sys.exit(130)
 
 
+def _chosen(ctx: click.Context) -> click.Command | None:
+    """The command that is run."""
+    group = ctx.command
+    return group.get_command(ctx, ctx.invoked_subcommand or "") if isinstance(group, click.Group) else None
+
+
+def in_options(message: str, command: click.Command | None) -> str:
+    """Return a message of the library in the options of a ``command``; advice that it has no option for is left out."""
+    if command is None:
+        return message
+    options = {param.name: param for param in command.params if isinstance(param, click.Option)}
+
+    def speak(name: str, value: str) -> str | None:
+        option = options.get(name)
+        if option is None:
+            return None
+        return option.opts[0] if option.is_flag or not value or value == "…" else f"{option.opts[0]} {_typed(value)}"
+
+    return setting_in_words_of(in_words_of(message, speak), speak)
+
+
+def _typed(value: str) -> str:
+    """A value as one types it: ``(x, y, z)`` as three, a call of Python as the name of a file."""
+    return "FILE" if re.fullmatch(r"\w+\(.*\)", value) else value.strip("()[]").replace(", ", " ")
+
+
 def printable(message: str) -> str:
     """``message`` without the control characters that a file may have put into it, which a terminal would obey."""
     return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in message)
 
 
 @contextlib.contextmanager
-def warnings_in_one_line() -> Iterator[None]:
+def warnings_in_one_line(command: Callable[[], click.Command | None] = lambda: None) -> Iterator[None]:
     """Print each of the library's warnings once, as one line on stderr without the line of code that raised it."""
     before, told = warnings.showwarning, set()
 
@@ -51,7 +79,7 @@ def warnings_in_one_line() -> Iterator[None]:
             return  # from another place
         if issubclass(category, PathControlWarning):
             told.add(str(message))
-            click.echo(f"warning: {printable(str(message))}", err=True)
+            click.echo(f"warning: {printable(in_options(str(message), command()))}", err=True)
         else:
             before(message, category, *where, **more)
 

@@ -121,7 +121,7 @@ def _with_robot(run: Run, file: Path, robot: RobotModel | None) -> Run:
         _ = run.robot
     except PathControlError as error:
         if robot is None:
-            raise InputError(f"{str(file)!r}: {error}; on the command line with --robot FILE") from error
+            raise InputError(f"{str(file)!r}: {error}") from error
         run = run.with_robot(robot)
     try:
         check_filmed(run, run.robot, run.task)

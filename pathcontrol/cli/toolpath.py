@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from pathcontrol.cli.group import json_option, uninterrupted
+from pathcontrol.cli.quantity import QuantityType, questioned_feed
 
 
 @click.command("toolpath")
@@ -16,8 +17,19 @@ from pathcontrol.cli.group import json_option, uninterrupted
 @click.option("--unit", metavar="UNIT", help="Unit of length of a file that does not say: mm, in, …")
 @click.option("--layer", "layers", multiple=True, metavar="LAYER", help="A layer of a DXF file; repeat for more.")
 @click.option("--ppi", type=float, help="Pixels per inch of an SVG file.  [default: 96]")
-@click.option("--feed", type=float, metavar="M/S", help="Feed of contours for which the file gives none.")
-@click.option("--start", type=float, nargs=3, metavar="X Y Z", help="Where a G-code program finds the tool, in metres.")
+@click.option(
+    "--feed",
+    type=QuantityType("m/s"),
+    metavar="SPEED",
+    help="Feed of contours for which the file gives none, as '50 mm/s', or a number in m/s.",
+)
+@click.option(
+    "--start",
+    type=QuantityType("m"),
+    nargs=3,
+    metavar="X Y Z",
+    help="Where a G-code program finds the tool, each as '10 mm', or a number in metres.",
+)
 @click.option(
     "--lenient", "unknown", flag_value="warn", help="Warn of what is not understood and cannot move the tool."
 )
@@ -32,6 +44,7 @@ def command(file: Path, layers: tuple[str, ...], plot: Path | None, as_json: boo
     from pathcontrol.toolpaths.summary import summary
 
     given = {name: value for name, value in (options | {"layers": list(layers) or None}).items() if value is not None}
+    questioned_feed(options["feed"])
     read = read_toolpath(file, **given)
     content = summary(read)
     if plot is not None:

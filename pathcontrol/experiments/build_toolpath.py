@@ -22,8 +22,8 @@ def build_toolpath(
         ExperimentError: the file cannot be used, or a contour cannot be followed.
     """
     workpiece = pose_of("task.workpiece", section.workpiece.arguments(to_radians))
-    with keyed("task.file"):
+    with keyed("task.file", section.reader_options):
         toolpath = read_toolpath(base_dir / section.file, **section.reading)
     arguments = section.arguments(to_radians)
-    with keyed("task", arguments):
+    with keyed("task", ToolpathSection.model_fields):
         return ToolpathTask(robot, arguments.pop("frame"), toolpath, workpiece, **arguments)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from pathcontrol._units import Quantity, quantity
+from pathcontrol._units import Quantity, is_quantity, offered, quantity
 from pathcontrol.errors import InputError
 from pathcontrol.experiments.values import did_you_mean, expected, shown
 
@@ -91,7 +91,7 @@ def in_si(at: tuple[int | str, ...], value: Any, units: str | tuple[str, ...], w
         return [in_si((*at, i), item, units, wrong) for i, item in enumerate(value)]
     if isinstance(value, dict):
         return {key: in_si((*at, key), item, units, wrong) for key, item in value.items()}
-    if isinstance(value, str):
+    if isinstance(value, str) and is_quantity(value):
         try:
             if len(wrong) > _MOST_TOLD:
                 return value
@@ -143,7 +143,14 @@ def _text(section: type[Section], error: Any) -> str:
     if kind == "extra_forbidden":
         keys = sorted(section.model_fields, key=lambda name: name not in section.not_arguments)
         return f": unknown key{did_you_mean(error['loc'][-1], keys) or ';'} valid keys: {', '.join(keys)}"
-    return f" = {shown(value)}, expected {_wanted(error)}{_closest_literal(error)}"
+    return f" = {shown(value)}, expected {_wanted(error)}{_closest_literal(error)}{_or_with_unit(section, error)}"
+
+
+def _or_with_unit(section: type[Section], error: Any) -> str:
+    """The units that a text might have had, where it stands for a quantity."""
+    about_text = error["loc"] and isinstance(error["input"], str)
+    units = section.units.get(error["loc"][0]) if about_text else None
+    return "" if units is None else f", or one with a unit: {offered([units] if isinstance(units, str) else units)}"
 
 
 def _wanted(error: Any) -> str:

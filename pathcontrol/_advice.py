@@ -1,0 +1,56 @@
+"""Advice in messages, said in the words of whoever reads it: keyword arguments as options, or as keys of a file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+#: what an argument and its value are called, or None where there is no such thing
+Speak = Callable[[str, str], str | None]
+
+_WORD = re.compile(
+    r"""(?<![\w=])'[^']*' | `[^`]*` | <[^>]*>                      # what is quoted is not ours
+    | (?<![-\w.&?\#/=$])(?<!\w\()(?P<name>[A-Za-z_]\w*)=(?!=)
+      (?P<value>'[^']*'|\([^()]*\)|\[[^][]*\]|\{[^{}]*\}|[\w.…]+(?:\([^()]*\))?)?
+    """,
+    re.VERBOSE,
+)
+_BREAK = re.compile(r"; |, or | \(")
+_SETTING = re.compile(r"(?P<name>[a-z]\w*) = (?P<value>'[^']*'|[^,;]+)(?=[,;])")
+
+
+def in_words_of(message: str, speak: Speak) -> str:
+    """Return ``message`` with ``name=value`` as ``speak`` calls it.
+
+    Where there is no such thing, the advice is left out, from the ``; `` or ``, or`` before it to the next one.
+    """
+    parts, end = [], 0
+    for word in _WORD.finditer(message):
+        if word["name"] is None or word.start() < end:
+            continue
+        said = speak(word["name"], (word["value"] or "").strip("'"))
+        if said is not None:
+            parts.append(message[end : word.start()] + said)
+            end = word.end()
+            continue
+        breaks = [found.start() for found in _BREAK.finditer(message, end, word.start())]
+        if breaks:
+            parts.append(message[end : breaks[-1]])
+            end = _end_of_advice(message, word.end(), bracket=message[breaks[-1]] == " ")
+    return "".join(parts) + message[end:]
+
+
+def setting_in_words_of(message: str, speak: Speak) -> str:
+    """Return ``message`` with the ``name = value`` or ``name:`` at its beginning as ``speak`` calls it."""
+    if (named := re.match(r"([a-z]\w*)(?=: )", message)) and (said := speak(named[1], "")) is not None:
+        return said + message[named.end() :]
+    found = _SETTING.match(message)
+    said = None if found is None else speak(found["name"], found["value"].strip("'"))
+    return message if found is None or said is None else said + message[found.end() :]
+
+
+def _end_of_advice(message: str, begin: int, bracket: bool) -> int:
+    if bracket:
+        return message.find(")", begin) + 1 or len(message)
+    ends = [at for mark in ("; ", "\n") if (at := message.find(mark, begin)) >= 0]
+    return min(ends, default=len(message))

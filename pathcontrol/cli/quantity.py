@@ -1,0 +1,41 @@
+"""Options that are quantities: a number in SI units, or one with its unit, as ``--feed "50 mm/s"``."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import click
+
+from pathcontrol._units import quantity
+from pathcontrol.errors import InputError, PathControlWarning
+
+_FASTEST = 5.0  # m/s; no arm feeds faster
+
+
+class QuantityType(click.ParamType):
+    """A number in an SI ``unit``, or a text with a unit of the same dimension."""
+
+    def __init__(self, unit: str) -> None:
+        self.unit, self.name = unit, "quantity"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            return float(value)
+        except ValueError:
+            pass
+        try:
+            return float(quantity(str(value), self.unit))
+        except InputError as error:
+            self.fail(f"{value!r}: {error}", param, ctx)
+
+
+def questioned_feed(feed: float | None) -> float | None:
+    """Return the feed of an option [m/s]; one that no arm can keep is questioned."""
+    if feed is not None and feed > _FASTEST:
+        warnings.warn(
+            f"--feed {feed:g} is {feed:g} m/s, faster than arms are; did you mean --feed '{feed:g} mm/s'?",
+            PathControlWarning,
+            stacklevel=2,
+        )
+    return feed

@@ -1,0 +1,133 @@
+"""Messages on the command line speak of the command's own options, and advise nothing that it has no option for."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import pathcontrol
+from pathcontrol.cli import main
+from pathcontrol.cli.group import in_options
+from pathcontrol.experiments.keyed import keyed
+
+SOURCE = Path(pathcontrol.__file__).parent
+KEYWORD = re.compile(r"(?<![-\w.&?#/=$'])(?<!\w\()([a-z_]\w*)=(?![=\d])")
+
+
+def messages():
+    """Every text of the package that an error or a warning may say and that names an argument by ``name=``."""
+    for file in sorted(SOURCE.rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if not (
+                isinstance(node, ast.Call)
+                and re.search(r"Error$|^warn$", getattr(node.func, "id", getattr(node.func, "attr", "")))
+            ):
+                continue
+            for text in node.args:
+                said = _text(text)
+                if said and KEYWORD.search(_without_quoted(said)):
+                    yield pytest.param(said, id=f"{file.stem}-{node.lineno}")
+
+
+def _text(node):
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value
+    if isinstance(node, ast.JoinedStr):
+        return "".join(part.value if isinstance(part, ast.Constant) else "thing" for part in node.values)
+    if isinstance(node, ast.BinOp):
+        return (_text(node.left) or "") + (_text(node.right) or "thing")
+    return None
+
+
+def _without_quoted(text):
+    return re.sub(r"`[^`]*`|<[^>]*>|(?<![=\w])'[^']*'", "", text)
+
+
+@pytest.mark.parametrize("message", list(messages()))
+def test_no_command_speaks_of_arguments_of_python(message):
+    for name, command in main.commands.items():
+        said = in_options(message, command)
+        left = KEYWORD.findall(_without_quoted(said))
+        assert not left or message.startswith(left[0]), (name, said)
+        for option in re.findall(r"(?<![-\w])--[a-z][-a-z0-9]*", _without_quoted(said)):
+            known = {word for param in command.params for word in param.opts}
+            assert option in known or option in message, (name, said)
+
+
+def test_there_are_such_messages():
+    assert len(list(messages())) > 10
+
+
+@pytest.mark.parametrize(
+    ("command", "message", "said"),
+    [
+        ("toolpath", "TEXT; choose layers= without it of A, B", "TEXT; choose --layer without it of A, B"),
+        ("toolpath", "'a=4', or pass it over with unknown='warn'", "'a=4', or pass it over with --lenient"),
+        ("toolpath", "give unit='mm' or unit='in'", "give --unit mm or --unit in"),
+        ("toolpath", "read the file with start=(x, y, z)", "read the file with --start x y z"),
+        ("toolpath", "ppi = -1, expected a number", "--ppi -1, expected a number"),
+        ("toolpath", "layers: there is no layer 'a'", "--layer: there is no layer 'a'"),
+        ("view", "no robot; give robot=load_robot(...)", "no robot; give --robot FILE"),
+        ("view", "no path, as it holds data only; give task=…", "no path, as it holds data only"),
+        ("check", "a joint (closed=[...] locks it) moves; see", "a joint moves; see"),
+        ("check", "wrong; closed=False makes it open; try another", "wrong; try another"),
+        ("check", "<joint name='a'> is odd; `dask --n=1` too", "<joint name='a'> is odd; `dask --n=1` too"),
+        ("view", "Circle.theta(s=3.1) = 0, expected more", "Circle.theta(s=3.1) = 0, expected more"),
+    ],
+)
+def test_advice_is_translated_or_left_out(command, message, said):
+    assert in_options(message, main.commands[command]) == said
+
+
+def test_keyed_errors_speak_of_lines_of_the_file():
+    from pathcontrol.errors import ExperimentError, ToolpathError
+
+    with pytest.raises(ExperimentError) as error, keyed("task.file", ("unit", "layers")):
+        raise ToolpathError("no unit; give unit='mm', or choose layers= of A; or read it with start=(x, y, z)")
+    assert str(error.value) == 'task.file: no unit; give unit = "mm", or choose layers = of A'
+
+
+def run(*words):
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def test_a_feed_and_a_start_may_have_units(tmp_path):
+    import json
+
+    file = tmp_path / "square.csv"
+    file.write_text("x [mm],y [mm],z [mm]\n0,0,0\n10,0,0\n10,10,0\n", encoding="utf-8")
+    done = [run("toolpath", file, "--feed", feed, "--json") for feed in ("0.05", "50 mm/s", "3 m/min")]
+    assert [json.loads(one.stdout)["contours"][0]["feed_m_s"] for one in done] == [0.05] * 3
+    program = tmp_path / "cut.ngc"
+    program.write_text("G21 G90 F300\nG1 X10\n", encoding="utf-8")
+    done = [
+        run("toolpath", program, "--start", *start, "--json") for start in (("0", "0.001", "0"), ("0 m", "1 mm", "0"))
+    ]
+    assert done[0].exit_code == 0, done[0].output
+    assert done[0].stdout == done[1].stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--feed", "50 kg"), "m/s (mm/s"),
+        (("--feed", "fast"), "expected a number with a unit"),
+        (("--start", "0", "1 s", "0"), "m (mm, cm"),
+    ],
+)
+def test_a_unit_of_another_dimension_is_refused_by_its_option(tmp_path, words, said):
+    done = run("toolpath", tmp_path / "square.csv", *words)
+    assert done.exit_code == 2
+    assert words[0] in done.output
+    assert said in " ".join(done.output.split())
+
+
+def test_a_feed_of_50_is_questioned(tmp_path):
+    file = tmp_path / "square.csv"
+    file.write_text("x [mm],y [mm],z [mm]\n0,0,0\n10,0,0\n10,10,0\n", encoding="utf-8")
+    assert "warning: --feed 50 is 50 m/s" in run("toolpath", file, "--feed", "50").stderr
+    assert "warning" not in run("toolpath", file, "--feed", "50 mm/s").stderr
