@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 
 _PATIENCE = 2.0
 
@@ -34,6 +35,9 @@ def _start():  # type: ignore[no-untyped-def]
     from rich.console import Console
     from rich.progress import Progress
 
-    bar = Progress(console=Console(stderr=True), transient=True)
+    console = Console(stderr=True)
+    # in a notebook without ipywidgets rich warns, and cannot draw a bar
+    missing = console.is_jupyter and find_spec("ipywidgets") is None
+    bar = Progress(console=Console(force_jupyter=False, quiet=True) if missing else console, transient=True)
     bar.start()
     return bar
