@@ -38,6 +38,16 @@ class Bezier(Segment):
                 raise InputError(f"weights = {weights.tolist()}, expected {len(points)} weights greater than 0")
             object.__setattr__(self, "weights", readonly(weights))
 
+    @classmethod
+    def of_each(cls, points: Array) -> list[Bezier]:
+        """Make a polynomial curve of each of the control points (k, degree + 1, 3), which are known to be good."""
+        points, curves = readonly(points), []
+        for row in points:
+            curve = object.__new__(cls)
+            curve.__dict__.update(points=row, weights=None)
+            curves.append(curve)
+        return curves
+
     @property
     def first(self) -> Array:
         return self.points[0]

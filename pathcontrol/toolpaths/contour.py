@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol.errors import InputError
+from pathcontrol.toolpaths.columns import measure_bounds, measure_lengths
 from pathcontrol.toolpaths.segments import Polyline, Segment
 
 _MEET = 1e-9  # m, how near the ends of neighbouring segments are
@@ -57,6 +58,7 @@ class Contour:
     @property
     def length(self) -> float:
         """Arc length [m]."""
+        measure_lengths(self.segments)
         return sum(segment.length for segment in self.segments)
 
     @property
@@ -77,6 +79,7 @@ class Contour:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper corner of the bounding box [m], each (3,)."""
+        measure_bounds(self.segments)
         lower, upper = zip(*(segment.bounds for segment in self.segments), strict=True)
         return np.min(lower, axis=0), np.max(upper, axis=0)
 
@@ -85,6 +88,7 @@ class Contour:
         x = as_array("x", x)
         flat = x.reshape(-1, 3)
         best = np.full(len(flat), np.inf)
+        measure_bounds(self.segments)
         boxes = np.stack([_to_box(flat, *segment.bounds) for segment in self.segments])
         for rank in np.argsort(boxes.min(1)):
             near = boxes[rank] < best

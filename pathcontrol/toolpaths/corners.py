@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.toolpaths.columns import end_tangents, measure_lengths
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments import Polyline, Segment
 
@@ -35,6 +36,9 @@ class Corner(NamedTuple):
 def corners(contour: Contour, angle: float = SHARP) -> list[Corner]:
     """The corners that turn by more than ``angle`` [rad], in order; that of a closed contour's start comes last."""
     found, station = [], 0.0
+    measure_lengths(contour.segments)
+    starts, ends = end_tangents(contour.segments)
+    turns_at = angles(ends, np.roll(starts, -1, axis=0))
     for i, segment in enumerate(contour.segments):
         if isinstance(segment, Polyline):
             turns = angles(segment.directions[:-1], segment.directions[1:])
@@ -42,11 +46,8 @@ def corners(contour: Contour, angle: float = SHARP) -> list[Corner]:
                 where = station + float(segment.stations[j])
                 found.append(Corner(i, int(j), where, segment.points[j], float(turns[j - 1])))
         station += segment.length
-        if i + 1 < len(contour.segments) or contour.closed:
-            after = contour.segments[(i + 1) % len(contour.segments)]
-            turn = float(angles(end_tangent(segment), start_tangent(after)))
-            if turn > angle:
-                found.append(Corner(i, 0, station, segment.point(np.array(1.0)), turn))
+        if (i + 1 < len(contour.segments) or contour.closed) and turns_at[i] > angle:
+            found.append(Corner(i, 0, station, segment.last, float(turns_at[i])))
     return found
 
 

@@ -11,6 +11,7 @@ from scipy.special import comb
 from pathcontrol._arrays import Array
 
 _STILL = 1e-8  # of the largest coefficient, what counts as zero
+_NEARLY_STILL, _TINY = 1e-4, 1e-300  # of the largest step, below which a closer look is taken
 _INSIDE = 1e-6  # how far from 0 and 1 a parameter lies inside
 
 
@@ -32,6 +33,40 @@ def straight_turns(points: Array, weights: Array | None, tolerance: float) -> Ar
         return None
     turns = _roots(_hodograph(along[:, None], weights)[0])
     return np.stack([points[0], *(_split(_homogeneous(points, weights), u)[0][-1, :3] for u in turns), points[-1]])
+
+
+def is_plain(points: Array, tolerance: float) -> Array:
+    """Which curves (k, degree + 1, 3), polynomial, are surely neither straight nor stand still anywhere, (k,).
+
+    Those of a degree above 3 are not looked at.
+    """
+    degree = points.shape[1] - 1
+    if not 2 <= degree <= 3:
+        return np.zeros(len(points), dtype=bool)
+    row = np.arange(len(points))
+    legs = points - points[:, :1]
+    squares = (legs * legs).sum(-1)
+    farthest = np.argmax(squares, axis=1)
+    size = np.sqrt(squares[row, farthest])
+    along = legs[row, farthest] / np.maximum(size, _TINY)[:, None]
+    off = legs - (legs * along[:, None]).sum(-1, keepdims=True) * along[:, None]
+    curved = (size > tolerance) & ((off * off).sum(-1).max(1) > (2 * tolerance) ** 2)
+    return curved & ~_may_stand_still(np.diff(points, axis=1))
+
+
+def _may_stand_still(steps: Array) -> Array:
+    """Whether the derivatives, with Bernstein coefficients ``steps`` (k, 2 or 3, 3), might vanish in (0, 1), (k,)."""
+    row, size = np.arange(len(steps)), np.abs(steps).max(1)
+    of = steps[row, :, np.argmax(size, axis=1)]  # the coordinate that changes most
+    a = of[:, 0] - 2 * of[:, 1] + of[:, 2] if of.shape[1] == 3 else np.zeros(len(of))
+    b, c = (of[:, 1] - of[:, 0]) * (of.shape[1] - 1), of[:, 0]
+    with np.errstate(all="ignore"):
+        q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4 * a * c, 0.0)), b))
+        turns = np.nan_to_num(np.stack([q / a, c / q], axis=1), nan=0.0, posinf=0.0, neginf=0.0).clip(0.0, 1.0)
+    rest = 1 - turns
+    basis = [rest, turns] if steps.shape[1] == 2 else [rest * rest, 2 * rest * turns, turns * turns]
+    left = sum(share[..., None] * steps[:, None, i] for i, share in enumerate(basis))
+    return (np.abs(left).max(-1) <= _NEARLY_STILL * size.max(1)[:, None]).any(1)
 
 
 def without_cusps(points: Array, weights: Array | None) -> list[tuple[Array, Array | None]]:

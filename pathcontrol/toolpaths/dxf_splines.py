@@ -10,7 +10,7 @@ from scipy.special import comb
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.pieces import Curve, Lines, Piece
+from pathcontrol.toolpaths.pieces import Curve, Curves, Lines, Piece
 
 _HIGHEST_DEGREE = 15
 _LIGHTEST = 1e-9  # of the largest weight
@@ -34,7 +34,7 @@ def b_spline(degree: int, knots: Array, points: Array, weights: Array | None) ->
     powers = np.stack([spline(ends[:-1], nu=k) * step**k / factorial(k) for k in range(degree + 1)])
     pieces = _bernstein(powers)
     if weights is None:
-        return [Curve(piece[:, :3]) for piece in pieces]
+        return [Curves(pieces[..., :3])]
     return [Curve(piece[:, :3] / piece[:, 3:], piece[:, 3]) for piece in pieces]
 
 
@@ -62,7 +62,7 @@ def through(points: Array, tangents: tuple[Array, Array] | None, closed: bool) -
         ends = tuple((1, tangent / np.linalg.norm(tangent)) for tangent in tangents)
     u = np.concatenate([[0.0], np.cumsum(chords)])
     powers = CubicSpline(u, ring, bc_type=ends).c[::-1]
-    return [Curve(piece) for piece in _bernstein(powers * chords[:, None] ** np.arange(4)[:, None, None])]
+    return [Curves(_bernstein(powers * chords[:, None] ** np.arange(4)[:, None, None]))]
 
 
 def _bernstein(powers: Array) -> Array:

@@ -14,7 +14,7 @@ from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.arc import Arc
 from pathcontrol.toolpaths.bezier import Bezier
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.cusps import straight_turns, without_cusps
+from pathcontrol.toolpaths.cusps import is_plain, straight_turns, without_cusps
 from pathcontrol.toolpaths.segments import Polyline, Segment
 from pathcontrol.toolpaths.text import MAX_COORDINATE, MAX_SEGMENTS
 
@@ -71,6 +71,27 @@ class Curve:
 
 
 @dataclass(frozen=True, eq=False)
+class Curves:
+    """Polynomial Bézier curves of one degree, one after another, with control points (k, degree + 1, 3)."""
+
+    points: Array
+
+    def mapped(self, matrix: Array) -> Curves:
+        return Curves(_mapped(self.points, matrix))
+
+    def segments(self) -> list[Segment]:
+        plain = is_plain(_near(self.points), NOTHING)
+        found: list[Segment] = list(Bezier.of_each(self.points[plain]))
+        if plain.all():
+            return found
+        several = iter(found)
+        parts = (
+            [next(several)] if good else Curve(row).segments() for good, row in zip(plain, self.points, strict=True)
+        )
+        return [segment for part in parts for segment in part]
+
+
+@dataclass(frozen=True, eq=False)
 class EllipticArc:
     """c + cos φ x + sin φ y for φ from ``start`` to ``start`` + ``sweep`` [rad]; c, x and y are (3,)."""
 
@@ -119,11 +140,18 @@ class Budget:
         Raises:
             ToolpathError: it is too much.
         """
-        self._used += sum(len(piece.points) if isinstance(piece, Lines) else _CURVE for piece in pieces)
+        self._used += sum(_effort(piece) for piece in pieces)
         if self._used > MAX_SEGMENTS:
             raise ToolpathError(
                 f"the drawing has more than {MAX_SEGMENTS} lines, or {MAX_SEGMENTS // _CURVE} curves; split it"
             )
+
+
+def _effort(piece: Piece) -> int:
+    """What a piece counts in the budget."""
+    if isinstance(piece, Lines):
+        return len(piece.points)
+    return _CURVE * (len(piece.points) if isinstance(piece, Curves) else 1)
 
 
 def distinct(points: Array) -> Array:

@@ -59,7 +59,7 @@ class Segment(ABC):
         """Arc length as a function of u, which it is inverted from."""
         return ArcLength(self.derivative)
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Arc length [m]."""
         return self.arc_length.total
@@ -116,11 +116,11 @@ class Polyline(Segment):
         """Arc length at each point [m], (k + 1,)."""
         return np.concatenate([[0.0], np.cumsum(self.edges)])
 
-    @property
+    @cached_property
     def length(self) -> float:
         return float(self.stations[-1])
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[Array, Array]:
         return self.points.min(0), self.points.max(0)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+import numpy as np
+
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.svg_pen import Pen, Subpath
 from pathcontrol.toolpaths.svg_values import arcs, numbers
@@ -41,6 +43,10 @@ def _draw(pen: Pen, letter: str, arguments: str) -> None:
         raise ToolpathError(
             f"path data has {len(values)} numbers after {letter}, expected {size} or a multiple: {arguments[:30]!r}"
         )
+    if name in _RUNS and len(values) > size:
+        points = np.array(values[::2]) + 1j * np.array(values[1::2])
+        _RUNS[name](pen, points.reshape(-1, size // 2), relative)
+        return
     for i in range(0, len(values), size):
         origin = pen.at if relative else 0j
         _STROKES[name](pen, origin, *values[i : i + size])
@@ -55,6 +61,7 @@ def _smooth_cubic(pen: Pen, o: complex, *v: float) -> None:
     pen.curve(pen.reflection("C"), o + complex(*v[:2]), o + complex(*v[2:]))
 
 
+_RUNS: dict[str, Callable[..., None]] = {"L": Pen.lines, "C": Pen.curves, "Q": Pen.curves}
 _STROKES: dict[str, Callable[..., None]] = {
     "M": lambda pen, o, x, y: pen.move(o + complex(x, y)),
     "L": lambda pen, o, x, y: pen.line(o + complex(x, y)),

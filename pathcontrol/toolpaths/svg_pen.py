@@ -10,8 +10,8 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.pieces import Curve, EllipticArc, Lines, Piece
-from pathcontrol.toolpaths.text import MAX_SEGMENTS
+from pathcontrol.toolpaths.pieces import Curve, Curves, EllipticArc, Lines, Piece
+from pathcontrol.toolpaths.text import MAX_CONTOURS, MAX_SEGMENTS
 
 _NO_RADIUS = 1e-15  # user units; with less an arc is a line
 _SHALLOW = 1e-3  # half chord over radius, below which the centre of an arc is too far away to start from
@@ -31,6 +31,7 @@ class Pen:
         self.at = self._start = 0j
         self._handle = ("", 0j)  # the last control point, and of which kind of curve
         self._line: list[complex] = [0j]
+        self._curves: list[Array] = []
         self._pieces: list[Piece] = []
         self._subpaths: list[Subpath] = []
         self._strokes = 0
@@ -48,8 +49,29 @@ class Pen:
 
     def curve(self, *points: complex) -> None:
         """A quadratic or cubic Bézier curve."""
-        self._add(Curve(_space([self.at, *points])), points[-1])
-        self._handle = ("Q" if len(points) == 2 else "C", points[-2])
+        self.curves(np.array([points]))
+
+    def curves(self, points: Array, relative: bool = False) -> None:
+        """Bézier curves one after another by their points but the first, (k, 2 or 3), from their starts if relative."""
+        starts = np.concatenate([[self.at], points[:-1, -1]])
+        if relative:
+            starts = np.cumsum(starts)
+            points = points + starts[:, None]
+        self._end_line()
+        if self._curves and self._curves[0].shape[1] != points.shape[1] + 1:
+            self._end_curves()
+        self._curves.append(np.column_stack([starts, points]))
+        self._go(complex(points[-1, -1]), len(points))
+        self._line = [self.at]
+        self._handle = ("Q" if points.shape[1] == 2 else "C", complex(points[-1, -2]))
+
+    def lines(self, points: Array, relative: bool = False) -> None:
+        """Straight lines one after another to points (k, 1), from each one's start if relative."""
+        ends = points[:, 0]
+        if relative:
+            ends = np.cumsum(np.concatenate([[self.at], ends]))[1:]
+        self._go(complex(ends[-1]), len(ends))
+        self._line += ends.tolist()
 
     def arc(self, rx: float, ry: float, rotation: float, large: float, sweep: float, point: complex) -> None:
         """An arc of an ellipse; ``rotation`` is in degrees, ``large`` and ``sweep`` are 0 or 1."""
@@ -75,27 +97,38 @@ class Pen:
         self._finish(closed=False)
         return self._subpaths
 
-    def _go(self, point: complex) -> None:
-        """The end of a line or a curve."""
+    def _go(self, point: complex, strokes: int = 1) -> None:
+        """The end of a line or a curve, or of several."""
         self.at, self._handle = point, ("", 0j)
-        self._strokes += 1
+        self._strokes += strokes
         if self._strokes > MAX_SEGMENTS:
             raise ToolpathError(f"path data has more than {MAX_SEGMENTS} segments; split it")
 
     def _add(self, piece: Piece, end: complex) -> None:
         self._end_line()
+        self._end_curves()
         self._pieces.append(piece)
         self._go(end)
         self._line = [end]
 
     def _end_line(self) -> None:
         if len(self._line) > 1:
+            self._end_curves()
             self._pieces.append(Lines(_space(self._line)))
+
+    def _end_curves(self) -> None:
+        if self._curves:
+            points = np.concatenate(self._curves)
+            self._pieces.append(Curves(np.stack([points.real, points.imag, np.zeros(points.shape)], axis=-1)))
+            self._curves = []
 
     def _finish(self, closed: bool) -> None:
         self._end_line()
+        self._end_curves()
         if self._pieces:
             self._subpaths.append(Subpath(self._pieces, closed))
+            if len(self._subpaths) > MAX_CONTOURS:
+                raise ToolpathError(f"path data has more than {MAX_CONTOURS} subpaths; split the drawing")
         self._pieces, self._line = [], [self._start]
         self.at, self._handle = self._start, ("", 0j)
 

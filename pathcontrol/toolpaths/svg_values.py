@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from pathcontrol.errors import ToolpathError
 # each pattern matches in one way only: no possessive quantifiers, which early releases of Python 3.11 get wrong
 _BLANKS = r"[ \t\n\r\f]*"
 _NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+_STRANGE, _BARE_COMMA = re.compile(r"[^-+0-9eE., \t\n\r\f]"), re.compile(rf",{_BLANKS}(?:,|\Z)|\A{_BLANKS},")
 _START, _AFTER = re.compile(_BLANKS), f"{_BLANKS}(,?){_BLANKS}"
 _FIGURE, _FLAG = re.compile(f"({_NUMBER}){_AFTER}"), re.compile(f"([01]){_AFTER}")
 _ARC = (_FIGURE, _FIGURE, _FIGURE, _FLAG, _FLAG, _FIGURE, _FIGURE)
@@ -34,6 +36,16 @@ def number(text: str) -> float:
 
 def numbers(text: str, what: str) -> list[float]:
     """Numbers separated by blanks or commas."""
+    if not (_STRANGE.search(text) or _BARE_COMMA.search(text)):
+        with suppress(ValueError):  # two of them without a separator, as in 1-2, or none
+            found = [float(figure) for figure in text.replace(",", " ").split()]
+            if max(map(abs, found), default=0.0) <= _LARGEST:
+                return found
+    return _scanned(text, what)
+
+
+def _scanned(text: str, what: str) -> list[float]:
+    """Numbers of any form, one after another."""
     start = _START.match(text)
     assert start is not None
     found, at, comma = [], start.end(), ""
