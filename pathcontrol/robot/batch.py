@@ -27,6 +27,11 @@ class RobotBatch:
     inertia go through one batched call together; for others the articulated-body algorithm is called row by row.
     Either way a row has the same result to the last bit as if it were alone.
 
+    Attributes:
+        robots: the arms.
+        bodies: the rigid bodies that differ among them.
+        body: which of these each arm has, (N,).
+
     Args:
         robots: the arms, one for each rollout.
         friction: the friction of all of them, with coefficients (n,) or (N, n); default that of each.
@@ -49,7 +54,7 @@ class RobotBatch:
         self.position_units = first.position_units
         law = friction_of_each([robot.friction for robot in self.robots]) if friction is None else friction
         self.actuation = Actuation(_limits(self.robots), law, _encoder_counts(self.robots))
-        self.bodies, self._body = _grouped(self.robots, _same_body)
+        self.bodies, self.body = _grouped(self.robots, _same_body)
         self._parts = self._divided(np.zeros(self.n))
 
     def __len__(self) -> int:
@@ -91,15 +96,15 @@ class RobotBatch:
                 M[found] = parts.together[part][0].mass_matrix(q[found])
         for k in np.flatnonzero(which < 0):
             row = rows[k]
-            M[k] = self.bodies[self._body[row]].mass_matrix_row(q[k], parts.armature[row])
+            M[k] = self.bodies[self.body[row]].mass_matrix_row(q[k], parts.armature[row])
         return M
 
     def _divided(self, added: Array) -> _Parts:
         """The rows by the calls that are made for them, with rotor inertia ``added`` to their own."""
-        armature = np.stack([body.armature for body in self.bodies])[self._body] + added
-        parts, order = _Parts(armature), np.argsort(self._body, kind="stable")
-        for rows in np.split(order, np.flatnonzero(np.diff(self._body[order])) + 1):
-            body = self.bodies[self._body[rows[0]]]
+        armature = np.stack([body.armature for body in self.bodies])[self.body] + added
+        parts, order = _Parts(armature), np.argsort(self.body, kind="stable")
+        for rows in np.split(order, np.flatnonzero(np.diff(self.body[order])) + 1):
+            body = self.bodies[self.body[rows[0]]]
             if len(rows) >= _FEW and (armature[rows] == armature[rows[0]]).all():
                 extra = np.broadcast_to(added, armature.shape)[rows[0]]
                 parts.part[rows] = len(parts.together)
