@@ -1,8 +1,11 @@
-"""Files that appear whole or not at all, and files that are read within bounds."""
+"""Files that appear whole or not at all, or are read within bounds, and folders that one process writes to."""
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
+import glob
+import os
 import secrets
 import stat
 from collections.abc import Iterator
@@ -10,24 +13,88 @@ from pathlib import Path
 
 from pathcontrol.errors import InputError, PathControlError
 
+_HEX = "[0-9a-f]" * 8
+
 
 @contextlib.contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """A temporary path beside ``path``, moved there if the block ends without an exception, else removed.
+    """Give a temporary path beside ``path``; it is moved there if the block ends without an exception, else removed.
 
-    The suffix is kept, since some writers choose the format by it.
+    The content is on the disk before the name is, so that a loss of power leaves the old file or the new one. The
+    suffix is kept, since some writers choose the format by it. What a killed process left of the same file is removed.
     """
     target = Path(path).resolve()  # through a link, to the file that is meant
     if target.is_dir():
         raise InputError(f"{str(path)!r} is a folder, expected the name of a file to write")
     target.parent.mkdir(parents=True, exist_ok=True)
-    temporary = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
-    try:
-        temporary.touch(exist_ok=False)
+    _remove_left_parts(target)
+    with _part_of(target) as temporary:
         yield temporary
+        _flush(temporary)
         temporary.replace(target)
+        with contextlib.suppress(OSError):  # not every file system can
+            _flush(target.parent)
+
+
+def write_whole(path: str | Path, content: bytes | memoryview) -> Path:
+    """Write a file, whole or not at all."""
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content)
+    return Path(path)
+
+
+@contextlib.contextmanager
+def locked(path: Path) -> Iterator[bool]:
+    """Hold the operating system's lock on a file or folder; give False where another process holds it.
+
+    The lock goes when the process does, however it ends, and leaves no file behind. On a file system without locks
+    nobody is kept out.
+    """
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        yield _lock(descriptor)
     finally:
+        os.close(descriptor)
+
+
+def _lock(descriptor: int) -> bool:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # the file system has no locks
+        return True
+    return True
+
+
+@contextlib.contextmanager
+def _part_of(target: Path) -> Iterator[Path]:
+    """Make an empty temporary file beside ``target``, locked to show that its writer lives, and remove it at the end."""
+    temporary = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
+    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    try:
+        _lock(descriptor)
+        yield temporary
+    finally:
+        os.close(descriptor)
         temporary.unlink(missing_ok=True)
+
+
+def _remove_left_parts(target: Path) -> None:
+    """Remove the temporary files of ``target`` whose writer does not live any more."""
+    for left in target.parent.glob(f".{glob.escape(target.stem)}-{_HEX}{glob.escape(target.suffix)}"):
+        with contextlib.suppress(OSError), locked(left) as ours:  # somebody else may be removing it too
+            if ours:
+                left.unlink()
+
+
+def _flush(path: Path) -> None:
+    """Have the operating system write a file or folder to the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def read_bounded(path: Path, most: int, what: str, error: type[PathControlError]) -> bytes:

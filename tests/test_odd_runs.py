@@ -80,6 +80,14 @@ def with_config(run: Run, config: Any) -> Run:
 # --- files --------------------------------------------------------------------------------------------------
 
 
+def spoilt(file: Path, spoil: Callable[[h5py.File], None]) -> None:
+    """Change a file as one of an earlier version, whose numbers no checksum guards."""
+    with h5py.File(file, "a") as opened:
+        for group in (opened, opened["origin"]):
+            del group.attrs["pathcontrol_sha256"]
+        spoil(opened)
+
+
 def without(name: str) -> Callable[[h5py.File], None]:
     return lambda file: file.__delitem__(name)
 
@@ -121,8 +129,7 @@ def unitless(file: h5py.File) -> None:
     ],
 )
 def test_a_spoilt_file_is_named(file: Path, spoil: Callable[[h5py.File], None], said: str) -> None:
-    with h5py.File(file, "a") as opened:
-        spoil(opened)
+    spoilt(file, spoil)
     result = CliRunner().invoke(main, ["view", str(file)])
     assert result.exit_code == 2
     assert str(file) in result.stderr
@@ -131,9 +138,11 @@ def test_a_spoilt_file_is_named(file: Path, spoil: Callable[[h5py.File], None], 
 
 
 def test_a_spoilt_path_is_named_with_its_file(file: Path) -> None:
-    with h5py.File(file, "a") as opened:
+    def renamed(opened: h5py.File) -> None:
         recipe = opened["origin"]["recipe"]
         recipe[:] = np.frombuffer(recipe[:].tobytes().replace(b"Circle", b"Cirkus"), dtype=np.uint8)
+
+    spoilt(file, renamed)
     result = CliRunner().invoke(main, ["view", str(file)])
     assert result.exit_code == 2
     assert str(file) in result.stderr

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pathcontrol._suffixes import check_suffix
 from pathcontrol.errors import InputError, PathControlError
 
 if TYPE_CHECKING:
@@ -56,8 +57,8 @@ def sweep_of(paths: Sequence[Path]) -> SweepResult | None:
     Raises:
         InputError: something else is named beside it.
     """
+    from pathcontrol.sweeps.manifest import MANIFEST
     from pathcontrol.sweeps.result import SweepResult
-    from pathcontrol.sweeps.store import MANIFEST
 
     found = [path for path in paths if (path / MANIFEST).is_file()]
     if found and len(paths) > 1:
@@ -66,10 +67,10 @@ def sweep_of(paths: Sequence[Path]) -> SweepResult | None:
 
 
 def check_out(out: Path | None, paths: Sequence[Path]) -> None:
-    """What is written is not what is read.
+    """Check that what is written is a page, and not what is read.
 
     Raises:
-        InputError: ``out`` is the file of one of the runs.
+        InputError: ``out`` is the file of one of the runs, or its name is that of another format.
     """
     if out is None:
         return
@@ -77,6 +78,7 @@ def check_out(out: Path | None, paths: Sequence[Path]) -> None:
     files = [run_file(path) for path in paths] if sweep is None else [sweep.history(i) for i in sweep.kept]
     if out.resolve() in [file.resolve() for file in files]:
         raise InputError(f"{str(out)!r} is the run itself, which would be lost; name another file to write")
+    check_suffix(out, "a page", ".html", ".htm")
 
 
 def run_file(path: Path) -> Path:

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.cli.group import json_option, uninterrupted
 from pathcontrol.cli.quantity import QuantityType, questioned_feed
 
@@ -43,6 +44,8 @@ def command(file: Path, layers: tuple[str, ...], plot: Path | None, as_json: boo
     from pathcontrol.toolpaths.read import read_toolpath
     from pathcontrol.toolpaths.summary import summary
 
+    if plot is not None:
+        refuse_suffix(plot, "a figure", ".svg", ".png", ".pdf")
     given = {name: value for name, value in (options | {"layers": list(layers) or None}).items() if value is not None}
     questioned_feed(options["feed"])
     read = read_toolpath(file, **given)

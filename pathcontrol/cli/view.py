@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pathcontrol._suffixes import check_suffix
 from pathcontrol.cli.group import import_all, json_option, open_option, open_page, printable
 from pathcontrol.cli.saved import check_out, load_runs, robot_option, run_file, runs_argument, sweep_of, worst_option
 
@@ -63,6 +64,8 @@ def command(
     from pathcontrol.view.film.recorder import record
 
     check_out(out, runs)
+    if mp4 is not None:
+        check_suffix(mp4, "a video (H.264 in MP4)", ".mp4")
     loaded = load_runs(runs, robot, worst)
     animation = record(one_or_all(loaded), rollout=rollout, layout=layout, tool=tool)  # type: ignore[arg-type]
     written = {}

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pathcontrol._files import whole_file
+from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.metrics import UNITS, metrics
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
@@ -22,8 +23,9 @@ def check_folder(out_dir: Path, output: Output) -> None:
     """Make the output folder and see that every file can be written, before time is spent on a simulation.
 
     Raises:
-        InputError: the folder cannot be made or written to, or a folder is where a file should go.
+        InputError: the folder is named like a file, cannot be made or written to, or is where a file should go.
     """
+    refuse_suffix(out_dir, "a folder")
     for name in output.model_dump(exclude_none=True, exclude={"figure_joints"}).values():
         target = out_dir / name
         try:

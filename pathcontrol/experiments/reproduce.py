@@ -12,6 +12,7 @@ import numpy as np
 
 from pathcontrol._files import whole_file
 from pathcontrol._progress import progress_bar
+from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.analysis.metrics import peak, steady_state
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
@@ -87,7 +88,8 @@ def reproduce(out: str | Path) -> dict[str, Any]:
     Returns:
         What ``summary.json`` holds.
     """
-    began, out, robot, experiments = time.perf_counter(), Path(out), load_robot("cicese_2dof"), {}
+    out = refuse_suffix(out, "a folder")
+    began, robot, experiments = time.perf_counter(), load_robot("cicese_2dof"), {}
     with progress_bar("reproducing", 2 * len(PAPER)) as update:
         for i, name in enumerate(PAPER):
             experiments[name] = paper_experiment(name, robot, progress=False)

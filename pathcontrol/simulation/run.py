@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
+from pathcontrol._suffixes import check_suffix
 from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
@@ -207,17 +208,23 @@ class Run:
         """Write netCDF, whole or not at all; :meth:`load` reads it back, :attr:`robot` and :attr:`task` included.
 
         The robot is kept as its URDF and what was done to it, without the files of its meshes; the path as what it is
-        made of where it is one of the library's, else as samples, see :class:`RecordedPath`.
+        made of where it is one of the library's, else as samples, see :class:`RecordedPath`. The file has checksums,
+        which :meth:`load` checks.
+
+        Raises:
+            InputError: the name does not end with ``.nc``; the message names what writes other formats.
+            OSError: the file cannot be written, as on a full disk; what was there before stays.
         """
-        write_run(Path(path), self.data, self.config, self._stored())
-        return Path(path)
+        path = check_suffix(path, "a run", ".nc")
+        write_run(path, self.data, self.config, self._stored())
+        return path
 
     @classmethod
     def load(cls, path: str | Path) -> Run:
-        """Read what :meth:`save` wrote.
+        """Read what :meth:`save` wrote; of a file without a checksum, from an earlier version, a warning says so.
 
         Raises:
-            InputError: there is no such file, or it is not a saved run.
+            InputError: there is no such file, it is damaged, or it is not a saved run.
         """
         data, config, stored = read_run(Path(path))
         return cls(data, config, None if stored is None else Origin.load(stored))

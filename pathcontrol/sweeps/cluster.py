@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pathcontrol.errors import ClusterError, MissingExtraError
-from pathcontrol.sweeps.store import PACKAGES, versions
+from pathcontrol.sweeps.manifest import PACKAGES, versions
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import warnings
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import xarray as xr
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.metrics import LABELS, UNITS
 from pathcontrol.analysis.readable import readable_parameters
-from pathcontrol.errors import InputError
+from pathcontrol.errors import InputError, PathControlWarning
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.variables import OUTCOMES
 from pathcontrol.sweeps.goals import Limits, Objectives, front
@@ -31,13 +32,14 @@ class SweepResult:
         definition: what it was defined by: space, seed, metrics, keep and what builds a chunk.
 
     Raises:
-        InputError: there is no sweep.
+        InputError: there is no sweep, or its manifest or a chunk is damaged or missing; the message names the files,
+            which resuming the sweep makes again.
     """
 
     def __init__(self, folder: str | Path) -> None:
         self._store = Store(folder)
         self.samples: int = self._store.samples
-        self.definition: dict[str, Any] = self._store.manifest["definition"]
+        self.definition: dict[str, Any] = self._store.manifest.definition
 
     @property
     def folder(self) -> Path:
@@ -58,10 +60,11 @@ class SweepResult:
         """The history of a sample that is kept, a run of one rollout; ``run.config["sweep"]`` has its parameters.
 
         Raises:
-            InputError: it is not kept.
+            InputError: it is not kept, or its file is damaged or missing.
         """
         if sample not in self.kept:
             raise InputError(f"the history of sample {sample} is not kept; kept are {self.kept}")
+        self._store.check_run(sample)
         return Run.load(self.history(sample))
 
     def history(self, sample: int) -> Path:
@@ -71,13 +74,14 @@ class SweepResult:
     def histories(self, worst: int | None = None) -> dict[str, Run]:
         """The kept histories by number and parameters of their samples, the worst first, to be filmed or compared.
 
-        What diverged comes first, then the largest values of the metric by which histories were kept.
+        What diverged comes first, then the largest values of the metric by which histories were kept. Histories whose
+        files are damaged or missing are left out, with a warning.
 
         Args:
             worst: how many of them; default all.
 
         Raises:
-            InputError: none is kept.
+            InputError: none is kept, or none can be read.
         """
         columns = self._store.columns(["sample", "status", self.kept_by])
         kept = [i for i in self.kept if i in columns["sample"]]  # a killed process may leave one without its numbers
@@ -86,7 +90,25 @@ class SweepResult:
         rows = np.searchsorted(columns["sample"], kept)
         badness = columns.get(self.kept_by, np.zeros(len(columns["sample"])))[rows]
         order = np.argsort(np.where(columns["status"][rows] == "diverged", -np.inf, -badness), kind="stable")
-        return dict(self._named(kept[i]) for i in order[:worst])
+        return self._readable([kept[i] for i in order], worst)
+
+    def _readable(self, samples: Sequence[int], most: int | None) -> dict[str, Run]:
+        """The first histories of ``samples`` that can be read, by their names."""
+        found: dict[str, Run] = {}
+        lost: list[str] = []
+        for sample in samples:
+            if len(found) == most:
+                break
+            try:
+                name, run = self._named(sample)
+                found[name] = run
+            except InputError as error:
+                lost.append(str(error))
+        if not found:
+            raise InputError("; ".join(lost))
+        if lost:
+            warnings.warn(f"left out: {'; '.join(lost)}", PathControlWarning, stacklevel=3)
+        return found
 
     @property
     def kept_by(self) -> str:

@@ -13,15 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
+from pathcontrol._files import locked
 from pathcontrol._progress import progress_bar
+from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.errors import InputError
 from pathcontrol.sweeps.cluster import connected
 from pathcontrol.sweeps.compute import Build, Chunk, Job, Measure, Piece, measure_of
 from pathcontrol.sweeps.desk import Desk
 from pathcontrol.sweeps.keep import Keep
+from pathcontrol.sweeps.manifest import MANIFEST
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.sweeps.space import Space, check_seed, digest
-from pathcontrol.sweeps.store import MANIFEST, Store
+from pathcontrol.sweeps.store import Store, parquet
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -104,16 +107,25 @@ def _computed_here(job: Job, pieces: Iterable[Piece]) -> Generator[Chunk]:
 
 @contextmanager
 def opened(folder: Path, samples: int, definition: Mapping[str, Any], resume: bool) -> Iterator[Store]:
-    """The folder of a new sweep, or with ``resume`` that of one which was begun; gone if nothing came of it."""
-    if not resume or not (folder / MANIFEST).exists():
-        store = Store.begin(folder, samples, definition)
-    else:
-        store = Store(folder)
-        store.resume(definition)
-    try:
-        yield store
-    finally:
-        store.free_if_empty()
+    """Give the folder of a new sweep, or with ``resume`` that of one which was begun; it goes if nothing came of it.
+
+    Raises:
+        InputError: something else is there, or another process writes there.
+    """
+    parquet()
+    refuse_suffix(folder, "the folder of a sweep")
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{str(folder)!r} is a file, expected a folder for the sweep; name another")
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder) as ours:
+        if not ours:
+            raise InputError(f"another process is writing to {str(folder)!r}; wait for it, or name another folder")
+        begun = (folder / MANIFEST).exists()
+        store = Store.resume(folder, definition) if resume and begun else Store.begin(folder, samples, definition)
+        try:
+            yield store
+        finally:
+            store.settle()
 
 
 def _definition(

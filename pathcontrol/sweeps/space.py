@@ -14,6 +14,7 @@ from numpy.random import SeedSequence, default_rng
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 
+MOST_SAMPLES, _MOST_NUMBERS = 10**7, 10**8  # that are in memory together
 _TOLD = 100  # values that a record lists; of more, their number and a digest
 
 
@@ -78,6 +79,7 @@ class Space:
         self._parameters = {str(name): _parameter(name, given) for name, given in parameters.items()}
         self.names, self.method = tuple(self._parameters), method
         self.samples = self._count() if samples is None else check_whole("samples", samples)
+        self._check_size()
 
     @classmethod
     def grid(cls, parameters: Mapping[str, Any]) -> Self:
@@ -136,6 +138,28 @@ class Space:
 
     def _choices(self) -> list[Array]:
         return [parameter.values for parameter in self._parameters.values() if isinstance(parameter, Choice)]
+
+    def _check_size(self) -> None:
+        """Check that all samples fit into memory, before any is made.
+
+        Raises:
+            InputError: they do not.
+        """
+        most = min(MOST_SAMPLES, max(1, _MOST_NUMBERS // max(1, self._numbers())))
+        if self.samples > most:
+            sizes = " × ".join(str(len(values)) for values in self._choices()) if self.method == "grid" else ""
+            raise InputError(
+                f"samples = {self.samples}{f' of a grid of {sizes}' if sizes else ''}, expected at most {most}, which "
+                "are in memory together; take fewer"
+                + (", as by Space.sobol or a coarser grid" if sizes else ", or several sweeps with a seed each")
+            )
+
+    def _numbers(self) -> int:
+        """How many numbers the parameters of a sample are."""
+        return sum(
+            int(np.prod(p.values.shape[1:])) if isinstance(p, Choice) else math.prod(p.shape)
+            for p in self._parameters.values()
+        )
 
     def _count(self) -> int:
         for name, parameter in self._parameters.items():

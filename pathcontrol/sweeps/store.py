@@ -1,16 +1,17 @@
 """The folder of a sweep: a manifest, one Parquet file a chunk, and the runs that are kept.
 
-Every file appears whole or not at all, in this order: the manifest, the histories of a chunk, its table. What a killed
-process leaves behind is a chunk that is there or is not, and histories that the next look at the folder removes.
+Every file appears whole or not at all, in this order: the histories of a chunk, its table, and their place in the
+manifest, with which they count. What a killed process leaves behind is a chunk that is there or is not, and files that
+the next process which writes to the folder removes.
 """
 
 from __future__ import annotations
 
-import json
-import platform
-from collections.abc import Iterator, Mapping
+import hashlib
+import io
+import warnings
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -19,16 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol._files import whole_file
-from pathcontrol.errors import InputError, MissingExtraError
+from pathcontrol._files import write_whole
+from pathcontrol.errors import InputError, MissingExtraError, PathControlWarning
 from pathcontrol.sweeps.compute import Chunk
 from pathcontrol.sweeps.keep import Keep
+from pathcontrol.sweeps.manifest import MANIFEST, Manifest
 
-FORMAT, FORMAT_VERSION = "pathcontrol sweep", 1
-MANIFEST = "manifest.json"
 _HEX = "[0-9a-f]" * 8
 _UNFINISHED = (f".manifest-{_HEX}.json", f"chunks/.*-{_HEX}.parquet", f"runs/.*-{_HEX}.nc")  # as whole_file has them
-PACKAGES = ("pathcontrol", "pin", "numpy", "scipy")
+_RESUME = "resume the sweep to make it again"
+_TOLD = 5  # damaged files that a message names
 
 
 def parquet() -> ModuleType:
@@ -49,17 +50,25 @@ class Store:
 
     Args:
         folder: where it is; its manifest is there.
+        mending: whether it is opened to be made whole, so that damaged files are no error.
+
+    Attributes:
+        folder: as given.
+        manifest: what the sweep says of itself.
+        samples: how many it has.
 
     Raises:
-        InputError: there is no sweep.
+        InputError: there is no sweep, its manifest is damaged, or unless it is mended, a chunk is.
     """
 
-    def __init__(self, folder: str | Path) -> None:
+    def __init__(self, folder: str | Path, mending: bool = False) -> None:
         self.folder = Path(folder)
-        self.manifest = _read_manifest(self.folder)
-        self.samples = int(self.manifest["samples"])
+        self.manifest = Manifest(self.folder, mending)
+        self.samples = self.manifest.samples
         self._parquet = parquet()
-        self._known: dict[tuple[Path, tuple[str, ...]], dict[str, Array]] = {}
+        self._known: dict[tuple[str, tuple[str, ...]], dict[str, Array]] = {}
+        if not mending:
+            self._check()
 
     @classmethod
     def begin(cls, folder: str | Path, samples: int, definition: Mapping[str, Any]) -> Store:
@@ -69,123 +78,258 @@ class Store:
             InputError: something is there that would get mixed up with it.
         """
         folder = Path(folder)
-        parquet()
-        if folder.exists() and not folder.is_dir():
-            raise InputError(f"{str(folder)!r} is a file, expected a folder for the sweep; name another")
         if (folder / MANIFEST).exists():
             raise InputError(f"{str(folder)!r} holds a sweep already; resume it, or name another folder")
         if any(folder.glob("chunks/*.parquet")):
             raise InputError(f"{str(folder)!r} holds the chunks of a sweep without its {MANIFEST}; name another folder")
-        for name in ("chunks", "runs"):
-            (folder / name).mkdir(parents=True, exist_ok=True)
-        head = {"format": FORMAT, "format_version": FORMAT_VERSION, "samples": samples}
-        _write_json(folder / MANIFEST, head | {"definition": definition, "versions": [versions()]})
+        try:
+            for name in ("chunks", "runs"):
+                (folder / name).mkdir(parents=True, exist_ok=True)
+            Manifest.begin(folder, samples, definition)
+        except BaseException:  # as on a full disk
+            _remove_empty(folder)
+            raise
         return cls(folder)
 
-    def resume(self, definition: Mapping[str, Any]) -> None:
-        """See that the sweep on disk is this one, and note with which versions it goes on.
+    @classmethod
+    def resume(cls, folder: str | Path, definition: Mapping[str, Any]) -> Store:
+        """Open the sweep on disk to go on with it; what is damaged or missing is told, and forgotten to be made again.
 
         Raises:
             InputError: it has another definition; the message names what differs.
         """
-        differing = list(_differences(self.manifest["definition"], definition))
-        if differing:
-            raise InputError(
-                f"the sweep in {str(self.folder)!r} has another definition: {'; '.join(differing[:5])}; "
-                "give what it was begun with, or name another folder"
-            )
-        if self.manifest["versions"][-1] != versions():
-            self.manifest["versions"].append(versions())
-            _write_json(self.folder / MANIFEST, self.manifest)
+        store = cls(folder, mending=True)
+        store.manifest.resume(definition)
+        store._forget_damaged()
+        store.manifest.settle()
+        return store
 
-    def free_if_empty(self) -> None:
-        """Leave no folder behind that holds no number: another sweep may be begun there."""
-        if self._files():
+    def settle(self) -> None:
+        """Have the manifest note all files; leave no folder behind that holds no number, so that another may begin."""
+        if self._chunks():
+            self.manifest.settle()
             return
-        (self.folder / MANIFEST).unlink(missing_ok=True)
-        with suppress(OSError):  # something else is there
-            for folder in (self.folder / "chunks", self.folder / "runs", self.folder):
-                folder.rmdir()
+        self.manifest.remove()
+        _remove_empty(self.folder)
+
+    def _check(self) -> None:
+        """Tell what has no checksum, and refuse chunks that are not what was written."""
+        if not self.manifest.listed:
+            warnings.warn(
+                f"the sweep in {str(self.folder)!r} has no checksums, as it was begun by an earlier version: damage "
+                "would not be noticed; resume it to give it some",
+                PathControlWarning,
+                stacklevel=4,
+            )
+        if bad := self._damaged("chunks"):
+            raise InputError(f"the sweep in {str(self.folder)!r} is damaged: {_listed(bad)}; {_RESUME}")
+
+    def _damaged(self, kind: str) -> dict[str, str]:
+        """What is wrong with the noted files of a kind that are not what was written, by their place."""
+        found = {}
+        for place in self._places(kind):
+            try:
+                self._content(place)
+            except InputError as error:
+                found[place] = str(error)
+        return found
+
+    def _content(self, place: str) -> bytes:
+        """The bytes of a noted file.
+
+        Raises:
+            InputError: it is missing, or damaged.
+        """
+        try:
+            content = (self.folder / place).read_bytes()
+        except FileNotFoundError as error:
+            raise InputError("missing") from error
+        except OSError as error:
+            raise InputError(f"cannot be read: {error}") from error
+        known = self.manifest.files[place]
+        if known is not None and hashlib.sha256(content).hexdigest() != known:
+            raise InputError("damaged")
+        return content
+
+    def _forget_damaged(self) -> None:
+        """Forget damaged and missing files, and the chunks of histories that are, so that they are computed again."""
+        self._adopt()
+        bad = self._damaged("chunks") | self._damaged("runs")
+        gone = set(bad)
+        for place in self._places("chunks"):
+            if place in bad or any(_sample(run) in _samples(place) for run in bad if run.startswith("runs")):
+                gone.add(place)
+        for place in gone:
+            self.manifest.files.pop(place, None)
+        if bad:
+            warnings.warn(
+                f"the sweep in {str(self.folder)!r} is damaged, and is made again there: {_listed(bad)}",
+                PathControlWarning,
+                stacklevel=6,
+            )
+
+    def _adopt(self) -> None:
+        """Give the files of a sweep of an earlier version, which has none, their checksums, if they can be read."""
+        if self.manifest.listed:
+            return
+        for place in list(self.manifest.files):
+            with suppress(InputError):
+                if place.startswith("chunks"):
+                    self._read(place, ["sample"])
+                self.manifest.files[place] = hashlib.sha256(self._content(place)).hexdigest()
+                continue
+            del self.manifest.files[place]
+        self.manifest.listed = True
 
     def missing(self, chunk: int) -> list[NDArray[np.int64]]:
         """The samples that have no numbers yet, at most ``chunk`` neighbours together."""
         done = np.zeros(self.samples, dtype=bool)
-        for file in self._files():
-            done[self._read(file, ["sample"])["sample"]] = True
+        for place in self._chunks():
+            done[self._read(place, ["sample"])["sample"]] = True
         lost = np.flatnonzero(~done)
         stretches = np.split(lost, np.flatnonzero(np.diff(lost) != 1) + 1)
         return [s[i : i + chunk].astype(np.int64) for s in stretches for i in range(0, len(s), chunk)]
 
     def write(self, chunk: Chunk, keep: Keep, at_random: NDArray[np.intp]) -> None:
-        """Add a chunk: first the histories that are to be kept so far, then its table, with which it is there."""
+        """Add a chunk: histories that are to be kept so far, its table, and their checksums, with which it counts."""
         import pyarrow as pa
 
         chosen = self._chosen(keep, at_random, chunk.columns) if chunk.runs else set()
+        notes: dict[str, str | None] = {}
         for number, run in chunk.runs.items():
             if number in chosen:
-                run.save(self.run_file(number))
+                notes[_run_place(number)] = _file_digest(run.save(self.run_file(number)))
         sample = chunk.columns["sample"]
         table = pa.table({name: _column(values) for name, values in chunk.columns.items()})
-        with whole_file(self.folder / "chunks" / f"{sample[0]:09d}-{sample[-1]:09d}.parquet") as temporary:
-            self._parquet.write_table(table, temporary)
+        memory = io.BytesIO()
+        self._parquet.write_table(table, memory)
+        place = f"chunks/{sample[0]:09d}-{sample[-1]:09d}.parquet"
+        notes[place] = hashlib.sha256(memory.getbuffer()).hexdigest()
+        write_whole(self.folder / place, memory.getbuffer())
         if chosen:
-            self._remove_others(chosen)
+            notes |= {_run_place(other): None for other in self.kept() if other not in chosen}
+        self.manifest.note(notes)
+        self._remove(place for place, digest in notes.items() if digest is None)
 
     def columns(self, names: list[str] | None = None) -> dict[str, Array]:
         """The finished samples in order, their numbers and texts, (k,) or (k, d) each; NaN or "" where one has none."""
-        return _joined([self._read(file, names) for file in self._files()])
+        return _joined([self._read(place, names) for place in self._chunks()])
 
     def tidy(self, keep: Keep, at_random: NDArray[np.intp]) -> None:
         """Remove the histories that need not be kept, and what a killed process left behind."""
-        for place in _UNFINISHED:
-            for left in self.folder.glob(place):
+        for unfinished in _UNFINISHED:
+            for left in self.folder.glob(unfinished):
                 left.unlink()
-        self._remove_others(self._chosen(keep, at_random))
+        chosen = self._chosen(keep, at_random)
+        if needless := [_run_place(other) for other in self.kept() if other not in chosen]:
+            self.manifest.note(dict.fromkeys(needless))
+        there = [*self.folder.glob("chunks/*.parquet"), *self.folder.glob("runs/*.nc")]
+        places = (file.relative_to(self.folder).as_posix() for file in there)
+        self._remove(place for place in places if place not in self.manifest.files)
+
+    def _remove(self, places: Iterable[str]) -> None:
+        for place in places:
+            (self.folder / place).unlink(missing_ok=True)
 
     def _chosen(self, keep: Keep, at_random: NDArray[np.intp], more: Mapping[str, Array] | None = None) -> set[int]:
         """The samples whose history is to be kept, of those that are there and ``more``."""
         if not (keep.worst or keep.diverged):
             return set(at_random.tolist())
         names = ["sample", "status"] + ([keep.by] if keep.worst else [])
-        chunks = [self._remembered(file, names) for file in self._files()]
+        chunks = [self._remembered(place, names) for place in self._chunks()]
         found = _joined(chunks + ([] if more is None else [{name: more[name] for name in names}]))
         count = len(found["sample"])
         diverged = found["status"] == "diverged" if count else np.zeros(0, dtype=bool)
         by = found.get(keep.by, np.full(count, np.nan))
         return set(at_random.tolist()) | keep.chosen(found["sample"], by, diverged)
 
-    def _remembered(self, file: Path, names: list[str]) -> dict[str, Array]:
-        key = (file, tuple(names))
+    def _remembered(self, place: str, names: list[str]) -> dict[str, Array]:
+        key = (place, tuple(names))
         if key not in self._known:
-            self._known[key] = self._read(file, names)
+            self._known[key] = self._read(place, names)
         return self._known[key]
 
-    def _remove_others(self, chosen: set[int]) -> None:
-        for sample in self.kept():
-            if sample not in chosen:
-                self.run_file(sample).unlink()
-
     def kept(self) -> list[int]:
-        """The samples whose history is there."""
-        return sorted(int(file.stem) for file in self.folder.glob("runs/*.nc") if file.stem.isdecimal())
+        """The samples whose history is kept."""
+        return sorted(_sample(place) for place in self._places("runs"))
 
     def run_file(self, sample: int) -> Path:
         """Where the history of a sample is, or would be."""
-        return self.folder / "runs" / f"{sample:09d}.nc"
+        return self.folder / _run_place(sample)
 
-    def _files(self) -> list[Path]:
-        return sorted(file for file in self.folder.glob("chunks/*.parquet") if not file.name.startswith("."))
+    def check_run(self, sample: int) -> None:
+        """Check that the history of a sample is what was written.
 
-    def _read(self, file: Path, names: list[str] | None) -> dict[str, Array]:
+        Raises:
+            InputError: it is missing or damaged.
+        """
+        try:
+            self._content(_run_place(sample))
+        except InputError as error:
+            raise InputError(f"{str(self.run_file(sample))!r}: {error}; {_RESUME}") from error
+
+    def _chunks(self) -> list[str]:
+        return self._places("chunks")
+
+    def _places(self, kind: str) -> list[str]:
+        """The noted files of a kind, in order."""
+        return sorted(place for place in self.manifest.files if place.startswith(kind))
+
+    def _read(self, place: str, names: list[str] | None) -> dict[str, Array]:
         import pyarrow as pa
 
         try:
-            with self._parquet.ParquetFile(file) as opened:
+            with self._parquet.ParquetFile(pa.BufferReader(self._content(place))) as opened:
+                if opened.metadata.num_rows != len(_samples(place)):
+                    raise InputError(f"it has {opened.metadata.num_rows} rows")
                 there = opened.schema_arrow.names
                 table = opened.read(columns=None if names is None else [name for name in names if name in there])
-        except (OSError, pa.ArrowInvalid) as error:
-            raise InputError(f"{str(file)!r} cannot be read: {error}; remove it and resume the sweep") from error
-        return {name: _values(table.column(name)) for name in table.column_names}
+            columns = {name: _values(table.column(name)) for name in table.column_names}
+            _check_samples(columns.get("sample"), self.samples)
+        except (InputError, OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
+            raise InputError(f"{str(self.folder / place)!r} cannot be read: {error}; {_RESUME}") from error
+        return columns
+
+
+def _remove_empty(folder: Path) -> None:
+    """Remove the folder of a sweep without files, unless something else is there."""
+    with suppress(OSError):
+        for one in (folder / "chunks", folder / "runs", folder):
+            one.rmdir()
+
+
+def _check_samples(sample: Array | None, samples: int) -> None:
+    """Check that a chunk has samples of its sweep."""
+    if sample is None or sample.ndim != 1 or sample.dtype.kind not in "iu" or not sample.size:
+        raise InputError("it has no numbers of samples")
+    if sample.min() < 0 or sample.max() >= samples:
+        raise InputError(f"it has samples {sample.min()} to {sample.max()}, of a sweep of {samples}")
+
+
+def _file_digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _run_place(sample: int) -> str:
+    return f"runs/{sample:09d}.nc"
+
+
+def _sample(place: str) -> int:
+    """The sample of a history."""
+    return int(Path(place).stem)
+
+
+def _samples(place: str) -> range:
+    """The samples of a chunk."""
+    first, last = map(int, Path(place).stem.split("-"))
+    return range(first, last + 1)
+
+
+def _listed(bad: Mapping[str, str]) -> str:
+    told = [f"{place} ({what})" for place, what in list(bad.items())[:_TOLD]]
+    more = len(bad) - len(told)
+    return ", ".join(told) + (f" and {more} more" if more else "")
 
 
 def _joined(chunks: list[dict[str, Array]]) -> dict[str, Array]:
@@ -196,11 +340,6 @@ def _joined(chunks: list[dict[str, Array]]) -> dict[str, Array]:
     found = {name: np.concatenate([_filled(chunk, name, chunks) for chunk in chunks]) for name in every}
     _, order = np.unique(found["sample"], return_index=True)
     return {name: values[order] for name, values in found.items()}
-
-
-def versions() -> dict[str, str]:
-    """What computes the numbers."""
-    return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
 
 
 def _column(values: Array) -> Any:
@@ -232,39 +371,3 @@ def _filled(chunk: Mapping[str, Array], name: str, chunks: list[dict[str, Array]
         return chunk[name]
     like = next(other[name] for other in chunks if name in other)
     return np.full((len(chunk["sample"]), *like.shape[1:]), "" if like.dtype.kind == "U" else np.nan)
-
-
-def _read_manifest(folder: Path) -> dict[str, Any]:
-    try:
-        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(f"there is no sweep in {str(folder)!r}: it has no {MANIFEST}") from error
-    except (OSError, ValueError) as error:
-        raise InputError(f"{str(folder / MANIFEST)!r} cannot be read: {error}") from error
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        raise InputError(f"{str(folder / MANIFEST)!r} is not that of a sweep")
-    if manifest.get("format_version") != FORMAT_VERSION:
-        raise InputError(
-            f"the sweep in {str(folder)!r} has the format version {manifest.get('format_version')}, expected "
-            f"{FORMAT_VERSION}; read it with the version of pathcontrol that wrote it"
-        )
-    return manifest
-
-
-def _write_json(path: Path, content: Mapping[str, Any]) -> None:
-    with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-
-
-def _differences(then: Any, now: Any, key: str = "") -> Iterator[str]:
-    """Where two definitions differ, each as ``key: then …, now …``."""
-    if isinstance(then, dict) and isinstance(now, Mapping):
-        for name in dict.fromkeys((*then, *now)):
-            yield from _differences(then.get(name), now.get(name), f"{key}.{name}" if key else name)
-    elif then != now:
-        yield f"{key} was {_short(then)}, is now {_short(now)}"
-
-
-def _short(value: Any) -> str:
-    text = json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= 80 else f"{text[:77]}…"

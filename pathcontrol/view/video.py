@@ -20,6 +20,7 @@ from pathcontrol._arrays import scalar
 from pathcontrol._expect import expect
 from pathcontrol._files import whole_file
 from pathcontrol._progress import progress_bar
+from pathcontrol._suffixes import check_suffix
 from pathcontrol.errors import InputError, MissingExtraError, PathControlError
 
 if TYPE_CHECKING:
@@ -80,9 +81,7 @@ def save_video(
     from pathcontrol.view.film.animation import Animation
 
     expect("animation", animation, Animation)
-    path = Path(path)
-    if path.suffix != ".mp4":
-        raise InputError(f"path = {str(path)!r}, expected the name of a file that ends with .mp4")
+    path = check_suffix(path, "a video (H.264 in MP4)", ".mp4")
     clip = _clip(animation.duration, size, scalar("fps", fps, positive=True), speed)
     for package in ("playwright", "imageio_ffmpeg"):
         if find_spec(package) is None:

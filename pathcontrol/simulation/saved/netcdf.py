@@ -2,74 +2,82 @@
 
 from __future__ import annotations
 
+import io
 import json
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import h5netcdf  # type: ignore[import-untyped]
+import h5py  # type: ignore[import-untyped]
 import numpy as np
 import xarray as xr
+from xarray.backends import H5NetCDFStore
 
 from pathcontrol._files import whole_file
-from pathcontrol.errors import InputError
+from pathcontrol.errors import InputError, PathControlWarning
 from pathcontrol.simulation.origin import Stored
+from pathcontrol.simulation.saved.form import check_form, check_sizes
+from pathcontrol.simulation.saved.seal import check_seal, digest_of, seal
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 
 _CONFIG = "pathcontrol_config"
+_DIGEST = "pathcontrol_sha256"
 _GROUP = "origin"
-_DEEPEST = 50
+_KNOWN = (*VARIABLES, *OUTCOMES, "time", "joint", "rollout")
 _RECIPE = {"long_name": "robot and task of the run, JSON in UTF-8"}
 _NUMBERS = {"long_name": "arrays of the recipe, one after another"}
 
 
 def write_run(path: Path, data: xr.Dataset, config: Mapping[str, Any], stored: Stored) -> None:
-    """Write a run, whole or not at all."""
-    text = np.frombuffer(stored.text.encode(), dtype=np.uint8)
-    origin = xr.Dataset({"recipe": ("byte", text, _RECIPE), "numbers": ("number", stored.numbers, _NUMBERS)})
-    with whole_file(path) as temporary:
-        _write(data.assign_attrs({_CONFIG: json.dumps(config)}), temporary, 1)
-        _write(origin, temporary, 4, mode="a", group=_GROUP)
+    """Write a run, whole or not at all, with its checksum.
+
+    The file is made in memory: HDF5 ends the process by a segmentation fault where it cannot write to a full disk.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    memory, text = io.BytesIO(), json.dumps(config)
+    recipe = np.frombuffer(stored.text.encode(), dtype=np.uint8)
+    origin = xr.Dataset({"recipe": ("byte", recipe, _RECIPE), "numbers": ("number", stored.numbers, _NUMBERS)})
+    with h5netcdf.File(memory, "w") as file:
+        _put(file, data.assign_attrs({_CONFIG: text, _DIGEST: _digest_of_run(data, text)}), 1)
+        _put(file.create_group(_GROUP), origin.assign_attrs({_DIGEST: _digest_of_origin(stored)}), 4)
+    content = memory.getbuffer()
+    with whole_file(path) as temporary, temporary.open("wb") as written:
+        written.write(content)
+        written.write(seal(content))
 
 
 def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], Stored | None]:
-    """Data, configuration, and robot and path if the file has them.
+    """Read data, configuration, and robot and path if the file has them.
 
     Raises:
-        InputError: there is no such file, or it is not a saved run.
+        InputError: there is no such file, it is damaged, or it is not a saved run.
     """
     if not path.is_file():
         raise InputError(f"there is no file {str(path)!r}")
     try:
+        check_seal(path)
+        with h5py.File(path, "r") as file:
+            check_sizes(file, path.stat().st_size)
         data = xr.load_dataset(path, engine="h5netcdf", decode_times=False)
-        config = json.loads(data.attrs.pop(_CONFIG))
-        _check(data, config)
-        return data, config, _read_origin(path)
+        digest, text = data.attrs.pop(_DIGEST, None), data.attrs.pop(_CONFIG)
+        config = json.loads(text)
+        check_form(data, config)
+        _check_digest(digest, lambda: _digest_of_run(data, text))
+        stored = _read_origin(path)
     except Exception as error:  # a broken file makes those who read it stumble anywhere
         raise InputError(f"{str(path)!r} is not a run saved by Run.save: {error}") from error
-
-
-def _check(data: xr.Dataset, config: Any) -> None:
-    """The file has the form of a run, whatever its numbers are."""
-    if not isinstance(config, dict):
-        raise InputError(f"its configuration is a {type(config).__name__}, expected names and values")
-    if _deeper(config, _DEEPEST):
-        raise InputError(f"its configuration is nested more than {_DEEPEST} deep")
-    if missing := [name for name in ("q", "time", "status") if name not in data.variables]:
-        raise InputError(f"it has no {' and no '.join(missing)}")
-    for name, (dims, *_) in (VARIABLES | OUTCOMES | {"time": (("time",),)}).items():
-        if name not in data.variables:
-            continue
-        variable, words = data[name], name in ("status", "reason", "path_status")
-        if variable.dims != dims or (variable.dtype.kind in "bfiu") == words:
-            raise InputError(f"{name} is {variable.dtype} over {variable.dims}, expected other values over {dims}")
-        if name in VARIABLES and not isinstance(variable.attrs.get("units"), str):
-            raise InputError(f"{name} has no unit")
-
-
-def _deeper(value: Any, levels: int) -> bool:
-    """Whether tables and lists are nested deeper than so many levels: no reader is to run out of stack."""
-    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
-    return levels == 0 or any(_deeper(item, levels - 1) for item in inner)
+    if digest is None:
+        warnings.warn(
+            f"{str(path)!r} has no checksum, as it was written by an earlier version: damage would not be noticed; "
+            "load it and save it again to give it one",
+            PathControlWarning,
+            stacklevel=3,
+        )
+    return data, config, stored
 
 
 def _read_origin(path: Path) -> Stored | None:
@@ -77,9 +85,27 @@ def _read_origin(path: Path) -> Stored | None:
         origin = xr.load_dataset(path, engine="h5netcdf", group=_GROUP)
     except OSError:  # there is no such group: the file is older than runs that know their robot
         return None
-    return Stored(origin["recipe"].to_numpy().tobytes().decode(), origin["numbers"].to_numpy())
+    recipe, numbers = origin["recipe"].to_numpy(), origin["numbers"].to_numpy()
+    if recipe.dtype != np.uint8 or numbers.dtype != np.float64 or recipe.ndim != 1 or numbers.ndim != 1:
+        raise InputError("what it says of its robot and path is no text with numbers")
+    stored = Stored(recipe.tobytes().decode(), numbers)
+    _check_digest(origin.attrs.get(_DIGEST), lambda: _digest_of_origin(stored))
+    return stored
 
 
-def _write(data: xr.Dataset, path: Path, level: int, **where: Any) -> None:
+def _check_digest(told: Any, digest: Callable[[], str]) -> None:
+    if told is not None and told != digest():
+        raise InputError("it is damaged, or was changed: its checksum is another one; take another copy of it")
+
+
+def _digest_of_run(data: xr.Dataset, text: str) -> str:
+    return digest_of({name: data[name].to_numpy() for name in _KNOWN if name in data.variables}, text)
+
+
+def _digest_of_origin(stored: Stored) -> str:
+    return digest_of({"numbers": stored.numbers}, stored.text)
+
+
+def _put(group: h5netcdf.Group, data: xr.Dataset, level: int) -> None:
     packed = {name: {"zlib": True, "complevel": level, "shuffle": True} for name in data.data_vars}
-    data.to_netcdf(path, engine="h5netcdf", encoding=packed, **where)
+    data.dump_to_store(H5NetCDFStore(group), encoding=packed)

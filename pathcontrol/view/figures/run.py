@@ -6,6 +6,7 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
+from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.view.figures.errors import error_figure as error_figure
@@ -32,6 +33,7 @@ def run_figure(
         joints: which two the path is drawn in; by default the two that move the most.
         limits: largest torques (n,); by default those of the run's own robot.
     """
+    refuse_suffix(path, "figures", ".svg", ".png", ".pdf")
     figures = {"errors": error_figure(run)}
     if run.data.sizes["joint"] > 1:
         figures["path"] = path_figure(run, task, joints)

@@ -18,6 +18,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from pathcontrol._expect import expect
 from pathcontrol._files import whole_file
+from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.errors import InputError
 from pathcontrol.view.figures.ticks import SpacedLocator
 
@@ -41,6 +42,7 @@ PEAK_LOOK: Look = {"linewidth": 0.8, "linestyle": DASHED}
 #: widths of figures [in]: one column of a page with two, and both
 COLUMN, PAGE = 3.5, 7.2
 FORMATS = ("svg", "png", "pdf")
+_SUFFIXES = (".svg", ".png", ".pdf")
 SMALL = 7.0  # pt, of numbers on axes and in insets
 _NOTEBOOK_DPI = 144
 _LAYOUTS, _SETTLED = 6, 5e-4  # at most so many, shares of the figure
@@ -150,12 +152,12 @@ def save_figure(figure: Figure, path: str | Path, formats: Sequence[str] = ("svg
         The files, in the order of the formats.
 
     Raises:
-        InputError: a format is not known, or a file cannot be written there.
+        InputError: a format is not known, the name promises another one, or a file cannot be written there.
     """
     expect("figure", figure, Figure)
-    stem, wanted = Path(path), [formats] if isinstance(formats, str) else list(formats)
-    if stem.suffix[1:] in FORMATS:
-        stem, wanted = stem.with_suffix(""), [*wanted, stem.suffix[1:]]
+    stem, wanted = refuse_suffix(path, "a figure", *_SUFFIXES), [formats] if isinstance(formats, str) else list(formats)
+    if (last := stem.suffix[1:].lower()) in FORMATS:
+        stem, wanted = stem.with_suffix(""), [*wanted, last]
     if unknown := [name for name in wanted if name not in FORMATS]:
         raise InputError(f"formats has {unknown[0]!r}, expected some of {', '.join(map(repr, FORMATS))}")
     targets = {name: stem.with_name(f"{stem.name}.{name}") for name in wanted}
@@ -168,4 +170,4 @@ def save_figure(figure: Figure, path: str | Path, formats: Sequence[str] = ("svg
 def stem_of(path: str | Path) -> Path:
     """``path`` without the suffix of a format."""
     path = Path(path)
-    return path.with_suffix("") if path.suffix[1:] in FORMATS else path
+    return path.with_suffix("") if path.suffix.lower() in _SUFFIXES else path

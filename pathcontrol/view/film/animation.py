@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pathcontrol._files import whole_file
+from pathcontrol._suffixes import check_suffix
 from pathcontrol.view.film.film import Film
 
 _NOTEBOOK_HEIGHT = 640  # px
@@ -44,8 +45,12 @@ class Animation:
         return page(self.film, self.title)
 
     def save(self, path: str | Path) -> Path:
-        """Write the page, whole or not at all."""
-        path = Path(path)
+        """Write the page, whole or not at all.
+
+        Raises:
+            InputError: the name does not end with ``.html``; the message names what writes other formats.
+        """
+        path = check_suffix(path, "an animation as a page", ".html", ".htm")
         with whole_file(path) as temporary:
             temporary.write_text(self.html(), encoding="utf-8")
         return path

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pathcontrol._expect import expect
 from pathcontrol._files import whole_file
+from pathcontrol._suffixes import check_suffix
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
 
@@ -41,13 +42,13 @@ def report(
         sweep: what the runs are histories of, :meth:`SweepResult.histories`; its numbers and figures come first.
 
     Raises:
-        InputError: there are no runs, or one does not know its robot.
+        InputError: there are no runs, one does not know its robot, or ``out`` does not end with ``.html``.
     """
     from pathcontrol.view.film.recorder import record
     from pathcontrol.view.page.html import page
     from pathcontrol.view.report.sections import sections
 
-    named, out = _named(runs), Path(out)
+    named, out = _named(runs), check_suffix(out, "a report as a page", ".html", ".htm")
     animation = record(runs, layout=layout)
     # the sections have tables of their own
     film = dataclasses.replace(animation.film, header=animation.film.header | {"tables": []})

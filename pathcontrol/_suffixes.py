@@ -1,0 +1,54 @@
+"""Names of files say what is in them: a name that promises another format is refused, with the call that writes it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pathcontrol.errors import InputError
+
+_PAGE = "record(run).save(path) writes an animation, report(run, path) a report"
+_FIGURE = "save_figure(error_figure(run), path) writes a figure"
+_TABLE = "run.data.to_dataframe() is a table, whose to_csv, to_excel and so on write it"
+_VIDEO = "save_video(record(run), 'name.mp4') writes a video"
+
+#: what writes the formats that people ask for
+_WRITERS = {
+    ".nc": "run.save(path) writes netCDF",
+    **dict.fromkeys((".html", ".htm"), _PAGE),
+    **dict.fromkeys((".svg", ".png", ".pdf"), _FIGURE),
+    **dict.fromkeys((".jpg", ".jpeg", ".gif", ".webp", ".tif", ".tiff", ".bmp", ".eps", ".ps"), _FIGURE),
+    **dict.fromkeys((".mp4", ".webm", ".mov", ".avi", ".mkv", ".m4v", ".mpg", ".mpeg"), _VIDEO),
+    **dict.fromkeys((".csv", ".tsv", ".txt", ".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json"), _TABLE),
+    **dict.fromkeys((".npz", ".npy", ".mat", ".pkl", ".pickle", ".h5", ".hdf5", ".zarr"), _TABLE),
+}
+
+
+def check_suffix(path: str | Path, what: str, *suffixes: str) -> Path:
+    """Return ``path`` if it ends with one of ``suffixes``.
+
+    Raises:
+        InputError: it ends otherwise; the message names the call that writes such a file, where there is one.
+    """
+    path = Path(path)
+    if path.suffix.lower() in suffixes:
+        return path
+    raise InputError(
+        f"{str(path)!r}: {what} is written, expected a name that ends with {' or '.join(suffixes)}{_instead(path)}"
+    )
+
+
+def refuse_suffix(path: str | Path, what: str, *allowed: str) -> Path:
+    """Return ``path`` unless it ends like a format that is not among those ``allowed``; any other dot is a name's.
+
+    Raises:
+        InputError: it does; the message names the call that writes such a file.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in _WRITERS or path.suffix.lower() in allowed:
+        return path
+    raise InputError(f"{str(path)!r}: {what} is written, expected a name without {path.suffix}{_instead(path)}")
+
+
+def _instead(path: Path) -> str:
+    writer = _WRITERS.get(path.suffix.lower())
+    return "" if writer is None else f"; {writer}"

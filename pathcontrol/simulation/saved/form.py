@@ -1,0 +1,104 @@
+"""What a file has to look like before a run is made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import h5py  # type: ignore[import-untyped]
+import numpy as np
+import xarray as xr
+
+from pathcontrol.errors import InputError
+from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
+
+_DEEPEST = 50
+_DENSEST = 1100  # numbers that deflate makes of one byte are fewer than 1032
+_UNWRITTEN = 1 << 20  # bytes that a small variable may have without any of them in the file
+_WORDS = ("status", "reason", "path_status")
+
+
+def check_sizes(file: h5py.File, size: int) -> None:
+    """Check that no variable is larger than what ``size`` bytes of a file can hold, before memory is taken for it.
+
+    Raises:
+        InputError: one is, or its numbers are not in this file.
+    """
+    stored = 0
+    for name, variable in _variables(file):
+        if variable.external or variable.is_virtual:
+            raise InputError(f"the numbers of {name} are said to be in another file")
+        stored += variable.id.get_storage_size()
+        most = _UNWRITTEN + _DENSEST * min(stored, size)
+        chunk = 1 if variable.chunks is None else int(np.prod([float(length) for length in variable.chunks]))
+        count = max(chunk, int(np.prod([float(length) for length in variable.shape])))
+        if count * variable.dtype.itemsize > most:
+            raise InputError(
+                f"it says that {name} has the shape {variable.shape}, which cannot be in a file of {size} bytes"
+            )
+
+
+def _variables(group: h5py.Group) -> Iterator[tuple[str, h5py.Dataset]]:
+    """All datasets but those that only say how long a dimension is."""
+    for name in group:
+        link = group.get(name, getlink=True)
+        if not isinstance(link, h5py.HardLink):
+            raise InputError(f"{name} is a link to somewhere else")
+        item = group[name]
+        if isinstance(item, h5py.Group):
+            yield from ((f"{name}/{inner}", one) for inner, one in _variables(item))
+        elif isinstance(item, h5py.Dataset) and not _is_length(item):
+            yield name, item
+
+
+def _is_length(item: h5py.Dataset) -> bool:
+    name = item.attrs.get("NAME", b"")
+    return bytes(name).startswith(b"This is a netCDF dimension but not a netCDF variable")
+
+
+def check_form(data: xr.Dataset, config: Any) -> None:
+    """Check that data and configuration have the form of a run, whatever their numbers are.
+
+    Raises:
+        InputError: they have not.
+    """
+    if not isinstance(config, dict):
+        raise InputError(f"its configuration is a {type(config).__name__}, expected names and values")
+    if deeper(config, _DEEPEST):
+        raise InputError(f"its configuration is nested more than {_DEEPEST} deep")
+    if missing := [name for name in ("q", "time", "status") if name not in data.variables]:
+        raise InputError(f"it has no {' and no '.join(missing)}")
+    for name, (dims, *_) in (VARIABLES | OUTCOMES | {"time": (("time",),)}).items():
+        if name not in data.variables:
+            continue
+        variable = data[name]
+        if variable.dims != dims or (variable.dtype.kind in "bfiu") == (name in _WORDS):
+            raise InputError(f"{name} is {variable.dtype} over {variable.dims}, expected other values over {dims}")
+        if name in VARIABLES and not isinstance(variable.attrs.get("units"), str):
+            raise InputError(f"{name} has no unit")
+    _check_labels(data)
+
+
+def _check_labels(data: xr.Dataset) -> None:
+    """Check the values along which the arrays are laid out: times, names of joints, numbers of rollouts, words."""
+    time, joints = data["time"].to_numpy(), data["joint"].to_numpy() if "joint" in data.coords else None
+    if not np.isfinite(time).all():
+        raise InputError("its times are not finite")
+    if not (np.diff(time) > 0).all():
+        raise InputError("its times do not increase")
+    if joints is None or not all(isinstance(name, str) for name in joints.tolist()):
+        raise InputError(f"its joints are {joints}, expected their names")
+    if len(set(joints.tolist())) < len(joints):
+        raise InputError(f"its joints are {joints.tolist()}, expected names that differ")
+    rollouts = data["rollout"].to_numpy()  # the numbers 0, 1, … where the file has none
+    if rollouts.dtype.kind not in "iu" or len(np.unique(rollouts)) < len(rollouts):
+        raise InputError(f"its rollouts are {rollouts}, expected whole numbers that differ")
+    for name in _WORDS:
+        if name in data.variables and not all(isinstance(word, str) for word in data[name].to_numpy().tolist()):
+            raise InputError(f"{name} holds something else than words")
+
+
+def deeper(value: Any, levels: int) -> bool:
+    """Return whether tables and lists are nested deeper than so many levels: no reader is to run out of stack."""
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return levels == 0 or any(deeper(item, levels - 1) for item in inner)

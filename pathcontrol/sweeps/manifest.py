@@ -1,0 +1,221 @@
+"""What a sweep says of itself: its definition, and which files it has with the SHA-256 of each.
+
+The manifest is one JSON file, which is written whole. While a sweep goes on, the files of each chunk are noted by one
+more line of ``files.log`` beside it, so that a chunk costs the same however many there are; the lines go into the
+manifest at the end, or when the sweep is next opened for writing. A file that is not noted does not count.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import re
+from collections.abc import Iterator, Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from pathcontrol._files import write_whole
+from pathcontrol.errors import InputError
+from pathcontrol.sweeps.space import MOST_SAMPLES
+
+FORMAT, FORMAT_VERSION = "pathcontrol sweep", 1
+MANIFEST, LOG = "manifest.json", "files.log"
+PACKAGES = ("pathcontrol", "pin", "numpy", "scipy")
+_PLACE = re.compile(r"chunks/[0-9]+-[0-9]+\.parquet|runs/[0-9]+\.nc")
+_SHA256 = re.compile(r"[0-9a-f]{64}")
+_MOST_BYTES = 1 << 28
+_DAMAGED = "it is damaged; take another copy of it, or begin the sweep anew in another folder"
+
+
+class Manifest:
+    """The manifest of the sweep in a folder.
+
+    Args:
+        folder: where it is.
+        mending: whether lines of the log that are damaged are left out, as what they note can be made again.
+
+    Attributes:
+        samples: how many the sweep has.
+        definition: what its numbers depend on.
+        versions: of the packages that took part, one table after another.
+        files: the SHA-256 of each file by its place in the folder; ``None`` where it is not known, as the sweep was
+            begun by an earlier version.
+        listed: whether the sweep has noted its files from the beginning.
+
+    Raises:
+        InputError: there is none, or it is damaged.
+    """
+
+    def __init__(self, folder: Path, mending: bool = False) -> None:
+        self.folder = folder
+        log = _read_log(folder / LOG, mending)  # first: while it is read, it may get into the manifest
+        content = _read(folder)
+        self.samples: int = content["samples"]
+        self.definition: dict[str, Any] = content["definition"]
+        self.versions: list[dict[str, str]] = content["versions"]
+        self.listed = "files" in content
+        self.files: dict[str, str | None] = dict(content["files"]) if self.listed else _unlisted(folder)
+        for line in log:
+            self._take(line)
+
+    @classmethod
+    def begin(cls, folder: Path, samples: int, definition: Mapping[str, Any]) -> Manifest:
+        """Write that of a new sweep."""
+        _write(folder, samples, definition, [versions()], {})
+        return cls(folder)
+
+    def note(self, files: Mapping[str, str | None]) -> None:
+        """Note files by their SHA-256, or by ``None`` that they are to go, all of them or none."""
+        line = json.dumps(files, sort_keys=True) + "\n"
+        descriptor = os.open(self.folder / LOG, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+        try:
+            os.write(descriptor, line.encode())
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+        self._take(files)
+
+    def settle(self) -> None:
+        """Write the manifest with all that was noted since."""
+        _write(self.folder, self.samples, self.definition, self.versions, self.files)
+        (self.folder / LOG).unlink(missing_ok=True)
+
+    def resume(self, definition: Mapping[str, Any]) -> None:
+        """Check that the sweep has this definition, and note with which versions it goes on.
+
+        Raises:
+            InputError: it has another definition; the message names what differs.
+        """
+        if differing := list(_differences(self.definition, definition)):
+            raise InputError(
+                f"the sweep in {str(self.folder)!r} has another definition: {'; '.join(differing[:5])}; "
+                "give what it was begun with, or name another folder"
+            )
+        if self.versions[-1] != versions():
+            self.versions.append(versions())
+
+    def remove(self) -> None:
+        """Leave no manifest behind."""
+        for name in (MANIFEST, LOG):
+            (self.folder / name).unlink(missing_ok=True)
+
+    def _take(self, files: Mapping[str, str | None]) -> None:
+        for place, digest in files.items():
+            self.files.pop(place, None)
+            if digest is not None:
+                self.files[place] = digest
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what computes the numbers."""
+    return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
+
+
+def _unlisted(folder: Path) -> dict[str, str | None]:
+    """The files of a sweep that was begun by an earlier version."""
+    found = sorted([*folder.glob("chunks/*.parquet"), *folder.glob("runs/*.nc")])
+    places = (file.relative_to(folder).as_posix() for file in found)
+    return {place: None for place in places if _PLACE.fullmatch(place)}
+
+
+def _write(folder: Path, samples: int, definition: Any, which: list[Any], files: Mapping[str, str | None]) -> None:
+    known = {place: digest for place, digest in sorted(files.items()) if digest is not None}
+    content = {"format": FORMAT, "format_version": FORMAT_VERSION, "samples": samples, "definition": definition}
+    content |= {"versions": which, "files": known}
+    content["sha256"] = _digest(content)
+    write_whole(folder / MANIFEST, (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode())
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    """That of all a manifest says but versions, which no number is read by, in one way of writing it."""
+    counted = {name: value for name, value in content.items() if name not in ("versions", "sha256")}
+    return hashlib.sha256(json.dumps(counted, sort_keys=True).encode()).hexdigest()
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    path = folder / MANIFEST
+    if not path.is_file():
+        raise InputError(f"there is no sweep in {str(folder)!r}: it has no {MANIFEST}")
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            raise ValueError(f"it has {path.stat().st_size} bytes")
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"{str(path)!r} cannot be read: {error}; {_DAMAGED}") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise InputError(f"{str(path)!r} is not that of a sweep")
+    if content.get("format_version") != FORMAT_VERSION:
+        raise InputError(
+            f"the sweep in {str(folder)!r} has the format version {content.get('format_version')}, expected "
+            f"{FORMAT_VERSION}; read it with the version of pathcontrol that wrote it"
+        )
+    if wrong := next(_wrong(content), None):
+        raise InputError(f"{str(path)!r} cannot be used: {wrong}; {_DAMAGED}")
+    return content
+
+
+def _wrong(content: Mapping[str, Any]) -> Iterator[str]:
+    """What a manifest says that none would."""
+    samples, definition, which = (content.get(name) for name in ("samples", "definition", "versions"))
+    if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
+        yield f"samples = {samples!r:.80}, expected a whole number from 1 to {MOST_SAMPLES}"
+    if not isinstance(definition, dict) or not isinstance(definition.get("space"), dict):
+        yield "it has no definition with a space"
+    elif not isinstance(definition["space"].get("parameters"), dict) or not isinstance(
+        definition.get("keep", {}), dict
+    ):
+        yield "its definition has no parameters, or what it keeps is no table"
+    if not isinstance(which, list) or not which or not all(isinstance(one, dict) for one in which):
+        yield "it has no versions"
+    if "files" in content:
+        yield from _wrong_files(content["files"])
+        if content.get("sha256") != _digest(content):
+            yield "its checksum is another one"
+
+
+def _wrong_files(files: Any, may_go: bool = False) -> Iterator[str]:
+    if not isinstance(files, dict):
+        yield f"files = {files!r:.80}, expected a table"
+        return
+    for place, digest in files.items():
+        if not _PLACE.fullmatch(place):
+            yield f"files has {place!r:.80}, expected chunks and runs"
+        if not (isinstance(digest, str) and _SHA256.fullmatch(digest)) and not (may_go and digest is None):
+            yield f"{place} has {digest!r:.80}, expected a SHA-256"
+
+
+def _read_log(path: Path, mending: bool) -> list[dict[str, str | None]]:
+    """The lines of the log; the last one without an end was being written when the process was killed."""
+    try:
+        text = path.read_bytes() if path.is_file() else b""
+    except OSError as error:
+        raise InputError(f"{str(path)!r} cannot be read: {error}") from error
+    lines = []
+    for number, line in enumerate(text.split(b"\n")[:-1], 1):
+        try:
+            files = json.loads(line)
+            wrong = next(_wrong_files(files, may_go=True), None)
+        except (ValueError, RecursionError) as error:
+            wrong = str(error)
+        if not wrong:
+            lines.append(files)
+        elif not mending:
+            raise InputError(f"{str(path)!r} is damaged in line {number}: {wrong}; resume the sweep to mend it")
+    return lines
+
+
+def _differences(then: Any, now: Any, key: str = "") -> Iterator[str]:
+    """Where two definitions differ, each as ``key: then …, now …``."""
+    if isinstance(then, dict) and isinstance(now, Mapping):
+        for name in dict.fromkeys((*then, *now)):
+            yield from _differences(then.get(name), now.get(name), f"{key}.{name}" if key else name)
+    elif then != now:
+        yield f"{key} was {_short(then)}, is now {_short(now)}"
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 80 else f"{text[:77]}…"
