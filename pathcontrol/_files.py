@@ -69,7 +69,7 @@ def _lock(descriptor: int) -> bool:
 
 @contextlib.contextmanager
 def _part_of(target: Path) -> Iterator[Path]:
-    """Make an empty temporary file beside ``target``, locked to show that its writer lives, and remove it at the end."""
+    """Make a temporary file beside ``target``, locked to show that its writer lives, and remove it at the end."""
     temporary = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
     descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     try:

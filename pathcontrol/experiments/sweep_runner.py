@@ -76,7 +76,7 @@ def space_of(section: SweepSection) -> Space:
     if (section.method == "grid") != (section.samples is None):
         said = "is as large as its grids; leave samples out" if section.method == "grid" else "needs samples = …"
         raise ExperimentError(f"sweep.samples: method = {section.method!r} {said}")
-    with keyed("sweep.parameters"):
+    with keyed("sweep", ("samples",)):
         return Space(parameters, section.method, section.samples)
 
 

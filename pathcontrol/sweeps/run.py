@@ -113,9 +113,9 @@ def opened(folder: Path, samples: int, definition: Mapping[str, Any], resume: bo
         InputError: something else is there, or another process writes there.
     """
     parquet()
-    refuse_suffix(folder, "the folder of a sweep")
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{str(folder)!r} is a file, expected a folder for the sweep; name another")
+    refuse_suffix(folder, "the folder of a sweep")
     folder.mkdir(parents=True, exist_ok=True)
     with locked(folder) as ours:
         if not ours:

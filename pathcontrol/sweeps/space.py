@@ -14,7 +14,7 @@ from numpy.random import SeedSequence, default_rng
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 
-MOST_SAMPLES, _MOST_NUMBERS = 10**7, 10**8  # that are in memory together
+MOST_SAMPLES, MOST_NUMBERS = 10**7, 10**8  # that are in memory together
 _TOLD = 100  # values that a record lists; of more, their number and a digest
 
 
@@ -145,7 +145,7 @@ class Space:
         Raises:
             InputError: they do not.
         """
-        most = min(MOST_SAMPLES, max(1, _MOST_NUMBERS // max(1, self._numbers())))
+        most = min(MOST_SAMPLES, max(1, MOST_NUMBERS // max(1, self._numbers())))
         if self.samples > most:
             sizes = " × ".join(str(len(values)) for values in self._choices()) if self.method == "grid" else ""
             raise InputError(

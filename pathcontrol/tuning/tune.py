@@ -20,7 +20,7 @@ from pathcontrol.sweeps.goals import Limits, Objectives, check_limits, check_obj
 from pathcontrol.sweeps.keep import Keep
 from pathcontrol.sweeps.result import dataset
 from pathcontrol.sweeps.run import opened, told
-from pathcontrol.sweeps.space import Space, check_seed, check_whole, digest
+from pathcontrol.sweeps.space import MOST_NUMBERS, MOST_SAMPLES, Space, check_seed, check_whole, digest
 from pathcontrol.sweeps.store import Store
 from pathcontrol.tuning.cases import Cases
 from pathcontrol.tuning.result import Tuning
@@ -87,11 +87,12 @@ def tune(
     check_whole("chunk", chunk)
     wanted = metrics if callable(metrics) else list(dict.fromkeys((*terms.metrics, *(metrics or ()))))
     space, several = _space(space, "random"), None if scenarios is None else _space(scenarios, "given")
+    count = 1 if several is None else several.samples
+    _check_size(space.width, population, generations, count)
     search = Search(space.width, (len(terms.goals), 1 + len(terms.bounds)), population, check_seed(seed))
     design = {} if several is None else several.design(seed)
     if both := set(design) & set(space.names):
         raise InputError(f"{', '.join(sorted(both))}: both searched and in the scenarios; call one of them otherwise")
-    count = 1 if several is None else several.samples
     definition = _definition(terms, build, (space, several), digest(list(design.values())), wanted) | {
         "population": population,
         "generations": generations,
@@ -110,6 +111,15 @@ def tune(
             if not tables:
                 raise
     return Tuning(xr.concat(tables, "sample"), terms, count, (len(tables), generations))
+
+
+def _check_size(width: int, population: int, generations: int, scenarios: int) -> None:
+    """Check that a generation fits into memory, and that all of them are not more than a sweep may have."""
+    if population * width > MOST_NUMBERS or population * generations * scenarios > MOST_SAMPLES:
+        raise InputError(
+            f"population = {population} candidates of {width} numbers, generations = {generations} and {scenarios} "
+            f"scenarios, expected at most {MOST_SAMPLES} simulations, and {MOST_NUMBERS} numbers in a generation"
+        )
 
 
 def _definition(

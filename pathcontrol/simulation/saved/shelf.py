@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable, Mapping
 from hashlib import blake2b
 from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, finite
 from pathcontrol.errors import InputError
 
+_MOST_AXES = 8
 _INLINE = 8  # numbers that are written where they belong
 
 
@@ -51,15 +53,17 @@ class Shelf:
         return self._known[key][1]
 
     def get(self, place: Mapping[str, Any]) -> Array:
-        """The array that :meth:`put` put at a place.
+        """Return the array that :meth:`put` put at a place.
 
         Raises:
-            InputError: there is no such place.
+            InputError: there is no such place, or its numbers are not finite.
         """
         if "values" in place:
-            return np.array(place["values"], dtype=np.float64)
+            return finite("values", np.array(place["values"], dtype=np.float64))
         (numbers,), shape, at = self._parts, place["shape"], place["at"]
-        size = int(np.prod(shape))
-        if min(shape) < 0 or at < 0 or at + size > len(numbers):
+        if not isinstance(shape, list) or not all(type(length) is int and length >= 0 for length in (at, *shape)):
+            raise InputError(f"an array is said to have the shape {shape} and to be at {at}, expected whole numbers")
+        size = math.prod(shape)
+        if len(shape) > _MOST_AXES or at + size > len(numbers):
             raise InputError(f"an array of shape {shape} is said to be at {at} of {len(numbers)} numbers")
-        return numbers[at : at + size].reshape(shape)
+        return finite("numbers", numbers[at : at + size].reshape(shape))

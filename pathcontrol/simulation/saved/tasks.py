@@ -16,6 +16,7 @@ from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.table import TabulatedProfile
 from pathcontrol.simulation.saved.contours import contour_of, contour_recipe
+from pathcontrol.simulation.saved.extent import check_extent
 from pathcontrol.simulation.saved.shared import shared
 from pathcontrol.simulation.saved.shelf import Shelf
 from pathcontrol.tasks.base import PathTask, Reprofiled
@@ -87,8 +88,9 @@ def task_of(recipe: Any, shelf: Shelf) -> PathTask:
         InputError: it is no recipe of a task.
     """
     try:
+        check_extent(recipe)
         task = _made(recipe, shelf)
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
         raise InputError(f"this is no recipe of a task ({type(error).__name__}: {error})") from error
     if not isinstance(task, PathTask):
         raise InputError(f"this is a recipe of {task!r}, expected one of a task")

@@ -1,0 +1,63 @@
+"""How large and deep the task is that a recipe would make, found before anything is made of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from pathcontrol.errors import InputError
+
+_MOST, _DEEPEST = 10**6, 100  # tables of which one task is made, and how deep they are inside one another
+
+
+class _Extent(NamedTuple):
+    size: int
+    depth: int
+
+
+def check_extent(recipe: Any) -> None:
+    """Check that a recipe makes a task of bounded size, parts that it names more than once counted each time.
+
+    Raises:
+        InputError: the task would be too large or too deep, a number is not finite, or a part is not there.
+    """
+    parts: list[_Extent] = []
+    if isinstance(recipe, Mapping) and recipe.get("class") == "TaskBatch":
+        for part in _listed(recipe, "parts"):
+            parts.append(_checked(part, parts))
+        for task in _listed(recipe, "tasks"):
+            _checked(task, parts)
+    else:
+        _checked(recipe, parts)
+
+
+def _listed(recipe: Mapping[str, Any], name: str) -> list[Any]:
+    if not isinstance(recipe.get(name), list):
+        raise InputError(f"its {name} are {recipe.get(name)!r:.80}, expected a list")
+    return recipe[name]
+
+
+def _checked(recipe: Any, parts: Sequence[_Extent]) -> _Extent:
+    extent = _of(recipe, parts)
+    if extent.size > _MOST or extent.depth > _DEEPEST:
+        raise InputError(
+            f"a task is said to be made of {extent.size} tables, {extent.depth} deep, expected at most {_MOST} and "
+            f"{_DEEPEST}"
+        )
+    return extent
+
+
+def _of(recipe: Any, parts: Sequence[_Extent]) -> _Extent:
+    if isinstance(recipe, Mapping) and "part" in recipe:
+        part = recipe["part"]
+        if type(part) is not int or not 0 <= part < len(parts):
+            raise InputError(f"part {part!r:.80} is named, of {len(parts)} before it")
+        return parts[part]
+    if isinstance(recipe, Mapping | list):
+        inner = [_of(value, parts) for value in (recipe.values() if isinstance(recipe, Mapping) else recipe)]
+        one = isinstance(recipe, Mapping)
+        return _Extent(one + sum(each.size for each in inner), one + max((each.depth for each in inner), default=0))
+    if isinstance(recipe, float) and math.isnan(recipe):
+        raise InputError("one of its numbers is no number")
+    return _Extent(0, 0)
