@@ -37,6 +37,7 @@ class Origin:
         stored: what both are made from, if they come from a file.
         robots: the arm of each rollout by its number, where they differ.
         first: gives the number of the first rollout that a :class:`TaskBatch` has a task for.
+        model: gives the arm that the law computes with, where it is not the simulated one.
     """
 
     def __init__(
@@ -46,27 +47,47 @@ class Origin:
         stored: Stored | None = None,
         robots: Mapping[int, RobotModel] | None = None,
         first: Callable[[], int] = lambda: 0,
+        model: Callable[[], RobotModel | None] = lambda: None,
     ) -> None:
         self._robot, self._task, self._stored, self._robots = robot, task, stored, robots
-        self._first = first
+        self._first, self._model = first, model
 
     @classmethod
-    def of(cls, robot: RobotModel | RobotBatch | None, task: PathTask | None, first: int = 0) -> Origin:
-        """That of a run whose robot and task are at hand; rollouts are numbered from ``first``."""
+    def of(
+        cls,
+        robot: RobotModel | RobotBatch | None,
+        task: PathTask | None,
+        first: int = 0,
+        model: RobotModel | None = None,
+    ) -> Origin:
+        """That of a run whose robot, task and model are at hand; rollouts are numbered from ``first``."""
+        numbered = {"first": lambda: first, "model": lambda: model}
         if isinstance(robot, RobotBatch):
             robots = dict(enumerate(robot.robots, first))
-            return cls(lambda: robot.robots[0], lambda: task, robots=robots, first=lambda: first)
-        return cls(lambda: robot, lambda: task, first=lambda: first)
+            return cls(lambda: robot.robots[0], lambda: task, robots=robots, **numbered)  # type: ignore[arg-type]
+        return cls(lambda: robot, lambda: task, **numbered)  # type: ignore[arg-type]
 
     @classmethod
     def load(cls, stored: Stored) -> Origin:
         """What was stored; it is looked at when it is asked for."""
-        return cls(lambda: _robot(stored), lambda: _task(stored), stored, first=lambda: _first(stored))
+        return cls(
+            lambda: _robot(stored),
+            lambda: _task(stored),
+            stored,
+            first=lambda: _first(stored),
+            model=lambda: _model(stored),
+        )
 
     @cached_property
     def robot(self) -> RobotModel | None:
         """The simulated arm."""
         return self._robot()
+
+    @cached_property
+    def model(self) -> RobotModel | None:
+        """The arm that the law computes with: the simulated one, unless another is known."""
+        model = self._model()
+        return self.robot if model is None else model
 
     @cached_property
     def task(self) -> PathTask | None:
@@ -88,15 +109,15 @@ class Origin:
         if self._stored is not None or (self._robots is None and not isinstance(self.task, TaskBatch)):
             return self
         robot, task = self.robot if self._robots is None else self._robots[number], self.task_of(np.array([number]))
-        return Origin(lambda: robot, lambda: task)
+        return Origin(lambda: robot, lambda: task, model=self._model)
 
     def with_robot(self, robot: RobotModel) -> Origin:
         """The same with another robot."""
-        return Origin(lambda: robot, lambda: self.task, first=self._first)
+        return Origin(lambda: robot, lambda: self.task, first=self._first, model=self._model)
 
     def path(self, index: int) -> Origin:
         """That of one path of a sequence."""
-        return Origin(lambda: self.robot, lambda: _path(self.task, index))
+        return Origin(lambda: self.robot, lambda: _path(self.task, index), model=self._model)
 
     def stored(self, upto: float) -> Stored:
         """Robot and task for a file; of an endless path what is needed ``upto`` this s."""
@@ -106,6 +127,8 @@ class Origin:
 
         shelf, robot = Shelf(), self.robot
         recipes: dict[str, Any] = {"robot": None if robot is None else recipe_of(robot)}
+        if self.model is not None and self.model is not robot:
+            recipes["model"] = recipe_of(self.model)
         recipes["task"] = _recipe(self.task, shelf, upto)
         if isinstance(self.task, TaskBatch):
             recipes["first_rollout"] = self._first()
@@ -132,6 +155,13 @@ def _robot(stored: Stored) -> RobotModel | None:
     return None if recipe is None else robot_of(recipe)
 
 
+def _model(stored: Stored) -> RobotModel | None:
+    from pathcontrol.robot.recipe import robot_of
+
+    recipe = _part_of(stored, "model", missing=None)
+    return None if recipe is None else robot_of(recipe)
+
+
 def _task(stored: Stored) -> PathTask | None:
     from pathcontrol.simulation.saved.tasks import task_of
 
@@ -146,10 +176,12 @@ def _first(stored: Stored) -> int:
     return first
 
 
-def _part_of(stored: Stored, name: str) -> Any:
+def _part_of(stored: Stored, name: str, **otherwise: Any) -> Any:
+    """One of the recipes; ``missing=`` says what is given where there is none, which else is an error."""
     try:
-        return json.loads(stored.text)[name]
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        recipes = json.loads(stored.text)
+        return recipes.get(name, otherwise["missing"]) if otherwise else recipes[name]
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"the {name} of the run cannot be read: {error}") from error
 
 

@@ -46,13 +46,15 @@ class Run:
         *,
         robot: RobotModel | RobotBatch | None = None,
         task: PathTask | None = None,
+        model: RobotModel | None = None,
         first_rollout: int = 0,
     ) -> Run:
         """A run from arrays laid out as :data:`VARIABLES` says, and the position unit of each joint by its name.
 
         ``outcome`` is laid out as :data:`OUTCOMES`; a rollout with a time in ``diverged_time`` has diverged, one with
         a time in ``finish_time`` is finished, and any other is running. ``robot`` and ``task`` are what the run is
-        about, where they are known. Rollouts are numbered from ``first_rollout``.
+        about, where they are known, and ``model`` the arm that the law computes with, where it is another one. Rollouts
+        are numbered from ``first_rollout``.
         """
         kinds = sorted(set(joints.values()), reverse=True)
         variables = {}
@@ -67,7 +69,7 @@ class Run:
             "joint": list(joints),
         }
         data = xr.Dataset(variables, coords).assign_coords(_outcome(rollouts, outcome or {}))
-        return cls(data, config, Origin.of(robot, task, first_rollout))
+        return cls(data, config, Origin.of(robot, task, first_rollout, model))
 
     def __getitem__(self, name: str) -> xr.DataArray:
         """One variable by its name."""
@@ -98,6 +100,17 @@ class Run:
         if self._origin.robot is None:
             raise InputError("the run does not know its robot, as it holds data only; give robot=load_robot(...)")
         return self._origin.robot
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm that the control law computed with: :attr:`robot`, unless the ``plant`` was another one.
+
+        Files of earlier versions do not know it, and give :attr:`robot`.
+
+        Raises:
+            InputError: the run does not know its robot.
+        """
+        return self.robot if self._origin.model is None else self._origin.model
 
     @property
     def robots(self) -> list[RobotModel]:

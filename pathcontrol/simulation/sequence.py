@@ -109,7 +109,7 @@ def simulate_sequence(
     described = {"controller": f"{len(laws)} paths with {names}", "sequence": [law.describe() for law in laws]}
     config = record_of(described, robot, loop, disturbance, duration=durations.tolist(), laps=laps)
     time = period * np.arange(arrays["s"].shape[1])
-    run = Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=whole)
+    run = Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=whole, model=laws[0].robot)
     arm.divergence.check(run)
     return run
 

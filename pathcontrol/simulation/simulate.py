@@ -95,7 +95,15 @@ def simulate(
         outcome["laps"] = whole_laps(controller.task, *first_and_last(arrays["s"]))
     time = period * np.arange(arrays["s"].shape[1])
     run = Run.from_arrays(
-        time, joints_of(robot), arrays, config, outcome, robot=robot, task=controller.task, first_rollout=first
+        time,
+        joints_of(robot),
+        arrays,
+        config,
+        outcome,
+        robot=robot,
+        task=controller.task,
+        model=controller.robot,
+        first_rollout=first,
     )
     arm.divergence.check(run)
     return run

@@ -102,7 +102,11 @@ def compute(
             values = _measured(run, measure)
             _put(measured, values, rows, len(samples))
             for row in _candidates(values, samples[rows], keep, at_random):
-                runs[int(samples[rows[row]])] = _history(run, row, parameters, rows[row], int(samples[rows[row]]))
+                at = rows[row]
+                alone = run if run.rollouts == 1 else _alone(build, parameters, samples, at)
+                runs[int(samples[at])] = _history(
+                    alone, {name: value[at].tolist() for name, value in parameters.items()}
+                )
     except InputError as error:
         raise InputError(f"samples {samples[0]} to {samples[-1]}: {error}") from error
     clash = set(parameters) & set(measured) | {"sample"} & set(measured)
@@ -191,9 +195,16 @@ def _candidates(
     return [row for row, sample in enumerate(samples.tolist()) if sample in chosen]
 
 
-def _history(run: Run, row: int, parameters: Mapping[str, Array], at: int, sample: int) -> Run:
-    end = int(samples_alone(run)[row])
-    kept = run.rollout(row)
-    kept = kept.with_data(kept.data.isel(time=slice(0, end)).copy(deep=True))
-    kept.config["sweep"] = {"sample": sample} | {name: value[at].tolist() for name, value in parameters.items()}
+def _alone(build: Build, parameters: Mapping[str, Array], samples: NDArray[np.int64], at: int) -> Run:
+    """One sample simulated alone, which says of itself nothing of the chunk that it is in: its own gains, arm, path."""
+    built = build({name: value[[at]] for name, value in parameters.items()}, samples[[at]])
+    [(_, arguments)] = [(0, built)] if isinstance(built, Mapping) else built
+    return _simulated(samples[[at]], arguments)
+
+
+def _history(alone: Run, parameters: Mapping[str, Any]) -> Run:
+    """The run of one sample as far as it says something, and what its ``parameters`` were."""
+    end, sample = int(samples_alone(alone)[0]), int(alone.data["rollout"][0])
+    kept = alone.with_data(alone.data.isel(time=slice(0, end)).copy(deep=True))
+    kept.config["sweep"] = {"sample": sample, **parameters}
     return kept

@@ -61,36 +61,45 @@ def script(name: str, run: Run) -> str:
     sequence = isinstance(run.config.get("duration"), list)
     if run.task is None or not _known(several, loop) or not _ended(run.config, sequence):
         return ""
-    if "disturbance" in run.config or "arms" in table(run.config, "plant"):
+    if "disturbance" in run.config or table(run.config, "plant").get("arms", 1) != 1:
         return ""
+    same = run.model is run.robot
     settings = _without(loop, ["loop"])
     if "noise" in settings:
         settings["noise"] = _Name(_call("pc.SensorNoise", [], settings["noise"]))
     closed = _call(f"pc.{_LOOPS[loop['loop']]}", [], settings)
     lines = [
         "import pathcontrol as pc\n",
-        f'saved = pc.Run.load("{file_name(name)}.nc")  # knows its robot and its path',
+        f'saved = pc.Run.load("{file_name(name)}.nc")  # knows its robot, the model of its law and its path',
         f"loop = {closed}",
         'q, qd = saved.array("q")[:, 0], saved.array("qd")[:, 0]',
-        *(_of_sequence if sequence else _of_one)(several[0], run.config),
+        *(_of_sequence if sequence else _of_one)(
+            several[0], run.config, {} if same else {"plant": _Name("saved.robot")}
+        ),
     ]
     text = "\n".join(lines) + "\n"
     return f"from math import inf\n\n{text}" if re.search(r"\binf\b", text) else text
 
 
-def _of_one(law: Mapping[str, Any], config: Mapping[str, Any]) -> list[str]:
-    made = _call(f"pc.{law['controller']}", ["saved.robot", "saved.task"], _without(law, _NOT_ARGUMENTS))
-    settings = {key: config[key] for key in ("duration", "laps", "until")} | {"loop": _Name("loop")}
+def _of_one(law: Mapping[str, Any], config: Mapping[str, Any], plant: Mapping[str, Any]) -> list[str]:
+    made = _call(f"pc.{law['controller']}", ["saved.model", "saved.task"], _without(law, _NOT_ARGUMENTS))
+    settings = {key: config[key] for key in ("duration", "laps", "until")} | {**plant, "loop": _Name("loop")}
     if config.get("first_rollout"):
         settings["first_rollout"] = config["first_rollout"]
     return [f"law = {made}", f"run = {_call('pc.simulate', ['law', 'q', 'qd'], settings)}"]
 
 
-def _of_sequence(law: Mapping[str, Any], config: Mapping[str, Any]) -> list[str]:
-    made = _call(f"pc.{law['controller']}", ["saved.robot", "path"], _without(law, _NOT_ARGUMENTS))
+def _of_sequence(law: Mapping[str, Any], config: Mapping[str, Any], plant: Mapping[str, Any]) -> list[str]:
+    made = _call(f"pc.{law['controller']}", ["saved.model", "path"], _without(law, _NOT_ARGUMENTS))
     times = config["duration"]
     duration = times[0] if all(each == times[0] for each in times) else times
-    settings = {"duration": duration, "laps": config["laps"], "task": _Name("saved.task"), "loop": _Name("loop")}
+    settings = {
+        "duration": duration,
+        "laps": config["laps"],
+        "task": _Name("saved.task"),
+        **plant,
+        "loop": _Name("loop"),
+    }
     run = _call("pc.simulate_sequence", ["laws", "q", "qd"], settings)
     return [f"laws = [{made} for path in saved.task]", f"run = {run}"]
 
