@@ -13,7 +13,7 @@ from pathcontrol.errors import UnknownNameError
 
 
 @click.command("check")
-@click.argument("file")
+@click.argument("file", type=click.Path(exists=False))
 @click.option("--lock", multiple=True, metavar="JOINT", help="A joint that will be locked; repeat for more.")
 @package_option
 @json_option
