@@ -9,11 +9,15 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
+from pathcontrol.analysis.contours import contour_numbers, tool_speed
 from pathcontrol.analysis.known import known_toolpath, where_known
-from pathcontrol.analysis.metrics import peak, rms
+from pathcontrol.analysis.limit_shares import limit_ratios
+from pathcontrol.analysis.progress import progress
+from pathcontrol.analysis.window import Samples, Window, own_samples, samples_of
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.base import PathTask
 from pathcontrol.toolpaths.contour import Contour
 
 
@@ -57,20 +61,113 @@ def tool_deviation(
     return deviation
 
 
-def toolpath_metrics(run: Run, robot: RobotModel | None = None, task: ToolpathTask | None = None) -> dict[str, Any]:
+def toolpath_metrics(
+    run: Run,
+    robot: RobotModel | None = None,
+    task: ToolpathTask | None = None,
+    *,
+    tolerance: float = 1e-3,
+    window: Window = "all",
+) -> dict[str, Any]:
     """The numbers of a run along its toolpath, or another, each a list with one entry for each rollout.
 
-    Largest and RMS distance of the tool from the drawing over the cuts, ``tool_deviation`` [m]; how far the smooth
-    curves are from it, ``smoothing_deviation`` [m]; peaks and RMS of ‖e_p‖ [rad] and ‖e_v‖ [rad/s] over the cuts;
-    the largest torque demand [N m]; and the time after which the last path was finished [s], NaN if it was not.
+    Over the cuts: largest and RMS distance of the tool from the drawing, ``tool_deviation`` [m]; the other way round
+    the largest distance of a point of the drawing from the tool's way, ``drawing_deviation_peak`` [m]; the share of
+    the drawing's length that the tool passed within ``tolerance``, ``coverage``; mean and largest speed of the tool
+    beside the ``feed`` that was asked for, all [m/s], and the time that the cuts took, ``cut_time`` [s]; the largest
+    ``orientation_error_peak`` [rad], left out where the tool may turn as it likes; peaks and RMS of ‖e_p‖ [rad] and
+    ‖e_v‖ [rad/s].
+
+    How far the smooth curves are from the drawing, ``smoothing_deviation`` [m]; the largest torque demand [N m]; the
+    largest shares that position, velocity and torque have of their limits; the share of the path that was passed,
+    ``progress``; and the time after which the last path was finished [s], NaN if it was not.
+
+    Args:
+        run: what happened.
+        robot: the arm; by default the run's own.
+        task: the toolpath; by default the run's own.
+        tolerance: how near [m] the tool has to come to a point of the drawing for it to count as passed.
+        window: from when to when [s] peaks and RMS are, by default all of the time until the last path is finished.
+
+    Raises:
+        InputError: something is left out that the run does not know.
     """
-    task = known_toolpath(run, task)
-    cutting = np.array([not contour.rapid for contour in task.contours])[run["path_index"].to_numpy()]
-    deviation = tool_deviation(run, robot, task.frame, task.contours)[:, cutting]
-    signals = {"tool_deviation": deviation, "e_p": run.norm("e_p")[:, cutting], "e_v": run.norm("e_v")[:, cutting]}
-    values = {f"{name}_peak": peak(v) for name, v in signals.items()}
-    values |= {f"{name}_rms": rms(v) for name, v in signals.items()}
+    task, arm = known_toolpath(run, task), run.robot if robot is None else robot
+    own, counted = samples_of(run, "all"), samples_of(run, window)
+    on_cuts = np.array([not contour.rapid for contour in task.contours])[run["path_index"].to_numpy()]
+    cutting = np.where(on_cuts, 1.0, np.nan)
+    signals = {
+        "tool_deviation": tool_deviation(run, arm, task.frame, task.contours),
+        "e_p": run.norm("e_p"),
+        "e_v": run.norm("e_v"),
+    }
+    values = {f"{name}_peak": counted.reduced(_largest, v * cutting) for name, v in signals.items()}
+    values |= {f"{name}_rms": counted.reduced(_rms, v * cutting) for name, v in signals.items()}
+    values |= _of_drawing(run, task, arm, tolerance) | _of_tool(run, task, arm, counted, cutting)
     values["smoothing_deviation"] = np.full(run.rollouts, task.deviation)
-    values["tau_demand_peak"] = np.abs(run.array("tau_demand")).max((1, 2))
-    values["path_time"] = run.finish_time
+    values["tau_demand_peak"] = own.reduced(np.max, np.abs(run.array("tau_demand")))
+    values |= limit_ratios(run if robot is None else run.with_robot(arm), own)
+    values |= {"progress": progress(run, task), "path_time": run.finish_time}
     return {name: value.tolist() for name, value in values.items()}
+
+
+def _of_drawing(run: Run, task: ToolpathTask, robot: RobotModel, tolerance: float) -> dict[str, Array]:
+    """How much of the drawing was passed in which time, (rollout,) each."""
+    stop, found = own_samples(run), []
+    for i in range(run.rollouts):
+        every = contour_numbers(run.rollout(i), task, robot, tolerance, int(stop[i]))
+        cuts = [one for one in every if not one.rapid]
+        length = sum(one.length for one in cuts)
+        found.append(
+            (
+                sum(one.length * one.coverage for one in cuts) / length if cuts else np.nan,
+                max((one.missed for one in cuts), default=np.nan),
+                sum(one.time for one in cuts),
+                length / sum(one.length / one.feed for one in cuts) if cuts else np.nan,
+            )
+        )
+    return dict(zip(("coverage", "drawing_deviation_peak", "cut_time", "feed"), np.array(found).T, strict=True))
+
+
+def _of_tool(run: Run, task: ToolpathTask, robot: RobotModel, counted: Samples, cutting: Array) -> dict[str, Array]:
+    """Speed and orientation of the tool over the cuts, (rollout,) each."""
+    speed = tool_speed(run, robot, task.frame) * cutting
+    values = {"tool_speed_mean": counted.reduced(_mean, speed), "tool_speed_peak": counted.reduced(_largest, speed)}
+    if task.rotations:
+        error = orientation_error(run, task, robot, task.frame, task.rotations) * cutting
+        values["orientation_error_peak"] = counted.reduced(_largest, error)
+    return values
+
+
+def orientation_error(run: Run, task: PathTask, robot: RobotModel, frame: str, rotations: int = 3) -> Array:
+    """The angle [rad], (rollout, time), between a frame and itself at q_d(s); with 2 ``rotations`` of its z axis only.
+
+    With 3 it is the angle of R R_dᵀ, about whatever axis.
+    """
+
+    def angle(s: Array, q: Array) -> Array:
+        wanted, there = (robot.frame_pose(at, frame)[..., :3, :3] for at in (task.q_d(s), q))
+        if rotations == 2:
+            return np.arctan2(
+                np.linalg.norm(np.cross(wanted[..., 2], there[..., 2]), axis=-1),
+                (wanted[..., 2] * there[..., 2]).sum(-1),
+            )
+        # ‖R − R_d‖ = 2√2 sin(θ/2), which is exact for small angles too
+        chord = np.linalg.norm(there - wanted, axis=(-2, -1)) / np.sqrt(8.0)
+        return 2 * np.arcsin(np.minimum(chord, 1.0))
+
+    return where_known(angle, run.array("s"), run.array("q"))
+
+
+def _largest(values: Array) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.max()) if known.size else np.nan
+
+
+def _mean(values: Array) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if known.size else np.nan
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(_mean(values**2)))

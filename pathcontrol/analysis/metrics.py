@@ -3,71 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
 from pathcontrol._expect import expect
-from pathcontrol.analysis.gamma import distance_to_gamma
+from pathcontrol.analysis.coverage import passed, path_points
+from pathcontrol.analysis.gamma import distance_to_gamma, planned_rate
 from pathcontrol.analysis.known import by_task, known_task, of_rollouts, where_known
+from pathcontrol.analysis.limit_shares import limit_ratios
+from pathcontrol.analysis.names import LABELS, UNITS
+from pathcontrol.analysis.progress import progress
 from pathcontrol.analysis.torque import torque_metrics
-from pathcontrol.errors import InputError, TaskError
+from pathcontrol.analysis.window import Samples, Window, samples_of
+from pathcontrol.errors import TaskError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
 
-#: the unit of each metric
-UNITS = {
-    **{f"{name}_{kind}": "rad" for name in ("e_p", "lag_error", "contour_error") for kind in ("peak", "rms")},
-    **{f"{name}_{kind}": "rad/s" for name in ("e_v",) for kind in ("peak", "rms")},
-    **{f"gamma_distance_{kind}": "rad" for kind in ("peak", "rms")},
-    "speed_ratio": "",
-    "settling_time": "s",
-    "tau_demand_peak": "N m",
-    "tau_peak": "N m",
-    "tau_demand_ratio": "",
-    "tau_noise": "N m",
-    "noise_amplification": "N m/rad",
-    **{f"tool_deviation_{kind}": "m" for kind in ("peak", "rms")},
-    "smoothing_deviation": "m",
-    "path_time": "s",
-    "end_error": "rad",
-}
-#: what each metric is called where a person reads, in the order in which they are shown
-LABELS = {
-    "tool_deviation_peak": "tool from the drawing, peak",
-    "tool_deviation_rms": "tool from the drawing, RMS",
-    "smoothing_deviation": "smooth curves from the drawing",
-    "e_p_peak": "‖e_p‖ peak",
-    "e_p_rms": "‖e_p‖ RMS",
-    "e_v_peak": "‖e_v‖ peak",
-    "e_v_rms": "‖e_v‖ RMS",
-    "contour_error_peak": "contour error, peak",
-    "contour_error_rms": "contour error, RMS",
-    "lag_error_peak": "lag error, peak",
-    "lag_error_rms": "lag error, RMS",
-    "gamma_distance_peak": "distance to Γ, peak",
-    "gamma_distance_rms": "distance to Γ, RMS",
-    "speed_ratio": "speed, mean σ̇ over mean ϑ",
-    "settling_time": "settling time of ‖e_p‖",
-    "path_time": "time for the path",
-    "end_error": "‖e_p‖ at the end",
-    "tau_demand_peak": "torque demand, peak",
-    "tau_peak": "torque that acted, peak",
-    "tau_demand_ratio": "torque demand over its limit, peak",
-    "tau_noise": "noise of the torque demand",
-    "noise_amplification": "noise of the torque over that of the position",
-}
+__all__ = ["LABELS", "UNITS"]
 
 
 def steady_state(run: Run, fraction: float = 0.5) -> Run:
-    """The last ``fraction`` of a run; the paper's peaks are those of the second half."""
+    """The last ``fraction`` of the time until the last rollout is finished; the paper's peaks are of the second half.
+
+    Rollouts that are finished at different times have no such time in common: :func:`metrics` takes each one's own.
+    """
     expect("run", run, Run)
-    fraction = scalar("fraction", fraction, positive=True)
-    if fraction > 1:
-        raise InputError(f"fraction = {fraction:g}, expected a number from 0 to 1")
-    first, last = run.time[0], run.time[-1]
-    return run.with_data(run.data.sel(time=run.time >= last - fraction * (last - first)))
+    own, time = samples_of(run, None, fraction), run.time
+    last = time[own.stop.max() - 1]
+    begin = last - fraction * (last - time[0])
+    return run.with_data(run.data.sel(time=(time >= begin) & (time <= last)))
 
 
 def peak(values: Array) -> Array:
@@ -77,12 +44,7 @@ def peak(values: Array) -> Array:
 
 def rms(values: Array) -> Array:
     """The root mean square over time, (rollout,) of (rollout, time)."""
-    return np.sqrt(_mean(values**2))
-
-
-def _mean(values: Array) -> Array:
-    """The mean over time, the same to the last bit however many rollouts lie beside one another in memory."""
-    return np.ascontiguousarray(values).mean(-1)
+    return np.sqrt(np.ascontiguousarray(values**2).mean(-1))
 
 
 def contour_error(run: Run, task: PathTask | None = None) -> Array:
@@ -94,7 +56,12 @@ def contour_error(run: Run, task: PathTask | None = None) -> Array:
 
 
 def _contour_error(run: Run, task: PathTask) -> Array:
-    return where_known(lambda q: np.linalg.norm(task.q_d(task.sigma_bar(q)) - q, axis=-1), run.array("q"))
+    return _distance(task, run.array("q"))
+
+
+def _distance(task: PathTask, q: Array) -> Array:
+    """Distance from the path, (rollout, time), of joint positions (rollout, time, n)."""
+    return where_known(lambda q: np.linalg.norm(task.q_d(task.sigma_bar(q)) - q, axis=-1), q)
 
 
 def lag_error(run: Run, task: PathTask | None = None) -> Array:
@@ -106,11 +73,17 @@ def lag_error(run: Run, task: PathTask | None = None) -> Array:
 
 
 def _lag_error(run: Run, task: PathTask) -> Array:
+    return _lag(task, run.array("s"), run.array("q"))
+
+
+def _lag(task: PathTask, s: Array, q: Array) -> Array:
+    """Lag, (rollout, time), at path parameters (rollout, time) and joint positions (rollout, time, n)."""
+
     def lag(s: Array, q: Array) -> Array:
         tangent = task.dq_d(s)
         return ((task.q_d(s) - q) * tangent).sum(-1) / np.linalg.norm(tangent, axis=-1)
 
-    return where_known(lag, run.array("s"), run.array("q"))
+    return where_known(lag, s, q)
 
 
 def settling_time(values: Array, time: Array, band: float) -> Array:
@@ -150,53 +123,106 @@ def metrics(
     fraction: float = 0.5,
     band: float = np.deg2rad(2.0),
     only: Collection[str] = tuple(UNITS),
+    *,
+    window: Window | None = None,
 ) -> dict[str, Any]:
     """The usual numbers of a run on its task, or on another, each a list with one entry for each rollout.
 
-    Peaks and RMS of ‖e_p‖ [rad], ‖e_v‖ [rad/s], contour and lag error [rad] and distance to Γ over the last
-    ``fraction`` of the time; there also the mean rate of s over the mean of ϑ, 1 for an arm that is as fast as it
-    should be and 0 for one that is stuck; settling time [s] of ‖e_p‖ into ``band`` [rad].
-
-    Largest torque demand and largest torque that acted [N m], over all joints and all of the time; the largest share
-    that a demand has of its limit, the loop's or else the robot's, left out where nothing is limited. Over the last
-    ``fraction`` of the time, the standard deviation of the noise on the torque demand [N m], see
+    The time of a rollout is its own: it ends when that rollout is finished, whatever others do, and so the numbers of
+    a rollout are the same alone and beside any others. Of that time the last ``fraction`` counts, unless a ``window``
+    is given, for: peaks and RMS of ‖e_p‖ [rad], ‖e_v‖ [rad/s], contour and lag error [rad] and distance to Γ;
+    ``speed_ratio``, the mean rate of s over the mean of ϑ, 1 for an arm that is as fast as it should be and 0 for one
+    that is stuck; the standard deviation of the noise on the torque demand [N m], see
     :func:`~pathcontrol.analysis.torque.noise_deviation`, and its amplification [N m/rad]: that deviation over the RMS
     error of the measured position, by encoder and noise, of the same joint, left out where positions are measured
-    exactly. Both are those of the joint where they are largest.
+    exactly. Both are those of the joint where they are largest. On an open path ϑ and Γ are those of the plan, which
+    comes to rest at the end: an arm that does what the plan asks for has the ratio 1 and the distance 0.
 
-    Contour error and distance to Γ are left out for paths that neither end nor repeat. Open paths have the time [s]
-    after which they were finished, and the :func:`end_error` [rad], each NaN where they were not. All numbers of a
-    rollout that diverged are NaN. Of these, those that ``only`` names; the distance to Γ takes the most time.
+    All of a rollout's time counts for: settling time [s] of ‖e_p‖ into ``band`` [rad]; largest torque demand and
+    largest torque that acted [N m], over all joints; the largest share that a demand has of its limit; the largest
+    shares that position, velocity and torque have of their limits, ``position_limit_ratio``, ``velocity_limit_ratio``
+    and ``torque_limit_ratio``, above 1 where a limit is passed; shares are left out where nothing is limited.
+
+    What says whether the arm went along the path at all: ``progress``, the share of what was to be passed that s has
+    passed, see :func:`~pathcontrol.analysis.progress.progress`; ``coverage``, the share of the path's length to which
+    the arm came within ``band``; and ``path_deviation_peak`` [rad], how far the farthest point of the path is from
+    where the arm was, which is the contour error the other way round.
+
+    Contour error, coverage and distance to Γ are left out for paths that neither end nor repeat. Open paths have the
+    time [s] after which they were finished, and the :func:`end_error` [rad], each NaN where they were not. All numbers
+    of a rollout that diverged are NaN. Of these, those that ``only`` names; the distance to Γ takes the most time.
 
     Rollouts with a task each have the numbers of their own.
+
+    Args:
+        run: what happened.
+        task: the path; by default the run's own.
+        fraction: how much of its time counts for errors, if no ``window`` is given.
+        band: of the settling time and of coverage [rad].
+        only: the metrics wanted.
+        window: from when to when the errors are, ``(t0, t1)`` in seconds, or ``"second half"`` or ``"all"`` of each
+            rollout's time. A rollout that was finished before has NaN there.
+
+    Raises:
+        InputError: no task is known, or a setting is something else.
+        TaskError: the task returns something it must not.
     """
+    band = scalar("band", band, positive=True)
     values: dict[str, Array] = {}
     for part, own, rows in by_task(run, known_task(run, task)):
-        for name, value in _metrics(part, own, fraction, band, only).items():
+        counted = samples_of(part, window, fraction)
+        for name, value in _metrics(part, own, counted, band, only).items():
             values.setdefault(name, np.full(run.rollouts, np.nan))[rows] = value
     return {name: value.tolist() for name, value in values.items()}
 
 
-def _metrics(run: Run, task: PathTask, fraction: float, band: float, only: Collection[str]) -> dict[str, Array]:
+def _metrics(run: Run, task: PathTask, counted: Samples, band: float, only: Collection[str]) -> dict[str, Array]:
     """The metrics of rollouts with one task, (rollout,) each."""
-    late = steady_state(run, fraction)
-    signals = {"e_p": late.norm("e_p"), "e_v": late.norm("e_v"), "lag_error": np.abs(_lag_error(late, task))}
-    try:
-        if not {"contour_error_peak", "contour_error_rms"}.isdisjoint(only):
-            signals["contour_error"] = _contour_error(late, task)
-        if not {"gamma_distance_peak", "gamma_distance_rms"}.isdisjoint(only):
-            signals["gamma_distance"] = where_known(
-                lambda q, qd: np.asarray(distance_to_gamma(task, q, qd)), late.array("q"), late.array("qd")
-            )
-    except TaskError:
-        pass  # no nearest point on an endless path
-    values = {f"{name}_peak": peak(v) for name, v in signals.items()}
-    values |= {f"{name}_rms": rms(v) for name, v in signals.items()}
-    theta = where_known(lambda s: task.at(s).theta, late.array("s"))
-    values["speed_ratio"] = _mean(late.array("sdot")) / _mean(theta)
-    values["settling_time"] = settling_time(run.norm("e_p"), run.time, band)
-    values |= torque_metrics(run, late)
+    own = samples_of(run, "all")
+    values = _of_errors(run, task, counted, only)
+    theta = where_known(lambda s: planned_rate(task, s), counted.within(run.array("s")))
+    values["speed_ratio"] = counted.reduced(np.mean, run.array("sdot")) / counted.reduced(np.mean, theta)
+    values["settling_time"] = own.reduced(lambda e, t: settling_time(e[None], t, band)[0], *_over_time(run))
+    values |= torque_metrics(run, own, counted) | limit_ratios(run, own)
+    values["progress"] = progress(run, task)
+    if not {"coverage", "path_deviation_peak"}.isdisjoint(only):
+        values |= _of_coverage(run, task, own, band)
     if np.isfinite(task.s_end):
         values |= {"path_time": run.finish_time, "end_error": _end_error(run, task)}
     sound = run.status != "diverged"
     return {name: np.where(sound, value, np.nan) for name, value in values.items() if name in only}
+
+
+def _of_errors(run: Run, task: PathTask, counted: Samples, only: Collection[str]) -> dict[str, Array]:
+    """Peaks and RMS of errors over the samples that count, (rollout,) each."""
+    q, qd, s = (counted.within(run.array(name)) for name in ("q", "qd", "s"))
+    signals = {"e_p": run.norm("e_p"), "e_v": run.norm("e_v"), "lag_error": np.abs(_lag(task, s, q))}
+    with suppress(TaskError):  # no nearest point on an endless path
+        if not {"contour_error_peak", "contour_error_rms"}.isdisjoint(only):
+            signals["contour_error"] = _distance(task, q)
+        if not {"gamma_distance_peak", "gamma_distance_rms"}.isdisjoint(only):
+            signals["gamma_distance"] = where_known(
+                lambda q, qd: np.asarray(distance_to_gamma(task, q, qd, braking=True)), q, qd
+            )
+    values = {f"{name}_peak": counted.reduced(np.max, v) for name, v in signals.items()}
+    return values | {f"{name}_rms": counted.reduced(_rms, v) for name, v in signals.items()}
+
+
+def _of_coverage(run: Run, task: PathTask, own: Samples, band: float) -> dict[str, Array]:
+    """How much of the path was passed, and how far the rest of it is, (rollout,) each."""
+    try:
+        points = path_points(task)
+    except TaskError:  # nor does an endless path have a share
+        return {}
+    share, farthest = own.reduced(lambda q: np.array(passed(points, q, band)), run.array("q")).T
+    return {"coverage": share, "path_deviation_peak": farthest}
+
+
+def _over_time(run: Run) -> tuple[Array, Array]:
+    """‖e_p‖ and the time, (rollout, time) each."""
+    e_p = run.norm("e_p")
+    return e_p, np.broadcast_to(run.time, e_p.shape)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

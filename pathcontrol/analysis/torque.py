@@ -2,38 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.torque_limits import torque_limits
-from pathcontrol.errors import InputError
-from pathcontrol.robot.model import RobotModel
+from pathcontrol.analysis.limit_shares import limits_of_each
+from pathcontrol.analysis.window import Samples
+from pathcontrol.simulation.record import laws
 from pathcontrol.simulation.run import Run
 
 _DEMAND = "tau_demand"
 
 
-def torque_metrics(run: Run, late: Run) -> dict[str, Array]:
-    """What can be said of the torques of a run, (rollout,) each: peaks of all of it, noise of its ``late`` part.
+def torque_metrics(run: Run, own: Samples, counted: Samples) -> dict[str, Array]:
+    """What can be said of the torques of a run, (rollout,) each: peaks of all of it, noise of what is ``counted``.
 
     Of several joints each number is that of the one where it is largest.
     """
-    values = {f"{name}_peak": np.abs(run.array(name)).max((1, 2)) for name in (_DEMAND, "tau") if name in run.data}
-    limits = _limits(run)
+    values = {
+        f"{name}_peak": own.reduced(_peak, run.array(name)).max(-1) for name in (_DEMAND, "tau") if name in run.data
+    }
+    limits = limits_of_each(run)
     if np.isfinite(limits).any():
-        values["tau_demand_ratio"] = (np.abs(run.array(_DEMAND)).max(1) / limits).max(-1)
-    noise = noise_deviation(late.array(_DEMAND))
+        values["tau_demand_ratio"] = (own.reduced(_peak, run.array(_DEMAND)) / limits).max(-1)
+    noise = _of_joints(counted.reduced(_noise, run.array(_DEMAND), _unsteady(run)), run)
     values["tau_noise"] = noise.max(-1)
-    heard = _sensor_error(late)
-    if (heard > 0).any():
-        gains = np.divide(noise, heard, out=np.zeros_like(noise), where=heard > 0)
-        values["noise_amplification"] = gains.max(-1)
+    if "q_measured" in run.data:
+        heard = _of_joints(counted.reduced(_rms, run.array("q_measured") - run.array("q")), run)
+        if (heard > 0).any():
+            gains = np.divide(noise, heard, out=np.zeros_like(noise), where=heard > 0)
+            values["noise_amplification"] = gains.max(-1)
     return values
 
 
-def noise_deviation(values: Array) -> Array:
+def noise_deviation(values: Array, left_out: NDArray[np.bool_] | None = None) -> Array:
     """Standard deviation of the white noise on smooth signals (rollout, time, joint), (rollout, joint).
 
     From second differences, in which what is smooth cancels: √(mean (y_{k+1} − 2 y_k + y_{k−1})² / 6), as the
@@ -41,29 +43,52 @@ def noise_deviation(values: Array) -> Array:
     Jennen-Steinmetz, Residual variance and residual pattern in nonlinear regression, Biometrika 73, 1986.) What a
     smooth signal with the second derivative ÿ adds is h² ÿ / √6 at the period h. Noise that comes through a difference
     of two samples is not white, and counts √(5/3) times its deviation.
+
+    Differences over a step from one sample to the next are ``left_out``, (rollout, time − 1, joint), where the signal
+    is known to jump for another reason than noise.
     """
     if values.shape[1] < 3:
         return np.full((len(values), values.shape[2]), np.nan)
-    return np.sqrt(_mean_square(np.diff(values, 2, axis=1)) / 6)
+    none = np.zeros((len(values), values.shape[1] - 1, values.shape[2]), dtype=bool)
+    steps = none if left_out is None else left_out
+    return np.stack([_noise_of_one(*row) for row in zip(values, steps, strict=True)])
 
 
-def _sensor_error(run: Run) -> Array:
-    """RMS of what is measured of the positions less the positions, (rollout, joint)."""
-    if "q_measured" not in run.data:
-        return np.zeros((run.rollouts, run.data.sizes["joint"]))
-    return np.sqrt(_mean_square(run.array("q_measured") - run.array("q")))
+def _noise(values: Array, unsteady: Array) -> Array:
+    """The deviation of one rollout, (joint,), of torques (time, joint) and the directions that they are for."""
+    return noise_deviation(values[None], (np.diff(unsteady, axis=0) != 0)[None])[0]
 
 
-def _mean_square(values: Array) -> Array:
-    """Of (rollout, time, joint) over the time; the same to the last bit however many rollouts there are."""
-    return np.ascontiguousarray(np.moveaxis(values**2, 1, -1)).mean(-1)
+def _noise_of_one(values: Array, left_out: NDArray[np.bool_]) -> Array:
+    counted = ~(left_out[1:] | left_out[:-1])
+    squares = np.where(counted, np.diff(values, 2, axis=0) ** 2, 0.0)
+    number = counted.sum(0)
+    total = np.ascontiguousarray(squares.T).sum(-1)
+    return np.sqrt(np.divide(total, 6 * number, out=np.full(len(total), np.nan), where=number > 0))
 
 
-def _limits(run: Run) -> Array:
-    """Torque limits [N m], (rollout, n); inf without one, or where the run does not know its robot."""
-    try:
-        robots: Sequence[RobotModel | None] = run.robots
-    except InputError:
-        robots = [None]
-    each = {id(robot): torque_limits(run, robot) for robot in robots}
-    return np.array([each[id(robot)] for robot in robots])
+def _unsteady(run: Run) -> Array:
+    """The direction in which a law compensates dry friction, (rollout, time, joint): +1, −1 or 0; 0 if it does not.
+
+    Where it changes, the torque jumps by design and not by noise: see :meth:`Controller.friction_torque`.
+    """
+    known = {"qd_measured", "e_v"} <= set(run.data.data_vars)
+    if not known or not any(law.get("friction") == "full" for law in laws(run.config)):
+        return np.zeros_like(run.array(_DEMAND))
+    measured = run.array("qd_measured")
+    return np.sign(np.where(measured == 0, run.array("e_v"), measured))
+
+
+def _peak(values: Array) -> Array:
+    """The largest size over time, (joint,) of (time, joint)."""
+    return np.abs(values).max(0)
+
+
+def _rms(values: Array) -> Array:
+    """Over time, (joint,) of (time, joint); the same to the last bit however many rollouts there are."""
+    return np.sqrt(np.ascontiguousarray((values**2).T).mean(-1))
+
+
+def _of_joints(values: Array, run: Run) -> Array:
+    """(rollout, joint), where none has a sample too."""
+    return np.broadcast_to(values.reshape(len(values), -1), (len(values), run.data.sizes["joint"]))

@@ -27,6 +27,13 @@ _START_TIME = 0.1  # s
 
 Held = Literal["free", "down", "normals", "tangent"]
 
+_ROTATIONS: dict[Held, int] = {"free": 0, "down": 2, "normals": 2, "tangent": 3}
+
+
+def rotations_of(held: Held | Orientation) -> int:
+    """How many rotations of the tool are prescribed: 3, 2 where it may turn about its z axis, or 0."""
+    return held.rows if isinstance(held, Orientation) else _ROTATIONS.get(held, 0)
+
 
 @dataclass(frozen=True, eq=False)
 class ContourPaths:

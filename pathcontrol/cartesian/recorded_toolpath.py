@@ -33,6 +33,7 @@ class RecordedToolpath(ToolpathTask):
         deviation: the largest distance that there is [m].
         source: the file that the contours come from.
         unit: that file's unit of length.
+        rotations: how many rotations of the tool are prescribed; older files do not say.
     """
 
     def __init__(
@@ -51,9 +52,11 @@ class RecordedToolpath(ToolpathTask):
         deviation: float,
         source: str,
         unit: str,
+        rotations: int = 0,
     ) -> None:
         PathSequence.__init__(self, paths)
         self.frame, self.workpiece, self.feed = frame, rigid("workpiece", workpiece), feed
+        self.rotations = rotations
         self.rapid_speed, self.acceleration = rapid_speed, acceleration
         self.tolerance, self.corner = tolerance, corner
         self._placed, self._deviation = tuple(placed), deviation

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, scalar
 from pathcontrol._expect import expect
-from pathcontrol.cartesian.contour_paths import ContourPaths, Held
+from pathcontrol.cartesian.contour_paths import ContourPaths, Held, rotations_of
 from pathcontrol.cartesian.links import linked
 from pathcontrol.cartesian.orientation import Orientation
 from pathcontrol.errors import InputError
@@ -53,6 +53,7 @@ class ToolpathTask(PathSequence):
         smoothed: for each contour how it was smoothed, a :class:`Smoothed`.
         frame: the frame that follows the contours.
         workpiece: pose of the workpiece in the base frame, (4, 4).
+        rotations: how many rotations of the tool are prescribed: 3, 2 where it may turn about its z axis, or 0.
 
     Raises:
         InputError: an argument has the wrong shape or value, or a cut has no feed.
@@ -80,6 +81,7 @@ class ToolpathTask(PathSequence):
         pose = rigid("workpiece", np.eye(4) if workpiece is None else workpiece)
         _check_feeds(toolpath, feed)
         self.frame, self.workpiece, self.feed = frame, pose, feed
+        self.rotations = rotations_of(orientation)
         self.rapid_speed = scalar("rapid_speed", rapid_speed, positive=True)
         self.acceleration = scalar("acceleration", acceleration, positive=True)
         self.tolerance, self.corner = scalar("tolerance", tolerance, positive=True), corner

@@ -100,9 +100,12 @@ def first_and_last(s: Array) -> tuple[Array, Array]:
     return np.where(some, s[:, 0], 0.0), np.where(some, s[rows, last], 0.0)
 
 
-def seen_finished(task: PathTask, finish_time: Array) -> Array:
-    """The times [s] at which it is known that rollouts were finished at ``finish_time`` [s], (N,) each."""
-    return finish_time + (_REST * (1 - 1e-9) if np.all(np.isfinite(task.s_end)) else 0.0)
+def seen_finished(finish_time: Array, at_rest: bool) -> Array:
+    """The times [s] at which it is known that rollouts were finished at ``finish_time`` [s], (N,) each.
+
+    That is later where they are finished when they have come to rest, ``at_rest``, as on open paths.
+    """
+    return finish_time + (_REST * (1 - 1e-9) if at_rest else 0.0)
 
 
 def finish_of(task: PathTask, laps: int | None, until: Until, rollouts: int) -> Finish | None:

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array
 from pathcontrol.analysis.metrics import UNITS, metrics
+from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError, SimulationError, UnknownNameError
-from pathcontrol.simulation.finish import seen_finished
 from pathcontrol.simulation.modes import SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
@@ -160,10 +160,8 @@ def _blocks(run: Run, some: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp]
 
 def samples_alone(run: Run) -> NDArray[np.intp]:
     """How many samples of each rollout say something: until it is finished or has diverged, (k,)."""
-    last = np.where(run.status == "diverged", run.diverged_time, np.inf)
-    if run.config.get("until") == "end" and run.task is not None:
-        last = np.where(run.status == "finished", seen_finished(run.task, run.finish_time), last)
-    return np.minimum(np.searchsorted(run.time, last) + 1, len(run.time))
+    ends = (run.status == "diverged") | ((run.status == "finished") & (run.config.get("until") == "end"))
+    return np.where(ends, own_samples(run), len(run.time))
 
 
 def _part(run: Run, rows: NDArray[np.intp], end: int) -> Run:

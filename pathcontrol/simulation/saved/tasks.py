@@ -48,7 +48,17 @@ _MADE: dict[type, tuple[str, ...]] = {
     RecordedProfile: ("s", "jets", "period"),
 }
 _CLASSES = {cls.__name__: cls for cls in _MADE}
-_TOOLPATH = ("frame", "workpiece", "feed", "rapid_speed", "acceleration", "tolerance", "corner", "deviation")
+_TOOLPATH = (
+    "frame",
+    "workpiece",
+    "feed",
+    "rapid_speed",
+    "acceleration",
+    "tolerance",
+    "corner",
+    "deviation",
+    "rotations",
+)
 
 
 def task_recipe(task: PathTask, shelf: Shelf, upto: float | None = None, rated: bool = True) -> dict[str, Any]:

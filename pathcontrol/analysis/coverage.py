@@ -1,0 +1,89 @@
+"""How much of a path was passed at all: what an arm that stays where it is on the path must not hide."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pathcontrol._arrays import Array
+from pathcontrol.tasks.base import PathTask
+
+_POINTS = 1000  # of a path, at least
+_MOST = 200_000  # points that a trace is refined to
+_FINER = 0.5  # of the tolerance, between the points of a trace
+
+
+class Points(NamedTuple):
+    """Points (k, m) that stand for a curve, and how much of its length each stands for, (k,)."""
+
+    at: Array
+    length: Array
+
+
+class Passed(NamedTuple):
+    """How a trace covers a curve: the share of its length within a tolerance, and how far its farthest point is."""
+
+    share: float
+    farthest: float
+
+
+def path_points(task: PathTask) -> Points:
+    """Points of one traverse of a path in joint space, its knots among them.
+
+    Raises:
+        TaskError: the path goes on for ever without repeating.
+    """
+    lower, upper = task.one_traverse
+    s = np.linspace(lower, upper, _POINTS + 1)
+    if task.knots is not None and len(task.knots) <= _MOST:
+        s = np.union1d(s, task.knots[(task.knots > lower) & (task.knots < upper)])
+    return even_points(task.q_d(s))
+
+
+def even_points(at: Array) -> Points:
+    """The points (k, m) of a curve in their order, each with half of the chords to its neighbours."""
+    chord = np.linalg.norm(np.diff(at, axis=0), axis=-1)
+    return Points(at, 0.5 * (np.append(chord, 0.0) + np.append(0.0, chord)))
+
+
+def passed(points: Points, trace: Array, tolerance: float) -> Passed:
+    """How a ``trace`` (t, m), straight between its samples, covers a curve."""
+    distance = distance_to_trace(points.at, trace, tolerance)
+    total = points.length.sum()
+    share = points.length[distance <= tolerance].sum() / total if total else float((distance <= tolerance).all())
+    return Passed(float(share), float(distance.max()))
+
+
+def distance_to_trace(x: Array, trace: Array, resolution: float) -> Array:
+    """Distance of points (k, m) from a trace (t, m), straight between its samples, (k,).
+
+    The trace is refined until its points are half of the ``resolution`` apart; then the straight lines on either side
+    of the nearest point count.
+    """
+    fine = refined(trace[np.isfinite(trace).all(-1)], _FINER * resolution)
+    if not len(fine):
+        return np.full(len(x), np.inf)
+    nearest = cKDTree(fine, balanced_tree=False).query(x)[1]
+    sides = [(np.maximum(nearest - 1, 0), nearest), (nearest, np.minimum(nearest + 1, len(fine) - 1))]
+    return np.min([_to_line(x, fine[a], fine[b]) for a, b in sides], axis=0)
+
+
+def refined(trace: Array, step: float) -> Array:
+    """The points of a trace (t, m) and more between them on straight lines, no farther apart than ``step``."""
+    chord = np.linalg.norm(np.diff(trace, axis=0), axis=-1)
+    if not len(chord):
+        return trace
+    step = max(step, float(chord.sum()) / _MOST)
+    place = np.append(0, np.cumsum(np.maximum(np.ceil(chord / step), 1)))
+    wanted = np.arange(place[-1] + 1)
+    return np.stack([np.interp(wanted, place, column) for column in trace.T], axis=-1)
+
+
+def _to_line(x: Array, start: Array, end: Array) -> Array:
+    """Distance from points (k, m) to straight lines between two points (k, m) each."""
+    line = end - start
+    square = np.maximum((line * line).sum(-1), np.finfo(float).tiny)
+    share = np.clip(((x - start) * line).sum(-1) / square, 0.0, 1.0)
+    return np.linalg.norm(start + share[:, None] * line - x, axis=-1)

@@ -1,0 +1,109 @@
+"""Positions, velocities and torques of a run as shares of the limits of its arm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.analysis.torque_limits import torque_limits
+from pathcontrol.analysis.window import Samples
+from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.run import Run
+
+#: the metrics that are above 1 where a limit is passed
+RATIOS = {"position_limit_ratio": "position", "velocity_limit_ratio": "velocity", "torque_limit_ratio": "torque"}
+_NO_LIMIT = 1e6  # rad, m, rad/s or m/s: files that know no limit say some huge number
+_ROUNDING = 1e-9
+
+
+class Worst(NamedTuple):
+    """Where a share of a limit is largest in a rollout: which joint, when [s], and the share."""
+
+    joint: str
+    time: float
+    share: float
+
+
+def limit_ratios(run: Run, own: Samples) -> dict[str, Array]:
+    """The largest share of each kind of limit that any joint had at any time, (rollout,); left out without a limit.
+
+    The share of a position is 0 in the middle between its limits and 1 at either of them.
+    """
+    found = {name: own.reduced(_largest, shares) for name, shares in limit_shares(run).items()}
+    return {name: value for name, value in found.items() if not np.isnan(value).all()}
+
+
+def limit_shares(run: Run) -> dict[str, Array]:
+    """|q − middle| over half of the range, |q̇| and |τ| over their limits, (rollout, time, joint); NaN without one."""
+    robots, n, shares = robots_of(run), run.data.sizes["joint"], {}
+    with np.errstate(invalid="ignore"):
+        if "q" in run.data:
+            middle, half = np.array([_range(robot, n) for robot in robots]).swapaxes(0, 1)[:, :, None]
+            shares["position_limit_ratio"] = np.abs(run.array("q") - middle) / half
+        if "qd" in run.data:
+            most = np.array([_velocity(robot, n) for robot in robots])
+            shares["velocity_limit_ratio"] = np.abs(run.array("qd")) / most[:, None]
+        if "tau" in run.data:
+            limits = limits_of_each(run)
+            limits = np.where(np.isfinite(limits), limits, np.nan)
+            shares["torque_limit_ratio"] = np.abs(run.array("tau")) / limits[:, None]
+    return shares
+
+
+def worst_shares(run: Run, own: Samples, rollout: int = 0) -> dict[str, Worst]:
+    """Where each kind of share is largest in a rollout, by its metric; left out without a limit."""
+    joints, found = run["joint"].to_numpy(), {}
+    for name, shares in limit_shares(run).items():
+        mine = shares[rollout, own.first[rollout] : own.stop[rollout]]
+        if not np.isfinite(mine).any():
+            continue
+        sample, joint = np.unravel_index(int(np.nanargmax(mine)), mine.shape)
+        time = float(run.time[own.first[rollout] + sample])
+        found[name] = Worst(str(joints[joint]), time, float(mine[sample, joint]))
+    return found
+
+
+def is_passed(share: Array | float) -> Array:
+    """Whether a share of a limit is above 1, not by rounding alone."""
+    return np.asarray(share) > 1 + _ROUNDING
+
+
+def robots_of(run: Run) -> Sequence[RobotModel | None]:
+    """The arm of each rollout, ``None`` where the run does not know it."""
+    try:
+        return run.robots
+    except InputError:
+        return [None] * run.rollouts
+
+
+def limits_of_each(run: Run) -> Array:
+    """Torque limits [N m], (rollout, n); inf without one, or where the run does not know its robot."""
+    robots = robots_of(run)
+    each = {id(robot): torque_limits(run, robot) for robot in robots}
+    return np.array([each[id(robot)] for robot in robots])
+
+
+def _range(robot: RobotModel | None, n: int) -> tuple[Array, Array]:
+    """The middle between the limits of each joint and half of its range, (n,) each; NaN without both limits."""
+    if robot is None or robot.n != n:
+        return np.full(n, np.nan), np.full(n, np.nan)
+    lower, upper = robot.limits.lower, robot.limits.upper
+    limited = (lower < upper) & (lower > -_NO_LIMIT) & (upper < _NO_LIMIT)
+    return np.where(limited, 0.5 * (lower + upper), np.nan), np.where(limited, 0.5 * (upper - lower), np.nan)
+
+
+def _velocity(robot: RobotModel | None, n: int) -> Array:
+    """Velocity limits, (n,); NaN without one."""
+    if robot is None or robot.n != n:
+        return np.full(n, np.nan)
+    most = np.abs(robot.limits.velocity)
+    return np.where((most > 0) & (most < _NO_LIMIT), most, np.nan)
+
+
+def _largest(shares: Array) -> float:
+    known = shares[np.isfinite(shares)]
+    return float(known.max()) if known.size else np.nan
