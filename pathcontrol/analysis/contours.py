@@ -84,6 +84,44 @@ def contour_numbers(
     return found
 
 
+#: the columns of :func:`contour_table`
+HEADS = (
+    "contour",
+    "",
+    "time [s]",
+    "feed [mm/s]",
+    "mean speed [mm/s]",
+    "tool from it [µm]",
+    "it from the tool [µm]",
+    "passed",
+)
+
+
+def contour_table(run: Run, robot: RobotModel | None = None) -> list[list[str]]:
+    """The numbers of each contour of a run along a toolpath as texts for a reader, heads first; empty for another run.
+
+    Raises:
+        InputError: the run does not know its robot.
+    """
+    task = run.task
+    if not isinstance(task, ToolpathTask) or "path_index" not in run.data.coords or "qd" not in run.data:
+        return []
+    arm = run.robot if robot is None else robot
+    return [list(HEADS), *(_texts(i, one) for i, one in enumerate(contour_numbers(run, task, arm)))]
+
+
+def _texts(number: int, one: ContourNumbers) -> list[str]:
+    begun = np.isfinite(one.speed)
+    return [
+        one.name or str(number),
+        "rapid" if one.rapid else "",
+        f"{one.time:.4g}" if np.isfinite(one.time) else "not finished" if begun else "not begun",
+        f"{1e3 * one.feed:.4g}",
+        *((f"{1e3 * one.speed:.4g}", f"{1e6 * one.deviation:.4g}", f"{1e6 * one.missed:.4g}") if begun else "–––"),
+        f"{100 * one.coverage:.4g} %",
+    ]
+
+
 def feed_of(contour: Contour, task: ToolpathTask) -> float:
     """The speed [m/s] that is asked for on a contour."""
     if contour.rapid:

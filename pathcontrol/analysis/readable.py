@@ -18,6 +18,8 @@ def reading(unit: str, values: Array) -> tuple[float, str]:
     """The factor to, and the name of, the unit in which a person reads values of a unit."""
     if unit in ("rad", "rad/s"):
         return 180 / np.pi, unit.replace("rad", "deg")
+    if unit == "m/s":
+        return 1e3, "mm/s"
     if unit == "m":
         return (1e3, "mm") if np.abs(values[np.isfinite(values)]).max(initial=0.0) >= 1e-3 else (1e6, "µm")
     return 1.0, unit
@@ -43,6 +45,8 @@ def readable_number(value: float, unit: str) -> str:
 def unit_of(metric: str, run: Run) -> str:
     """The unit of a metric; that of the run where joints slide."""
     unit = UNITS[metric]
+    if metric == "orientation_error_peak":  # an angle whatever the joints do
+        return unit
     if unit == "N m/rad":
         return " or ".join(map("/".join, zip(*(_units(part, run) for part in ("N m", "rad")), strict=True)))
     return " or ".join(_units(unit, run))
@@ -60,6 +64,11 @@ def readable_parameters(parameters: Mapping[str, Any], digits: int = 4) -> str:
     return ", ".join(
         f"{name} = {_value(value, digits)}" for name, value in zip(names, parameters.values(), strict=True)
     )
+
+
+def counted(number: int, word: str) -> str:
+    """A number of things: ``"1 path"``, ``"2 paths"``."""
+    return f"{number} {word}{'' if number == 1 else 's'}"
 
 
 def _value(value: Any, digits: int) -> str:

@@ -48,7 +48,7 @@ class Samples(NamedTuple):
 
 
 def own_samples(run: Run) -> NDArray[np.intp]:
-    """How many samples of each rollout are its own: until it is seen to be finished or diverged, or time is up, (rollout,).
+    """How many samples of each rollout are its own, (rollout,): until it is seen to be finished, or diverged.
 
     It is where the run would have ended had the rollout been alone. One that is finished is held at the end of its path
     while others go on, which says nothing of it.

@@ -48,14 +48,28 @@ def _animation(done: Outcome, out: Path) -> Path:
 
 
 def _tell(done: Outcome, as_json: bool) -> None:
-    from pathcontrol.cli.tables import metric_lines
+    from rich import print as rich_print
+
+    from pathcontrol.analysis.remarks import remarks
+    from pathcontrol.analysis.window import told
+    from pathcontrol.cli.tables import contour_lines, metric_lines, remark_lines
 
     written = {name: str(path) for name, path in done.written.items()}
     if as_json:
-        click.echo(json.dumps({"run": repr(done.run), "metrics": done.metrics, "written": written}))
+        click.echo(
+            json.dumps(
+                {"run": repr(done.run), "metrics": done.metrics, "remarks": remarks(done.run), "written": written}
+            )
+        )
         return
     click.echo(repr(done.run))
+    cuts = "path_time" in done.metrics and "tool_deviation_peak" in done.metrics
+    click.echo(f"  errors are of {'the cuts' if cuts else told()}, torques and shares of limits of all of it")
     for line in metric_lines(done.metrics, done.run):
+        click.echo(f"  {line}")
+    for table in contour_lines(done.run):
+        rich_print(table)
+    for line in remark_lines(done.run):
         click.echo(f"  {line}")
     for name, path in written.items():
         click.echo(f"  {name}: {path}")

@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+import click
 from rich.table import Table
 from rich.text import Text
+
+from pathcontrol.cli.group import printable
 
 if TYPE_CHECKING:
     from pathcontrol.simulation.run import Run
@@ -34,6 +37,7 @@ def peaks_table(summary: dict[str, Any]) -> Table:
 
 def metric_lines(metrics: dict[str, Any], run: Run) -> list[str]:
     """A line for each metric, with a value for each rollout; null, of what is not finite, is a dash."""
+    from pathcontrol.analysis.limit_shares import RATIOS, is_passed
     from pathcontrol.analysis.readable import readable_number, unit_of
 
     lines = []
@@ -41,8 +45,37 @@ def metric_lines(metrics: dict[str, Any], run: Run) -> list[str]:
         unit = unit_of(name, run)
         absent = math.inf if name == "settling_time" else math.nan
         words = (readable_number(absent if value is None else value, unit) for value in values)
-        lines.append(f"{name:22} {', '.join(words)}")
+        line = f"{name:22} {', '.join(words)}"
+        beyond = name in RATIOS and any(value is not None and is_passed(value) for value in values)
+        lines.append(red(line) if beyond else line)
     return lines
+
+
+def remark_lines(run: Run) -> list[str]:
+    """What must not be overlooked in a run, in red: limits that were passed, and an arm that did not get there."""
+    from pathcontrol.analysis.remarks import remarks
+
+    return [red(printable(sentence)) for sentence in remarks(run)]
+
+
+def red(text: str) -> str:
+    """``text`` in red on a terminal."""
+    return click.style(text, fg="red")
+
+
+def contour_lines(run: Run) -> list[Table]:
+    """What became of each contour of a toolpath; nothing of another run."""
+    from pathcontrol.analysis.contours import contour_table
+
+    heads, *rows = contour_table(run) or [[]]
+    if not rows:
+        return []
+    table = Table()
+    for i, head in enumerate(heads):
+        table.add_column(Text(head), justify="left" if i < 2 else "right")
+    for row in rows[:_MOST_ROWS]:
+        table.add_row(*map(Text, row))
+    return [table]
 
 
 def toolpath_table(content: dict[str, Any]) -> list[Text | Table]:

@@ -93,12 +93,19 @@ def _default(runs: tuple[Path, ...]) -> Path:
 
 
 def tell(runs: Mapping[str, Run], written: Mapping[str, Path], as_json: bool) -> None:
-    """Say which runs were shown and which files were written."""
+    """Say which runs were shown, what must not be overlooked in them, and which files were written."""
+    from pathcontrol.analysis.remarks import remarks
+    from pathcontrol.cli.tables import remark_lines
+
     if as_json:
         files = {kind: str(path) for kind, path in written.items()}
-        click.echo(json.dumps({"runs": {name: repr(run) for name, run in runs.items()}, "written": files}))
+        said = {name: found for name, run in runs.items() if (found := remarks(run))}
+        told = {"runs": {name: repr(run) for name, run in runs.items()}, "written": files}
+        click.echo(json.dumps(told | ({"remarks": said} if said else {})))
         return
     for name, run in runs.items():
         click.echo(printable(f"{name}: {run!r}"))
+        for line in remark_lines(run):
+            click.echo(f"  {line}")
     for kind, path in written.items():
         click.echo(f"  {kind}: {path} ({path.stat().st_size / 1e6:.1f} MB)")

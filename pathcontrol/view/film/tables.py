@@ -7,9 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from pathcontrol.analysis.contours import contour_table
 from pathcontrol.analysis.deviation import toolpath_metrics
+from pathcontrol.analysis.limit_shares import RATIOS, is_passed
 from pathcontrol.analysis.metrics import LABELS, metrics
 from pathcontrol.analysis.readable import readable_number, unit_of
+from pathcontrol.analysis.remarks import remarks
+from pathcontrol.analysis.window import told
 from pathcontrol.view.film.settings import settings
 from pathcontrol.view.film.take import Take
 
@@ -17,23 +21,37 @@ _NEEDED = {"qd", "s", "e_p", "e_v", "sdot", "tau_demand"}
 
 
 def tables(takes: Sequence[Take]) -> list[dict[str, Any]]:
-    """Metrics and settings as the header of a film has them."""
-    names = [take.name for take in takes]
+    """Metrics, contours and settings as the header of a film has them; rows beyond a limit are ``marked``."""
+    names, numbers = [take.name for take in takes], [_numbers(take) for take in takes]
+    rows = _rows([_measured(take, found) for take, found in zip(takes, numbers, strict=True)])
+    beyond = {LABELS[name] for name in RATIOS for found in numbers if is_passed(found.get(name, [0.0])[0])}
     found = [
-        ("Metrics", _meant(takes), [_measured(take) for take in takes]),
-        ("Settings", "", [settings(take) for take in takes]),
+        {"title": "Metrics", "columns": [_meant(takes), *names], "rows": rows},
+        *_contours(takes),
+        {"title": "Settings", "columns": ["", *names], "rows": _rows([settings(take) for take in takes])},
     ]
-    return [
-        {"title": title, "columns": [meant, *names], "rows": rows}
-        for title, meant, each in found
-        if (rows := _rows(each))
-    ]
+    found[0]["marked"] = [i for i, row in enumerate(rows) if row[0] in beyond]
+    return [table for table in _mind(takes) + found if table["rows"]]
+
+
+def _mind(takes: Sequence[Take]) -> list[dict[str, Any]]:
+    """What must not be overlooked, all of it marked."""
+    rows = [[take.name, sentence] for take in takes for sentence in remarks(take.run.with_robot(take.robot))]
+    return [{"title": "To be noted", "columns": ["", ""], "rows": rows, "marked": list(range(len(rows)))}]
+
+
+def _contours(takes: Sequence[Take]) -> list[dict[str, Any]]:
+    """What became of each contour, of a single take: several have tables too large to be compared."""
+    if len(takes) > 1 or takes[0].toolpath is None or not set(takes[0].run.data.data_vars) >= _NEEDED:
+        return []
+    heads, *rows = contour_table(takes[0].run, takes[0].robot) or [[]]
+    return [{"title": "Contours", "columns": heads, "rows": rows}]
 
 
 def _meant(takes: Sequence[Take]) -> str:
-    """Of which time the peaks are: the charts beside them show all of it."""
+    """Of which time the errors are: the charts beside them show all of it."""
     drawn = [take.toolpath is not None for take in takes]
-    cuts, late = "over the cuts", "of the second half of the time"
+    cuts, late = "over the cuts", f"of {told()}"
     return f"peaks and RMS {cuts if all(drawn) else f'{late}, of toolpaths {cuts}' if any(drawn) else late}"
 
 
@@ -42,11 +60,10 @@ def _rows(columns: Sequence[Mapping[str, str]]) -> list[list[str]]:
     return [[name, *(column.get(name, "–") for column in columns)] for name in names]
 
 
-def _measured(take: Take) -> dict[str, str]:
-    if take.task is None or not set(take.run.data.data_vars) >= _NEEDED or _idle(take):
-        return {}
-    numbers, run = _numbers(take), take.run
-    return {LABELS[name]: readable_number(numbers[name][0], unit_of(name, run)) for name in LABELS if name in numbers}
+def _measured(take: Take, numbers: Mapping[str, Any]) -> dict[str, str]:
+    return {
+        LABELS[name]: readable_number(numbers[name][0], unit_of(name, take.run)) for name in LABELS if name in numbers
+    }
 
 
 def _idle(take: Take) -> bool:
@@ -58,6 +75,8 @@ def _idle(take: Take) -> bool:
 
 
 def _numbers(take: Take) -> dict[str, Any]:
+    if take.task is None or not set(take.run.data.data_vars) >= _NEEDED or _idle(take):
+        return {}
     if take.toolpath is not None:
         return toolpath_metrics(take.run, take.robot, take.toolpath)
-    return metrics(take.run, take.task)
+    return metrics(take.run.with_robot(take.robot), take.task)

@@ -11,7 +11,10 @@ from typing import Any
 import jinja2
 from markupsafe import Markup, escape
 
+from pathcontrol.analysis.contours import contour_table
 from pathcontrol.analysis.metrics import UNITS
+from pathcontrol.analysis.remarks import remarks
+from pathcontrol.analysis.window import told
 from pathcontrol.simulation.run import Run
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.view.page.html import Section
@@ -41,6 +44,9 @@ def sections(runs: Mapping[str, Run], made_by: str, sweep: SweepResult | None = 
             runs=runs,
             facts=facts(runs),
             rows=rows(runs, numbers),
+            remarks=[(name, sentence) for name, run in runs.items() for sentence in remarks(run)],
+            contours=[(name, table) for name, run in runs.items() if (table := contour_table(run))],
+            window=told(),
             files=[_metrics_file(numbers), json_file("configuration.json", configuration), *_signals(runs)],
         ),
         _section("Figures", pictures=pictures(runs)),

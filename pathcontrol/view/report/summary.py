@@ -11,9 +11,12 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import toolpath_metrics
-from pathcontrol.analysis.metrics import LABELS, metrics, peak, rms, steady_state
-from pathcontrol.analysis.readable import reading, unit_of
+from pathcontrol.analysis.limit_shares import RATIOS, is_passed, limit_ratios
+from pathcontrol.analysis.metrics import LABELS, metrics
+from pathcontrol.analysis.progress import got_there
+from pathcontrol.analysis.readable import counted, reading, unit_of
 from pathcontrol.analysis.torque import torque_metrics
+from pathcontrol.analysis.window import samples_of
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.simulation.record import table
 from pathcontrol.simulation.run import Run
@@ -23,19 +26,30 @@ from pathcontrol.tasks.sequence import PathSequence
 #: how far from good a value is, where that is not the value itself; None where none is better than another
 _BADNESS: dict[str, Callable[[float], float] | None] = {
     "speed_ratio": lambda value: abs(value - 1),
+    "progress": lambda value: -value,
+    "coverage": lambda value: -value,
     "smoothing_deviation": None,
+    "feed": None,
+    "tool_speed_mean": None,
+    "tool_speed_peak": None,
 }
-_ENDLESS = {"settling_time": "never", "path_time": "not finished", "end_error": "not finished"}
+_ENDLESS = {
+    "settling_time": "never",
+    "path_time": "not finished",
+    "cut_time": "not finished",
+    "end_error": "not finished",
+}
 
 
 _NEEDED = {"q", "qd", "s", "sdot", "e_p", "e_v", "tau_demand"}
 
 
 class Cell(NamedTuple):
-    """What a table says of one run, and whether it is the best of its row."""
+    """What a table says of one run, whether it is the best of its row, and whether it is beyond a limit."""
 
     text: str
     best: bool = False
+    beyond: bool = False
 
 
 class Row(NamedTuple):
@@ -56,11 +70,13 @@ def measured(run: Run) -> dict[str, list[float]]:
 
 def _without_path(run: Run) -> dict[str, list[float]]:
     """What can be said of a run that does not know its path, or has not recorded everything."""
-    late = steady_state(run)
+    own, late = samples_of(run, "all"), samples_of(run)
     errors = [name for name in ("e_p", "e_v") if name in run.data]
-    values = {f"{name}_{kind.__name__}": kind(late.norm(name)) for name in errors for kind in (peak, rms)}
+    kinds: dict[str, Callable[[Array], Any]] = {"peak": np.max, "rms": lambda v: np.sqrt(np.mean(v**2))}
+    values = {f"{name}_{kind}": late.reduced(of, run.norm(name)) for name in errors for kind, of in kinds.items()}
     if "tau_demand" in run.data:
-        values |= torque_metrics(run, late)
+        values |= torque_metrics(run, own, late)
+    values |= limit_ratios(run, own)
     return {name: value.tolist() for name, value in values.items()}
 
 
@@ -79,11 +95,11 @@ def facts(runs: Mapping[str, Run]) -> list[Row]:
 def _path(run: Run) -> str:
     task = run.task
     if isinstance(task, ToolpathTask):
-        return f"{Path(task.drawing.source).name}, {len(task)} paths"
+        return f"{Path(task.drawing.source).name}, {counted(len(task), 'path')}"
     if isinstance(task, PathSequence):
-        return f"{len(task)} paths"
+        return counted(len(task), "path")
     if isinstance(task, TaskBatch):
-        return f"{len(task)} tasks, {', '.join(task.describe()['kinds'])}"
+        return f"{counted(len(task), 'task')}, {', '.join(task.describe()['kinds'])}"
     # what was sampled for a file has its own name still in the configuration
     described = _law(run).get("task")
     name = described.get("task") if isinstance(described, Mapping) else None
@@ -106,7 +122,7 @@ def _outcome(run: Run) -> str:
         return f"diverged at {run.diverged_time[0]:.4g} s"
     if finished[0]:
         return f"finished after {run.finish_time[0]:.4g} s"
-    return f"{run.laps[0]} whole laps" if "laps" in run.data.coords else "not finished when the time was up"
+    return counted(int(run.laps[0]), "whole lap") if "laps" in run.data.coords else "not finished when the time was up"
 
 
 def rows(runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]]]) -> list[Row]:
@@ -124,8 +140,15 @@ def _row(key: str, unit: str, runs: Mapping[str, Run], numbers: Mapping[str, Map
     values = {n: np.asarray(numbers[n][key]) for n, r in runs.items() if key in numbers[n] and unit_of(key, r) == unit}
     scale, shown = reading(unit, np.concatenate(list(values.values())))
     texts = {name: _text(scale * value, _ENDLESS.get(key, "–")) for name, value in values.items()}
-    best = _best(_BADNESS.get(key, abs), {name: float(np.median(value)) for name, value in values.items()}, texts)
-    return Row(LABELS[key], shown, tuple(Cell(texts.get(name, "–"), name in best) for name in runs))
+    arrived = {name: float(np.median(value)) for name, value in values.items() if _arrived(numbers[name])}
+    best = _best(_BADNESS.get(key, abs), arrived, texts)
+    beyond = {name for name, value in values.items() if key in RATIOS and is_passed(value).any()}
+    return Row(LABELS[key], shown, tuple(Cell(texts.get(name, "–"), name in best, name in beyond) for name in runs))
+
+
+def _arrived(numbers: Mapping[str, list[float]]) -> bool:
+    """Whether all rollouts of a run came as far as they were to: one that stands still has the smallest errors."""
+    return bool(got_there(np.array(numbers.get("progress", [np.nan]))).all())
 
 
 def _text(values: Array, endless: str) -> str:

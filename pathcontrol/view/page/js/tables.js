@@ -9,7 +9,7 @@ function tables(film) {
   place.append(...found.map(tableOf));
 }
 
-function tableOf({ title, columns, rows }) {
+function tableOf({ title, columns, rows, marked = [] }) {
   const details = document.createElement("details");
   details.open = rows.length <= LONG;
   const scroll = document.createElement("div");
@@ -17,6 +17,7 @@ function tableOf({ title, columns, rows }) {
   const table = document.createElement("table");
   if (columns.some((name) => name)) table.createTHead().append(rowOf(columns, ["th", "th"], "col"));
   table.createTBody().append(...rows.map((row) => rowOf(row, ["th", "td"], "row")));
+  for (const row of marked) table.tBodies[0].rows[row].className = "beyond";
   scroll.append(table);
   details.append(textElement("summary", title), scroll);
   return details;
