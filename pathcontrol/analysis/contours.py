@@ -104,7 +104,7 @@ def contour_table(run: Run, robot: RobotModel | None = None) -> list[list[str]]:
         InputError: the run does not know its robot.
     """
     task = run.task
-    if not isinstance(task, ToolpathTask) or "path_index" not in run.data.coords or "qd" not in run.data:
+    if not isinstance(task, ToolpathTask) or "path_finish_time" not in run.data.coords or "qd" not in run.data:
         return []
     arm = run.robot if robot is None else robot
     return [list(HEADS), *(_texts(i, one) for i, one in enumerate(contour_numbers(run, task, arm)))]

@@ -103,7 +103,9 @@ def toolpath_metrics(
     }
     values = {f"{name}_peak": counted.reduced(_largest, v * cutting) for name, v in signals.items()}
     values |= {f"{name}_rms": counted.reduced(_rms, v * cutting) for name, v in signals.items()}
-    values |= _of_drawing(run, task, arm, tolerance) | _of_tool(run, task, arm, counted, cutting)
+    if "path_finish_time" in run.data.coords:  # not of a part of a run
+        values |= _of_drawing(run, task, arm, tolerance)
+    values |= _of_tool(run, task, arm, counted, cutting)
     values["smoothing_deviation"] = np.full(run.rollouts, task.deviation)
     values["tau_demand_peak"] = own.reduced(np.max, np.abs(run.array("tau_demand")))
     values |= limit_ratios(run if robot is None else run.with_robot(arm), own)

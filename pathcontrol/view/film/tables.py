@@ -36,13 +36,23 @@ def tables(takes: Sequence[Take]) -> list[dict[str, Any]]:
 
 def _mind(takes: Sequence[Take]) -> list[dict[str, Any]]:
     """What must not be overlooked, all of it marked."""
-    rows = [[take.name, sentence] for take in takes for sentence in remarks(take.run.with_robot(take.robot))]
+    rows = [
+        [take.name, sentence]
+        for take in takes
+        if not _idle(take)
+        for sentence in remarks(take.run.with_robot(take.robot))
+    ]
     return [{"title": "To be noted", "columns": ["", ""], "rows": rows, "marked": list(range(len(rows)))}]
 
 
 def _contours(takes: Sequence[Take]) -> list[dict[str, Any]]:
     """What became of each contour, of a single take: several have tables too large to be compared."""
-    if len(takes) > 1 or takes[0].toolpath is None or not set(takes[0].run.data.data_vars) >= _NEEDED:
+    if (
+        len(takes) > 1
+        or takes[0].toolpath is None
+        or _idle(takes[0])
+        or not set(takes[0].run.data.data_vars) >= _NEEDED
+    ):
         return []
     heads, *rows = contour_table(takes[0].run, takes[0].robot) or [[]]
     return [{"title": "Contours", "columns": heads, "rows": rows}]
