@@ -182,9 +182,11 @@ def _refuse_if_deciding(text: str, head: str) -> None:
 def _text(nodes: Any) -> str:
     """Write parsed CSS out again."""
     try:
-        return tinycss2.serialize(nodes)
+        return tinycss2.serialize([node for node in nodes if node.type != "error"])
     except RecursionError as error:
         raise ToolpathError("the style has brackets nested too deep; write it as attributes") from error
+    except TypeError as error:  # an error further inside
+        raise ToolpathError(f"the style is no CSS: {error}; write it as attributes") from error
 
 
 def _overlay(found: Declarations, more: Declarations) -> None:
@@ -210,7 +212,7 @@ def _parsed(content: Any) -> Declarations:
     """The declarations that matter of the content of a rule."""
     found: Declarations = {}
     for node in tinycss2.parse_blocks_contents(content, skip_comments=True, skip_whitespace=True):
-        if node.type == "declaration":
+        if node.type == "declaration" and all(token.type != "error" for token in node.value):
             value = _text([token for token in node.value if token.type != "comment"])
             _overlay(found, _kept(node.lower_name, value.strip(), node.important))
         elif node.type in ("qualified-rule", "at-rule") and node.content is not None:
