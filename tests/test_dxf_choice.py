@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 
 import ezdxf
 import pytest
+from click.testing import CliRunner
 from drawings import dxf_reader
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pathcontrol.cli import main
 from pathcontrol.errors import InputError, PathControlWarning, ToolpathError, UnknownNameError
+from pathcontrol.experiments.toolpath_section import ToolpathSection
 from pathcontrol.toolpaths.dxf import read_dxf
 from pathcontrol.toolpaths.read import read_toolpath
 
@@ -81,7 +85,7 @@ def test_points_text_and_dimensions_are_skipped_when_asked(read):
         m.add_hatch()
         m.add_circle((5, 5), 1)
 
-    with pytest.raises(ToolpathError, match=r"1 POINT.*skip=\['POINT', .*unknown='warn'"):
+    with pytest.raises(ToolpathError, match=r"1 POINT.*skip='POINT,.*unknown='warn'"):
         read(draw)
     everything = ("point", "text", "dimension", "hatch")
     assert [len(read(draw, skip=skip)) for skip in (everything, [*everything, "CIRCLE"])] == [2, 1]
@@ -190,3 +194,26 @@ def test_nothing_is_told_of_a_plain_drawing(read):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert read(lambda m: (lines(m, SQUARE), m.add_circle((5, 5), 1))).notes == ()
+
+
+def test_the_options_on_the_command_line_and_in_experiment_files(tmp_path):
+    document = ezdxf.new("R2010", units=4)
+    m = document.modelspace()
+    m.add_line((0, 0), (10, 0))
+    m.add_line((10, 0.01), (10, 10))
+    m.add_point((0, 0))
+    m.add_text("A")
+    document.saveas(tmp_path / "part.dxf")
+    file = str(tmp_path / "part.dxf")
+    refused = CliRunner().invoke(main, ["toolpath", file])
+    assert "--skip POINT,TEXT" in refused.output
+    assert "--lenient" in refused.output
+    for options in (["--skip", "POINT,TEXT"], ["--skip", "point", "--skip", "text"]):
+        shown = CliRunner().invoke(main, ["toolpath", file, "--json", *options])
+        assert len(json.loads(shown.stdout)["contours"]) == 2
+        assert "--gap 1.1e-05" in shown.output
+    joined = CliRunner().invoke(main, ["toolpath", file, "--json", "--lenient", "--gap", "0.011 mm"])
+    assert len(json.loads(joined.stdout)["contours"]) == 1
+    section = ToolpathSection(file=file, frame="tip", skip=["point", "text"], gap=1.1e-5)
+    assert section.reading == {"skip": ["point", "text"], "gap": 1.1e-5}
+    assert len(read_toolpath(file, **section.reading)) == 1

@@ -16,7 +16,16 @@ from pathcontrol.cli.quantity import QuantityType, questioned_feed
 @click.command("toolpath")
 @click.argument("file", type=click.Path(exists=False, path_type=Path))
 @click.option("--unit", metavar="UNIT", help="Unit of length of a file that does not say: mm, in, …")
-@click.option("--layer", "layers", multiple=True, metavar="LAYER", help="A layer of a DXF file; repeat for more.")
+@click.option(
+    "--layer", "layers", multiple=True, metavar="LAYER", help="A layer of a DXF or SVG file, or an id; repeat for more."
+)
+@click.option("--skip", multiple=True, metavar="KIND", help="Leave out text, image, point, …; repeat for more.")
+@click.option(
+    "--gap",
+    type=QuantityType("m"),
+    metavar="LENGTH",
+    help="Join the ends of a DXF or SVG file that are so near, as '5 um', or a number in metres.",
+)
 @click.option("--ppi", type=float, help="Pixels per inch of an SVG file.  [default: 96]")
 @click.option(
     "--feed",
@@ -38,7 +47,9 @@ from pathcontrol.cli.quantity import QuantityType, questioned_feed
     "--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw it: writes this name as SVG and PNG."
 )
 @json_option
-def command(file: Path, layers: tuple[str, ...], plot: Path | None, as_json: bool, **options: Any) -> None:
+def command(
+    file: Path, layers: tuple[str, ...], skip: tuple[str, ...], plot: Path | None, as_json: bool, **options: Any
+) -> None:
     """Show what is in a toolpath FILE: CSV, G-code, SVG or DXF."""
     from pathcontrol.cli.tables import toolpath_table
     from pathcontrol.toolpaths.read import read_toolpath
@@ -46,7 +57,8 @@ def command(file: Path, layers: tuple[str, ...], plot: Path | None, as_json: boo
 
     if plot is not None:
         refuse_suffix(plot, "a figure", ".svg", ".png", ".pdf")
-    given = {name: value for name, value in (options | {"layers": list(layers) or None}).items() if value is not None}
+    options |= {"layers": list(layers) or None, "skip": list(skip) or None}
+    given = {name: value for name, value in options.items() if value is not None}
     questioned_feed(options["feed"])
     read = read_toolpath(file, **given)
     content = summary(read)

@@ -25,8 +25,8 @@ class Workpiece(Section):
 class ToolpathSection(Section):
     """``toolpath``: see :func:`pathcontrol.read_toolpath` and :class:`pathcontrol.ToolpathTask`.
 
-    ``file`` is relative to the experiment file; ``unit``, ``layers``, ``ppi`` and ``unknown`` are for its
-    reader. Lengths are in metres and metres per second, ``start`` is in ``angle_unit``.
+    ``file`` is relative to the experiment file; ``unit``, ``layers``, ``skip``, ``gap``, ``ppi`` and ``unknown`` are
+    for its reader. Lengths are in metres and metres per second, ``start`` is in ``angle_unit``.
     """
 
     units: ClassVar[Units] = {
@@ -35,10 +35,11 @@ class ToolpathSection(Section):
         "acceleration": "m/s^2",
         "tolerance": "m",
         "clearance": "m",
+        "gap": "m",
         "start": ("rad", "m"),
     }
     angles = ("start",)
-    reader_options: ClassVar[tuple[str, ...]] = ("unit", "layers", "ppi", "unknown")
+    reader_options: ClassVar[tuple[str, ...]] = ("unit", "layers", "ppi", "unknown", "skip", "gap")
     not_arguments: ClassVar[tuple[str, ...]] = ("type", "file", "workpiece", *reader_options)
     type: Literal["toolpath"] = "toolpath"
     file: Text
@@ -46,6 +47,8 @@ class ToolpathSection(Section):
     workpiece: Workpiece = Workpiece()
     unit: Text | None = None
     layers: list[Text] | None = None
+    skip: list[Text] | None = None
+    gap: NotNegative | None = None
     ppi: Positive | None = None
     unknown: Literal["refuse", "warn"] | None = None
     orientation: Literal["free", "down", "normals", "tangent"] | None = None

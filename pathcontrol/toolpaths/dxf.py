@@ -174,9 +174,9 @@ def _strands(entities: Entities, layers: Layers, skip: frozenset[str], scale: Ar
             strands.append(Strand(name, layer.lower(), len(strands), segments))
     if refused:
         what = ", ".join(f"{count} {kind} on layer {layer!r}" for (kind, layer), count in refused.most_common(8))
-        kinds = ", ".join(dict.fromkeys(repr(kind) for (kind, _), _ in refused.most_common(8)))
+        kinds = ",".join(dict.fromkeys(kind for (kind, _), _ in refused.most_common(8)))
         raise ToolpathError(
-            f"{entities.source} holds what cannot be cut: {what}; take it away, leave it out with skip=[{kinds}], pass "
+            f"{entities.source} holds what cannot be cut: {what}; take it away, leave it out with skip={kinds!r}, pass "
             f"it over with unknown='warn', or choose layers= without it of {layers.listed}"
         )
     return strands

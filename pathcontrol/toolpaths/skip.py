@@ -42,7 +42,7 @@ def names_of(option: str, names: str | Sequence[str] | None) -> tuple[str, ...] 
     """
     if names is None:
         return None
-    found = (names,) if isinstance(names, str) else tuple(names) if isinstance(names, Iterable) else (names,)
+    found = (names,) if isinstance(names, str) or not isinstance(names, Iterable) else tuple(names)
     wrong = [name for name in found if not isinstance(name, str)]
     if wrong:
         raise InputError(f"{option} = {names!r}, expected a name or several, such as ['a', 'b']")
@@ -53,7 +53,7 @@ def skipped(names: str | Sequence[str] | None, known: Iterable[str]) -> frozense
     """Return the kinds, in lower case, that these names stand for.
 
     Args:
-        names: ``"text"`` and the other names of :data:`KINDS`, or single kinds.
+        names: ``"text"`` and the other names of :data:`KINDS`, or single kinds; a string may hold several: ``"a,b"``.
         known: the kinds that there are.
 
     Raises:
@@ -62,7 +62,7 @@ def skipped(names: str | Sequence[str] | None, known: Iterable[str]) -> frozense
     """
     single = {kind.lower() for kind in known} | {kind for kinds in KINDS.values() for kind in kinds}
     found: set[str] = set()
-    for name in names_of("skip", names) or ():
+    for name in [name.strip() for some in names_of("skip", names) or () for name in some.split(",")]:
         kinds = KINDS.get(name.lower(), (name.lower(),))
         if not single.issuperset(kinds):
             raise UnknownNameError(
