@@ -15,14 +15,15 @@ _WORD = re.compile(
     """,
     re.VERBOSE,
 )
-_BREAK = re.compile(r"; |, or | \(")
+_BREAK = re.compile(r"; |, | \(")
+_END = re.compile(r"; |, |\n|$")
 _SETTING = re.compile(r"(?P<name>[a-z]\w*) = (?P<value>'[^']*'|[^,;]+)(?=[,;])")
 
 
 def in_words_of(message: str, speak: Speak) -> str:
     """Return ``message`` with ``name=value`` as ``speak`` calls it.
 
-    Where there is no such thing, the advice is left out, from the ``; `` or ``, or`` before it to the next one.
+    Where there is no such thing, the advice is left out, from the semicolon or comma before it to the one after it.
     """
     parts, end = [], 0
     for word in _WORD.finditer(message):
@@ -33,10 +34,11 @@ def in_words_of(message: str, speak: Speak) -> str:
             parts.append(message[end : word.start()] + said)
             end = word.end()
             continue
-        breaks = [found.start() for found in _BREAK.finditer(message, end, word.start())]
-        if breaks:
-            parts.append(message[end : breaks[-1]])
-            end = _end_of_advice(message, word.end(), bracket=message[breaks[-1]] == " ")
+        starts = [found.start() for found in _BREAK.finditer(message, end, word.start())]
+        starts = [start for start in starts if not _depth(message[end:start])]
+        if starts:
+            parts.append(message[end : starts[-1]])
+            end = _end_of_advice(message, starts[-1], word.end())
     return "".join(parts) + message[end:]
 
 
@@ -49,8 +51,14 @@ def setting_in_words_of(message: str, speak: Speak) -> str:
     return message if found is None or said is None else said + message[found.end() :]
 
 
-def _end_of_advice(message: str, begin: int, bracket: bool) -> int:
-    if bracket:
-        return message.find(")", begin) + 1 or len(message)
-    ends = [at for mark in ("; ", "\n") if (at := message.find(mark, begin)) >= 0]
-    return min(ends, default=len(message))
+def _end_of_advice(message: str, start: int, after: int) -> int:
+    """Where the advice from ``start`` on ends, ``after`` the word in it: at its bracket, or with the clause."""
+    if message[start] == " ":
+        return message.find(")", after) + 1 or len(message)
+    ends = (found.start() for found in _END.finditer(message, after))
+    return next((end for end in ends if _depth(message[start:end]) <= 0), len(message))
+
+
+def _depth(text: str) -> int:
+    """How many brackets are open at the end of ``text``."""
+    return text.count("(") - text.count(")")

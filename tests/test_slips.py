@@ -230,3 +230,16 @@ def test_rows_of_gains_that_look_like_a_matrix_are_given_with_an_axis_more(arm):
     np.testing.assert_array_equal(law.K_p, rows)
     run = pc.simulate(law, [1.0, 0.0], duration=0.01)
     assert run.rollouts == 2
+
+
+def test_a_gain_of_an_experiment_may_be_a_diagonal_matrix(tmp_path):
+    from pathcontrol.experiments.runner import load_setup
+    from pathcontrol.experiments.template import example_text
+
+    file, text = tmp_path / "experiment.toml", example_text()
+    assert "\nK_p = 800.0" in text
+    file.write_text(text.replace("\nK_p = 800.0", "\nK_p = [[800.0, 0.0], [0.0, 700.0]]"), encoding="utf-8")
+    np.testing.assert_array_equal(load_setup(file).controller.K_p, [800.0, 700.0])
+    file.write_text(text.replace("\nK_p = 800.0", "\nK_p = [[800.0, 1.0], [0.0, 700.0]]"), encoding="utf-8")
+    with pytest.raises(pc.ExperimentError, match=r"controller\.K_p = .* not diagonal"):
+        load_setup(file)

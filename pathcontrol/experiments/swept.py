@@ -196,6 +196,7 @@ def _entry(inside: Any, step: str | int, key: str) -> Any:
 def _check_gains(experiment: Experiment, sample: int, where: str) -> None:
     for name, value in experiment.controller.arguments(float).items():
         numbers = np.asarray(value if _GAIN.fullmatch(f"controller.{name}") else 1.0)
+        numbers = numbers.diagonal() if numbers.ndim > 1 else numbers
         if (numbers < 0).any() or (name != "k" and (numbers == 0).any()):
             raise ExperimentError(
                 f"{where}: controller.{name} = {shown(value)} in sample {sample}, expected gains greater "

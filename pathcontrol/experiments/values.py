@@ -90,8 +90,11 @@ Numbers = Annotated[list[float], _only(_list_of(_is_number), "a list of finite n
 Positives = Annotated[list[float], _only(_list_of(_is_positive), "a list of numbers greater than 0")]
 Wholes = Annotated[list[int], _only(_list_of(_is_whole), "a list of whole numbers")]
 Gain = Annotated[
-    float | list[float],
-    _only(_either(_is_number, _list_of(_is_number)), "a finite number, or a list with one for each joint"),
+    float | list[float] | list[list[float]],
+    _only(
+        _either(_is_number, _list_of(_is_number), _list_of(_list_of(_is_number))),
+        "a finite number, or a list with one for each joint",
+    ),
 ]
 FlagOrLimits = Annotated[
     bool | list[float],
