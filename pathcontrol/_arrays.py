@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pathcontrol._labels import by_name, labelled, refuse_labels
 from pathcontrol.errors import InputError
 
 #: an array of floats; shapes are said in docstrings
@@ -15,21 +16,35 @@ Array = NDArray[Any]
 
 
 def as_array(name: str, value: ArrayLike) -> Array:
-    """``value`` as a float array, or an error that names it."""
+    """``value`` as a float array, or an error that names it; labels, which would be lost, are refused."""
+    refuse_labels(name, value)
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} = {value!r}, expected numbers") from error
 
 
-def joint_array(name: str, value: ArrayLike, n: int) -> Array:
-    """``value`` as an array of shape (*batch, n)."""
-    array = value if type(value) is np.ndarray and value.dtype == np.float64 else as_array(name, value)
+def joint_array(name: str, value: Any, n: int, joints: Sequence[str] | None = None) -> Array:
+    """``value`` as an array of shape (*batch, n), in the order of the ``joints`` if it is labelled by their names."""
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        array: Array = value
+    else:
+        array = as_array(name, value if joints is None else unlabelled(name, value, joints))
     if array.ndim == 0 or array.shape[-1] != n:
         raise InputError(
             f"{name} has shape {array.shape}, expected (*batch, {n}): one value for each of the {n} joints last"
         )
     return array
+
+
+def unlabelled(name: str, value: Any, joints: Sequence[str]) -> Any:
+    """``value`` in the order of the ``joints`` without its labels, if it has any.
+
+    Raises:
+        InputError: the labels are not the names of the joints.
+    """
+    found = labelled(name, value)
+    return value if found is None else by_name(name, found, joints)
 
 
 def finite(name: str, array: Array) -> Array:

@@ -448,6 +448,9 @@ def test_a_mass_matrix_called_singular_is_singular(kinds, masses, arms, moments)
     report = check_urdf(robot(*parts))
     model = read_by_pinocchio(robot(*parts))
     diagonals = [np.diag(pin.crba(model, model.createData(), q * np.ones(model.nq))) for q in (0.0, 0.7, -2.0)]
+    if find(report, "no-mass"):
+        assert not np.any(diagonals)
+        return
     for finding in find(report, "mass-matrix-singular"):
         index = model.joints[model.getJointId(finding.where.split("'")[1])].idx_v
         assert all(abs(diagonal[index]) < 1e-12 for diagonal in diagonals)
@@ -594,7 +597,8 @@ def test_the_mimic_finger_of_the_panda_is_refused_by_name():
 @pytest.mark.parametrize("name", ["ur5", "kinova", "talos_arm"])
 def test_common_arms_have_no_warnings(name):
     path = urdf_path(name)
-    assert check_urdf(path.read_text(encoding="utf-8"), base_dir=path.parent).warnings == ()
+    warnings = check_urdf(path.read_text(encoding="utf-8"), base_dir=path.parent).warnings
+    assert {finding.code for finding in warnings} <= {"effort-below-weight"}  # TALOS states 22.3 N m for its shoulder
 
 
 @given(st.tuples(*[st.floats(-3, 3)] * 6), st.floats(0, 5), st.sampled_from(["1 0 0", "0 0.6 0.8"]))

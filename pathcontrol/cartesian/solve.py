@@ -57,7 +57,7 @@ def _followed(constraint: ToolConstraint, starts: Array) -> list[Trail]:
 
 def posture(robot: RobotModel, start: ArrayLike) -> Array:
     """``start`` as a posture (n,) within the joint limits."""
-    q = finite("start", joint_array("start", start, robot.n))
+    q = finite("start", joint_array("start", start, robot.n, robot.joint_names))
     if q.shape != (robot.n,):
         raise InputError(f"start has shape {q.shape}, expected one posture ({robot.n},)")
     if outside(robot, q):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly
+from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly, unlabelled
 from pathcontrol._expect import expect
 from pathcontrol.control.ending import Ending
 from pathcontrol.errors import InputError, UnknownNameError
@@ -95,7 +96,7 @@ class Controller(ABC):
 
     def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """State z, (*batch, 1), for an arm that starts at (q, q̇)."""
-        q = joint_array("q", q, self.robot.n)
+        q = joint_array("q", q, self.robot.n, self.robot.joint_names)
         joint_array("qd", qd, self.robot.n)
         s = np.full(q.shape[:-1], self.task.s0) if self.start_at == "s0" else self.task.sigma_bar(q)
         return np.asarray(s)[..., None]
@@ -178,7 +179,7 @@ def _phi(x: Array) -> tuple[Array, Array]:
     return phi_1, phi_2
 
 
-def diagonal_gain(name: str, value: ArrayLike, n: int) -> Array:
+def diagonal_gain(name: str, value: ArrayLike, n: int, joints: Sequence[str] | None = None) -> Array:
     """Return the diagonal of a diagonal, positive definite gain matrix.
 
     Args:
@@ -187,11 +188,13 @@ def diagonal_gain(name: str, value: ArrayLike, n: int) -> Array:
             (N, n) has a row for each rollout. Where N = n, an array with zeros, or one that is symmetric and in which
             the diagonal exceeds the rest of each row, is a matrix, and any other has rows; (N, 1, n) always has rows.
         n: number of joints.
+        joints: their names, by which values that are labelled are put in order.
 
     Raises:
         InputError: it has another shape, is not positive, or is a matrix that is not diagonal.
     """
-    array = _without_matrix(name, finite(name, as_array(name, value)), n)
+    given = value if joints is None else unlabelled(name, value, joints)
+    array = _without_matrix(name, finite(name, as_array(name, given)), n)
     if array.ndim and array.shape[-1] not in (1, n):
         raise InputError(
             f"{name} has shape {array.shape}, expected a scalar, its diagonal ({n},) or a diagonal matrix ({n}, {n})"

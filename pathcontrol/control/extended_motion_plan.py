@@ -40,7 +40,10 @@ class ExtendedMotionPlan(Controller, single=True):
         self, robot: RobotModel, task: PathTask, K_p: ArrayLike, K_v: ArrayLike, k: ArrayLike, **options: Any
     ) -> None:
         super().__init__(robot, task, **options)
-        self.K_p, self.K_v = diagonal_gain("K_p", K_p, robot.n), diagonal_gain("K_v", K_v, robot.n)
+        self.K_p, self.K_v = (
+            diagonal_gain("K_p", K_p, robot.n, robot.joint_names),
+            diagonal_gain("K_v", K_v, robot.n, robot.joint_names),
+        )
         plan_gain = finite("k", as_array("k", k))
         self.k = readonly(plan_gain[..., 0] if plan_gain.ndim > 1 else plan_gain)
         if (self.k < 0).any():

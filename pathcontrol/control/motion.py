@@ -56,7 +56,10 @@ class ProportionalDerivative(MotionController):
 
     def __init__(self, robot: RobotModel, task: PathTask, K_p: ArrayLike, K_v: ArrayLike, **options: Any) -> None:
         super().__init__(robot, task, **options)
-        self.K_p, self.K_v = diagonal_gain("K_p", K_p, robot.n), diagonal_gain("K_v", K_v, robot.n)
+        self.K_p, self.K_v = (
+            diagonal_gain("K_p", K_p, robot.n, robot.joint_names),
+            diagonal_gain("K_v", K_v, robot.n, robot.joint_names),
+        )
 
     def correction(self, ref: Tracking) -> Array:
         """K_v dq̃/dt + K_p q̃, (*batch, n)."""
@@ -101,7 +104,10 @@ class SlotineLi(MotionController, single=True):
 
     def __init__(self, robot: RobotModel, task: PathTask, Lambda: ArrayLike, K_d: ArrayLike, **options: Any) -> None:
         super().__init__(robot, task, **options)
-        self.Lambda, self.K_d = diagonal_gain("Lambda", Lambda, robot.n), diagonal_gain("K_d", K_d, robot.n)
+        self.Lambda, self.K_d = (
+            diagonal_gain("Lambda", Lambda, robot.n, robot.joint_names),
+            diagonal_gain("K_d", K_d, robot.n, robot.joint_names),
+        )
 
     def torque(self, q: Array, qd: Array, ref: Tracking) -> Array:
         velocity = ref.velocity + self.Lambda * ref.position_error

@@ -61,7 +61,7 @@ class Projection(Controller):
         ends = np.all(np.isfinite(getattr(task, "s_end", np.inf)))  # what is no task is refused below
         super().__init__(robot, task, **({"start": "s0" if ends else "nearest"} | options))
         self.branches = BranchPolicy(branch, capture)
-        self.k_p, self.K_v = scalar_gain("k_p", k_p), diagonal_gain("K_v", K_v, robot.n)
+        self.k_p, self.K_v = scalar_gain("k_p", k_p), diagonal_gain("K_v", K_v, robot.n, robot.joint_names)
 
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         last, none = z[..., 0], np.zeros(z.shape[:-1])

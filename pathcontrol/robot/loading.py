@@ -10,14 +10,16 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from pathcontrol._arrays import Array, readonly
-from pathcontrol.errors import InputError, PathControlWarning, UrdfError
+from pathcontrol._arrays import Array, readonly, scalar
+from pathcontrol.errors import PathControlWarning, UrdfError
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Viscous
 from pathcontrol.robot.model import RobotModel, UrdfSource, build_model
 from pathcontrol.robot.urdf import UrdfReport, check_urdf, parse_urdf
 from pathcontrol.robot.urdf.extension import extension_values
+from pathcontrol.robot.urdf.locking import locked_angles
+from pathcontrol.robot.urdf.parse import Parsed, parse_and_mend
 
 TOLD = ("inertia-negative",)  # warnings of the check that are worth hearing of each time, beside those of its XML
 _UNLIMITED = 1e30  # some URDFs write 1.8e308 for "no limit"
@@ -27,6 +29,9 @@ def load_robot(
     source: str | Path,
     *,
     lock: Mapping[str, float] | None = None,
+    keep: Sequence[str] = (),
+    tip: str | None = None,
+    estimated_inertia: bool | float = False,
     package_dirs: str | Path | Sequence[str | Path] = (),
     threads: int = 1,
 ) -> RobotModel:
@@ -35,24 +40,42 @@ def load_robot(
     Args:
         source: the name of a bundled robot (``"cicese_2dof"``) or of one of example-robot-data (extra ``robots``), the
             path of a URDF file, or the URDF itself as a string.
-        lock: joints to lock, ``{"joint name": angle [rad]}``, such as the fingers of a gripper.
+        lock: joints to lock, ``{"joint name": angle [rad]}``, such as the fingers of a gripper. A joint that mimics one
+            of them is locked with it, at multiplier × angle + offset.
+        keep: names of joints that stay free: all others are locked, where ``lock`` does not say at 0, or at the limit
+            nearest to 0.
+        tip: a link or joint: as ``keep`` with all joints that move it, such as one arm of two.
+        estimated_inertia: give links that have a shape and no mass one from it, as solid bodies of 1300 kg/m³, or of
+            the density given [kg/m³].
         package_dirs: folders in which ``package://`` mesh files are looked up: those that hold packages, or packages.
         threads: threads for batched calls.
 
     Raises:
         UrdfError: the URDF is missing or cannot be used; the message lists every reason found.
-        UnknownNameError: no such robot; the message lists the known ones.
+        UnknownNameError: no such robot, joint or tip; the message lists the known ones.
+        InputError: a joint is to be locked and kept, or a value is out of range.
     """
     urdf = find_urdf(source, _folders(package_dirs))
-    if lock is not None and not isinstance(lock, Mapping):
-        raise InputError(f"lock = {lock!r}, expected angles by joint, as {{'joint name': 0.0}}")
     label = "this URDF" if str(source).lstrip().startswith("<") else repr(str(source))
-    report = _checked(urdf, label, tuple(lock or ()))
-    for finding in report.warnings:
-        if finding.code in TOLD or finding.code.startswith("xml-"):
-            warnings.warn(f"{label}: {finding.where}: {finding.message}", PathControlWarning, stacklevel=2)
+    root, mended = _parsed(urdf, label)
+    locked = locked_angles(root, lock, keep, tip)
+    if estimated_inertia is not False:
+        from pathcontrol.robot.estimate import DENSITY, with_estimated_inertia  # reading meshes takes half a second
+
+        density = DENSITY if estimated_inertia is True else estimated_inertia
+        urdf = with_estimated_inertia(urdf, scalar("estimated_inertia", density, positive=True))
+    report = _checked(urdf, label, tuple(locked))
+    for finding in (*mended, *(finding for finding in report.warnings if finding.code in TOLD)):
+        warnings.warn(f"{label}: {finding.where}: {finding.message}", PathControlWarning, stacklevel=2)
     robot = _build(urdf, threads)
-    return robot.reduced(lock) if lock else robot
+    return robot.reduced(locked) if locked else robot
+
+
+def _parsed(urdf: UrdfSource, label: str) -> Parsed:
+    try:
+        return parse_and_mend(urdf.text)
+    except UrdfError as error:
+        raise UrdfError(f"{label} cannot be used: {error}") from None
 
 
 def checked_model(urdf: UrdfSource, label: str, locked: Sequence[str] = (), threads: int = 1) -> RobotModel:

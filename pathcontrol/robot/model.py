@@ -19,7 +19,10 @@ from pathcontrol._arrays import Array, as_array, finite, joint_array, scalar
 from pathcontrol.errors import InputError, UnknownNameError, UrdfError
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.friction import FrictionLaw, no_friction
+from pathcontrol.robot.lump import rod
 from pathcontrol.robot.rigid_body import RigidBody, together
+from pathcontrol.robot.urdf.locking import locked_angles
+from pathcontrol.robot.urdf.parse import parse_urdf
 
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED  # the frame's origin, axes parallel to the base's
 
@@ -113,6 +116,12 @@ class RobotModel:
         """Rotor inertia [kg m²] on the diagonal of M, (n,)."""
         return np.array(self.pinocchio_model.armature)
 
+    @property
+    def has_mass(self) -> bool:
+        """Whether there is anything for the joints to move; without it the arm has kinematics and no dynamics."""
+        bodies = list(self.pinocchio_model.inertias)[1:]
+        return any(body.mass or body.inertia.any() for body in bodies) or bool((self.armature > 0).all())
+
     def joint_index(self, joint: str) -> int:
         """The position of a joint in ``joint_names``."""
         if joint not in self.joint_names:
@@ -128,7 +137,7 @@ class RobotModel:
         """
         if velocity is None:
             return self._body.inverse_dynamics(q, qd, qdd)
-        qd, v = joint_array("qd", qd, self.n), joint_array("velocity", velocity, self.n)
+        qd, v = self._array("qd", qd), self._array("velocity", velocity)
         surplus = self._centripetal(q, 0.5 * (qd - v))
         return self._body.inverse_dynamics(q, 0.5 * (qd + v), qdd) - surplus
 
@@ -175,22 +184,24 @@ class RobotModel:
         That C is symmetric in its two velocities, C(q,x)y = C(q,y)x, so with c(q,x) = C(q,x)x polarisation gives
         C(q,q̇)v = c(q,(q̇+v)/2) − c(q,(q̇−v)/2).
         """
-        qd, v = joint_array("qd", qd, self.n), joint_array("v", v, self.n)
+        qd, v = self._array("qd", qd), self._array("v", v)
         return self._centripetal(q, 0.5 * (qd + v)) - self._centripetal(q, 0.5 * (qd - v))
 
     def coriolis_matrix(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """C(q,q̇) [N m s], (*batch, n, n), of Christoffel symbols: Ṁ − 2C is skew-symmetric."""
-        q, qd = joint_array("q", q, self.n)[..., None, :], joint_array("qd", qd, self.n)[..., None, :]
+        q, qd = self._array("q", q)[..., None, :], self._array("qd", qd)[..., None, :]
         return self.coriolis(q, qd, np.eye(self.n)).swapaxes(-1, -2)
 
     def kinetic_energy(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """½ q̇ᵀM(q)q̇ [J], (*batch,)."""
+        qd = self._array("qd", qd)
         momentum = self._weightless.inverse_dynamics(q, np.zeros(self.n), qd)
-        return 0.5 * np.asarray((momentum * as_array("qd", qd)).sum(-1))
+        return 0.5 * np.asarray((momentum * qd).sum(-1))
 
     def potential_energy(self, q: ArrayLike) -> Array:
         """Energy in the field of gravity [J], (*batch,), zero where all mass is at the height of the base frame."""
-        return self._each(q, (), lambda qi: pin.computePotentialEnergy(self.pinocchio_model, self._data, qi))
+        data = self._body.data
+        return self._each(q, (), lambda qi: pin.computePotentialEnergy(self.pinocchio_model, data, qi))
 
     # --- kinematics -----------------------------------------------------------------------------------------
 
@@ -217,7 +228,7 @@ class RobotModel:
 
     def frame_kinematics(self, q: ArrayLike, frame: str) -> tuple[Array, Array]:
         """Pose of ``frame`` (*batch, 4, 4) and its Jacobian (*batch, 6, n), as above, for the price of one of them."""
-        i, data, array = self._frame_id(frame), self._data, joint_array("q", q, self.n)
+        i, data, array = self._frame_id(frame), self._data, self._array("q", q)
         batch, rows = array.shape[:-1], array.reshape(-1, self.n)
         poses, jacobians = np.empty((len(rows), 4, 4)), np.empty((len(rows), 6, self.n))
         for k, qi in enumerate(rows):
@@ -263,6 +274,7 @@ class RobotModel:
             com: centre of mass in that frame [m], shape (3,).
             inertia: inertia about the centre of mass, axes of that frame [kg m²], shape (3, 3); default a point mass.
         """
+        self._check_mass()
         mass, lever = scalar("mass", mass, least=0.0), finite("com", as_array("com", com))
         tensor = np.zeros((3, 3)) if inertia is None else finite("inertia", as_array("inertia", inertia))
         if lever.shape != (3,) or tensor.shape != (3, 3):
@@ -296,35 +308,65 @@ class RobotModel:
 
     def with_armature(self, armature: ArrayLike) -> RobotModel:
         """The same arm with rotor inertia [kg m²], shape (n,), added to the diagonal of M."""
-        added = joint_array("armature", armature, self.n)
+        added = self._array("armature", armature)
         if added.shape != (self.n,) or (added < 0).any():
             raise InputError(f"armature = {added.tolist()}, expected {self.n} values not below 0")
         model = pin.Model(self.pinocchio_model)
         model.armature = np.asarray(model.armature) + added
         return self._changed(model, "with_armature", {"armature": added.tolist()})
 
-    def with_masses(self, scale: Mapping[str, float]) -> RobotModel:
-        """The same arm with heavier or lighter bodies.
+    def with_masses(
+        self, scale: Mapping[str, float] | None = None, kg: Mapping[str, float] | None = None
+    ) -> RobotModel:
+        """The same arm with heavier or lighter bodies: what moves with a joint, up to the next joint.
 
         Args:
-            scale: factors on mass and inertia of what moves with a joint, up to the next joint, by the joint's name:
-                ``{"joint_2": 1.1}`` for 10 % more, with the same centre of mass.
+            scale: factors on mass and inertia by the joint's name: ``{"joint_2": 1.1}`` for 10 % more, with the same
+                centre of mass.
+            kg: masses [kg] by the joint's name. A body that has one already keeps its form; one without becomes a rod
+                from its joint to what is farthest on it.
+
+        Raises:
+            InputError: a factor of a body that has no mass, or a number that is not above 0.
         """
-        model, factors = pin.Model(self.pinocchio_model), dict(scale)
-        for joint, value in factors.items():
-            factor, i = scalar(f"scale of {joint}", value, positive=True), self.joint_index(joint) + 1
+        model = pin.Model(self.pinocchio_model)
+        factors = {
+            joint: scalar(f"scale of {joint}", value, positive=True) for joint, value in dict(scale or {}).items()
+        }
+        masses = {joint: scalar(f"kg of {joint}", value, positive=True) for joint, value in dict(kg or {}).items()}
+        for joint, value in (*factors.items(), *masses.items()):
+            i = self.joint_index(joint) + 1
             body = model.inertias[i]
-            model.inertias[i] = pin.Inertia(factor * body.mass, body.lever, factor * body.inertia)
-            factors[joint] = factor
-        return self._changed(model, "with_masses", {"scale": factors})
+            if body.mass > 0:
+                factor = value if joint in factors else value / body.mass
+                model.inertias[i] = pin.Inertia(factor * body.mass, body.lever, factor * body.inertia)
+            elif joint in masses:
+                model.inertias[i] = pin.Inertia(*rod(value, self._farthest(i)))
+            else:
+                raise InputError(f"scale of {joint} = {value:g}, but it moves no mass; say how many with kg={{...}}")
+        return self._changed(model, "with_masses", {"scale": factors, "kg": masses})
 
     def with_threads(self, threads: int) -> RobotModel:
         """The same arm whose batched calls use ``threads`` threads."""
         return replace(self, threads=threads)
 
-    def reduced(self, lock: Mapping[str, float]) -> RobotModel:
-        """The arm with some joints locked: ``{"joint name": angle [rad]}``; the others keep their order."""
-        angles = {joint: scalar(f"angle of {joint}", angle) for joint, angle in lock.items()}
+    def reduced(
+        self, lock: Mapping[str, float] | None = None, *, keep: Sequence[str] = (), tip: str | None = None
+    ) -> RobotModel:
+        """The arm with some joints locked; the others keep their order.
+
+        Args:
+            lock: joints to lock, ``{"joint name": angle [rad]}``. Those that mimic them are locked with them.
+            keep: names of joints that stay free: all others are locked, where ``lock`` does not say at 0, or at the
+                limit nearest to 0.
+            tip: a frame: as ``keep`` with all joints that move it.
+        """
+        named = [*(lock or {}), *([keep] if isinstance(keep, str) else keep)]
+        for joint in named:
+            self.joint_index(joint)
+        moving = None if tip is None else self.pinocchio_model.names[self._support(tip)]
+        found = locked_angles(parse_urdf(self.source.text), lock, keep, moving)
+        angles = {joint: angle for joint, angle in found.items() if joint in self.joint_names}
         indices = {self.joint_index(joint): angle for joint, angle in angles.items()}
         if len(indices) == self.n:
             raise InputError(f"locking all {self.n} joints of {self.name} leaves nothing to control; leave one free")
@@ -338,14 +380,16 @@ class RobotModel:
 
     @cached_property
     def _body(self) -> RigidBody:
+        self._check_mass()
         return RigidBody(self.pinocchio_model, self.threads)
 
-    @property
+    @cached_property
     def _data(self) -> Any:
-        return self._body.data
+        return self.pinocchio_model.createData()
 
     @cached_property
     def _weightless(self) -> RigidBody:
+        self._check_mass()
         model = pin.Model(self.pinocchio_model)
         model.gravity = pin.Motion.Zero()
         return RigidBody(model, self.threads)
@@ -353,6 +397,7 @@ class RobotModel:
     @cached_property
     def _scratch(self) -> tuple[Any, Any]:
         """A model that may be changed, and its data."""
+        self._check_mass()
         model = pin.Model(self.pinocchio_model)
         return model, model.createData()
 
@@ -366,9 +411,35 @@ class RobotModel:
 
     def _each(self, q: ArrayLike, shape: tuple[int, ...], function: Callable[..., Any], **more: ArrayLike) -> Array:
         """``function`` of each configuration (and ``more`` beside it), for what Pinocchio has no batched call for."""
-        arrays = together(self.n, {"q": q, **more})
+        arrays = together(self.n, {"q": q, **more}, self.joint_names)
         values = [function(*rows) for rows in zip(*(a.reshape(-1, self.n) for a in arrays), strict=True)]
         return np.array(values, dtype=np.float64).reshape(arrays[0].shape[:-1] + shape)
+
+    def _array(self, name: str, value: ArrayLike) -> Array:
+        """Values of the joints, (*batch, n), by their names if they are labelled."""
+        return joint_array(name, value, self.n, self.joint_names)
+
+    def _check_mass(self) -> None:
+        """Refuse to compute with inertia where there is none."""
+        if not self.has_mass:
+            raise UrdfError(
+                f"{self.name}: no link has a mass, so there are kinematics and no dynamics; give some with "
+                f"with_masses(kg={{{self.joint_names[0]!r}: 2.0, ...}}) or load_robot(..., estimated_inertia=True)"
+            )
+
+    def _support(self, frame: str) -> int:
+        """The index of the joint of Pinocchio that moves a frame, which is not 0."""
+        i = self.pinocchio_model.frames[self._frame_id(frame)].parentJoint
+        if i == 0:
+            raise InputError(f"no joint of {self.name} moves the frame {frame!r}; give one farther out as tip")
+        return i
+
+    def _farthest(self, i: int) -> Array:
+        """Of the joints and frames on what joint ``i`` of Pinocchio moves, the place of the farthest [m], (3,)."""
+        model = self.pinocchio_model
+        joints = [model.jointPlacements[k].translation for k in range(len(model.parents)) if model.parents[k] == i]
+        frames = [frame.placement.translation for frame in model.frames if frame.parentJoint == i]
+        return max((np.array(place) for place in (*joints, *frames)), key=lambda x: float(x @ x), default=np.zeros(3))
 
     def _frame_id(self, frame: str) -> int:
         # getFrameId answers nframes for a frame that does not exist, so ask first

@@ -29,6 +29,7 @@ class RigidBody:
 
     def __init__(self, model: Any, threads: int) -> None:
         self.model, self.n, self.data = model, model.nv, model.createData()
+        self._joints = tuple(model.names)[1:]
         self._threads = threads
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
@@ -47,7 +48,7 @@ class RigidBody:
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """M(q) [kg m²], (*batch, n, n), by the composite rigid body algorithm."""
-        array = joint_array("q", q, self.n)
+        array = joint_array("q", q, self.n, self._joints)
         M = np.empty((array.size // self.n, self.n, self.n))
         for k, qi in enumerate(array.reshape(-1, self.n)):
             M[k] = pin.crba(self.model, self.data, qi)
@@ -64,7 +65,7 @@ class RigidBody:
     ) -> Array:
         """An algorithm for one configuration, and for many, of three (*batch, n) arguments that broadcast."""
         if not _alike(x, y, z, self.n):
-            x, y, z = together(self.n, dict(zip(names, (x, y, z), strict=True)))
+            x, y, z = together(self.n, dict(zip(names, (x, y, z), strict=True)), self._joints)
         if x.size == self.n:  # one configuration is not worth the threads' overhead
             if x.ndim == 1:
                 return one(self.model, self.data, x, y, z)
@@ -79,13 +80,13 @@ class RigidBody:
         return pin.ModelPool(self.model, self._threads)
 
 
-def together(n: int, arguments: Mapping[str, ArrayLike]) -> list[Array]:
-    """Arguments (*batch, n) broadcast to one shape.
+def together(n: int, arguments: Mapping[str, ArrayLike], joints: Sequence[str] | None = None) -> list[Array]:
+    """Arguments (*batch, n) broadcast to one shape, each in the order of the ``joints``.
 
     Raises:
         InputError: one of them has another last axis than n, or their batch axes do not fit together.
     """
-    arrays = [joint_array(name, value, n) for name, value in arguments.items()]
+    arrays = [joint_array(name, value, n, joints) for name, value in arguments.items()]
     if len({a.shape for a in arrays}) == 1:
         return arrays
     try:

@@ -91,7 +91,7 @@ def simulate_sequence(
     if not isinstance(robot, RobotModel):
         raise InputError("plant is one arm for each rollout, expected one: a sequence has a single rollout")
     durations, loop = _durations(duration, len(laws)), checked_loop(loop)
-    q0, qd0 = _one_state(q, qd, robot.n)
+    q0, qd0 = _one_state(q, qd, robot.joint_names)
     period, ends = period_of(loop, durations.min()), [_finish(law, laps) for law in laws]
     check_length(float(durations.sum()), loop, 1, robot.n, ends=True)
     whole = _whole(laws, laps) if task is None else _checked_whole(task, laws, laps)
@@ -191,8 +191,8 @@ def _durations(duration: ArrayLike, paths: int) -> Array:
     return np.broadcast_to(durations, (paths,))
 
 
-def _one_state(q: ArrayLike, qd: ArrayLike | None, n: int) -> tuple[Array, Array]:
-    q0, qd0 = initial_state(q, qd, n)
+def _one_state(q: ArrayLike, qd: ArrayLike | None, joints: Sequence[str]) -> tuple[Array, Array]:
+    q0, qd0 = initial_state(q, qd, joints)
     if len(q0) != 1:
         raise InputError(
             f"q and qd are {len(q0)} initial states, expected one: rollouts would not end their paths together; call "

@@ -102,10 +102,13 @@ def check_joints(controller: Controller, robot: Arm) -> None:
         )
 
 
-def initial_state(q: ArrayLike, qd: ArrayLike | None, n: int, rollouts: int | None = None) -> tuple[Array, Array]:
+def initial_state(
+    q: ArrayLike, qd: ArrayLike | None, joints: Sequence[str], rollouts: int | None = None
+) -> tuple[Array, Array]:
     """q and q̇ as (N, n) each, of any batch shape and broadcast against each other, and one state to all rollouts."""
-    position = finite("q", joint_array("q", q, n))
-    velocity = np.zeros(n) if qd is None else finite("qd", joint_array("qd", qd, n))
+    n = len(joints)
+    position = finite("q", joint_array("q", q, n, joints))
+    velocity = np.zeros(n) if qd is None else finite("qd", joint_array("qd", qd, n, joints))
     try:
         pair = np.broadcast_arrays(position, velocity)
     except ValueError as error:
@@ -126,7 +129,7 @@ def states_of_each(q: ArrayLike, qd: ArrayLike | None, robot: Arm, task: PathTas
     if isinstance(task, TaskBatch):
         counts["the controller's TaskBatch has {} tasks"] = len(task)
     _check_equal(counts)
-    q0, qd0 = initial_state(q, qd, robot.n, next(iter(counts.values()), None))
+    q0, qd0 = initial_state(q, qd, robot.joint_names, next(iter(counts.values()), None))
     _check_equal(counts | {"q and qd are {} initial states": len(q0)})
     return q0, qd0
 

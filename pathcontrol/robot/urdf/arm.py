@@ -112,6 +112,14 @@ def moving_bodies(arm: Arm) -> list[Body]:
     return bodies
 
 
+def link_pose(arm: Arm, link: str) -> np.ndarray:
+    """Pose of a link that does not move in the frame of the root, shape (4, 4), lengths in m."""
+    over, pose = {joint.child: joint for joint in arm.joints}, np.eye(4)
+    while (joint := over.get(link)) is not None:
+        pose, link = _pose(joint) @ pose, joint.parent
+    return pose
+
+
 def axis_inertia(arm: Arm, body: Body) -> float:
     """Moment of inertia of a body about the axis of its joint [kg m^2].
 

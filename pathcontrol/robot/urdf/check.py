@@ -15,11 +15,13 @@ from pathcontrol.robot.urdf.extension import check_extension
 from pathcontrol.robot.urdf.finding import Finding, Level, UrdfReport
 from pathcontrol.robot.urdf.form import check_form
 from pathcontrol.robot.urdf.inertia import check_inertials, check_inertias, check_mass_matrix, check_masses
+from pathcontrol.robot.urdf.locking import locked_angles
 from pathcontrol.robot.urdf.parse import parse_and_mend
 from pathcontrol.robot.urdf.shapes import check_meshes, check_shapes
 from pathcontrol.robot.urdf.values import (
     check_axes,
     check_dynamics,
+    check_efforts,
     check_joint_types,
     check_limits,
     check_mimics,
@@ -37,6 +39,7 @@ VALUE_CHECKS = (
     check_inertials,
     check_mass_matrix,
     check_dynamics,
+    check_efforts,
 )
 
 
@@ -56,7 +59,8 @@ def check_urdf(
         text: The XML of the robot.
         base_dir: Folder of the URDF file. Relative meshes are looked for there, and packages there and above.
         package_dirs: Folders that hold packages, for ``package://`` meshes.
-        allow_mimic: Joints that the caller is going to lock: taken as fixed here, and free to mimic another.
+        allow_mimic: Joints that the caller is going to lock: taken as fixed here, with those that mimic them, and
+            free to mimic another.
 
     Returns:
         The names in the robot and the findings.
@@ -67,7 +71,8 @@ def check_urdf(
         return UrdfReport("", (), (), (Finding("error", "unreadable", "file", str(error)),))
     findings = [*mended, *check_form(root)]
     if not any(finding.level == "error" for finding in findings):
-        arm = read_arm(root, allow_mimic)
+        movable = names_of(joint for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES)
+        arm = read_arm(root, locked_angles(root, {name: 0.0 for name in allow_mimic if name in movable}))
         findings += [finding for check in VALUE_CHECKS for finding in check(arm)]
         findings += check_extension(root)
     findings += [*check_shapes(root), *check_meshes(root, base_dir, package_dirs)]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pathcontrol.robot.urdf.arm import Arm, axis_inertia, has_direction, moving_bodies
+from pathcontrol.robot.urdf.dynamics import dynamics, postures
 from pathcontrol.robot.urdf.finding import Finding, Level, place
 
 if TYPE_CHECKING:
@@ -15,6 +17,8 @@ if TYPE_CHECKING:
 
 INERTIA_TOLERANCE = 1e-6  # of the largest principal moment: what rounding in a file may cost
 NO_INERTIA = 1e-15  # kg m^2, far below any finger joint
+_TINY_SHARE = 0.05  # of the largest moment: a negative one that is smaller may be forgiven
+_TINY_MOMENT = 1e-4  # kg m^2, likewise
 NO_MASS = 1e-15  # kg
 
 
@@ -31,14 +35,18 @@ def check_masses(arm: Arm) -> Iterator[Finding]:
 
 
 def check_inertias(arm: Arm) -> Iterator[Finding]:
-    """Every inertia could be that of a rigid body: no moment negative or above the sum of the two others."""
-    moving = arm.moving
+    """Every inertia could be that of a rigid body: no moment negative or above the sum of the two others.
+
+    A negative moment that is tiny, as rounding leaves it, does no harm where the mass matrix is positive definite.
+    """
+    moving, is_positive_definite = arm.moving, cache(lambda: _is_positive_definite(arm))
     for name, inertial in arm.inertials.items():
         moments = np.linalg.eigvalsh(inertial.inertia)
         slack = max(NO_INERTIA, INERTIA_TOLERANCE * np.abs(moments).max())
         given = f"the principal moments are {', '.join(f'{moment:g}' for moment in moments)} kg m^2"
         if moments[0] < -slack:
-            level: Level = "error" if name in moving else "warning"
+            tiny = -moments[0] <= max(_TINY_SHARE * moments[2], _TINY_MOMENT) and is_positive_definite()
+            level: Level = "error" if name in moving and not tiny else "warning"
             message = f"{given}; expected none below zero, check signs and products of inertia"
             yield Finding(level, "inertia-negative", place("link", name), message)
         elif moments[2] - moments[0] - moments[1] > slack:
@@ -48,6 +56,8 @@ def check_inertias(arm: Arm) -> Iterator[Finding]:
 
 def check_inertials(arm: Arm) -> Iterator[Finding]:
     """Every moving body has an inertial, and so has every moving link with a shape."""
+    if is_massless(arm):
+        return  # which is told once
     for body in moving_bodies(arm):
         bare = [name for name in body.poses if arm.links[name].inertial is None]
         if len(bare) < len(body.poses):
@@ -59,6 +69,13 @@ def check_inertials(arm: Arm) -> Iterator[Finding]:
 
 def check_mass_matrix(arm: Arm) -> Iterator[Finding]:
     """Every joint has something to move; otherwise the mass matrix is singular in every configuration."""
+    if is_massless(arm):
+        message = (
+            "no link has a mass, so there are kinematics and no dynamics; give <inertial>, or let it be estimated with "
+            "load_robot(..., estimated_inertia=True)"
+        )
+        yield Finding("warning", "no-mass", "robot", message)
+        return
     weight: dict[str, np.ndarray] = {}
     for body in reversed(moving_bodies(arm)):
         parts = [_weight(arm.links[name]) for name in body.poses]
@@ -70,8 +87,21 @@ def check_mass_matrix(arm: Arm) -> Iterator[Finding]:
             singular = abs(axis_inertia(arm, body)) < NO_INERTIA
         if singular:
             what = f"mass is {mass:g} kg" if slides else "inertia about its axis is 0 kg m^2"
-            message = f"the {what} for all it moves: the mass matrix is singular; give <inertial>, or lock it"
+            message = (
+                f"the {what} for all it moves: the mass matrix is singular; give <inertial>, lock it, "
+                "or estimate it with load_robot(..., estimated_inertia=True)"
+            )
             yield Finding("error", "mass-matrix-singular", place("joint", body.joint.name), message)
+
+
+def is_massless(arm: Arm) -> bool:
+    """Whether nothing that moves has a mass or an inertia."""
+    return not any(_weight(arm.links[name]).any() for name in arm.moving)
+
+
+def _is_positive_definite(arm: Arm) -> bool:
+    M, _ = dynamics(arm, postures(arm))
+    return bool(np.linalg.eigvalsh(M).min() > NO_INERTIA)
 
 
 def _weight(link: Link) -> np.ndarray:

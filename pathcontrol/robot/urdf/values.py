@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pathcontrol.robot.urdf.arm import Arm, has_direction
+from pathcontrol.robot.urdf.arm import Arm, has_direction, moving_bodies
+from pathcontrol.robot.urdf.dynamics import dynamics, postures
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES
 from pathcontrol.robot.urdf.finding import Finding, place, shown
 from pathcontrol.robot.urdf.numbers import ABSURD
@@ -34,7 +35,10 @@ def check_mimics(arm: Arm) -> Iterator[Finding]:
     for joint in arm.movable:
         if joint.name in arm.mimics and joint.name not in arm.locked:
             followed = shown(arm.mimics[joint.name])
-            message = f"it mimics joint {followed}, which is refused; make it fixed or independent, or lock it"
+            message = (
+                f"it mimics joint {followed}, which is refused; lock {followed}, which locks it too, "
+                "or keep other joints only, or make it fixed or independent"
+            )
             yield Finding("error", "joint-mimic", place("joint", joint.name), message)
 
 
@@ -77,6 +81,24 @@ def check_dynamics(arm: Arm) -> Iterator[Finding]:
         if joint.type == "continuous":
             message = "it turns without end and is treated as one angle; lower and upper are ignored"
             yield Finding("note", "joint-continuous", place("joint", joint.name), message)
+
+
+def check_efforts(arm: Arm) -> Iterator[Finding]:
+    """No joint is too weak to hold what it carries, in any of some hundred postures within its limits."""
+    bodies = moving_bodies(arm)
+    if not bodies or not all(has_direction(body.joint) for body in bodies):
+        return
+    q = postures(arm)
+    for body, torque in zip(bodies, np.abs(dynamics(arm, q)[1]).T, strict=True):
+        effort = np.inf if body.joint.limit is None else body.joint.limit.effort
+        if 0 < effort < torque.max():
+            unit = "N" if body.joint.type == "prismatic" else "N m"
+            share = (torque > effort).mean()
+            message = (
+                f"the limit of effort is {effort:g} {unit}, but holding its own weight takes up to "
+                f"{torque.max():.4g} {unit}, and too much in {share:.0%} of postures; check the effort"
+            )
+            yield Finding("warning", "effort-below-weight", place("joint", body.joint.name), message)
 
 
 def _no_limit(joint: Joint) -> Finding:

@@ -60,7 +60,7 @@ def torque_limits(one: Shown, limits: ArrayLike | None = None) -> Array:
     """Largest torques (n,): given, clamped to, or of the run's own robot; infinite where none is known."""
     if limits is None:
         return clamped_limits(one.run, own_robot(one.run))
-    given = np.abs(joint_array("limits", limits, len(one.joints)))
+    given = np.abs(joint_array("limits", limits, len(one.joints), tuple(one.joints)))
     return np.where(drawable(given) > 0, given, np.inf)
 
 

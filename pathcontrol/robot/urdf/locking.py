@@ -1,0 +1,121 @@
+"""Which joints of a URDF are locked, and where: those that are named, those that follow them, and all but some."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+
+from lxml import etree
+
+from pathcontrol._arrays import scalar
+from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.robot.urdf.elements import MOVABLE_TYPES
+from pathcontrol.robot.urdf.numbers import read_numbers
+
+
+def locked_angles(
+    root: etree._Element,
+    lock: Mapping[str, float] | None = None,
+    keep: Sequence[str] = (),
+    tip: str | None = None,
+) -> dict[str, float]:
+    """The position [rad or m] of each joint that is locked, those that mimic a locked one included.
+
+    A joint that mimics another is at multiplier × position + offset of that one. Where ``keep`` or ``tip`` says what
+    stays free, all others are locked: where ``lock`` says, else at 0, or at the limit that is nearest to 0.
+
+    Args:
+        root: the ``<robot>``, whose form need not be sound.
+        lock: joints to lock, with their positions.
+        keep: names of joints that stay free.
+        tip: a link or joint; the joints that move it stay free.
+
+    Raises:
+        InputError: a joint is to be kept and locked, or to be kept though it mimics another.
+        UnknownNameError: a joint, or the tip, does not exist.
+    """
+    joints = {joint.get("name", ""): joint for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES}
+    given = _positions(lock, joints)
+    kept = {*_kept(keep, joints), *(() if tip is None else _carrying(root, tip, joints))}
+    if both := sorted(kept & given.keys()):
+        raise InputError(f"{', '.join(both)}: to be locked and kept; take it out of lock, keep or tip")
+    if following := sorted(name for name in kept if _leaders(name, joints)):
+        raise InputError(f"{', '.join(following)} follows another joint and cannot stay free; keep or lock that one")
+    chosen = bool(keep) or tip is not None
+    wanted = [name for name in joints if name in given or (chosen and name not in kept)]
+    wanted += [name for name in joints if not given.keys().isdisjoint(_leaders(name, joints))]
+    return {name: _position(name, joints, given, frozenset()) for name in wanted}
+
+
+def _positions(lock: Mapping[str, float] | None, joints: Collection[str]) -> dict[str, float]:
+    if lock is None:
+        return {}
+    if not isinstance(lock, Mapping):
+        raise InputError(f"lock = {lock!r}, expected angles by joint, as {{'joint name': 0.0}}")
+    return {_known(name, joints): scalar(f"angle of {name}", angle) for name, angle in lock.items()}
+
+
+def _kept(keep: Sequence[str], joints: Collection[str]) -> list[str]:
+    return [_known(name, joints) for name in ([keep] if isinstance(keep, str) else keep)]
+
+
+def _known(name: str, joints: Collection[str]) -> str:
+    if name not in joints:
+        raise UnknownNameError(f"there is no movable joint {name!r}; there are {', '.join(joints)}")
+    return name
+
+
+def _carrying(root: etree._Element, tip: str, joints: Collection[str]) -> Iterator[str]:
+    """The movable joints between the base and a link, or a joint and what it moves."""
+    over = {_end(joint, "child"): joint for joint in root.iterfind("joint")}
+    links = [link.get("name", "") for link in root.iterfind("link")]
+    by_name = {joint.get("name", ""): joint for joint in root.iterfind("joint")}
+    if tip not in links and tip not in by_name:
+        raise UnknownNameError(f"there is no frame {tip!r} to end at; there are {', '.join(links)}")
+    joint, seen = over.get(tip) if tip in links else by_name[tip], set()
+    while joint is not None and joint not in seen:  # a loop is refused by the checks
+        seen.add(joint)
+        if joint.get("name") in joints:
+            yield joint.get("name")
+        joint = over.get(_end(joint, "parent"))
+
+
+def _position(
+    name: str, joints: Mapping[str, etree._Element], given: Mapping[str, float], passed: frozenset[str]
+) -> float:
+    """Where a locked joint is: as it is said, as the one it follows says, or as near to 0 as it can be."""
+    if name in given:
+        return given[name]
+    mimic = joints[name].find("mimic")
+    leader = "" if mimic is None else mimic.get("joint", "")
+    if mimic is None or leader not in joints or leader in passed:
+        return _nearest_to_zero(joints[name])
+    followed = _position(leader, joints, given, passed | {name})
+    return _number(mimic, "multiplier", 1.0) * followed + _number(mimic, "offset", 0.0)
+
+
+def _leaders(name: str, joints: Mapping[str, etree._Element]) -> set[str]:
+    """The joint that a joint follows, the one that that one follows, and so on."""
+    found: set[str] = set()
+    while (mimic := joints[name].find("mimic")) is not None and (name := mimic.get("joint", "")) in joints:
+        if name in found:
+            break
+        found.add(name)
+    return found
+
+
+def _nearest_to_zero(joint: etree._Element) -> float:
+    limit = joint.find("limit")
+    if limit is None or joint.get("type") == "continuous":
+        return 0.0
+    return min(max(0.0, _number(limit, "lower", 0.0)), _number(limit, "upper", 0.0))
+
+
+def _number(element: etree._Element, name: str, default: float) -> float:
+    """An attribute; one that is no number is told by the checks."""
+    values = read_numbers(element.get(name, ""), 1)
+    return default if values is None else values[0]
+
+
+def _end(joint: etree._Element, end: str) -> str | None:
+    element = joint.find(end)
+    return None if element is None else element.get("link")
