@@ -113,7 +113,7 @@ def _of_pandas(value: Any) -> Labelled | None:
 
 def _names(labels: Iterable[Any]) -> tuple[str, ...] | None:
     """The labels, if there are any and all of them are texts."""
-    found = tuple(labels) if np.ndim(labels) == 1 or not isinstance(labels, np.ndarray) else ()
+    found = () if isinstance(labels, np.ndarray) and labels.ndim != 1 else tuple(labels)
     return tuple(map(str, found)) if found and all(isinstance(one, str) for one in found) else None
 
 

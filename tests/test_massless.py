@@ -9,11 +9,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
 import pathcontrol as pc
-from pathcontrol.errors import InputError, PathControlWarning, UnknownNameError, UrdfError
+from pathcontrol.cli import main
+from pathcontrol.errors import ExperimentError, InputError, PathControlWarning, UnknownNameError, UrdfError
 from pathcontrol.robot.lump import ball, combined, rod
 from pathcontrol.robot.recipe import recipe_of, robot_of
 from pathcontrol.robot.urdf import check_urdf, parse_urdf
@@ -311,8 +313,8 @@ def test_a_locked_joint_that_cannot_be_at_zero_is_at_its_limit():
 
 def test_wrong_choices_are_told():
     for options, error, message in (
-        ({"keep": ["j1", "j9"]}, UnknownNameError, "'j9'; there are j1, j2"),
-        ({"tip": "nothing"}, UnknownNameError, "no frame 'nothing'"),
+        ({"keep": ["j1", "j9"]}, UnknownNameError, "keep: the robot has no movable joint 'j9'; it has j1, j2"),
+        ({"tip": "nothing"}, UnknownNameError, "tip = 'nothing': there is no such frame"),
         ({"keep": ["j1"], "lock": {"j1": 0.0}}, InputError, "j1: to be locked and kept"),
         ({"keep": ["j1", "j2", "j4"]}, InputError, "j4 follows another joint"),
         ({"tip": "l0"}, UrdfError, "0 of 5 joints can move"),
@@ -331,3 +333,70 @@ def test_two_arms_are_one_by_its_tip():
     assert panda.n == 7
     fingers = itertools.pairwise(panda.frame_poses(np.zeros(7), ["panda_leftfinger", "panda_rightfinger"])[:, :3, 3])
     assert [np.linalg.norm(b - a) for a, b in fingers] == [pytest.approx(0.04)]
+
+
+# --- experiment files and the command line ------------------------------------------------------------------------
+
+
+def test_experiment_files_say_what_is_locked_and_estimated(tmp_path):
+    from pathcontrol.experiments.build_arms import build_arms
+    from pathcontrol.experiments.load import load_experiment
+
+    (tmp_path / "hand.urdf").write_text(hand())
+    (tmp_path / "bare.urdf").write_text(arm("", shape(SHAPES["box"][0]), shape(SHAPES["box"][0])))
+    rest = """
+[task]
+type = "line"
+start = [0.0, 0.0]
+end = [0.1, 0.1]
+speed = 0.1
+[controller]
+type = "projection"
+k_p = 100.0
+K_v = 20.0
+"""
+    q = np.array([0.3, -0.4])
+    for robot, same in (
+        ('source = "hand.urdf"\nkeep = ["j1", "j2"]', pc.load_robot(hand(), keep=["j1", "j2"])),
+        ('source = "hand.urdf"\ntip = "l2"', pc.load_robot(hand(), tip="l2")),
+        ('source = "hand.urdf"\nlock = { j3 = 0.4 }', pc.load_robot(hand(), lock={"j3": 0.4})),
+        (
+            'source = "bare.urdf"\nestimated_inertia = true',
+            pc.load_robot(tmp_path / "bare.urdf", estimated_inertia=True),
+        ),
+        (
+            'source = "bare.urdf"\nestimated_inertia = 500',
+            pc.load_robot(tmp_path / "bare.urdf", estimated_inertia=500.0),
+        ),
+    ):
+        (tmp_path / "a.toml").write_text(f"[robot]\n{robot}\n{rest}")
+        model, plant = build_arms(load_experiment(tmp_path / "a.toml"), tmp_path)
+        np.testing.assert_array_equal(model.mass_matrix(q), same.mass_matrix(q))
+        np.testing.assert_array_equal(plant.mass_matrix(q), same.mass_matrix(q))
+    for robot in ('keep = ["j9"]', 'tip = "nowhere"', "estimated_inertia = -1", 'estimated_inertia = "yes"'):
+        (tmp_path / "a.toml").write_text(f'[robot]\nsource = "hand.urdf"\n{robot}\n{rest}')
+        with pytest.raises(ExperimentError, match=robot.split(" ")[0]):
+            build_arms(load_experiment(tmp_path / "a.toml"), tmp_path)
+
+
+def test_the_check_locks_as_loading_does(tmp_path):
+    (tmp_path / "hand.urdf").write_text(hand())
+    (tmp_path / "meshes").mkdir()
+    trimesh.creation.box().export(tmp_path / "meshes" / "a.stl")
+    text = arm(shape('<mesh filename="package://gone/meshes/a.stl"/>'), solid(1, 0.1, 0.1, 0.1))
+    (tmp_path / "sub" / "urdf").mkdir(parents=True)
+    (tmp_path / "sub" / "urdf" / "mesh.urdf").write_text(text)
+    runner = CliRunner()
+    for options in (["--lock", "j3"], ["--keep", "j1", "--keep", "j2"], ["--tip", "l2"]):
+        done = runner.invoke(main, ["check", str(tmp_path / "hand.urdf"), *options])
+        assert done.exit_code == 0
+        assert "2 movable joints and 3 locked" in done.stdout
+    assert runner.invoke(main, ["check", str(tmp_path / "hand.urdf")]).exit_code == 1
+    done = runner.invoke(main, ["check", str(tmp_path / "hand.urdf"), "--tip", "l9"])
+    assert done.exit_code == 2
+    (tmp_path / "elsewhere.urdf").write_text(text.replace("meshes/", "parts/"))
+    (tmp_path / "store" / "renamed" / "parts").mkdir(parents=True)
+    (tmp_path / "meshes" / "a.stl").rename(tmp_path / "store" / "renamed" / "parts" / "a.stl")
+    assert "mesh-missing" in runner.invoke(main, ["check", str(tmp_path / "elsewhere.urdf")]).stdout
+    found = runner.invoke(main, ["check", str(tmp_path / "elsewhere.urdf"), "--package-dir", str(tmp_path / "store")])
+    assert "mesh-missing" not in found.stdout

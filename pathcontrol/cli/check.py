@@ -9,15 +9,24 @@ from pathlib import Path
 import click
 
 from pathcontrol.cli.group import json_option, package_option, uninterrupted
-from pathcontrol.errors import UnknownNameError
+from pathcontrol.errors import UrdfError
 
 
 @click.command("check")
 @click.argument("file", type=click.Path(exists=False))
 @click.option("--lock", multiple=True, metavar="JOINT", help="A joint that will be locked; repeat for more.")
+@click.option("--keep", multiple=True, metavar="JOINT", help="A joint that stays free while all others are locked.")
+@click.option("--tip", metavar="FRAME", help="A link or joint: all joints that do not move it are locked.")
 @package_option
 @json_option
-def command(file: str, lock: tuple[str, ...], package_dir: tuple[Path, ...], as_json: bool) -> None:
+def command(
+    file: str,
+    lock: tuple[str, ...],
+    keep: tuple[str, ...],
+    tip: str | None,
+    package_dir: tuple[Path, ...],
+    as_json: bool,
+) -> None:
     """Report what is wrong or odd in a URDF.
 
     FILE is a URDF file or the name of a known robot. Exits with 1 on errors.
@@ -28,17 +37,27 @@ def command(file: str, lock: tuple[str, ...], package_dir: tuple[Path, ...], as_
     with uninterrupted():
         import yourdfpy  # noqa: F401
     urdf = find_urdf(file, package_dir)
-    report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=lock)
-    unknown = sorted(set(lock) - set(report.joints))
-    if unknown and report.joints:
-        raise UnknownNameError(f"no movable joint {', '.join(unknown)} to lock; there are {', '.join(report.joints)}")
+    locked = _locked(urdf.text, lock, keep, tip)
+    report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=locked)
     if as_json:
         click.echo(json.dumps(report.as_dict()))
     else:
-        free = len(set(report.joints) - set(lock))
-        locked = f" and {len(lock)} locked" if lock else ""
-        click.echo(f"{report.name or file}: {len(report.links)} links, {free} movable joints{locked}")
+        free = len(set(report.joints) - set(locked))
+        also = f" and {len(locked)} locked" if locked else ""
+        click.echo(f"{report.name or file}: {len(report.links)} links, {free} movable joints{also}")
         for finding in report.findings:
             click.echo(f"  {finding}")
         click.echo("usable" if report.ok else "not usable")
     sys.exit(0 if report.ok else 1)
+
+
+def _locked(text: str, lock: tuple[str, ...], keep: tuple[str, ...], tip: str | None) -> tuple[str, ...]:
+    """The joints that will be locked; where they are does not matter here."""
+    from pathcontrol.robot.urdf import parse_urdf
+    from pathcontrol.robot.urdf.locking import locked_angles
+
+    try:
+        root = parse_urdf(text)
+    except UrdfError:
+        return ()  # which the report says
+    return tuple(locked_angles(root, dict.fromkeys(lock, 0.0), keep, tip))

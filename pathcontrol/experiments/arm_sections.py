@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import PlainValidator, model_validator
@@ -30,12 +31,21 @@ class ToolFrame(Section):
     name: Text = "tip"
 
 
+def _density(value: Any) -> Any:
+    if not isinstance(value, bool) and not (isinstance(value, int | float) and 0 < value < math.inf):
+        raise expected("true, false, or a density [kg/m³] greater than 0")
+    return value
+
+
 class Robot(Section):
     """The arm as the controller knows it. ``lock`` is in ``angle_unit``, and in metres for sliding joints."""
 
     units: ClassVar[Units] = {"lock": ("rad", "m")}
     source: Text
     lock: dict[str, Number] | None = None
+    keep: list[Text] | None = None
+    tip: Text | None = None
+    estimated_inertia: Annotated[bool | float, PlainValidator(_density)] = False
     package_dirs: list[Text] | None = None
     payload: Payload | None = None
     tool: ToolFrame | None = None

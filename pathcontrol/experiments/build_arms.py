@@ -62,8 +62,15 @@ def _load(experiment: Experiment, base_dir: Path) -> RobotModel:
     }
     for joint, value in lock.items():
         refuse_unit(f"robot.lock.{joint}", value, "m" if joint in sliding else "rad")
-    with keyed("robot", ("lock",)):
-        robot = load_robot(source, lock=lock, package_dirs=package_dirs)
+    with keyed("robot", ("lock", "keep", "tip", "estimated_inertia")):
+        robot = load_robot(
+            source,
+            lock=lock,
+            keep=section.keep or (),
+            tip=section.tip,
+            estimated_inertia=section.estimated_inertia,
+            package_dirs=package_dirs,
+        )
     if experiment.angle_unit == "deg":
         _refuse_degrees(robot, sliding)
     return robot

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -106,7 +107,7 @@ def _mesh(shape: etree._Element, urdf: UrdfSource) -> trimesh.Trimesh | None:
         parts = load_parts(path)
     except UrdfError:
         return None
-    whole = trimesh.util.concatenate([trimesh.Trimesh(part.vertices, part.faces) for part in parts])
+    whole: Any = trimesh.util.concatenate([trimesh.Trimesh(part.vertices, part.faces) for part in parts])
     whole.apply_scale(scale)
     return whole if whole.is_volume else _hull(whole)
 
@@ -128,7 +129,7 @@ def _pose(origin: etree._Element | None) -> Array:
     if origin is None:
         return np.eye(4)
     xyz, rpy = (read_numbers(origin.get(name, "0 0 0"), 3) or (0.0, 0.0, 0.0) for name in ("xyz", "rpy"))
-    pose = trimesh.transformations.euler_matrix(*rpy, axes="sxyz")
+    pose = trimesh.transformations.euler_matrix(rpy[0], rpy[1], rpy[2], axes="sxyz")
     pose[:3, 3] = xyz
     return pose
 

@@ -51,16 +51,16 @@ def _positions(lock: Mapping[str, float] | None, joints: Collection[str]) -> dic
         return {}
     if not isinstance(lock, Mapping):
         raise InputError(f"lock = {lock!r}, expected angles by joint, as {{'joint name': 0.0}}")
-    return {_known(name, joints): scalar(f"angle of {name}", angle) for name, angle in lock.items()}
+    return {_known("lock", name, joints): scalar(f"angle of {name}", angle) for name, angle in lock.items()}
 
 
 def _kept(keep: Sequence[str], joints: Collection[str]) -> list[str]:
-    return [_known(name, joints) for name in ([keep] if isinstance(keep, str) else keep)]
+    return [_known("keep", name, joints) for name in ([keep] if isinstance(keep, str) else keep)]
 
 
-def _known(name: str, joints: Collection[str]) -> str:
+def _known(argument: str, name: str, joints: Collection[str]) -> str:
     if name not in joints:
-        raise UnknownNameError(f"there is no movable joint {name!r}; there are {', '.join(joints)}")
+        raise UnknownNameError(f"{argument}: the robot has no movable joint {name!r}; it has {', '.join(joints)}")
     return name
 
 
@@ -70,7 +70,7 @@ def _carrying(root: etree._Element, tip: str, joints: Collection[str]) -> Iterat
     links = [link.get("name", "") for link in root.iterfind("link")]
     by_name = {joint.get("name", ""): joint for joint in root.iterfind("joint")}
     if tip not in links and tip not in by_name:
-        raise UnknownNameError(f"there is no frame {tip!r} to end at; there are {', '.join(links)}")
+        raise UnknownNameError(f"tip = {tip!r}: there is no such frame; there are {', '.join(links)}")
     joint, seen = over.get(tip) if tip in links else by_name[tip], set()
     while joint is not None and joint not in seen:  # a loop is refused by the checks
         seen.add(joint)
