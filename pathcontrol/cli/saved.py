@@ -30,10 +30,13 @@ worst_option = click.option(
 )
 
 
-def load_runs(paths: Sequence[Path], robot: str | None, worst: int | None = None) -> dict[str, Run]:
+def load_runs(
+    paths: Sequence[Path], robot: str | None, worst: int | None = None, package_dirs: Sequence[Path] | None = None
+) -> dict[str, Run]:
     """The runs by the shortest names that tell them apart: of their files, or of the folders of files ``run.nc``.
 
-    Of a sweep, alone, its ``worst`` histories, by their samples and parameters.
+    Of a sweep, alone, its ``worst`` histories, by their samples and parameters. Where ``package_dirs``, the folders of
+    its meshes, are given, a URDF or a known robot may take the place of a run: its joints move in turn.
 
     Raises:
         InputError: a file is missing, is no run, or is named twice, or a run does not know its robot.
@@ -48,7 +51,11 @@ def load_runs(paths: Sequence[Path], robot: str | None, worst: int | None = None
     if twice:
         raise InputError(f"{', '.join(repr(str(path)) for path in twice)} are one run; name each run once")
     arm = None if robot is None else load_robot(robot)
-    return {name: _with_robot(Run.load(file), file, arm) for name, file in zip(names(files), files, strict=True)}
+    called = dict(zip(names(files), files, strict=True))
+    return {
+        name: _tour(file, package_dirs) if is_robot(file) else _with_robot(Run.load(file), file, arm)
+        for name, file in called.items()
+    }
 
 
 def sweep_of(paths: Sequence[Path]) -> SweepResult | None:
@@ -113,6 +120,26 @@ def names(files: Sequence[Path]) -> list[str]:
 def _parts(file: Path) -> tuple[str, ...]:
     folders = file.parent.parts[1:]
     return folders if file.name == _DEFAULT and folders else (*folders, file.stem)
+
+
+def is_robot(file: Path) -> bool:
+    """Whether what is named is a URDF or a known robot, and not a run."""
+    from pathcontrol.robot.catalogue import known_robots
+
+    return file.suffix.lower() in (".urdf", ".xacro") or (not file.exists() and str(file) in known_robots())
+
+
+def _tour(file: Path, package_dirs: Sequence[Path] | None) -> Run:
+    """A run in which the joints of a robot move in turn; those that mimic each other stay where they are."""
+    from pathcontrol.robot.catalogue import find_urdf
+    from pathcontrol.robot.loading import load_robot
+    from pathcontrol.view.tour import joints_to_show, tour
+
+    source = file if file.suffix else str(file)
+    if package_dirs is None:
+        raise InputError(f"{str(file)!r} is a robot and no run; look at it with `pathcontrol view`, or name a run")
+    folders = tuple(package_dirs)
+    return tour(load_robot(source, keep=joints_to_show(find_urdf(source, folders).text), package_dirs=folders))
 
 
 def _with_robot(run: Run, file: Path, robot: RobotModel | None) -> Run:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from pathcontrol._suffixes import check_suffix
-from pathcontrol.cli.group import import_all, json_option, open_option, open_page, printable
+from pathcontrol.cli.group import import_all, json_option, open_option, open_page, package_option, printable
 from pathcontrol.cli.saved import check_out, load_runs, robot_option, run_file, runs_argument, sweep_of, worst_option
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ layout_option = click.option(
 @click.option("--tool", metavar="FRAME", help="The frame whose path is drawn. Default: that of the task, or the last.")
 @worst_option
 @robot_option
+@package_option
 @open_option
 @json_option
 def command(
@@ -50,15 +51,18 @@ def command(
     tool: str | None,
     worst: int | None,
     robot: str | None,
+    package_dir: tuple[Path, ...],
     opened: bool,
     as_json: bool,
 ) -> None:
-    """Write the animation of saved runs: one HTML page.
+    """Write the animation of saved runs, or of a robot: one HTML page.
 
     The page plays in any browser and needs no network. A RUN is a file that Run.save or `pathcontrol run` has written
     (.nc), or the folder of one. Several move side by side. Of the folder of a sweep the histories that it has kept are
-    shown, the worst first, as histories.html there. With --mp4 a video is written, which needs the extra `video`
-    and a Chromium, Chrome or Edge on this machine; the page is then written only if --out or --open asks for it.
+    shown, the worst first, as histories.html there. A URDF file, or the name of a known robot, is shown with its joints
+    moving in turn; --package-dir says where its meshes are. With --mp4 a video is written, which needs the extra
+    `video` and a Chromium, Chrome or Edge on this machine; the page is then written only if --out or --open asks for
+    it.
     """
     import_all()
     from pathcontrol.view.film.recorder import record
@@ -66,7 +70,7 @@ def command(
     check_out(out, runs)
     if mp4 is not None:
         check_suffix(mp4, "a video (H.264 in MP4)", ".mp4")
-    loaded = load_runs(runs, robot, worst)
+    loaded = load_runs(runs, robot, worst, package_dir)
     animation = record(one_or_all(loaded), rollout=rollout, layout=layout, tool=tool)  # type: ignore[arg-type]
     written = {}
     if out is not None or opened or mp4 is None:
