@@ -139,6 +139,12 @@ def tool_speed(run: Run, robot: RobotModel, frame: str) -> Array:
     return where_known(speed, run.array("q"), run.array("qd"))
 
 
+def feed_along(task: ToolpathTask, robot: RobotModel, s: Array) -> Array:
+    """The speed [m/s], (*batch,), at which the plan leads the tool at s: the feed, or less where it is limited."""
+    _, jacobian = robot.frame_kinematics(task.q_d(s), task.frame)
+    return np.linalg.norm((jacobian[..., :3, :] @ task.dq_d(s)[..., None])[..., 0], axis=-1) * task.theta(s)
+
+
 def contour_points(contour: Contour, tolerance: float) -> Points:
     """Points of a contour [m], (k, 3), no farther apart than half of the ``tolerance``, each on the contour itself."""
     parts = []

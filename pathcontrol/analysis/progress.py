@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.gamma import planned_rate
-from pathcontrol.analysis.known import where_known
+from pathcontrol.analysis.known import by_task, where_known
 from pathcontrol.analysis.window import samples_of
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
@@ -25,6 +26,16 @@ def progress(run: Run, task: PathTask) -> Array:
     """
     share = _of_end(run, task) if _ends(run, task) else _of_going_on(run, task)
     return np.where(run.status == "finished", 1.0, np.clip(share, 0.0, 1.0))
+
+
+def unfinished(run: Run) -> NDArray[np.bool_]:
+    """Which rollouts were still running when the time was up and did not get there, (rollout,); none without a task."""
+    if run.task is None or "s" not in run.data:
+        return np.zeros(run.rollouts, dtype=bool)
+    short = np.zeros(run.rollouts, dtype=bool)
+    for part, own, rows in by_task(run, run.task):
+        short[rows] = ~got_there(progress(part, own))
+    return short & (run.status == "running")
 
 
 def got_there(progress: Array) -> Array:

@@ -11,6 +11,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.analysis.metrics import UNITS
 from pathcontrol.simulation.run import Run
 
+_NOTHING = 1e-7  # of the largest of several numbers
 _VARIABLES = {"rad": "q", "rad/s": "qd", "N m": "tau_demand"}
 
 
@@ -73,7 +74,11 @@ def counted(number: int, word: str) -> str:
 
 def _value(value: Any, digits: int) -> str:
     if np.ndim(value):
-        return f"[{', '.join(_value(one, digits) for one in value)}]"
+        # what is next to nothing beside the others is 0 but for rounding
+        numbers = np.asarray(value)
+        if numbers.dtype.kind == "f":
+            numbers = np.where(np.abs(numbers) < _NOTHING * np.abs(numbers).max(initial=0.0), 0.0, numbers)
+        return f"[{', '.join(_value(one, digits) for one in numbers)}]"
     if np.asarray(value).dtype.kind != "f":
         return str(value)
     return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"

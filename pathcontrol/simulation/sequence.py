@@ -30,6 +30,7 @@ from pathcontrol.simulation.setup import (
     record_of,
     simulated_arm,
 )
+from pathcontrol.simulation.slips import warn_of_slips
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import refuse_batch
 from pathcontrol.tasks.laps import Laps
@@ -98,12 +99,14 @@ def simulate_sequence(
     for law in laws:
         check_joints(law, robot)
         check_law(law, q0, qd0)
+    slip = warn_of_slips(robot, whole, q0)
     arm, legs = simulated_arm(loop, robot, q0, qd0, Outside(disturbance)), []
     for law, longest, finish in zip(laws, durations, ends, strict=True):
         arrays = arm.run(law, longest, finish, progress)
         legs.append(_Leg(arrays, float(finish.time[0]), law.task.s0, _length(law.task, laps)))
         if arm.divergence.any or np.isnan(legs[-1].finish_time):
             break
+    arm.divergence.explain(slip)
     arrays, outcome = _joined(legs, len(laws), period, arm.divergence)
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws))
     described = {"controller": f"{len(laws)} paths with {names}", "sequence": [law.describe() for law in laws]}

@@ -29,6 +29,7 @@ from pathcontrol.simulation.setup import (
     simulated_arm,
     states_of_each,
 )
+from pathcontrol.simulation.slips import warn_if_still, warn_of_slips
 
 
 def simulate(
@@ -73,6 +74,9 @@ def simulate(
             it, and their random numbers depend on their numbers.
         progress: show a bar on standard error when it takes longer than two seconds.
 
+    A start or a path outside position limits, an arm that cannot hold its own weight, and one that never moved, held by
+    its friction, are told by a :class:`PathControlWarning`.
+
     Raises:
         InputError: an argument has the wrong shape or value.
         SimulationError: all rollouts diverged, as a single one does; its ``run`` holds what happened until then.
@@ -86,10 +90,12 @@ def simulate(
     period, finish = period_of(loop, duration), finish_of(controller.task, laps, until, len(q0))
     check_length(duration, loop, len(q0), robot.n, finish is not None and finish.ends_run)
     check_law(controller, q0, qd0)
+    slip = warn_of_slips(robot, controller.task, q0, first)
     arm = simulated_arm(loop, robot, q0, qd0, Outside(disturbance, first))
     settings = {"duration": duration, "laps": laps, "until": until, "first_rollout": first}
     config = record_of(controller.describe(), robot, loop, disturbance, **settings)
     arrays = arm.run(controller, duration, finish, progress)
+    arm.divergence.explain(slip)
     outcome = arm.divergence.outcome() | ({} if finish is None else {"finish_time": finish.time})
     if controller.task.closed:
         outcome["laps"] = whole_laps(controller.task, *first_and_last(arrays["s"]))
@@ -106,4 +112,6 @@ def simulate(
         first_rollout=first,
     )
     arm.divergence.check(run)
+    if not first:
+        warn_if_still(run, robot, controller.friction)
     return run

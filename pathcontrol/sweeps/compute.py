@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array
 from pathcontrol.analysis.metrics import UNITS, metrics
+from pathcontrol.analysis.progress import unfinished
 from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError, SimulationError, UnknownNameError
 from pathcontrol.simulation.modes import SampledLoop
@@ -137,6 +138,7 @@ def _simulated(samples: NDArray[np.int64], arguments: Arguments) -> Run:
 def _measured(run: Run, measure: Measure) -> dict[str, Array]:
     """The outcome and the metrics of each rollout, as if it had been alone, (k,) each."""
     values: dict[str, Array] = {name: np.array(run.data[name].to_numpy()) for name in OUTCOME}
+    values["status"] = np.where(unfinished(run), "unfinished", values["status"])
     sound = values["status"] != "diverged"
     some = np.flatnonzero(sound) if sound.any() else np.array([0])  # one at least, for the names
     for rows, part in _blocks(run, some):

@@ -18,6 +18,8 @@ Objectives = str | Sequence[str] | Mapping[str, str]
 #: of metrics the largest value allowed, or the smallest and the largest, None where there is none
 Limits = Mapping[str, Any]
 
+#: the statuses of samples that are never the best
+FAILED = ("diverged", "unfinished")
 _SIGNS = {"min": 1.0, "max": -1.0}
 
 
@@ -79,17 +81,22 @@ def excess(values: Array, ends: tuple[float, float]) -> Array:
 
 
 def within(table: xr.Dataset, limits: Limits | None) -> NDArray[np.bool_]:
-    """Which samples keep all limits, (sample,); none that diverged.
+    """Which samples keep all limits, (sample,); none that diverged, or did not get as far as it was to.
 
     Raises:
         UnknownNameError: there is no such metric.
     """
     kept = np.ones(table.sizes["sample"], dtype=bool)
     if "status" in table:
-        kept &= table["status"].to_numpy() != "diverged"
+        kept &= ~failed(table)
     for name, ends in check_limits(limits).items():
         kept &= excess(metric(table, name), ends) <= 0
     return kept
+
+
+def failed(table: xr.Dataset) -> NDArray[np.bool_]:
+    """Which samples diverged or did not get there, (sample,): an arm that stands still has the smallest errors."""
+    return np.isin(table["status"].to_numpy().astype(str), FAILED)
 
 
 def front(table: xr.Dataset, objectives: Objectives, limits: Limits | None = None) -> xr.Dataset:

@@ -10,7 +10,7 @@ import xarray as xr
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import UnknownNameError
-from pathcontrol.sweeps.goals import costs, excess, front, metric, within
+from pathcontrol.sweeps.goals import costs, excess, failed, front, metric, within
 from pathcontrol.tuning.terms import Terms
 
 
@@ -104,11 +104,11 @@ class Tuning:
         return self.candidate(int(cost.argmin())) if np.isfinite(cost).any() else None
 
     def nearest(self) -> Candidate | None:
-        """The candidate with the least sum of the shares by which it exceeds limits; None if all diverged."""
+        """The candidate with the least sum of the shares by which it exceeds limits; None if none got there."""
         beyond = np.zeros(self._table.sizes["sample"])
         for name in self.limits:
             beyond += np.maximum(self.beyond(name), 0.0)
-        beyond = np.where(np.isfinite(self._cost(None)), beyond, np.inf)
+        beyond = np.where(np.isfinite(self._cost(None)) & ~failed(self._table), beyond, np.inf)
         return self.candidate(int(np.argmin(beyond))) if np.isfinite(beyond).any() else None
 
     def knee(self) -> Candidate | None:

@@ -16,13 +16,14 @@ if TYPE_CHECKING:
 def summary(tuning: Tuning) -> str:
     """Several lines: how many candidates, the best ones, and how active each limit is; or which limits are missed."""
     table, (whole, asked) = tuning.table(), tuning.generations
-    lost = int((table["status"] == "diverged").sum())
+    lost, short = (int((table["status"] == status).sum()) for status in ("diverged", "unfinished"))
     lines = [
         f"{table.sizes['sample']} candidates in {whole} generations"
         + (f" of {asked}, then stopped" if whole < asked else "")
         + (f", each in {tuning.scenarios} scenarios" if tuning.scenarios > 1 else "")
         + f": {tuning.feasible().sizes['sample']} within the limits"
         + (f", {lost} diverged" if lost else "")
+        + (f", {short} did not get to the end in the time" if short else "")
     ]
     return "\n".join(lines + (_found(tuning) if tuning.feasible().sizes["sample"] else _missed(tuning)))
 

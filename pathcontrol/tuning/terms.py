@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pathcontrol._arrays import Array
-from pathcontrol.sweeps.goals import costs, excess, metric
+from pathcontrol.sweeps.goals import costs, excess, failed, metric
 from pathcontrol.tuning.search import Told
 
 #: how a metric over the scenarios becomes one number
@@ -55,7 +55,7 @@ class Terms(NamedTuple):
     def told(self, table: xr.Dataset) -> Told:
         """Costs and violations of candidates, as the search is told them: all finite."""
         cost = costs(table, self.goals)
-        lost = ~np.isfinite(cost).all(1) | (table["status"].to_numpy() == "diverged")
+        lost = ~np.isfinite(cost).all(1) | failed(table)
         beyond = [excess(metric(table, name), ends) for name, ends in self.bounds.items()]
         violations = np.stack([np.where(lost, _FARTHEST, -1.0), *(np.minimum(one, _FAR) for one in beyond)], axis=1)
         return Told(np.where(lost[:, None], 0.0, cost), violations)

@@ -155,6 +155,7 @@ def _generation(search: Search, space: Space, cases: Cases, terms: Terms, first:
     numbers = {name: v.reshape(-1, cases.count) for name, v in rows.items() if name not in inputs}
     status = rows["status"].reshape(-1, cases.count)
     every = np.where((status == "finished").all(1), "finished", "running")
+    every = np.where((status == "unfinished").any(1), "unfinished", every)
     columns = {
         "sample": first + np.arange(len(status)),
         **parameters,

@@ -8,9 +8,11 @@ from typing import TypeAlias
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.analysis.contours import feed_along, tool_speed
 from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.analysis.torque_limits import torque_limits
 from pathcontrol.view.film.charts import Chart, Curve
+from pathcontrol.view.film.error import MILLIMETRE
 from pathcontrol.view.film.shot import Shot
 from pathcontrol.view.film.take import Take
 
@@ -53,11 +55,25 @@ def _rates(shot: Shot, index: int, several: bool) -> list[_Entry]:
     take = shot.take
     if "sdot" not in take.run.data:
         return []
+    if take.toolpath is not None and "qd" in take.run.data:
+        return _feeds(take, index, several)
     curves = [Curve(take.name if several else "σ̇", take.time, take.run.array("sdot")[0], index)]
     if take.task is not None:
         theta = np.broadcast_to(take.task.theta(take.s), take.s.shape)
         curves.append(Curve("ϑ(s)", take.time, theta, index, "reference"))
     return [("rate along the path σ̇", "1/s", curves)]
+
+
+def _feeds(take: Take, index: int, several: bool) -> list[_Entry]:
+    """The speed of the tool on a toolpath, beside the one that the plan asks for there."""
+    assert take.toolpath is not None
+    speed = tool_speed(take.run, take.robot, take.toolpath.frame)[0]
+    wanted = feed_along(take.toolpath, take.robot, take.s)
+    curves = [
+        Curve(take.name if several else "tool", take.time, MILLIMETRE * speed, index),
+        Curve("feed", take.time, MILLIMETRE * wanted, index, "reference"),
+    ]
+    return [("speed of the tool", "mm/s", curves)]
 
 
 def _torques(shot: Shot, index: int, several: bool) -> list[_Entry]:

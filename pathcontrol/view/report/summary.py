@@ -141,8 +141,8 @@ def _row(key: str, unit: str, runs: Mapping[str, Run], numbers: Mapping[str, Map
     scale, shown = reading(unit, np.concatenate(list(values.values())))
     texts = {name: _text(scale * value, _ENDLESS.get(key, "–")) for name, value in values.items()}
     arrived = {name: float(np.median(value)) for name, value in values.items() if _arrived(numbers[name])}
-    best = _best(_BADNESS.get(key, abs), arrived, texts)
     beyond = {name for name, value in values.items() if key in RATIOS and is_passed(value).any()}
+    best = _best(_BADNESS.get(key, abs), arrived, texts) - beyond
     return Row(LABELS[key], shown, tuple(Cell(texts.get(name, "–"), name in best, name in beyond) for name in runs))
 
 
@@ -167,4 +167,4 @@ def _best(badness: Callable[[float], float] | None, values: Mapping[str, float],
     if badness is None or not finite or len(set(texts.values())) < 2:
         return set()
     least = min(finite, key=lambda name: badness(finite[name]))
-    return {name for name, text in texts.items() if text == texts[least]}
+    return {name for name in finite if texts[name] == texts[least]}
