@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -42,8 +43,21 @@ class Arc(Segment):
                 raise InputError(f"{name} has shape {array.shape}, expected (3,)")
             object.__setattr__(self, name, readonly(array))
         scalar("start", self.start)
-        if scalar("sweep", self.sweep) == 0 or not np.linalg.norm(np.cross(self.x, self.y)) > 0:
+        if scalar("sweep", self.sweep) == 0 or not _parallelogram(self.x.tolist(), self.y.tolist()) > 0:
             raise InputError(f"an arc with x = {self.x}, y = {self.y} and sweep = {self.sweep:g} has no length")
+
+    @property
+    def first(self) -> Array:
+        return self._ends[0]
+
+    @property
+    def last(self) -> Array:
+        return self._ends[1]
+
+    @cached_property
+    def _ends(self) -> Array:
+        """First and last point [m], (2, 3)."""
+        return readonly(self.point(np.array([0.0, 1.0])))
 
     @property
     def circular(self) -> bool:
@@ -61,7 +75,7 @@ class Arc(Segment):
         first = angles + 2 * np.pi * np.ceil((low - angles) / (2 * np.pi))
         last = angles + 2 * np.pi * np.floor((high - angles) / (2 * np.pi))
         u = (np.concatenate([first, last]).clip(low, high) - self.start) / self.sweep
-        points = np.concatenate([np.diagonal(self.point(u), axis1=1, axis2=2), self.point(np.array([0.0, 1.0]))])
+        points = np.concatenate([np.diagonal(self.point(u), axis1=1, axis2=2), self._ends])
         return points.min(0), points.max(0)
 
     def distance(self, x: ArrayLike) -> Array:
@@ -94,3 +108,8 @@ class Arc(Segment):
 
     def reversed(self) -> Arc:
         return Arc(self.center + self.rise, self.x, self.y, self.start + self.sweep, -self.sweep, -self.rise)
+
+
+def _parallelogram(x: list[float], y: list[float]) -> float:
+    """The area that two vectors span, ‖x × y‖; three numbers are faster without NumPy."""
+    return math.hypot(x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
