@@ -60,7 +60,7 @@ def test_separators_columns_and_units(points, unit, separator, order, pattern, n
 @given(polylines(), st.integers(0, 99), floats(1e-200, 1e200))
 def test_tool_axes_become_unit_vectors(points, seed, size):
     axes = np.random.default_rng(seed).normal(size=points.shape)
-    (contour,) = read(rows(np.hstack([points, axes * size])))
+    (contour,) = read(rows(np.hstack([points, axes * size])), columns="x,y,z,nx,ny,nz")
     assert np.allclose(np.linalg.norm(contour.normals, axis=-1), 1)
     assert np.allclose(np.cross(contour.normals, axes), 0, atol=1e-12)
     assert ((contour.normals * axes).sum(-1) > 0).all()
@@ -94,8 +94,8 @@ def test_a_contour_is_closed_if_it_returns_to_its_first_point_and_axis(points):
     tilted[-1] = [0, 1, 1]
     assert not read(rows(points))[0].closed
     assert read(rows(ring))[0].closed
-    assert read(rows(np.hstack([ring, up])))[0].closed
-    assert not read(rows(np.hstack([ring, tilted])))[0].closed
+    assert read("x y z i j k\n" + rows(np.hstack([ring, up])))[0].closed
+    assert not read("x y z nx ny nz\n" + rows(np.hstack([ring, tilted])))[0].closed
 
 
 def test_a_slow_creep_is_not_lost():
@@ -113,33 +113,41 @@ REFUSED = {
     "": "there is no point in it",
     "# 1 2 3": "there is no point in it",
     "x y z": "there is no point in it, only the names",
-    "1 2": "line 1: 2 values between blanks, expected 3",
-    "1,2,3,": "line 1: 4 values between commas, expected 3",
+    "1 2": "line 1: 2 values between blanks and no names of columns, expected 3 .* x y alone need z=",
+    "1,2,3,4": "line 1: 4 values between commas and no names of columns, expected 3",
+    "1,2,3,": "line 1: the contour that begins here is one point",
     "0 0 0\n\n1 2": "line 3: 2 values between blanks, expected 3: x y z",
     "x,y,z\n1 2 3": "line 2: 1 values between commas, expected 3: x y z",
     "x,y,z\n1,2,3,4": "line 2: 4 values between commas, expected 3: x y z",
     "x,y,z,contour\n0,0,0,a\n1,1,1": "line 3: 3 values between commas, expected 4: x y z contour",
     "x,y,z,contour\n0,0,0,a\n1,q,1,b": "line 3: y = 'q', expected a number",
-    "a b c": r"line 1: 'a', expected a number, or as the name of a column x, y or z, perhaps with a unit \(m, mm, in\)",
-    "x y z w": "line 1: 'w', expected a number",
-    "x_ft y_ft z_ft": "line 1: 'x_ft', expected a number",
-    "x y z i_mm j k": "line 1: 'i_mm', expected a number",
-    "x y": "line 1: columns 'x y', expected x, y and z",
-    "x y z i j": "line 1: columns 'x y z i j', expected x, y and z, and none or all of i, j and k",
-    "x y z z": "line 1: columns 'x y z z', expected .* each once",
-    "x_mm y_in z_mm": "line 1: x, y and z in different units, 'in', 'mm'",
-    "x_mm y z_mm": "line 1: x, y and z in different units, 'mm', 'no unit'",
+    "a b c\n0 0 0": "line 1: columns 'a b c', expected x, y and z, .* say which they are by columns= and unit=",
+    "x_ft y_ft z_ft\n0 0 0": "line 1: columns 'x_ft y_ft z_ft', expected x, y and z",
+    "x y z i_mm j k\n0 0 0 0 0 1": "line 1: columns 'x y z i_mm j k', expected .* none or all of i, j and k",
+    "x y\n0 0": "line 1: columns 'x y', expected x, y and z",
+    "x y z i j\n0 0 0 0 0": "line 1: columns 'x y z i j', expected x, y and z, and none or all of i, j and k",
+    "x y z qx qy qz\n0 0 0 0 0 1": "line 1: columns 'x y z qx qy qz', expected .* or of qx, qy, qz and qw",
+    "x y z i j k qx qy qz qw\n0": "line 1: columns .* expected a normal or an orientation, not both",
+    "x y z z\n0 0 0 0": "line 1: columns 'x y z z', expected .* each once",
+    "x_mm y_in z_mm\n0 0 0": "line 1: x, y and z in different units, 'in', 'mm'",
+    "x_mm y z_mm\n0 0 0": "line 1: x, y and z in different units, 'mm', 'no unit'",
+    "0 0 0 0 0 1\n1 0 0 0 0 1": "line 1: 6 values between blanks and no names .* whether .* is not guessed",
     "0 0 0\n1 2 three": "line 2: z = 'three', expected a number",
     "0 0 0\n1 2 1_000": "line 2: z = '1_000', expected a number",
     "0 0 0\n1 2 ٣": "line 2: z = '٣', expected a number",
-    "0;0;0\n1,5;2;3": "line 2: x = '1,5', expected a number with a decimal point",
+    "0;0;0\n1,500;2;3": "line 2: is '1,500' a number with a decimal comma, or with a comma between thousands",
+    "0;0.5;0\n1,5;2;3": "line 2: is '1,5' a number with a decimal comma",
+    "0;0;0\n1,5,5;2;3": "line 2: x = '1,5,5', expected a number with .* decimal=','",
+    "0,5 1,5 0": "line 1: y = '5 1', expected a number with a decimal point, or read the file with decimal=','",
     "0,0,0\n1,,3": "line 2: y = '', expected a number",
     "0 0 0\n1 nan 3": "line 2: y = nan, expected a finite number",
     "0 0 0\n-1e999 0 3": "line 2: x = -inf, expected a finite number",
     "0 0 0\n1e5 0 0": "line 2: further than 10000 m from the origin; is the unit right",
     "0 0 0\n1 1 1\n\n2 2 2\n2 2 2\n\n3 3 3": "line 4: the contour that begins here is one point",
-    "0 0 0 0 0 1\n1 0 0 0 0 0": "line 2: the tool axis i j k is 0 0 0",
-    "0 0 0 0 0 1\n1 0 0 0 0 1\n1 0 0 0 1 1": "line 3: the tool axis turns on the spot",
+    "x y z i j k\n0 0 0 0 0 1\n1 0 0 0 0 0": "line 3: the tool axis i j k is 0 0 0",
+    "x y z qx qy qz qw\n0 0 0 0 0 0 1\n1 0 0 0 0 0 0": "line 3: the quaternion is 0 0 0 0",
+    "x y z qx qy qz qw\n0 0 0 0 0 0 1\n1 0 0 0 0 0 2": "line 3: the quaternion qx qy qz qw has not the norm 1",
+    "x y z i j k\n0 0 0 0 0 1\n1 0 0 0 0 1\n1 0 0 0 1 1": "line 4: the tool axis turns on the spot",
 }
 
 

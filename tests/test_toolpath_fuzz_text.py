@@ -135,6 +135,15 @@ def test_tables_of_random_values(table, separator):
         b"%" + b" " * 99_000 + b"?",
         b"O" + b" " * 99_000 + b"?",
         b"\xff" * 99_999,
+        b"._" * 49_999,
+        b"# unit" + b" " * 99_000 + b"?",
+        b"# " + b"x [" * 33_000,
+        b"pos" * 33_000,
+        b'"' * 99_999,
+        b'" ' * 49_999,
+        b"//" * 49_999,
+        b"*" * 99_999,
+        b"Xe-1" * 24_000 + b"!",
     ],
 )
 def test_long_lines_end_soon(reader, line):

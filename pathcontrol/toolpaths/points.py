@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,8 +12,10 @@ from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.passed import Passed
-from pathcontrol.toolpaths.points_columns import CONTOUR, UNITS
-from pathcontrol.toolpaths.points_table import Rows, Table
+from pathcontrol.toolpaths.points_columns import Columns, checked_choice
+from pathcontrol.toolpaths.points_names import CONTOUR, UNITS, hint_of_unit
+from pathcontrol.toolpaths.points_rows import Rows
+from pathcontrol.toolpaths.points_table import Table, decimal_mark
 from pathcontrol.toolpaths.segments import Polyline
 from pathcontrol.toolpaths.text import read_lines
 
@@ -20,41 +23,89 @@ _NOTHING = 1e-9  # m, points nearer than this are the same, as are tool axes
 
 
 def read_csv(
-    path: str | os.PathLike[str], unit: str | None = None, feed: float | None = None, unknown: str = "refuse"
+    path: str | os.PathLike[str],
+    unit: str | None = None,
+    feed: float | None = None,
+    columns: str | Sequence[str] | Mapping[str, int | str] | None = None,
+    decimal: str | None = None,
+    z: float | None = None,
+    unknown: str = "refuse",
 ) -> Toolpath:
-    """Contours from a table of points, a point a line: ``x y z``, or ``x y z i j k`` with the tool's axis.
+    """Contours from a table of points, a point a line: ``x y z``, with the tool's axis or orientation if it has them.
 
     Semicolons, tabs, commas or blanks separate the values; the first line says which. It may name the columns, in any
-    order and with the unit: ``x [mm]``, ``x (mm)`` or ``x_mm``. A ``#`` begins a comment. An empty line begins a new
-    contour, and so does another value in a column ``contour``, which may be text and is then the contour's name; else
-    that is the number of its first line. A point that repeats the one before it is left out. A contour is closed if its
-    last point, and tool axis, repeat the first. Tool axes are normalised.
+    order and with the unit: ``x [mm]``, ``x (mm)`` or ``x_mm``, and so may a comment above, or a line of units below.
+    Three columns need no names, others do. A ``#`` begins a comment. Values may be quoted, lines may end in separators.
+
+    - ``x y z``: the point. ``i j k``, also called ``nx ny nz``: the tool's axis, the direction that stands on the
+      surface; it is normalised.
+    - ``qx qy qz qw``: the orientation of the tool's frame as a unit quaternion in the order of ROS, w last. Of it the
+      axis is kept, against which the tool's z axis points; how the tool is turned about it is not.
+    - ``contour``: the name of the contour, a text; another value begins a new contour, and so does an empty line.
+    - Columns with other names are passed over, and told in :attr:`Toolpath.notes`.
+
+    A contour without a name is called by its first line. A point that repeats the one before it is left out. A contour
+    is closed if its last point, and tool axis, repeat the first.
 
     Args:
         path: the file.
-        unit: unit of the coordinates: ``"m"``, ``"mm"`` or ``"in"``. By default the one that the first line names, else
-            metres, as everywhere in this package.
+        unit: unit of the coordinates: ``"m"``, ``"cm"``, ``"mm"``, ``"um"`` or ``"in"``. By default the one that the
+            file names, else metres, as everywhere in this package.
         feed: speed of the tool along the contours [m/s], which a table does not give.
-        unknown: ``"refuse"`` or ``"warn"``, as for the other readers.
+        columns: what the columns are, whatever the file calls them: names in the order of the file, as ``("x", "y",
+            "z", "nx", "ny", "nz")``, of which any other, such as ``"_"``, passes a column over; or for each name a
+            number from 0 or the name in the file, as ``{"x": 0, "y": "Pos Y", "z": 2}``; or either as a text:
+            ``"x,y,z"`` or ``"x=0,y=Pos Y,z=2"``.
+        decimal: ``"."`` or ``","``, the mark in the numbers. By default it is found out: a comma is one only where
+            nothing else can be meant, and that is told.
+        z: height of all points [m], for tables of x and y alone.
+        unknown: ``"refuse"`` or ``"warn"``, as for the other readers; a table has nothing that makes a difference.
 
     Raises:
-        InputError: ``path``, ``unit``, ``feed`` or ``unknown`` is none.
+        InputError: an argument is none of these.
         ToolpathError: the file cannot be used; the message says in which line and why.
     """
-    if unit is not None and unit not in UNITS:
-        raise InputError(f"unit = {unit!r}, expected one of {', '.join(UNITS)}, or None")
-    if feed is not None:
-        feed = scalar("feed", feed, positive=True)
-    passed = Passed(unknown)
-    rows = Rows.of(read_lines(path, "a table of points"))
+    passed, chosen = Passed(unknown), checked_choice(columns)
+    _check_choice("unit", unit, [*UNITS])
+    _check_choice("decimal", decimal, [".", ","])
+    feed = None if feed is None else scalar("feed", feed, positive=True)
+    z = None if z is None else scalar("z", z)
+    lines = read_lines(path, "a table of points")
     try:
-        columns = rows.columns()
-        unit = columns.unit_with(unit)
-        table = Table.of(rows, columns, UNITS[unit])
+        rows = Rows.of(lines, decimal)
+        found = Columns.of(rows, chosen, passed, flat=z is not None)
+        unit = found.unit_with(unit) if unit or found.unit else _assumed(rows, passed)
+        table = Table.of(rows, found, UNITS[unit], decimal or _decimal(rows, found, passed), z)
         contours = [_contour(table, first, end, feed) for first, end in table.parts]
     except ToolpathError as error:
         raise ToolpathError(f"{os.fspath(path)}: {error}") from None
+    if "qx" in found.places:
+        passed.tell("of the orientations qx qy qz qw the tool's z axis is kept, not how it is turned about that")
     return Toolpath(tuple(contours), os.fspath(path), unit, passed.notes)
+
+
+def _check_choice(name: str, value: str | None, choices: list[str]) -> None:
+    if value is not None and value not in choices:
+        raise InputError(f"{name} = {value!r}, expected one of {', '.join(choices)}, or None")
+
+
+def _assumed(rows: Rows, passed: Passed) -> str:
+    """Metres, told where a comment sounds otherwise."""
+    for line, comment in rows.comments:
+        if (word := hint_of_unit(comment)) is not None:
+            passed.tell(
+                f"line {line} speaks of {word!r}, but the coordinates are taken for metres: give unit= if they are not"
+            )
+            break
+    return "m"
+
+
+def _decimal(rows: Rows, columns: Columns, passed: Passed) -> str:
+    """The decimal mark that the numbers have."""
+    mark = decimal_mark(rows, columns)
+    if mark == ",":
+        passed.tell("the numbers have a decimal comma")
+    return mark
 
 
 def _contour(table: Table, first: int, end: int, feed: float | None) -> Contour:

@@ -1,48 +1,59 @@
-"""What the columns of a table of points are."""
+"""What the columns of a table of points are: by their names in the file, by their number, or as the caller says."""
 
 from __future__ import annotations
 
 import re
 import reprlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from pathcontrol.errors import ToolpathError
+from pathcontrol.errors import InputError, ToolpathError
+from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.points_header import Header
+from pathcontrol.toolpaths.points_names import AXIS, KNOWN, POINT, QUATERNION, Name
+from pathcontrol.toolpaths.points_rows import Rows
 
-#: units of length of a table: metres in one
-UNITS = {"m": 1.0, "mm": 1e-3, "in": 25.4e-3}
-#: columns with the coordinates, and with the tool's axis
-POINT, AXIS = ["x", "y", "z"], ["i", "j", "k"]
-#: column with the name of the contour
-CONTOUR = "contour"
-
-_SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", None: "blanks"}
-_COLUMN = re.compile(r"([a-z]+)(?:_([a-z]+)|\[([a-z]+)\]|\(([a-z]+)\))?")
+#: what a caller may say of columns
+Chosen = Sequence[str] | Mapping[str, int | str]
+_MOST_TOLD = 8
 
 
 @dataclass(frozen=True)
 class Columns:
-    """Names of the columns, the character between them or None for blanks, and the unit that the file names."""
+    """Where each known column is, how many there are, and the unit that the file names."""
 
-    names: list[str]
-    separator: str | None
+    places: dict[str, int]
+    width: int
     unit: str | None = None
-    in_file: bool = False
 
     @classmethod
-    def of(cls, line: int, text: str) -> Columns:
-        """The columns as the first line of a table names them, or as its number of values says."""
-        separator = next((s for s in ";\t," if s in text), None)
-        fields = split(text, separator)
-        if number(fields[0]) is None:
-            if separator is None:  # "x [mm]" is one name
-                fields = " ".join(fields).replace(" [", "[").replace(" (", "(").split()
-            return cls(*_named(line, fields, separator), in_file=True)
-        if len(fields) not in (3, 6):
-            raise ToolpathError(
-                f"line {line}: {len(fields)} values between {_SEPARATORS[separator]}, expected 3 (x y z) or "
-                "6 (x y z i j k), or a first line that names the columns"
-            )
-        return cls((POINT + AXIS)[: len(fields)], separator)
+    def of(cls, rows: Rows, chosen: Chosen | None, passed: Passed, *, flat: bool) -> Columns:
+        """The columns of the rows, out of which the line that names them is taken.
+
+        Args:
+            rows: the lines of the table.
+            chosen: which columns are what, or None for what the file says.
+            passed: columns that are passed over are told there.
+            flat: whether z is given by the caller.
+
+        Raises:
+            ToolpathError: the columns make up no points.
+        """
+        header = Header.of(rows)
+        names = _names(rows, header, chosen, flat=flat)
+        places = {name: k for k, name in enumerate(names) if name}
+        if (mistake := _mistake(names, places, flat=flat)) is not None:
+            there = reprlib.repr(" ".join(name.text for name in header.names) or " ".join(names))
+            raise ToolpathError(f"line {header.line}: columns {there}, {mistake}")
+        _tell(header, places, passed)
+        rows.trim(header.width)
+        return cls(places, header.width, header.unit(places))
+
+    @property
+    def numeric(self) -> dict[str, int]:
+        """The columns of numbers, x y z first."""
+        return {name: self.places[name] for name in (*POINT, *AXIS, *QUATERNION) if name in self.places}
 
     def unit_with(self, unit: str | None) -> str:
         """The unit of the coordinates, given the one that the caller names."""
@@ -50,58 +61,85 @@ class Columns:
             raise ToolpathError(f"its columns are in {self.unit!r}, which unit = {unit!r} contradicts")
         return unit or self.unit or "m"
 
-    def index(self, name: str) -> int | None:
-        """Where the column is, or None if there is none."""
-        return self.names.index(name) if name in self.names else None
 
-    def fields(self, line: int, text: str) -> list[str]:
-        """The values in a line, one for each column."""
-        fields = split(text, self.separator)
-        if len(fields) != len(self.names):
-            raise ToolpathError(
-                f"line {line}: {len(fields)} values between {_SEPARATORS[self.separator]}, expected {len(self.names)}: "
-                f"{' '.join(self.names)}"
-            )
-        return fields
+def checked_choice(chosen: Any) -> Chosen | None:
+    """``columns`` as a caller gives it: names one after another, or a place for each name; a text lists either.
 
-
-def split(text: str, separator: str | None) -> list[str]:
-    """The values in a line."""
-    return [field.strip() for field in text.split(separator)]
-
-
-def number(field: str) -> float | None:
-    """The number that a field is, in ASCII and without the underscores of Python, or None."""
-    try:
-        return None if "_" in field or not field.isascii() else float(field)
-    except ValueError:
+    Raises:
+        InputError: it is neither.
+    """
+    if chosen is None:
         return None
+    given = _listed(chosen) if isinstance(chosen, str) else chosen
+    if isinstance(given, Mapping) and given and all(isinstance(name, str) and Name.of(name).name for name in given):
+        if all(isinstance(at, str) or (isinstance(at, int) and not isinstance(at, bool)) for at in given.values()):
+            return {Name.of(name).name: at for name, at in given.items()}
+    elif isinstance(given, list | tuple) and given and all(isinstance(name, str) for name in given):
+        return given
+    raise InputError(
+        f"columns = {reprlib.repr(chosen)}, expected names in the order of the file, such as ('x', 'y', 'z', 'i', 'j', "
+        "'k'), or for each name a number from 0 or the name that the file gives it, such as {'x': 0, 'y': 'Pos Y', "
+        f"'z': 2}}; names are {', '.join(KNOWN)}"
+    )
 
 
-def _named(line: int, fields: list[str], separator: str | None) -> tuple[list[str], str | None, str | None]:
-    """Names, separator and unit of columns from the line that names them."""
-    found = [_name_and_unit(line, field) for field in fields]
-    names = [name for name, _ in found]
-    complete = set(POINT) <= set(names) and len(set(AXIS) & set(names)) in (0, 3)
-    if not complete or len(set(names)) < len(names):
+def _listed(text: str) -> list[str] | dict[str, int | str]:
+    """``x,y,z`` as names, ``x=0,y=Pos Y,z=2`` as places."""
+    if "=" not in text:
+        return [name for name in re.split(r"[,;\s]+", text) if name]
+    pairs = [item.partition("=") for item in text.split(",")]
+    return {name.strip(): int(at) if re.fullmatch(r"\s*[0-9]{1,6}\s*", at) else at.strip() for name, _, at in pairs}
+
+
+def _names(rows: Rows, header: Header, chosen: Chosen | None, *, flat: bool) -> list[str]:
+    """The name of each column, empty where it is passed over."""
+    if isinstance(chosen, Mapping):
+        names = [""] * header.width
+        for name, at in chosen.items():
+            names[header.place(at)] = name
+        return names
+    if chosen is not None:
+        if len(chosen) > header.width:
+            raise ToolpathError(f"columns= names {len(chosen)} columns, the file has {header.width}")
+        return [Name.of(name).name for name in chosen]
+    if header.names:
+        return [name.name for name in header.names]
+    if header.width != (2 if flat else 3):
+        reason = "x y alone need z=, their height in metres" if header.width == 2 else _UNNAMED
         raise ToolpathError(
-            f"line {line}: columns {reprlib.repr(' '.join(names))}, expected x, y and z, and none or all of i, j and "
-            "k, each once"
+            f"line {header.line}: {header.width} values between {rows.between} and no names of columns, expected "
+            f"{'2 (x y)' if flat else '3 (x y z)'}; {reason}"
         )
-    units = {unit for name, unit in found if name in POINT}
-    if len(units) > 1:
-        listed = ", ".join(sorted(repr(unit or "no unit") for unit in units))
-        raise ToolpathError(f"line {line}: x, y and z in different units, {listed}, expected the same for all")
-    return names, separator, units.pop()
+    return POINT[: header.width]
 
 
-def _name_and_unit(line: int, field: str) -> tuple[str, str | None]:
-    match = _COLUMN.fullmatch(field.strip("\"' ").lower().replace(" ", ""))
-    name = match[1] if match else ""
-    unit = next(filter(None, match.groups()[1:]), None) if match else None
-    if name not in [*POINT, *AXIS, CONTOUR] or (unit and (name not in POINT or unit not in UNITS)):
-        raise ToolpathError(
-            f"line {line}: {reprlib.repr(field)}, expected a number, or as the name of a column x, y or z, perhaps "
-            f"with a unit ({', '.join(UNITS)}) as in 'x [mm]', or i, j, k, or {CONTOUR}"
-        )
-    return name, unit
+_UNNAMED = (
+    "whether others are normals, angles or colours is not guessed: name them in the first line, or read the file with "
+    "columns=('x', 'y', 'z', 'i', 'j', 'k') or the like"
+)
+
+
+def _mistake(names: list[str], places: Mapping[str, int], *, flat: bool) -> str | None:
+    """Why columns make up no points, or None."""
+    once = len(places) == sum(map(bool, names))
+    point = {"x", "y"} | (set() if flat else {"z"})
+    parts = [len(places.keys() & group) in (0, len(group)) for group in (set(AXIS), set(QUATERNION))]
+    if flat and "z" in places:
+        return "expected no z where z= is given"
+    if set(AXIS) | set(QUATERNION) <= places.keys():
+        return "expected a normal or an orientation, not both: choose by columns="
+    if once and point <= places.keys() and all(parts):
+        return None
+    return (
+        f"expected {'x and y' if flat else 'x, y and z'}, and none or all of i, j and k, or of qx, qy, qz and qw, each "
+        "once; if they have other names or units, say which they are by columns= and unit="
+    )
+
+
+def _tell(header: Header, places: Mapping[str, int], passed: Passed) -> None:
+    """Tell which columns are passed over."""
+    texts = [name.text for name in header.names] or [str(k) for k in range(header.width)]
+    over = [reprlib.repr(text) for k, text in enumerate(texts) if k not in places.values()]
+    if over:
+        listed = ", ".join(over[:_MOST_TOLD]) + (", …" if len(over) > _MOST_TOLD else "")
+        passed.tell(f"column{'s' * (len(over) > 1)} {listed} {'are' if len(over) > 1 else 'is'} passed over")

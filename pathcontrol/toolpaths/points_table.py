@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import reprlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,51 +12,16 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.points_columns import AXIS, CONTOUR, POINT, Columns, number
+from pathcontrol.toolpaths.points_columns import Columns
+from pathcontrol.toolpaths.points_header import number
+from pathcontrol.toolpaths.points_names import CONTOUR
+from pathcontrol.toolpaths.points_rows import Rows
 from pathcontrol.toolpaths.text import MAX_COORDINATE, MAX_SEGMENTS
 
-
-@dataclass
-class Rows:
-    """The lines that are neither empty nor comments.
-
-    Attributes:
-        texts: the lines without comments.
-        lines: their numbers.
-        after_gap: which of them follow an empty line.
-    """
-
-    texts: list[str]
-    lines: list[int]
-    after_gap: list[int]
-
-    @classmethod
-    def of(cls, lines: list[str]) -> Rows:
-        """The rows among the lines of a file."""
-        rows, gap = cls([], [], []), False
-        for line, content in enumerate(lines, 1):
-            text = content.partition("#")[0].strip()
-            if text:
-                if gap:
-                    rows.after_gap.append(len(rows.texts))
-                rows.texts.append(text)
-                rows.lines.append(line)
-            gap = not text and (gap or not content.strip())  # a comment is no gap, and ends none
-        return rows
-
-    def columns(self) -> Columns:
-        """What the columns are; the line that names them is taken out."""
-        if not self.texts:
-            raise ToolpathError("there is no point in it, expected lines of x y z, or x y z i j k")
-        columns = Columns.of(self.lines[0], self.texts[0])
-        if columns.in_file:
-            del self.texts[0], self.lines[0]
-            self.after_gap = [row - 1 for row in self.after_gap if row]
-        if not self.texts:
-            raise ToolpathError("there is no point in it, only the names of columns")
-        if len(self.texts) > MAX_SEGMENTS:
-            raise ToolpathError(f"line {self.lines[MAX_SEGMENTS]}: more than {MAX_SEGMENTS} points; split the file")
-        return columns
+_SWAP = str.maketrans({",": ".", ".": "?"})  # a decimal comma; a point is then no part of a number
+_UNIT_NORM = 0.01  # how far the norm of a quaternion that was rounded may be from 1
+_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]+)?")
+_THOUSANDS = re.compile(r"[-+]?[0-9]{1,3}(?:,[0-9]{3})+")
 
 
 @dataclass(frozen=True)
@@ -77,20 +43,24 @@ class Table:
     starts: list[int]
 
     @classmethod
-    def of(cls, rows: Rows, columns: Columns, scale: float) -> Table:
-        """The table with the coordinates in ``scale`` metres."""
+    def of(cls, rows: Rows, columns: Columns, scale: float, decimal: str, z: float | None) -> Table:
+        """The table with the coordinates in ``scale`` metres, and z [m] where there is no such column."""
+        if len(rows.texts) > MAX_SEGMENTS:
+            raise ToolpathError(f"line {rows.lines[MAX_SEGMENTS]}: more than {MAX_SEGMENTS} points; split the file")
         labels, starts = None, {0, *rows.after_gap}
-        if (label := columns.index(CONTOUR)) is not None:
-            fields = (columns.fields(line, text) for line, text in zip(rows.lines, rows.texts, strict=True))
-            labels = [row[label] for row in fields]
+        if (place := columns.places.get(CONTOUR)) is not None:
+            _find_wrong_width(rows, columns)
+            labels = [rows.fields(text)[place] for text in rows.texts]
             starts |= {row for row in range(1, len(labels)) if labels[row] != labels[row - 1]}
-        values = _values(rows, columns)
-        points, axes = scale * values[:, :3], values[:, 3:]
+        values = _values(rows, columns, decimal)
+        points, axes = scale * values[:, : 3 if z is None else 2], values[:, 3 if z is None else 2 :]
+        if z is not None:
+            points = np.column_stack([points, np.full(len(points), z)])
         far = np.abs(points).max(1) > MAX_COORDINATE
         if far.any():
             line = rows.lines[int(np.argmax(far))]
             raise ToolpathError(f"line {line}: further than {MAX_COORDINATE:g} m from the origin; is the unit right?")
-        return cls(points, _unit(axes, rows.lines) if axes.size else None, rows.lines, labels, sorted(starts))
+        return cls(points, _axes(axes, rows.lines), rows.lines, labels, sorted(starts))
 
     @property
     def parts(self) -> Iterator[tuple[int, int]]:
@@ -98,41 +68,98 @@ class Table:
         return pairwise([*self.starts, len(self.points)])
 
 
-def _values(rows: Rows, columns: Columns) -> Array:
-    """The numbers, x y z first, then i j k if there are any, (k, 3 or 6)."""
-    order = [name for name in POINT + AXIS if name in columns.names]
-    numeric = [name for name in columns.names if name != CONTOUR]
-    use = None if numeric == columns.names else [columns.names.index(name) for name in numeric]
+def decimal_mark(rows: Rows, columns: Columns) -> str:
+    """``","`` where the numbers have a decimal comma and nothing else can be meant, else ``"."``.
+
+    Raises:
+        ToolpathError: commas in the numbers could separate thousands, or points are there too.
+    """
+    if rows.separator == "," or not any("," in text for text in rows.texts):
+        return "."
+    commas: dict[str, int] = {}
+    points: dict[str, int] = {}
+    for line, text in zip(rows.lines, rows.texts, strict=True):
+        fields = rows.fields(text)
+        for at in columns.numeric.values():
+            if at < len(fields):
+                if "," in fields[at]:
+                    commas.setdefault(fields[at], line)
+                elif "." in fields[at]:
+                    points.setdefault(fields[at], line)
+    if not commas or not all(map(_COMMA.fullmatch, commas)):
+        return "."
+    if points or all(map(_THOUSANDS.fullmatch, commas)):
+        field, line = next(iter(commas.items()))
+        raise ToolpathError(
+            f"line {line}: is {reprlib.repr(field)} a number with a decimal comma, or with a comma between thousands? "
+            "Read the file with decimal=',' or write decimal points alone"
+        )
+    return ","
+
+
+def _values(rows: Rows, columns: Columns, decimal: str) -> Array:
+    """The numbers of the columns in their order, (k, columns)."""
+    places = list(columns.numeric.values())
+    texts = [text.translate(_SWAP) for text in rows.texts] if decimal == "," else rows.texts
+    _find_wrong_width(rows, columns)
     try:
-        values = np.loadtxt(rows.texts, delimiter=columns.separator, comments=None, usecols=use, ndmin=2)
-        if values.shape[1] != len(numeric):
-            raise ValueError(f"{values.shape[1]} columns")
+        values = np.loadtxt(texts, delimiter=rows.separator, comments=None, usecols=places, ndmin=2)
     except ValueError as error:
-        _find_mistake(rows, columns)
+        _find_mistake(rows, columns, decimal)
         raise ToolpathError(f"it cannot be read: {error}") from None
-    values = values[:, [numeric.index(name) for name in order]]
     if not np.isfinite(values).all():
         row, column = np.argwhere(~np.isfinite(values))[0]
-        raise ToolpathError(
-            f"line {rows.lines[row]}: {order[column]} = {values[row, column]}, expected a finite number"
-        )
+        name = list(columns.numeric)[column]
+        raise ToolpathError(f"line {rows.lines[row]}: {name} = {values[row, column]}, expected a finite number")
     return values
 
 
-def _find_mistake(rows: Rows, columns: Columns) -> None:
-    """Raise for the first line that has not one number for each column."""
+def _find_wrong_width(rows: Rows, columns: Columns) -> None:
+    """Raise for the first line that has not one value for each column."""
+    separator, width = rows.separator, columns.width
     for line, text in zip(rows.lines, rows.texts, strict=True):
-        for name, field in zip(columns.names, columns.fields(line, text), strict=True):
-            if name != CONTOUR and number(field) is None:
-                found = reprlib.repr(field)
-                raise ToolpathError(f"line {line}: {name} = {found}, expected a number with a decimal point")
+        found = len(text.split()) if separator is None else text.count(separator) + 1
+        if found != width:
+            names = sorted(columns.places, key=columns.places.__getitem__)
+            raise ToolpathError(
+                f"line {line}: {found} values between {rows.between}, expected {width}: {' '.join(names)}"
+                f"{' and what is passed over' if len(names) < width else ''}"
+            )
 
 
-def _unit(axes: Array, lines: list[int]) -> Array:
-    """Tool axes as unit vectors."""
-    largest = np.abs(axes).max(1, keepdims=True)
+def _find_mistake(rows: Rows, columns: Columns, decimal: str) -> None:
+    """Raise for the first line in which a value is no number."""
+    for line, text in zip(rows.lines, rows.texts, strict=True):
+        fields = rows.fields(text)
+        for name, at in columns.numeric.items():
+            if number(fields[at], decimal) is None:
+                mark = "a decimal comma" if decimal == "," else "a decimal point"
+                split_up = rows.separator == "," and " " in fields[at]
+                comma = decimal == "." and ("," in fields[at] or split_up)
+                raise ToolpathError(
+                    f"line {line}: {name} = {reprlib.repr(fields[at])}, expected a number with {mark}"
+                    f"{', or read the file with decimal=' + repr(',') if comma else ''}"
+                )
+
+
+def _axes(values: Array, lines: list[int]) -> Array | None:
+    """Tool axes as unit vectors, from i j k, or as those against which z of the orientation qx qy qz qw points."""
+    if not values.size:
+        return None
+    largest = np.abs(values).max(1, keepdims=True)
     if not largest.all():
         line = lines[int(np.argmin(largest))]
-        raise ToolpathError(f"line {line}: the tool axis i j k is 0 0 0, expected a direction")
-    axes = axes / largest  # so that squares neither overflow nor vanish
-    return axes / np.linalg.norm(axes, axis=-1, keepdims=True)
+        what = "the tool axis i j k is 0 0 0, expected a direction"
+        raise ToolpathError(f"line {line}: {what if values.shape[1] == 3 else 'the quaternion is 0 0 0 0'}")
+    unit = values / largest  # so that squares neither overflow nor vanish
+    unit /= np.linalg.norm(unit, axis=-1, keepdims=True)
+    if values.shape[1] == 3:
+        return unit
+    off = ~(np.abs(values - unit).max(1) <= _UNIT_NORM)
+    if off.any():
+        line = lines[int(np.argmax(off))]
+        raise ToolpathError(
+            f"line {line}: the quaternion qx qy qz qw has not the norm 1; are its columns the right ones?"
+        )
+    x, y, z, w = unit.T
+    return np.stack([-2 * (x * z + w * y), 2 * (w * x - y * z), 2 * (x * x + y * y) - 1], axis=-1)

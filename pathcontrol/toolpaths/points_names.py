@@ -1,0 +1,101 @@
+"""Names of the columns of a table of points, with their units."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+#: units of length of a table: metres in one
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
+#: columns with the coordinates, with the tool's axis, and with its orientation, in the order of ROS
+POINT, AXIS, QUATERNION = ["x", "y", "z"], ["i", "j", "k"], ["qx", "qy", "qz", "qw"]
+#: column with the name of the contour
+CONTOUR = "contour"
+KNOWN = (*POINT, *AXIS, *QUATERNION, CONTOUR)
+
+_UNIT_ALIASES = {"inch": "in", "inches": "in", "µm": "um", "μm": "um", "meter": "m", "metre": "m", "millimeter": "mm"}
+#: names as other programs write them: position.x and pose.orientation.w of ROS, pos_x, nx, normal_z
+_LONG = re.compile(
+    r"(?:.*[._/])?(?=.+(?P<letter>[xyzw])\Z)(?:(?P<point>pos(?:ition)?)|(?P<quaternion>orientation)|(?P<axis>n(?:ormal)?))"
+    r"[._/]?[xyzw]"
+)
+_LONGEST = 100  # characters of a name that is looked at closer
+_PREFIX = {"point": "", "quaternion": "q", "axis": "n"}
+_NORMAL = {"nx": "i", "ny": "j", "nz": "k"}
+_COLUMN = re.compile(r"([^\[\]()]*?)(?:_([^\W\d_]+)|\[([^\[\]()]*)\]|\(([^\[\]()]*)\))?")
+_IN_A_COMMENT = re.compile(r"\bunits?(?: ?[:=] ?| (?:in|is|are) )\[?([a-zµμ]+)\b", re.IGNORECASE)
+_HINT = re.compile(r"\b(mm|cm|inch(?:es)?|millimet(?:er|re)s?|µm)\b", re.IGNORECASE)
+
+
+class Name(NamedTuple):
+    """What a column is called in a file.
+
+    Attributes:
+        text: as it is there, without quotes.
+        name: one of those that are known, or an empty string.
+        unit: unit of length, as here, or as it is there if it is none; None where there is none.
+    """
+
+    text: str
+    name: str
+    unit: str | None
+
+    @classmethod
+    def of(cls, text: str) -> Name:
+        """The name in a field such as ``x``, ``X [mm]``, ``x (mm)``, ``x_mm`` or ``nx``."""
+        text = text.strip("\"' ")
+        plain = text.lower().replace(" ", "")
+        if len(plain) > _LONGEST:
+            return cls(text, "", None)
+        if name := _known(plain):
+            return cls(text, name, None)
+        found = _COLUMN.fullmatch(plain)
+        name = _known(found[1]) if found else ""
+        unit = next(filter(None, found.groups()[1:]), None) if found else None
+        unit = None if unit is None else _UNIT_ALIASES.get(unit, unit)
+        if name in POINT:
+            return cls(text, name if unit in UNITS else "", unit)
+        if plain[-1:] not in ("]", ")"):
+            return cls(text, "", None)
+        return cls(text, name, unit if not name and unit in UNITS else None)
+
+    @property
+    def plain(self) -> str:
+        """The text without case and blanks, to compare it."""
+        return self.text.lower().replace(" ", "")
+
+
+def _known(plain: str) -> str:
+    """The known name that a text is another spelling of, or an empty string."""
+    if plain in KNOWN:
+        return plain
+    found = _LONG.fullmatch(plain)
+    name = "" if found is None else _PREFIX[str(found.lastgroup)] + found["letter"]
+    name = _NORMAL.get(name, name)
+    return name if name in KNOWN else ""
+
+
+def names_in(fields: list[str]) -> list[Name]:
+    """The names in the fields of a line, without empty ones at its end."""
+    last = next((k for k in range(len(fields), 0, -1) if fields[k - 1].strip("\"' ")), 0)
+    return [Name.of(field) for field in fields[:last]]
+
+
+def unit_of_row(fields: list[str]) -> str | None:
+    """The unit that a line of units below the names, such as ``mm;mm;mm`` or ``[mm] [mm] [mm] -``, gives lengths."""
+    plain = [field.strip("\"' ").strip("[]()").lower() for field in fields]
+    units = {_UNIT_ALIASES.get(unit, unit) for unit in plain if unit not in ("", "-", "1")}
+    return units.pop() if len(units) == 1 and units <= UNITS.keys() else None
+
+
+def unit_in(comment: str) -> str | None:
+    """The unit that a comment such as ``units: mm`` names."""
+    found = _IN_A_COMMENT.search(comment)
+    unit = _UNIT_ALIASES.get(found[1].lower(), found[1].lower()) if found else None
+    return unit if unit in UNITS else None
+
+
+def hint_of_unit(comment: str) -> str | None:
+    """A word in a comment that sounds like a unit."""
+    found = _HINT.search(comment)
+    return found[0] if found else None
