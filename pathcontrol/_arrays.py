@@ -20,7 +20,7 @@ def as_array(name: str, value: ArrayLike) -> Array:
     refuse_labels(name, value)
     try:
         return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:  # OverflowError: an integer of hundreds of digits
         raise InputError(f"{name} = {value!r}, expected numbers") from error
 
 

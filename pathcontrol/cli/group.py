@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import errno
 import re
+import shlex
 import signal
 import sys
 import warnings
@@ -54,14 +56,28 @@ def in_options(message: str, command: click.Command | None) -> str:
         option = options.get(name)
         if option is None:
             return None
-        return option.opts[0] if option.is_flag or not value or value == "…" else f"{option.opts[0]} {_typed(value)}"
+        return option.opts[0] if option.is_flag or not value or value == "…" else _typed(option, value)
 
     return setting_in_words_of(in_words_of(message, speak), speak)
 
 
-def _typed(value: str) -> str:
-    """A value as one types it: ``(x, y, z)`` as three, a call of Python as the name of a file."""
-    return "FILE" if re.fullmatch(r"\w+\(.*\)", value) else value.strip("()[]").replace(", ", " ")
+def _typed(option: click.Option, value: str) -> str:
+    """An option with a value as one types it: ``(x, y, z)`` as three, a call of Python as the name of a file."""
+    flag, items = option.opts[0], _items(value)
+    if re.fullmatch(r"\w+\(.*\)", value):
+        return f"{flag} FILE"
+    if option.multiple:
+        return " ".join(f"{flag} {item}" for item in items)
+    return f"{flag} {(' ' if option.nargs > 1 else ',').join(items)}"
+
+
+def _items(value: str) -> list[str]:
+    """The words of a value that is written as in Python, without the quotes around a single text."""
+    try:
+        literal = ast.literal_eval(value) if value[:1] in ("(", "[") else value
+    except (ValueError, SyntaxError):  # as it is: (x, y, z)
+        return [word.strip() for word in value.strip("()[]").split(",")]
+    return [shlex.quote(str(item)) for item in literal] if isinstance(literal, list | tuple) else [value]
 
 
 def printable(message: str) -> str:

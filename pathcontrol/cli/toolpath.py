@@ -34,6 +34,20 @@ from pathcontrol.cli.quantity import QuantityType, questioned_feed
     help="Feed of contours for which the file gives none, as '50 mm/s', or a number in m/s.",
 )
 @click.option(
+    "--arc-tolerance",
+    type=QuantityType("m"),
+    metavar="LENGTH",
+    help="How far arcs of G-code may be rounded, as '0.02 mm', or in metres.",
+)
+@click.option("--columns", metavar="NAMES", help="What the columns of a table are: x,y,z,nx,ny,nz or x=0,y=2,z=Height.")
+@click.option("--decimal", metavar="MARK", help="The decimal mark in a table: . or ,")
+@click.option(
+    "--z",
+    type=QuantityType("m"),
+    metavar="LENGTH",
+    help="Height of a table of x and y alone, as '5 mm', or in metres.",
+)
+@click.option(
     "--start",
     type=QuantityType("m"),
     nargs=3,
@@ -47,9 +61,7 @@ from pathcontrol.cli.quantity import QuantityType, questioned_feed
     "--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw it: writes this name as SVG and PNG."
 )
 @json_option
-def command(
-    file: Path, layers: tuple[str, ...], skip: tuple[str, ...], plot: Path | None, as_json: bool, **options: Any
-) -> None:
+def command(file: Path, plot: Path | None, as_json: bool, **options: Any) -> None:
     """Show what is in a toolpath FILE: CSV, G-code, SVG or DXF."""
     from pathcontrol.cli.tables import toolpath_table
     from pathcontrol.toolpaths.read import read_toolpath
@@ -57,8 +69,7 @@ def command(
 
     if plot is not None:
         refuse_suffix(plot, "a figure", ".svg", ".png", ".pdf")
-    options |= {"layers": list(layers) or None, "skip": list(skip) or None}
-    given = {name: value for name, value in options.items() if value is not None}
+    given = {name: value for name, value in options.items() if value not in (None, ())}
     questioned_feed(options["feed"])
     read = read_toolpath(file, **given)
     content = summary(read)

@@ -22,7 +22,8 @@ def build_toolpath(
         ExperimentError: the file cannot be used, or a contour cannot be followed.
     """
     workpiece = pose_of("task.workpiece", section.workpiece.arguments(to_radians))
-    with keyed("task.file", section.reader_options):
+    keys = {name.removeprefix("tool_"): name for name in (*section.reader_options, "feed")}
+    with keyed("task.file", keys):
         toolpath = read_toolpath(base_dir / section.file, **section.reading)
     arguments = section.arguments(to_radians)
     with keyed("task", ToolpathSection.model_fields):

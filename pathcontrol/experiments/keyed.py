@@ -5,22 +5,25 @@ from __future__ import annotations
 import contextlib
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from pathcontrol._advice import in_words_of
 from pathcontrol._units import Quantity, offered
 from pathcontrol.errors import ExperimentError, PathControlError
 
+_LISTS = str.maketrans("()", "[]")  # of Python and of TOML
+
 
 @contextlib.contextmanager
-def keyed(key: str, fields: Iterable[str] = ()) -> Iterator[None]:
+def keyed(key: str, fields: Iterable[str] | Mapping[str, str] = ()) -> Iterator[None]:
     """Errors inside the block become ExperimentErrors whose message begins with the key path.
 
     A message that begins with one of the ``fields`` of the section ``key``, as ``K_v = -1.0, expected …``, is
-    told as ``controller.K_v = …``; advice to give one of them, as ``unit='mm'``, is told as a line of the file.
+    told as ``controller.K_v = …``; advice to give one of them, as ``unit='mm'``, is told as a line of the file. Where a
+    field has another name there than the argument, ``fields`` is a mapping from this to that.
     """
-    names = set(fields)
+    names = dict(fields) if isinstance(fields, Mapping) else {name: name for name in fields}
     try:
         yield
     except ExperimentError:
@@ -28,13 +31,17 @@ def keyed(key: str, fields: Iterable[str] = ()) -> Iterator[None]:
     except (PathControlError, OSError) as error:
         word = re.match(r"\w*", str(error))
         joint = "." if word and word[0] in names else ": "
-        message = in_words_of(str(error), lambda name, value: _line(name, value) if name in names else None)
+        message = in_words_of(str(error), lambda name, value: _line(names[name], value) if name in names else None)
         raise ExperimentError(f"{key}{joint}{message}") from error
 
 
 def _line(name: str, value: str) -> str:
     """How a key is given in a file."""
-    return f"{name} = {json.dumps(value)}" if re.fullmatch(r"[^\W\d]\w*", value) else f"{name} = {value}".rstrip()
+    return (
+        f"{name} = {json.dumps(value)}"
+        if re.fullmatch(r"[^\W\d]\w*", value)
+        else f"{name} = {value.translate(_LISTS)}".rstrip()
+    )
 
 
 @contextlib.contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, Literal
 
 from pathcontrol.experiments.section import Section, Units
-from pathcontrol.experiments.values import NotNegative, Numbers, Positive, Text
+from pathcontrol.experiments.values import Columns, NotNegative, Number, Numbers, Positive, Text
 
 
 class Workpiece(Section):
@@ -25,8 +25,8 @@ class Workpiece(Section):
 class ToolpathSection(Section):
     """``toolpath``: see :func:`pathcontrol.read_toolpath` and :class:`pathcontrol.ToolpathTask`.
 
-    ``file`` is relative to the experiment file; ``unit``, ``layers``, ``skip``, ``gap``, ``ppi`` and ``unknown`` are
-    for its reader. Lengths are in metres and metres per second, ``start`` is in ``angle_unit``.
+    ``file`` is relative to the experiment file; the options of its reader are keys of the same name, but for its
+    ``start``, which is ``tool_start``. Lengths are in metres and metres per second, ``start`` is in ``angle_unit``.
     """
 
     units: ClassVar[Units] = {
@@ -36,10 +36,15 @@ class ToolpathSection(Section):
         "tolerance": "m",
         "clearance": "m",
         "gap": "m",
+        "arc_tolerance": "m",
+        "z": "m",
+        "tool_start": "m",
         "start": ("rad", "m"),
     }
     angles = ("start",)
-    reader_options: ClassVar[tuple[str, ...]] = ("unit", "layers", "ppi", "unknown", "skip", "gap")
+    reader_options: ClassVar[tuple[str, ...]] = (
+        *("unit", "layers", "skip", "gap", "ppi", "tool_start", "arc_tolerance", "columns", "decimal", "z", "unknown"),
+    )
     not_arguments: ClassVar[tuple[str, ...]] = ("type", "file", "workpiece", *reader_options)
     type: Literal["toolpath"] = "toolpath"
     file: Text
@@ -50,6 +55,11 @@ class ToolpathSection(Section):
     skip: list[Text] | None = None
     gap: NotNegative | None = None
     ppi: Positive | None = None
+    tool_start: Numbers | None = None
+    arc_tolerance: Positive | None = None
+    columns: Columns | None = None
+    decimal: Literal[".", ","] | None = None
+    z: Number | None = None
     unknown: Literal["refuse", "warn"] | None = None
     orientation: Literal["free", "down", "normals", "tangent"] | None = None
     feed: Positive | None = None
@@ -64,4 +74,5 @@ class ToolpathSection(Section):
     def reading(self) -> dict[str, Any]:
         """What the reader of the file is told."""
         given = {name: getattr(self, name) for name in (*self.reader_options, "feed")}
+        given["start"] = given.pop("tool_start")
         return {name: value for name, value in given.items() if value is not None}

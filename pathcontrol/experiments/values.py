@@ -57,6 +57,12 @@ def _is_flag(value: Any) -> bool:
     return isinstance(value, bool)
 
 
+def _is_columns(value: Any) -> bool:
+    if isinstance(value, dict):
+        return all(_is_text(at) or (_is_whole(at) and at >= 0) for at in value.values())
+    return _is_text(value) or (isinstance(value, list) and all(map(_is_text, value)))
+
+
 def _is_text(value: Any) -> bool:
     return isinstance(value, str) and value.strip() != "" and "\0" not in value
 
@@ -83,6 +89,10 @@ def _only(test: Callable[[Any], bool], what: str) -> PlainValidator:
 Text = Annotated[str, _only(_is_text, "a text in quotes")]
 Flag = Annotated[bool, _only(_is_flag, "true or false")]
 Whole = Annotated[int, _only(_is_whole, "a whole number")]
+Columns = Annotated[
+    str | list[str] | dict[str, int | str],
+    _only(_is_columns, "names of columns in their order, or a table with the number or the name of each"),
+]
 Number = Annotated[float, _only(_is_number, "a finite number")]
 Positive = Annotated[float, _only(_is_positive, "a number greater than 0")]
 NotNegative = Annotated[float, _only(lambda value: _is_number(value) and value >= 0, "a number not below 0")]

@@ -42,10 +42,8 @@ def read_toolpath(path: str | Path, **options: Any) -> Toolpath:
     known = [name for name in inspect.signature(reader).parameters if name != "path"]
     unknown = sorted(set(options) - set(known))
     if unknown:
-        takes = ", ".join(known) or "no options"
-        raise InputError(
-            f"{Path(path).name!r} is read by {reader.__name__}, which takes {takes}, not {', '.join(unknown)}"
-        )
+        takes, wrong = (", ".join(f"{name}=" for name in names) for names in (known, unknown))
+        raise InputError(f"{Path(path).name!r} is read by {reader.__name__}, which takes {takes}, not {wrong}")
     toolpath = reader(path, **options)
     for note in toolpath.notes:
         warnings.warn(f"{Path(path).name}: {note}", PathControlWarning, stacklevel=2)
