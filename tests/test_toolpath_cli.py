@@ -182,7 +182,7 @@ def test_the_arm_begins_on_the_path_and_in_time(experiment):
         ("position = [0.3, -0.05, 0.7]", "position = [3.0, -0.05, 0.7]", "task: contour 0 of 1 .*: "),
         ("clearance = 0.0", "clearance = -1.0", "task.clearance = -1.0, expected a number not below 0"),
         ("clearance = 0.0", 'unit = "furlong"', "furlong"),
-        ("clearance = 0.0", "ppi = 96.0", "task.file: .*which takes unit, tool_start, .*, not ppi"),
+        ("clearance = 0.0", "ppi = 96.0", "task.file: .*which takes unit =, tool_start =, .*, not ppi ="),
         ('tool = { frame = "tool"', 'tool = { frame = "hand"', "robot.tool: .*has no frame 'hand'"),
         ("clearance = 0.0", 'orientation = "up"', "task.orientation = 'up', expected 'free', 'down'"),
         ('angle_unit = "deg"', 'angle_unit = "deg"\nlaps = 2', "laps = 2, expected .*closed path"),
