@@ -276,7 +276,7 @@ def test_another_frame_can_be_the_tool(arm: RobotModel) -> None:
     np.testing.assert_allclose(line[0], arm.frame_pose(run.array("q")[0, 0], "link_2")[:3, 3], atol=1e-6)
 
 
-def test_the_tool_is_the_last_link_that_carries_no_other(arm: RobotModel, odd: RobotModel) -> None:
+def test_the_tool_is_the_end_of_the_arm(arm: RobotModel, odd: RobotModel) -> None:
     assert default_tool(arm) == "tool"
     assert default_tool(odd) == "tip"
 

@@ -10,11 +10,12 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.analysis.contours import contour_numbers, tool_speed
-from pathcontrol.analysis.known import known_toolpath, where_known
+from pathcontrol.analysis.known import known_task, known_toolpath, where_known
 from pathcontrol.analysis.limit_shares import limit_ratios
 from pathcontrol.analysis.progress import progress
 from pathcontrol.analysis.window import Samples, Window, own_samples, samples_of
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
@@ -24,13 +25,16 @@ from pathcontrol.toolpaths.contour import Contour
 def tool_positions(run: Run, robot: RobotModel | None = None, frame: str | None = None) -> Array:
     """Where the origin of a frame was [m], (rollout, time, 3), in the base frame.
 
-    By default of the run's own robot, and of the frame that follows its toolpath.
+    By default of the run's own robot, and of the frame that its path was made for, or the tool in it.
+
+    Raises:
+        InputError: no frame is given, and the path of the run was made for none.
     """
     expect("run", run, Run)
     arm = run.robot if robot is None else robot
     expect("robot", arm, RobotModel)
-    name = known_toolpath(run, None).frame if frame is None else frame
-    return where_known(lambda q: arm.frame_pose(q, name)[..., :3, 3], run.array("q"))
+    name, tip = _tool(known_task(run, None)) if frame is None else (frame, np.eye(4)[3])
+    return where_known(lambda q: (arm.frame_pose(q, name) @ tip)[..., :3], run.array("q"))
 
 
 def tool_deviation(
@@ -43,7 +47,7 @@ def tool_deviation(
     Args:
         run: what happened.
         robot: the arm that it happened to; by default the run's own.
-        frame: the tool's frame; by default that of the run's toolpath.
+        frame: the tool's frame; by default the one that the run's path was made for.
         contours: the contour of each path of the run in the robot's base frame, or one for all; a run of several
             paths is measured at each sample against the contour of the path it was on. By default those of the run's
             toolpath.
@@ -173,3 +177,10 @@ def _mean(values: Array) -> float:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(_mean(values**2)))
+
+
+def _tool(task: PathTask) -> tuple[str, Array]:
+    """The frame that a path was made for, and the tip of the tool in it, homogeneous (4,)."""
+    if task.frame is None:
+        raise InputError(f"the {type(task).__name__} of the run was not made for a frame of the arm; give frame=…")
+    return task.frame, (np.eye(4) if task.tool_pose is None else task.tool_pose)[:, 3]

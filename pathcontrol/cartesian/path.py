@@ -94,6 +94,7 @@ class CartesianPath(SplinePath):
         constraint = ToolConstraint.of(carried, self.curve, self.orientation, tolerances)
         spline, self.report = solve(constraint, first, closed)
         super().__init__(spline, speed, closed)
+        self.tool_pose = carried.pose
         self.start_posture = readonly(self.q_d(np.array(self.s0)))
 
     def theta(self, s: Array) -> Array:
@@ -112,7 +113,7 @@ class CartesianPath(SplinePath):
 
     def _question(self, speed: float, tool: Tool) -> None:
         """Warn of a feed, a tolerance or a curve that is far beyond the arm."""
-        robot, frame = tool.robot, self.frame
+        robot, frame = tool.robot, tool.frame
         question_speed("the speed of the tool", speed, robot, frame)
         question_length("tolerance", self.tolerance, robot, frame, share=_COARSEST)
         points = self.curve.position(np.linspace(self.curve.s0, self.curve.s_end, _LOOKED_AT))

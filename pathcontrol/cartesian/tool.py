@@ -40,6 +40,11 @@ class Tool:
         object.__setattr__(self, "_offset", readonly(_transform(self.offset)))
         self.robot.frame_pose(np.zeros(self.robot.n), self.frame)  # an unknown frame is told here
 
+    @property
+    def pose(self) -> Array | None:
+        """Pose of the tool in its frame, (4, 4); None for the frame itself."""
+        return None if self.offset is None else self._offset
+
     def kinematics(self, q: Array) -> ToolKinematics:
         """Pose and Jacobian at q (N, n)."""
         pose, jacobian = self.robot.frame_kinematics(q, self.frame)

@@ -87,8 +87,7 @@ def _write_figures(run: Run, setup: Setup, path: Path) -> dict[str, Path]:
 def _write_html(run: Run, setup: Setup, path: Path) -> Path:
     from pathcontrol.view.film.recorder import record
 
-    tool = setup.task.frame if isinstance(setup.task, ToolpathTask) else None
-    record(run, setup.plant, task=setup.task, tool=tool).save(path)
+    record(run, setup.plant, task=setup.task).save(path)
     return path
 
 

@@ -56,11 +56,16 @@ class PathTask(ABC):
         s0: first path parameter.
         s_end: last path parameter; ``inf`` for a path that does not end.
         period: for a closed path, the period of q_d and ϑ in s; else ``None``.
+        frame: name of the frame of the arm that the path was made for, such as its tool; ``None`` where none is said.
+            What is made from the path keeps it, and films, figures and metrics show it.
+        tool_pose: pose in that frame of what follows the path, (4, 4); ``None`` for the frame itself.
     """
 
     s0: float = 0.0
     s_end: float = np.inf
     period: float | None = None
+    frame: str | None = None
+    tool_pose: Array | None = None
 
     single = False
 
@@ -209,6 +214,12 @@ class PathTask(ABC):
         """Name and public parameters, for the record of a run."""
         return {"task": type(self).__name__} | plain_attributes(self)
 
+    def keep_tool(self, *paths: PathTask) -> None:
+        """Take over the frame that ``paths`` were made for, and what follows them in it, if it is the same for all."""
+        frame, pose = paths[0].frame, paths[0].tool_pose
+        if isinstance(frame, str) and all(path.frame == frame and _same(path.tool_pose, pose) for path in paths):
+            self.frame, self.tool_pose = frame, pose
+
     # --- inside ---------------------------------------------------------------------------------------------
 
     def _differentiator(self, function: Any) -> Differentiator:
@@ -239,6 +250,7 @@ class Reprofiled(PathTask):
     def __init__(self, path: PathTask, profile: VelocityProfile) -> None:
         self.path, self.profile = path, profile
         self.s0, self.s_end, self.period = path.s0, path.s_end, path.period
+        self.keep_tool(path)
 
     def q_d(self, s: Array) -> Array:
         return self.path.q_d(s)
@@ -273,6 +285,11 @@ class Reprofiled(PathTask):
 
     def describe(self) -> dict[str, Any]:
         return self.path.describe() | self.profile.describe()
+
+
+def _same(a: Array | None, b: Array | None) -> bool:
+    """Whether two poses, or the lack of them, are the same."""
+    return a is b or (a is not None and b is not None and np.array_equal(a, b))
 
 
 def _short(value: Any) -> str:

@@ -48,6 +48,7 @@ class TaskBatch(PathTask):
         if self.tasks[0].closed:
             self.period = _number([task.period for task in self.tasks])
         self._n = self.tasks[0].n
+        self.keep_tool(*self.tasks)
 
     def __len__(self) -> int:
         return len(self.tasks)

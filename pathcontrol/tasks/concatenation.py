@@ -62,6 +62,7 @@ class ConcatenatedPath(PathTask):
     def __init__(self, paths: Sequence[PathTask], blend: float | None = None) -> None:
         self.blend = 0.0 if blend is None else scalar("blend", blend, positive=True)
         self.paths = _checked(paths)
+        self.keep_tool(*self.paths)
         self.s0 = self.paths[0].s0
         self._pieces = self._joined()
         self._starts = np.array([piece.start for piece in self._pieces])

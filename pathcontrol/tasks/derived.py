@@ -16,6 +16,7 @@ class DerivedPath(PathTask):
     def __init__(self, path: PathTask) -> None:
         refuse_batch(f"the path of a {type(self).__name__}", path)
         self.path = path
+        self.keep_tool(path)
 
     def _keep_domain(self) -> None:
         """The domain is that of the path underneath."""

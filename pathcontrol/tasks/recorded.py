@@ -88,6 +88,8 @@ class RecordedPath(PathTask):
         projects: whether an endless path has a projection.
         knots: where the pieces of a path made of pieces meet, (K,).
         original: the name of the class it was.
+        frame: the frame of the arm that it was made for.
+        tool_pose: pose in that frame of what follows it, (4, 4).
 
     Raises:
         InputError: wrong shapes, values that are not finite, parameters that do not increase.
@@ -104,11 +106,14 @@ class RecordedPath(PathTask):
         projects: bool = True,
         knots: ArrayLike | None = None,
         original: str = "",
+        frame: str | None = None,
+        tool_pose: ArrayLike | None = None,
     ) -> None:
         self.samples, self.jets = _checked(samples, jets, 3)
         self.profile, self.endless, self.projects, self.original = profile, endless, projects, original
         self.s0, self._last, self.period = float(self.samples[0]), float(self.samples[-1]), period
         self.s_end = np.inf if endless or period is not None else self._last
+        self.frame, self.tool_pose = _checked_tool(frame, tool_pose)
         self._knots = None if knots is None else readonly(finite("knots", as_array("knots", knots)))
 
     @classmethod
@@ -135,6 +140,8 @@ class RecordedPath(PathTask):
             projects=not endless or type(task).sigma_bar is not PathTask.sigma_bar,
             knots=task.knots,
             original=type(task).__name__,
+            frame=task.frame,
+            tool_pose=task.tool_pose,
         )
 
     @property
@@ -211,6 +218,17 @@ def _within(s: Array, knots: Array, period: float | None) -> Array:
     if period is None:
         return np.clip(s, knots[0], knots[-1])
     return knots[0] + np.mod(s - knots[0], period)
+
+
+def _checked_tool(frame: str | None, tool_pose: ArrayLike | None) -> tuple[str | None, Array | None]:
+    if not isinstance(frame, str | None):
+        raise InputError(f"frame = {frame!r}, expected the name of a frame, or None")
+    if tool_pose is None:
+        return frame, None
+    pose = finite("tool_pose", as_array("tool_pose", tool_pose))
+    if pose.shape != (4, 4):
+        raise InputError(f"tool_pose has shape {pose.shape}, expected (4, 4)")
+    return frame, readonly(pose)
 
 
 def _checked(s: ArrayLike, jets: ArrayLike, order: int) -> tuple[Array, Array]:

@@ -49,6 +49,7 @@ class PathSequence(PathTask):
                     f"path {i} of the sequence does not end; take a part of it, as path.between(s0, s_end)"
                 )
         self._check_meeting()
+        self.keep_tool(*self.paths)
         lengths = [path.s_end - path.s0 for path in self.paths]
         self.starts = readonly(np.concatenate([[0.0], np.cumsum(lengths)]))
         self.s0, self.s_end = 0.0, float(self.starts[-1])

@@ -41,7 +41,10 @@ _MADE: dict[type, tuple[str, ...]] = {
     Laps: ("path", "laps"),
     Reprofiled: ("path", "profile"),
     PathSequence: ("paths", "gaps"),
-    RecordedPath: ("samples", "jets", "profile", "period", "endless", "projects", "knots", "original"),
+    RecordedPath: (
+        *("samples", "jets", "profile", "period", "endless", "projects", "knots"),
+        *("original", "frame", "tool_pose"),
+    ),
     ConstantRate: ("rate",),
     ConstantSpeed: ("speed",),
     TabulatedProfile: ("s", "squared", "period"),

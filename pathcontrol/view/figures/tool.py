@@ -34,7 +34,7 @@ from pathcontrol.view.figures.style import (
     style,
 )
 from pathcontrol.view.figures.words import legend
-from pathcontrol.view.tool import default_tool
+from pathcontrol.view.tool import with_tool
 
 _AXES = "xyz"
 _MOST_POSES = 50_000
@@ -81,8 +81,8 @@ def tool_figure(
         run: a run, or several by their names.
         robot: the arm; by default each run's own.
         task: the path; by default each run's own, where it knows it.
-        tool: the frame that is drawn; by default that of the toolpath, or the last frame of the robot that is a link
-            carrying no other.
+        tool: the frame that is drawn; by default the one that the path was made for, or the end of the robot's longest
+            limb.
         errors: colour the path taken by its distance from the desired one; for one run.
         rollout: which rollout of each run.
 
@@ -153,7 +153,7 @@ def wide_axes(points: Sequence[Array]) -> tuple[int, int]:
 def _way(one: Shown, robot: RobotModel | None, tool: str | None) -> Way:
     robot = one.run.robot if robot is None else robot
     expect("robot", robot, RobotModel)
-    frame = default_tool(robot, one.task) if tool is None else tool
+    robot, frame = with_tool(robot, one.task, tool)
     q = drawable(one.run.array("q")[0])
     some = slice(None, None, -(-len(q) // _MOST_POSES))
     return Way(_positions(robot, q[some], frame), _cutting(one)[some], _desired(one, robot, frame))

@@ -18,7 +18,7 @@ from pathcontrol.view.bodies.sticks import stick_figure
 from pathcontrol.view.bodies.visuals import LinkVisual, link_visuals
 from pathcontrol.view.film.palette import run_color
 from pathcontrol.view.film.take import Take
-from pathcontrol.view.tool import default_tool
+from pathcontrol.view.tool import with_tool
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import UrdfSource
@@ -56,7 +56,7 @@ def cast_takes(
         if arm.source not in looks:
             looks[arm.source] = link_visuals(arm.source, FINENESS) or stick_figure(arm.source)
         path = path if "s" in one.data else None  # where on it the arm should be is not known
-        frame = default_tool(arm, path) if tool is None else tool
+        arm, frame = with_tool(arm, path, tool)
         part, visuals = _until_it_diverged(part), looks[arm.source]
         takes.append(Take(str(name), part, arm, path, frame, visuals, run_color(i), one.rollouts))
     return takes

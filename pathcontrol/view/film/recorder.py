@@ -52,8 +52,8 @@ def record(
         rollout: which of the rollouts, counted from 0.
         layout: several arms ``"beside"`` one another, or ``"ghosted"``: in one another, all but the first
             see-through and in the colour of their run.
-        tool: the frame whose path is drawn; by default the one that follows the drawing of a toolpath, or the last of
-            ``robot.frame_names`` that is a link carrying no other, such as ``tool`` or ``tool0``.
+        tool: the frame whose path is drawn; by default the one that the task was made for, and the tool in it, or else
+            the end of the robot's longest limb, such as ``tool`` or ``tool0``.
 
     Raises:
         InputError: run, robot and task do not belong together, a run does not know its robot and none is given,
