@@ -188,7 +188,7 @@ def test_a_sequence_is_marked_where_it_diverges(arm):
     first, second = Line([0.2, -0.3], [0.6, 0.2], 1.5), Line([0.6, 0.2], [0.9, 0.6], 1.5)
     laws = [law("plan", arm, first, 800.0), law("plan", arm, second, WILD), law("plan", arm, first, 800.0)]
     with pytest.raises(SimulationError, match=r"rollout 0 diverged at t = .* s: its state left") as error:
-        simulate_sequence(laws, [0.2, -0.3], duration=3.0, progress=False)
+        simulate_sequence(laws, [0.2, -0.3], duration=3.0, gaps=True, progress=False)
     run = error.value.run
     assert run.status[0] == "diverged"
     assert list(run["path_status"].to_numpy()) == ["finished", "diverged", "waiting"]

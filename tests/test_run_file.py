@@ -267,7 +267,7 @@ def test_an_experiment_keeps_its_text(tmp_path):
 def test_a_sequence_knows_its_paths(arm, tmp_path):
     paths = [Line([0.1, 0.2], [0.4, 0.1], 1.0), Circle(0.3, 1.0), Lemniscate().between(0.3, 0.8)]
     laws = [ExtendedMotionPlan(arm, path, friction="full", **GAINS) for path in paths]
-    run = simulate_sequence(laws, [0.1, 0.2], duration=5.0, laps=2, progress=False)
+    run = simulate_sequence(laws, [0.1, 0.2], duration=5.0, laps=2, gaps=True, progress=False)
     loaded = saved(run, tmp_path)
     assert np.array_equal(loaded.task.starts, run.task.starts)
     assert np.array_equal(np.diff(run.task.starts)[:2], [paths[0].s_end, 4 * np.pi])

@@ -58,7 +58,7 @@ def by_hand(controllers, q, duration, **options):
 @settings(max_examples=3)
 def test_a_sequence_is_each_path_by_hand(arm, makers, speed, offset):
     laws = [make(arm, speed) for make in makers]
-    run = simulate_sequence(laws, HOME + offset, duration=9.0, progress=False)
+    run = simulate_sequence(laws, HOME + offset, duration=9.0, gaps=True, progress=False)
     runs = by_hand(laws, HOME + offset, 9.0)
     assert list(run.data["path_status"].to_numpy()) == ["finished"] * 3
     for i, alone in enumerate(runs):
@@ -102,7 +102,7 @@ def test_nothing_happens_at_the_seams(arm):
 
 def test_a_path_that_is_not_finished_ends_the_sequence(arm):
     laws = [there(arm), back(arm), around(arm), there(arm)]
-    run = simulate_sequence(laws, HOME, duration=[9.0, 0.5, 9.0, 9.0], progress=False)
+    run = simulate_sequence(laws, HOME, duration=[9.0, 0.5, 9.0, 9.0], gaps=True, progress=False)
     assert list(run.data["path_status"].to_numpy()) == ["finished", "running", "waiting", "waiting"]
     assert np.array_equal(np.isnan(run.data["path_finish_time"]), [False, True, True, True])
     assert run.status[0] == "running"
@@ -117,7 +117,7 @@ def test_a_path_that_is_not_finished_ends_the_sequence(arm):
 def test_laps_of_the_closed_ones(arm):
     laws = [around(arm), there(arm)]
     start = laws[0].task.q_d(np.array(0.0))
-    run = simulate_sequence(iter(laws), start, duration=9.0, laps=2, progress=False)
+    run = simulate_sequence(iter(laws), start, duration=9.0, laps=2, gaps=True, progress=False)
     s = run.path(0).array("s")[0]
     assert s[-1] < s[0] + 2 * laws[0].task.period <= s[-1] + 0.05
     assert run.path(1).status[0] == "finished"

@@ -64,8 +64,8 @@ class ContourPaths:
 
     def along(
         self, whole: Sequence[tuple[Contour, Smoothed]], start: ArrayLike | None
-    ) -> Iterator[tuple[PathTask, Contour]]:
-        """The path of each curve with the contour it follows, each from where the one before it ends.
+    ) -> Iterator[tuple[PathTask, Contour, str]]:
+        """The path of each curve, the contour it follows and its posture, each from where the one before it ends.
 
         Raises:
             InputError: the orientation does not suit the contours.
@@ -75,28 +75,27 @@ class ContourPaths:
         for i, (contour, smooth) in enumerate(whole):
             for j, curve in enumerate(smooth.curves):
                 try:
-                    path = self._path(contour, curve, self._orientation(whole, i, j), start)
+                    path, posture = self._path(contour, curve, self._orientation(whole, i, j), start)
                 except (TaskError, InputError) as error:
                     name = f" ({contour.name})" if contour.name else ""
                     raise TaskError(f"contour {i} of {len(whole)}{name}: {error}") from error
-                yield path, contour
+                yield path, contour, posture
                 start = path.q_d(np.array(path.s_end))
 
-    def start_on(self, tour: ToolCurve) -> Array | None:
-        """A posture at the beginning of a curve from which all of it is in reach, or None."""
+    def start_on(self, tour: ToolCurve) -> CartesianPath | None:
+        """The path along a curve from a posture that is searched, or None if not all of it is in reach."""
         orientation = self.held if isinstance(self.held, Orientation) else None
         if orientation is None and self.held != "free":
             orientation = NormalOrientation(self.up)
         try:
-            found = CartesianPath(self.robot, self.frame, tour, orientation, speed=self.rapid_speed)
+            return CartesianPath(self.robot, self.frame, tour, orientation, speed=self.rapid_speed)
         except (TaskError, InputError):
             return None  # the contours themselves may still be in reach
-        return found.start_posture
 
     def _path(
         self, contour: Contour, curve: ToolCurve, orientation: Orientation | None, start: ArrayLike | None
-    ) -> PathTask:
-        """One curve as a path of the joints, at its feed within the acceleration of the tool."""
+    ) -> tuple[PathTask, str]:
+        """One curve as a path of the joints, at its feed within the acceleration of the tool, and its posture."""
         speed = self.rapid_speed if contour.rapid else contour.feed or self.feed
         assert speed is not None
         path = CartesianPath(self.robot, self.frame, curve, orientation, speed=speed, start=start, closed=False)
@@ -105,7 +104,7 @@ class ContourPaths:
         )
         # at once as fast as friction lets go of: a plan that waits for the arm would wait for ever at a creep
         begin = min(speed, _START_TIME * self.acceleration)
-        return path.with_profile(limited(path, limit, start_rate=begin))
+        return path.with_profile(limited(path, limit, start_rate=begin)), path.posture
 
     def _check_held(self, whole: Sequence[tuple[Contour, Smoothed]]) -> None:
         if self.held == "normals" and all(contour.normals is None for contour, _ in whole):

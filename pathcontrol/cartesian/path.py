@@ -50,7 +50,8 @@ class CartesianPath(SplinePath):
             :class:`FixedOrientation`, :class:`TangentOrientation` or :class:`NormalOrientation`.
         speed: feed of the tool [m/s].
         start: posture (n,) at the beginning, moved onto the curve if it is not there; None to have one searched from
-            which the whole curve is followed, away from singularities and limits.
+            which the whole curve is followed: with all joints above the base plane if there is one, away from
+            singularities and limits, and of those the one with the highest elbow.
         tolerance: largest distance between the tool and p(s) [m].
         angle_tolerance: largest angle between the tool and its orientation at s [rad].
         tool: pose of the tool in ``frame``, (4, 4), or its tip [m], (3,); None for the frame itself.
@@ -59,6 +60,7 @@ class CartesianPath(SplinePath):
     Attributes:
         report: what was measured, a :class:`CartesianReport`.
         start_posture: q_d(s0) [rad], (n,).
+        posture: which posture was chosen, in words.
 
     Raises:
         InputError: an argument has the wrong shape or value.
@@ -95,6 +97,7 @@ class CartesianPath(SplinePath):
         spline, self.report = solve(constraint, first, closed)
         super().__init__(spline, speed, closed)
         self.tool_pose = carried.pose
+        self.posture = self.report.posture
         self.start_posture = readonly(self.q_d(np.array(self.s0)))
 
     def theta(self, s: Array) -> Array:

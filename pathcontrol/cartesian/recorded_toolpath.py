@@ -34,6 +34,7 @@ class RecordedToolpath(ToolpathTask):
         source: the file that the contours come from.
         unit: that file's unit of length.
         rotations: how many rotations of the tool are prescribed; older files do not say.
+        posture: which posture was chosen, in words.
     """
 
     def __init__(
@@ -53,12 +54,14 @@ class RecordedToolpath(ToolpathTask):
         source: str,
         unit: str,
         rotations: int = 0,
+        posture: str = "",
     ) -> None:
         PathSequence.__init__(self, paths)
         self.frame, self.workpiece, self.feed = frame, rigid("workpiece", workpiece), feed
         self.rotations = rotations
         self.rapid_speed, self.acceleration = rapid_speed, acceleration
         self.tolerance, self.corner = tolerance, corner
+        self.posture = posture
         self._placed, self._deviation = tuple(placed), deviation
         back = np.linalg.inv(self.workpiece)
         self.drawing = Toolpath(tuple(contour.placed(back) for contour in placed), source, unit)

@@ -11,9 +11,11 @@ from pathcontrol._arrays import Array
 from pathcontrol.cartesian.constraint import ToolConstraint
 from pathcontrol.cartesian.deviation import deviations
 from pathcontrol.cartesian.postures import distance_to_limits
+from pathcontrol.cartesian.preference import PLANE, lowest
 from pathcontrol.cartesian.refinement import Refined
 
 _VALLEYS = 8  # of a function along the path, looked at more closely
+_HEIGHTS = 256  # postures at which heights are measured
 _FINE, _ZOOMS = 33, 3  # points in each, and how often
 
 
@@ -37,6 +39,9 @@ class CartesianReport:
         limit_at: where that is [m].
         fastest: largest ‖q_d'‖ [rad/m], joint motion for a motion of the tool.
         start_postures: number of start postures from which the curve was followed.
+        posture: which posture was chosen, in words.
+        lowest_joint: name of the joint that comes lowest, of those that move the tool.
+        lowest_height: how high that is above the base plane, z = 0 of the base frame [m].
     """
 
     position_deviation: float
@@ -53,10 +58,13 @@ class CartesianReport:
     limit_at: float
     fastest: float
     start_postures: int
+    posture: str
+    lowest_joint: str
+    lowest_height: float
 
 
-def measured(constraint: ToolConstraint, refined: Refined, start_postures: int) -> CartesianReport:
-    """The report on a refined spline."""
+def measured(constraint: ToolConstraint, refined: Refined, start_postures: int, searched: bool) -> CartesianReport:
+    """The report on a refined spline, whose start posture was ``searched`` or given."""
     robot, spline, found, s = constraint.tool.robot, refined.spline, refined.deviations, refined.checks
 
     def conditioning(s: Array) -> Array:
@@ -69,6 +77,7 @@ def measured(constraint: ToolConstraint, refined: Refined, start_postures: int) 
     limit_at = _lowest(distance, refined, distance(s))
     distances = distance_to_limits(robot, spline(limit_at))
     joint = int(np.argmin(distances))
+    lowest_joint, lowest_height = lowest(constraint, spline(s[:: -(-len(s) // _HEIGHTS)]))
     return CartesianReport(
         position_deviation=float(found.position.max()),
         angle_deviation=float(found.angle.max()),
@@ -84,7 +93,18 @@ def measured(constraint: ToolConstraint, refined: Refined, start_postures: int) 
         limit_at=limit_at,
         fastest=float(np.linalg.norm(spline(s, 1), axis=-1).max()),
         start_postures=start_postures,
+        posture=_posture(start_postures, searched, lowest_joint, lowest_height),
+        lowest_joint=lowest_joint,
+        lowest_height=lowest_height,
     )
+
+
+def _posture(start_postures: int, searched: bool, lowest_joint: str, lowest_height: float) -> str:
+    """Which posture was chosen, and whether it keeps above the base plane."""
+    choice = f"the best of {start_postures} searched" if searched else "from the start given"
+    if lowest_height >= -PLANE:
+        return f"{choice}, all joints above the base plane"
+    return f"{choice}, {lowest_joint} down to {-lowest_height:.3g} m below the base plane"
 
 
 def _lowest(function: Callable[[Array], Array], refined: Refined, values: Array) -> float:

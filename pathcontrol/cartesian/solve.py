@@ -12,6 +12,7 @@ from pathcontrol.cartesian.constraint import ToolConstraint
 from pathcontrol.cartesian.continuation import SINGULAR, Stop, Trail, follow
 from pathcontrol.cartesian.inverse_kinematics import InverseKinematics, Samples
 from pathcontrol.cartesian.postures import distance_to_limits, outside
+from pathcontrol.cartesian.preference import by_preference
 from pathcontrol.cartesian.redundancy import rest_curve
 from pathcontrol.cartesian.refinement import Refined, refine
 from pathcontrol.cartesian.refusal import not_closing, refusal
@@ -33,7 +34,7 @@ def solve(constraint: ToolConstraint, start: Array | None, closed: bool) -> tupl
     lap = _best(constraint, trails, closed)
     kinematics = InverseKinematics(constraint, rest_curve(lap.s, lap.q, closed))
     refined = refine(kinematics, lap, closed)
-    report = measured(constraint, refined, len(trails))
+    report = measured(constraint, refined, len(trails), searched=start is None)
     _check_between(constraint, refined, report)
     return refined.spline, report
 
@@ -68,9 +69,9 @@ def posture(robot: RobotModel, start: ArrayLike) -> Array:
 
 
 def _best(constraint: ToolConstraint, trails: list[Trail], closed: bool) -> Samples:
-    """The most comfortable of the trails that go all the way, and come back if they have to."""
+    """The preferred of the trails that go all the way, and come back if they have to."""
     complete = [trail for trail in trails if trail.stop is Stop.NONE]
-    for trail in sorted(complete, key=lambda trail: -trail.comfort):
+    for trail in by_preference(constraint, complete):
         s, q = np.array(trail.s), np.array(trail.q)
         lap = closed_lap(constraint, s, q) if closed else q
         if lap is not None:

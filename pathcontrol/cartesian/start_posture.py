@@ -9,6 +9,7 @@ from pathcontrol.cartesian.constraint import ToolConstraint
 from pathcontrol.cartesian.continuation import Stop, Trail, comforts, verdicts
 from pathcontrol.cartesian.correction import KEPT, Corrected, correct
 from pathcontrol.cartesian.postures import distance_to_limits, unwound
+from pathcontrol.cartesian.preference import above_base
 from pathcontrol.cartesian.reach import reach
 from pathcontrol.cartesian.redundancy import PostureCost
 from pathcontrol.cartesian.refusal import refusal, unreached
@@ -18,10 +19,11 @@ _SEEDS = 256
 _MOST = 12  # start postures from which the whole curve is tried
 _APART = np.pi  # rad; start postures nearer to each other than this are too alike to be worth as much
 _SAME = 1e-3  # rad
+_BELOW = 0.2  # how much a posture with a joint below the base plane is worth
 
 
 def search_starts(constraint: ToolConstraint) -> Array:
-    """Good start postures (N, n), the most comfortable first.
+    """Good start postures (N, n), the most comfortable of those above the base plane first.
 
     Seeds spread over the joint range are moved onto the curve by :func:`reach`. Kept are at most 12 postures that are
     comfortable and differ from each other.
@@ -35,7 +37,8 @@ def search_starts(constraint: ToolConstraint) -> Array:
     fit = stops == Stop.NONE
     if not fit.any():
         raise _no_start(constraint, found)
-    return found.q[_comfortable_and_different(found.q, np.where(fit, comforts(constraint, found), 0.0))]
+    comfort = comforts(constraint, found) * np.where(above_base(constraint, found.q), 1.0, _BELOW)
+    return found.q[_comfortable_and_different(found.q, np.where(fit, comfort, 0.0))]
 
 
 def rewound_starts(constraint: ToolConstraint, trails: list[Trail]) -> Array:

@@ -54,6 +54,7 @@ class ToolpathTask(PathSequence):
         frame: the frame that follows the contours.
         workpiece: pose of the workpiece in the base frame, (4, 4).
         rotations: how many rotations of the tool are prescribed: 3, 2 where it may turn about its z axis, or 0.
+        posture: which posture was chosen, in words.
 
     Raises:
         InputError: an argument has the wrong shape or value, or a cut has no feed.
@@ -93,8 +94,10 @@ class ToolpathTask(PathSequence):
         back = np.linalg.inv(pose)
         self.drawing = Toolpath(tuple(contour.placed(back) for contour, _ in whole), toolpath.source, toolpath.unit)
         maker = ContourPaths(robot, frame, orientation, pose[:3, 2], feed, self.rapid_speed, self.acceleration)
-        first = maker.start_on(_tour(toolpath, pose)) if start is None else start
-        paths, contours = zip(*maker.along(whole, first), strict=True)
+        found = maker.start_on(_tour(toolpath, pose)) if start is None else None
+        first = start if found is None else found.start_posture
+        paths, contours, postures = zip(*maker.along(whole, first), strict=True)
+        self.posture = postures[0] if found is None else found.posture
         self.contours: tuple[Contour, ...] = contours
         super().__init__(paths)
 
@@ -104,7 +107,7 @@ class ToolpathTask(PathSequence):
         return max(smoothed.deviation for smoothed in self.smoothed)
 
     def describe(self) -> dict[str, Any]:
-        names = ("frame", "feed", "rapid_speed", "acceleration", "tolerance", "corner", "deviation")
+        names = ("frame", "feed", "rapid_speed", "acceleration", "tolerance", "corner", "deviation", "posture")
         counts = {"contours": len(self.drawing), "paths": len(self.paths)}
         return {"task": "ToolpathTask"} | {name: getattr(self, name) for name in names} | counts
 

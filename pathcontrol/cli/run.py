@@ -65,6 +65,8 @@ def _tell(done: Outcome, as_json: bool) -> None:
     click.echo(repr(done.run))
     cuts = "path_time" in done.metrics and "tool_deviation_peak" in done.metrics
     click.echo(f"  errors are of {'the cuts' if cuts else told()}, torques and shares of limits of all of it")
+    if posture := getattr(done.run.task, "posture", ""):
+        click.echo(f"  posture: {posture}")
     for line in metric_lines(done.metrics, done.run):
         click.echo(f"  {line}")
     for table in contour_lines(done.run):

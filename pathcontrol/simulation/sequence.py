@@ -53,6 +53,7 @@ def simulate_sequence(
     *,
     duration: ArrayLike,
     laps: int = 1,
+    gaps: bool = False,
     task: PathSequence | None = None,
     plant: RobotModel | None = None,
     loop: SampledLoop | ContinuousTime | None = None,
@@ -76,6 +77,8 @@ def simulate_sequence(
         qd: initial joint velocities [rad/s], (n,); default at rest.
         duration: longest time for each path [s]: one for all, or one for each, (paths,).
         laps: how many times each closed path is gone round.
+        gaps: whether a path may begin elsewhere than where the one before it ends, so that the arm goes there as its
+            law does from any start; without it such paths are refused.
         task: the whole that the controllers' tasks are the paths of, such as a :class:`ToolpathTask`: the run knows it
             then, with all that it says beside the paths; default a :class:`PathSequence` of these tasks.
         plant: the arm that is really there; default the model of the first controller.
@@ -84,7 +87,8 @@ def simulate_sequence(
         progress: show a bar on standard error when it takes longer than two seconds.
 
     Raises:
-        InputError: an argument has the wrong shape or value, or a path neither ends nor repeats.
+        InputError: an argument has the wrong shape or value, a path neither ends nor repeats, or one does not begin
+            where the one before it ends and ``gaps`` are not allowed.
         SimulationError: the arm diverged; ``run`` of the error holds what happened until then.
     """
     laws = _checked_controllers(controllers)
@@ -95,7 +99,7 @@ def simulate_sequence(
     q0, qd0 = _one_state(q, qd, robot.joint_names)
     period, ends = period_of(loop, durations.min()), [_finish(law, laps) for law in laws]
     check_length(float(durations.sum()), loop, 1, robot.n, ends=True)
-    whole = _whole(laws, laps) if task is None else _checked_whole(task, laws, laps)
+    whole = _whole(laws, laps, gaps) if task is None else _checked_whole(task, laws, laps)
     for law in laws:
         check_joints(law, robot)
         check_law(law, q0, qd0)
@@ -160,9 +164,9 @@ def _checked_controllers(controllers: Iterable[Controller]) -> list[Controller]:
     return laws
 
 
-def _whole(laws: Sequence[Controller], laps: int) -> PathSequence:
-    """The tasks one after another as the run strings them; the arm goes over the gaps by itself."""
-    return PathSequence([Laps(law.task, laps) if law.task.closed else law.task for law in laws], gaps=True)
+def _whole(laws: Sequence[Controller], laps: int, gaps: bool) -> PathSequence:
+    """The tasks one after another as the run strings them."""
+    return PathSequence([Laps(law.task, laps) if law.task.closed else law.task for law in laws], gaps=gaps)
 
 
 def _checked_whole(task: PathSequence, laws: Sequence[Controller], laps: int) -> PathSequence:

@@ -126,6 +126,7 @@ class PathSequence(PathTask):
             if gap.max() > _MEET:
                 joint = int(np.argmax(gap))
                 raise InputError(
-                    f"path {i + 1} begins {gap[joint]:.3g} rad away from the end of path {i}, at joint {joint + 1}; "
-                    "put a path in between"
+                    f"path {i + 1} begins {gap[joint]:.3g} rad away from the end of path {i}, at joint {joint + 1}: at "
+                    f"{start[joint]:.6g} after {end[joint]:.6g}, expected at most {_MEET:g} rad; put a path in "
+                    "between, begin it with the posture at that end (start=…), or allow it by gaps=True"
                 )

@@ -151,6 +151,7 @@ def _toolpath_recipe(task: ToolpathTask, shelf: Shelf) -> dict[str, Any]:
         **{name: _value(getattr(task, name), shelf, None, True) for name in _TOOLPATH},
         "source": task.drawing.source,
         "unit": task.drawing.unit,
+        "posture": task.posture,
     }
 
 
