@@ -21,7 +21,7 @@ _FINE, _ZOOMS = 33, 3  # points in each, and how often
 
 @dataclass(frozen=True)
 class CartesianReport:
-    """What was measured between the knots, on ``points`` places that the refinement had not looked at.
+    """What was measured at the knots and on more places between them, ``points`` in all.
 
     Attributes:
         position_deviation: largest distance between the tool and p(s) [m].
