@@ -38,7 +38,7 @@ def by_preference(constraint: ToolConstraint, trails: Sequence[Trail]) -> list[T
     higher their joints on average the sooner; then the others by comfort.
     """
     height = [heights(constraint, _some(trail)) for trail in trails]
-    above = np.array([bool((h >= -PLANE).all()) for h in height])
+    above = np.array([(h >= -PLANE).all() for h in height], dtype=bool)
     comfort = np.array([trail.comfort for trail in trails])
     best = np.array([comfort[above == side].max() for side in above])
     good = comfort >= _AS_COMFORTABLE * best
