@@ -68,6 +68,8 @@ class CartesianPath(SplinePath):
             message says at which s and point, and what to change.
     """
 
+    frame: str
+
     def __init__(
         self,
         robot: RobotModel,

@@ -61,6 +61,8 @@ class ToolpathTask(PathSequence):
         TaskError: a contour cannot be followed; the message says which, where and why.
     """
 
+    frame: str
+
     def __init__(
         self,
         robot: RobotModel,
