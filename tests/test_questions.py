@@ -108,3 +108,25 @@ def test_the_extent_of_two_links_is_that_of_their_lengths(arm):
     assert 0.8 * 20 * (0.9 + 0.45) < found.speed <= 20 * (0.9 + 0.45) * (1 + 1e-9)
     height = np.linalg.norm(arm.frame_pose([0.0, 0.0], "joint_1")[:3, 3])
     assert 0.8 * (height + 0.9) < found.reach <= np.hypot(height + 0.9, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("line", "questioned"),
+    [
+        ('payload = { mass = 1.0, frame = "tool", com = [0.0, 0.0, 50.0] }', "robot.payload.com is 50 m long"),
+        ('payload = { mass = 1.0, frame = "tool", com = [0.0, 0.0, "50 mm"] }', ""),
+        ('tool = { frame = "tool", position = [0.0, 0.0, 120.0] }', "robot.tool.position is 120 m long"),
+        ('tool = { frame = "tool", position = [0.0, 0.0, 0.12] }', ""),
+    ],
+)
+def test_an_offset_longer_than_the_arm_is_questioned(tmp_path, line, questioned):
+    from pathcontrol.experiments.template import example_text
+
+    file = tmp_path / "experiment.toml"
+    text = example_text().replace('source = "cicese_2dof"', f'source = "cicese_2dof"\n{line}', 1)
+    file.write_text(text, encoding="utf-8")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        load_setup(file)
+    told = [str(one.message) for one in caught if "did you mean" in str(one.message)]
+    assert (bool(told) and questioned in told[0]) if questioned else not told

@@ -12,6 +12,7 @@ from pathcontrol.experiments.placement import pose_of
 from pathcontrol.experiments.schema import Experiment
 from pathcontrol.experiments.section import converted
 from pathcontrol.robot.catalogue import find_urdf
+from pathcontrol.robot.extent import question_offset
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.robot.urdf import parse_urdf
@@ -81,6 +82,7 @@ def _with_tool(robot: RobotModel, experiment: Experiment) -> RobotModel:
     if tool is None:
         return robot
     pose = pose_of("robot.tool", tool.arguments(experiment.to_radians))
+    question_offset("robot.tool.position", tool.position or (0.0,), robot)
     with keyed("robot.tool", ("name", "frame")):
         return robot.with_frame(tool.name, tool.frame, pose)
 
@@ -109,5 +111,6 @@ def _refuse_degrees(robot: RobotModel, sliding: set[str]) -> None:
 def _carrying(key: str, robot: RobotModel, payload: Payload | None) -> RobotModel:
     if payload is None:
         return robot
+    question_offset(f"{key}.com", payload.com or (0.0,), robot)
     with keyed(key, ("mass", "com")):
         return robot.with_payload(**payload.arguments(float))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +30,7 @@ class Extent(NamedTuple):
     speed: float
 
 
+@lru_cache(maxsize=4)  # of the arm that a toolpath asks about for each of its contours
 def extent(robot: RobotModel, frame: str) -> Extent:
     """Return how far and how fast a frame of an arm can be."""
     limits = robot.limits
@@ -58,6 +61,20 @@ def question_length(name: str, length: float, robot: RobotModel, frame: str, sha
         warnings.warn(
             f"{name} = {length:g} m, but {frame!r} of {robot.name} reaches some {reach:.2g} m; did you mean "
             f"{length:g} mm, which is {1e-3 * length:g}?",
+            PathControlWarning,
+            stacklevel=3,
+        )
+
+
+def question_offset(name: str, offset: Sequence[float], robot: RobotModel) -> None:
+    """Warn of an ``offset`` [m] on an arm that is longer than the arm itself: it is likely in millimetres."""
+    length = float(np.linalg.norm(offset))
+    poses = robot.frame_poses(np.zeros(robot.n), robot.frame_names)
+    size = float(np.linalg.norm(poses[..., :3, 3], axis=-1).max())
+    if size > 0 and length > size:
+        warnings.warn(
+            f"{name} is {length:g} m long, but {robot.name} is some {size:.2g} m; did you mean {length:g} mm, which is "
+            f"{1e-3 * length:g}?",
             PathControlWarning,
             stacklevel=3,
         )
