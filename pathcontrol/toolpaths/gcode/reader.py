@@ -34,11 +34,15 @@ def read_gcode(
     Cuts (G1, G2 and G3, one after another, at one feed) and rapids (G0, straight) are contours, called by their first
     line: ``"N20"``, or ``"line 14"`` where it has no number. What is not understood is refused, never guessed.
 
-    - Motion: G0, G1, and the arcs G2 and G3 by I J K or R, helices too, in the planes of G17, G18 and G19.
+    - Motion: G0, G1, and the arcs G2 and G3 by I J K or R, helices and turns P too, in the planes of G17, G18 and G19;
+      the drilling cycles G73, G81, G82 and G83, with G98 and G99, as the moves that they stand for.
     - Modes: G20 inch, G21 mm; G90 absolute, G91 relative; G90.1 and G91.1, the same for centres; G80 no motion; G94,
       F is per minute. At the beginning G17, G90 and G91.1 are in force.
-    - No effect here: G4 P, G40, G43, G49, G54, G61, G61.1, G64, G97, M0, M1, M3-M9, S, T, comments, line numbers,
-      program numbers and %. The coordinates are those of the tool's tip in one workpiece frame.
+    - No effect here: G4, G15, G40, G43, G49, G61, G61.1, G64, G67, G69, G97, M0, M1, M3-M9, S, T, comments, line
+      numbers, program numbers and %. Smoothing (G5 P, G5.1 Q, G187, …), outputs and overrides (M62-M68, M48-M53, …) and
+      rotary axes that stay where they are have none either, and are told in :attr:`Toolpath.notes`.
+    - The coordinates are those of the tool's tip in one workpiece frame, one of G54 to G59.3; G92 before the first move
+      says where the tool is.
     - M2, M30 and the second % end the program; what follows is not read.
     - Where the tool is at the beginning is in no program. An axis is known once the program gives it absolutely; rapids
       before that are left out, cuts refused. An axis that is named nowhere is 0. After G28, G30 and G53 G0 the axes are
