@@ -225,9 +225,16 @@ WHOLE = [
     '<clipPath id="c"><path d="M0 0H100V50H0z"/></clipPath>',
     '<clipPath id="c" transform="translate(-5 -5)"><polygon points="0,0 0,60 110,60 110,0"/></clipPath>',
     '<clipPath id="c"><circle cx="50" cy="25" r="56"/></clipPath>',
+    '<rect id="page" x="-9" width="100" height="50"/><clipPath id="c"><use href="#page" x="9"/></clipPath>',
     '<clipPath id="c"><rect width="1" height="1"/><rect width="100" height="50"/></clipPath>',
     '<clipPath id="c" clipPathUnits="objectBoundingBox"><rect width="1" height="1"/></clipPath>',
 ]
+
+
+def test_a_shape_without_length_is_told(read):
+    """An arc from a point to itself draws nothing, by the specification, whatever was meant."""
+    found = read('<path id="whole" d="M10 10A5 5 0 1 1 10 10"/>' + SEEN)
+    assert found.notes == ("a shape without length was passed over once: path 'whole' (line 1)",)
 
 
 @pytest.mark.parametrize("clip", WHOLE)

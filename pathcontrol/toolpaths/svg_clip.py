@@ -23,6 +23,7 @@ from pathcontrol.toolpaths.svg_values import Viewport, transform
 _LINK = re.compile(r"""url\(\s*["']?([^"')]*)["']?\s*\)""")
 _SAMPLES, _NEAR = 257, 1e-6  # of an outline; share of its size by which a drawing may stick out
 _MOST_INSIDE = 8
+_CLIPS = frozenset({"clip-path", "mask"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,13 +104,21 @@ class Clips:
             tag, style = tag_of(child), self._document.style(child)
             if tag in (None, "title", "desc", "metadata") or style.get("display") == "none":
                 continue
-            if tag not in SHAPES or {"clip-path", "mask"} & style.keys():
+            place = matrix @ transform(style.get("transform", ""))
+            if tag == "use" and not mask and not _CLIPS & style.keys():
+                get = self._document.attributes(child)
+                shift = np.eye(4)
+                shift[:2, 3] = [viewport.length(get(name) or "0", name) for name in ("x", "y")]
+                child, place = self._document.target(child), place @ shift
+                tag, style = tag_of(child), self._document.style(child)
+                place = place @ transform(style.get("transform", ""))
+            if tag not in SHAPES or _CLIPS & style.keys():
                 raise ToolpathError(f"it holds {tag}, expected a shape such as rect")
             if mask and not self._lets_through(clip, child):
                 raise ToolpathError(f"its {tag} is not opaque and bright")
             drawn = subpaths(tag, self._document.attributes(child), viewport)
             if len(drawn) == 1:
-                yield from _convex(drawn[0].pieces, matrix @ transform(style.get("transform", "")))
+                yield from _convex(drawn[0].pieces, place)
 
     def _lets_through(self, mask: Any, child: Any) -> bool:
         """Whether what lies behind a shape of a mask is seen at all."""

@@ -189,6 +189,8 @@ class Walk:
             if segments:
                 self._count += 1
                 found.append(Strand(f"{name}/{k}" if len(drawn) > 1 else name, place.layer, self._count, segments))
+        if not found:
+            self._passed.over("a shape without length", self._where(element))
         if not all(region.holds(strand.segments) for region in place.clips for strand in found):
             raise ToolpathError(
                 "a clip path or mask cuts part of it off: apply that in the drawing program, or take it away"
