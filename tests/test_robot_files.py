@@ -94,6 +94,24 @@ def test_what_a_mesh_announces_or_names_is_bounded(tmp_path):
         load_parts(tmp_path / "pipe.stl")
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("flat.obj", "v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n"),
+        ("far.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n"),
+        ("back.ply", "0 0 0\n1 0 0\n0 1 0\n3 0 1 -7\n"),
+        ("nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+        ("huge.obj", "v 0 0 1e300\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+    ],
+)
+def test_triangles_without_corners_are_refused(tmp_path, name, text):
+    head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    (tmp_path / name).write_text((head if name.endswith("ply") else "") + text)
+    with pytest.raises(UrdfError):
+        read_mesh(tmp_path / name)
+
+
 def test_a_dense_mesh_keeps_its_form_with_a_bounded_number_of_triangles():
     ball = trimesh.creation.icosphere(subdivisions=7, radius=0.3)  # 327 680 triangles
     few = clustered(ball, 20_000)

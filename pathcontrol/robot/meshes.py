@@ -57,7 +57,20 @@ def load_parts(path: Path) -> list[Part]:
         raise UrdfError(f"it cannot be read: {type(error).__name__}: {error}") from error
     if not parts:
         raise UrdfError("it has no triangles")
+    for part in parts:
+        _check_part(part)
     return parts
+
+
+def _check_part(part: Part) -> None:
+    """Every triangle has three corners in space, which the file has."""
+    count = len(part.vertices)
+    if part.vertices.ndim != 2 or part.vertices.shape[1] != 3 or part.vertices.dtype.kind not in "fiu":
+        raise UrdfError(f"its vertices have the shape {part.vertices.shape}, expected three coordinates each")
+    if part.faces.ndim != 2 or part.faces.shape[1] != 3 or part.faces.dtype.kind not in "iu":
+        raise UrdfError(f"its faces have the shape {part.faces.shape}, expected three corners each")
+    if part.faces.min() < 0 or part.faces.max() >= count:
+        raise UrdfError(f"a triangle has a corner {part.faces.max()}, but there are {count} vertices")
 
 
 def _parts(data: bytes, path: Path) -> list[Part]:
