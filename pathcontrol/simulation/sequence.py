@@ -113,7 +113,8 @@ def simulate_sequence(
     arm.divergence.explain(slip)
     arrays, outcome = _joined(legs, len(laws), period, arm.divergence)
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws))
-    described = {"controller": f"{len(laws)} paths with {names}", "sequence": [law.describe() for law in laws]}
+    paths = f"{len(laws)} path{'s' if len(laws) > 1 else ''}"
+    described = {"controller": f"{paths} with {names}", "sequence": [law.describe() for law in laws]}
     config = record_of(described, robot, loop, disturbance, duration=durations.tolist(), laps=laps)
     time = period * np.arange(arrays["s"].shape[1])
     run = Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=whole, model=laws[0].robot)

@@ -10,6 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.analysis.readable import in_degrees
+from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
@@ -77,7 +78,7 @@ def shown(run: Runs, task: PathTask | None = None, rollout: int | None = None) -
         expect("task", task, PathTask)
     if rollout is not None and task is not None:
         task = rows_of(task, np.array([rollout]))
-    chosen = {name: one if rollout is None else one.rollout(rollout) for name, one in named.items()}
+    chosen = {name: one if rollout is None else _alone(one, rollout) for name, one in named.items()}
     return [
         Shown(
             str(name) if several else "",
@@ -88,6 +89,14 @@ def shown(run: Runs, task: PathTask | None = None, rollout: int | None = None) -
         )
         for i, (name, one) in enumerate(chosen.items())
     ]
+
+
+def _alone(run: Run, rollout: int) -> Run:
+    """A rollout until it is finished, not as it is held at the end while others go on."""
+    part = run.rollout(rollout)
+    if run.rollouts == 1 or part.status[0] != "finished":
+        return part
+    return part.with_data(part.data.isel(time=slice(0, int(own_samples(part)[0]))))
 
 
 def of_one_arm(runs: Sequence[Shown]) -> list[str]:

@@ -10,20 +10,27 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
+from pathcontrol.analysis.contours import feed_along, tool_speed
+from pathcontrol.analysis.known import where_known
+from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.view.figures.inset import magnified
 from pathcontrol.view.figures.limits import extent, over_time, span
 from pathcontrol.view.figures.lines import drawable, series
-from pathcontrol.view.figures.shown import Runs, Shown, shown
+from pathcontrol.view.figures.shown import Runs, Shown, own_robot, shown
 from pathcontrol.view.figures.style import COLUMN, PROFILE_LOOK, dressed, new_figure, style
 from pathcontrol.view.figures.words import legend
 
 RATE, PROFILE = r"$\dot{\sigma}$", r"$\vartheta(\sigma)$"
 SPEED_LABEL = f"{RATE}, {PROFILE} [1/s]"
 
+FEED_LABEL = "speed of the tool [mm/s]"
+
 
 def speed_figure(run: Runs, task: PathTask | None = None, rollout: int = 0) -> Figure:
     """The rate σ̇ of the path parameter beside the velocity profile ϑ(σ) [1/s], over time.
+
+    Of a toolpath, or several, the speed of the tool beside the feed that the plan asks for [mm/s].
 
     Args:
         run: a run, or several by their names.
@@ -36,13 +43,18 @@ def speed_figure(run: Runs, task: PathTask | None = None, rollout: int = 0) -> F
     runs = shown(run, task, rollout)
     with style():
         figure = new_figure(COLUMN, 2.3)
-        axes = dressed(figure.add_subplot())
-        drawn, times = [draw_speed(axes, one) for one in runs], [one.run.time for one in runs]
-        axes.set(xlabel="time [s]", ylabel=SPEED_LABEL, ylim=speed_limits(drawn))
+        axes, of_tool = dressed(figure.add_subplot()), all(map(_has_tool, runs))
+        draw = _draw_feed if of_tool else draw_speed
+        drawn, times = [draw(axes, one) for one in runs], [one.run.time for one in runs]
+        axes.set(xlabel="time [s]", ylabel=FEED_LABEL if of_tool else SPEED_LABEL, ylim=speed_limits(drawn))
         over_time(axes, times)
-        magnified(axes, times, drawn, lambda inset: [draw_speed(inset, one) for one in runs])
-        names = {one.label or RATE: Line2D([], [], **one.look) for one in runs}
-        profile = {PROFILE: Line2D([], [], **PROFILE_LOOK)} if any(one.task is not None for one in runs) else {}
+        magnified(axes, times, drawn, lambda inset: [draw(inset, one) for one in runs])
+        names = {one.label or ("tool" if of_tool else RATE): Line2D([], [], **one.look) for one in runs}
+        profile = (
+            {"feed" if of_tool else PROFILE: Line2D([], [], **PROFILE_LOOK)}
+            if any(one.task is not None for one in runs)
+            else {}
+        )
         legend(figure, names | profile)
     return figure
 
@@ -54,6 +66,23 @@ def draw_speed(axes: Axes, one: Shown) -> Array:
     if one.task is not None:
         drawn.append(_profile(one.task, drawable(one.run.array("s")[0])))
         series(axes, one.run.time, drawn[1], zorder=2.5, **PROFILE_LOOK)
+    return np.array(drawn)
+
+
+def _has_tool(one: Shown) -> bool:
+    """Whether a run is along a toolpath with an arm whose tool has a speed."""
+    along = isinstance(one.task, ToolpathTask) and "path_index" in one.run.data.coords
+    return along and "qd" in one.run.data and own_robot(one.run) is not None
+
+
+def _draw_feed(axes: Axes, one: Shown) -> Array:
+    """The speed of the tool and the feed, of the first rollout; what is drawn, (2, time)."""
+    assert isinstance(one.task, ToolpathTask)
+    task, robot = one.task, one.run.robot
+    wanted = where_known(lambda s: feed_along(task, robot, s), one.run.array("s"))
+    drawn = [drawable(1e3 * tool_speed(one.run, robot, task.frame)[0]), drawable(1e3 * wanted[0])]
+    series(axes, one.run.time, drawn[0], **one.look)
+    series(axes, one.run.time, drawn[1], zorder=2.5, **PROFILE_LOOK)
     return np.array(drawn)
 
 
