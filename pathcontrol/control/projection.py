@@ -15,6 +15,8 @@ from pathcontrol.tasks.base import PathPoint, PathTask
 
 # σ̄ is called irregular where dσ̄/dq exceeds this many times its value on the path
 _STEEPEST = 1e6
+# time constant [s] in which, in continuous time, the state comes to σ̄ where it was not
+_CATCH_UP = 1e-2
 
 
 class Projection(Controller):
@@ -63,6 +65,12 @@ class Projection(Controller):
         self.branches = BranchPolicy(branch, capture)
         self.k_p, self.K_v = scalar_gain("k_p", k_p), diagonal_gain("K_v", K_v, robot.n, robot.joint_names)
 
+    def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """State z, (*batch, 1): σ̄ of an arm that starts at (q, q̇), on the branch that ``start`` says."""
+        z = super().start(q, qd)
+        q, qd = np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64)
+        return self._project(q, np.broadcast_to(qd, q.shape), z[..., 0])[0][..., None]
+
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         last, none = z[..., 0], np.zeros(z.shape[:-1])
         s, point, sdot, regular = self._project(q, qd, last)
@@ -75,7 +83,9 @@ class Projection(Controller):
         e_p, e_v = point.q_d - q, point.velocity - qd
         qdd = point.velocity_slope * sdot[..., None] + self.K_v * e_v + self.k_p * e_p
         tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd, point.velocity)
-        return ControlOutput(tau, sdot[..., None], s, sdot, slope, none, e_p, e_v, regular)
+        # in continuous time σ̄ is the state's own integral: what it is off by, as where a branch is left, dies away
+        zdot = sdot + np.where(regular, (s - last) / _CATCH_UP, 0.0)
+        return ControlOutput(tau, zdot[..., None], s, sdot, slope, none, e_p, e_v, regular)
 
     def describe(self) -> dict[str, Any]:
         return super().describe() | {"branch": self.branches.branch, "capture": self.branches.capture}

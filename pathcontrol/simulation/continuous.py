@@ -12,11 +12,14 @@ from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.simulation.disturbance import Disturbance
-from pathcontrol.simulation.divergence import NO_NUMBERS, STOPPED, Divergence, sound
+from pathcontrol.simulation.divergence import CRAWLED, NO_NUMBERS, STOPPED, Divergence, sound
 from pathcontrol.simulation.finish import Finish
 from pathcontrol.simulation.modes import Arm, ContinuousTime, Outside, check_rows, torque_limits
 from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sensors import Reading
+
+_WATCHED = 2000  # steps of the integrator
+_SHORTEST = 1e-6  # s, the mean step of so many below which a run is given up: a second of it would take minutes
 
 
 class ClosedLoop:
@@ -122,6 +125,7 @@ class _Solution:
     def __init__(self, loop: ClosedLoop, start: Array, lost: Divergence, push: _Push | None) -> None:
         self._push = push
         self._loop, self._start, self._lost = loop, start, lost
+        self._steps, self._since = 0, 0.0  # since when it is watched whether the integrator crawls
         self._odd = lost.lost  # rows whose rate was no number in the last step
         # the integrator's norm averages over rollouts: tighten it so that each one alone keeps the tolerance
         share, band = np.sqrt(max(1, len(start))), start.shape[1] - 1
@@ -138,8 +142,9 @@ class _Solution:
             while given < len(time) and solver.status == "running":
                 t, y, self._odd = solver.t, solver.y.copy(), self._lost.lost
                 solver.step()
-                if self._in_trouble(solver):
-                    self._take_out(t, solver.y, y)
+                crawls = self._crawls(solver.t)
+                if crawls or self._in_trouble(solver):
+                    self._take_out(t, solver.y, y, CRAWLED if crawls else STOPPED)
                     y = self._lost.replaced(y.reshape(self._start.shape), self._start)
                     break
                 known = int(np.searchsorted(time, solver.t, side="right"))
@@ -155,6 +160,15 @@ class _Solution:
             self._odd = self._odd | ~np.isfinite(rate).all(-1)
         return (self._lost.replaced(rate, 0.0) if self._lost.any else rate).reshape(-1)
 
+    def _crawls(self, t: float) -> bool:
+        """Whether the last steps, now that t [s] is reached, took the integrator hardly anywhere."""
+        self._steps += 1
+        if self._steps < _WATCHED:
+            return False
+        crawls = t - self._since < _WATCHED * _SHORTEST
+        self._steps, self._since = 0, t
+        return crawls
+
     def _in_trouble(self, solver: LSODA) -> bool:
         return solver.status == "failed" or not np.isfinite(solver.t) or bool(self._beyond(solver.y).any())
 
@@ -163,8 +177,11 @@ class _Solution:
         q, qd, z = self._loop.split(y.reshape(self._start.shape))
         return ~(sound(q, qd) & np.isfinite(z).all(-1))
 
-    def _take_out(self, t: float, reached: Array, y: Array) -> None:
-        """Mark whoever is to blame that the integrator did not get from y at t [s] to a state that can be."""
+    def _take_out(self, t: float, reached: Array, y: Array, reason: str) -> None:
+        """Mark whoever is to blame that the integrator did not get from y at t [s] to a state that can be.
+
+        ``reason`` is that of a rollout which is to blame for its speed alone.
+        """
         odd, beyond = self._odd & ~self._lost.lost, self._beyond(reached) & ~self._lost.lost
         if odd.any():
             self._lost.mark(t, odd, NO_NUMBERS)
@@ -173,4 +190,4 @@ class _Solution:
         else:
             fastest = np.abs(self._loop.rate(t, y.reshape(self._start.shape))).max(-1)
             blamed = np.argmax(np.where(self._lost.lost, -np.inf, fastest))
-            self._lost.mark(t, np.arange(len(fastest)) == blamed, STOPPED)
+            self._lost.mark(t, np.arange(len(fastest)) == blamed, reason)

@@ -13,8 +13,15 @@ from pathcontrol.errors import SimulationError
 from pathcontrol.simulation.sensors import Reading
 
 _ABSURD = 1e6  # rad and rad/s, beyond any arm
-BEYOND = "its state left all bounds; lower the gains or shorten the period"
+BEYOND = (
+    "its state left all bounds; if it does so with more substeps of the loop too, shorten the period, lower the gains, "
+    "or start nearer to the path"
+)
 NO_NUMBERS = "its law asks for torques that are no numbers; look for a NaN in the task, q_d or ϑ, near where the arm is"
+CRAWLED = (
+    "the integrator crawls, by steps below 1 µs; start away from where the law is not defined, such as the centre of a "
+    "circle, lower the gains, widen friction_width, or use a SampledLoop"
+)
 STOPPED = "the integrator gave up; lower the gains, or widen friction_width"
 
 

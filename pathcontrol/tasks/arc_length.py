@@ -16,6 +16,7 @@ _FIRST_CELLS, _MOST_CELLS = 16, 1 << 20
 _TOLERANCE = 1e-11  # relative, of a cell; its halves are then good to rounding
 _NOISE = 1e-8  # disagreements below this that do not fall as cells are halved are rounding of the path itself
 _NEWTON_STEPS = 20
+_COINCIDENT = 1e-13  # relative to the parameter; places nearer to one another are one place
 
 
 class ArcLength:
@@ -99,7 +100,7 @@ class ArcLength:
         knots = self.path.knots
         if knots is None:
             return ends
-        return np.union1d(ends, knots[(knots > self.lower) & (knots < self.upper)])
+        return _apart(np.union1d(ends, knots[(knots > self.lower) & (knots < self.upper)]))
 
     def _cells(self, ends: Array) -> tuple[Array, Array]:
         """Ends of the cells, (K + 1,), and their lengths, (K,)."""
@@ -119,6 +120,17 @@ class ArcLength:
             count += len(a)
         order = np.argsort(np.concatenate(starts))
         return np.append(np.concatenate(starts)[order], ends[-1]), np.concatenate(lengths)[order]
+
+
+def _apart(ends: Array) -> Array:
+    """``ends`` (K,), ascending, without those that rounding alone tells from the one before, or from the last."""
+    nearest = _COINCIDENT * np.abs(ends[[0, -1]]).max()
+    kept, last_kept = [ends[0]], ends[0]
+    for end in ends[1:-1]:
+        if end - last_kept > nearest and ends[-1] - end > nearest:
+            kept.append(end)
+            last_kept = end
+    return np.array([*kept, ends[-1]])
 
 
 def arc_length(task: PathTask, s0: ArrayLike | None = None, s_end: ArrayLike | None = None) -> Array:

@@ -15,6 +15,8 @@ from pathcontrol.tasks.batch import TaskBatch
 
 _SAMPLES = 129
 _GOLDEN = (5**0.5 - 1) / 2
+_HALVINGS = 40  # of the stretch between two samples, down to rounding
+_OPPOSITE = -0.99  # cosine of an angle
 
 
 def check_task(task: PathTask, n: int) -> None:
@@ -45,6 +47,7 @@ def check_task(task: PathTask, n: int) -> None:
     for method in ("dq_d", "ddq_d", "dtheta"):
         _check_values(f"{name}.{method}", getattr(task, method), s, None if method == "dtheta" else n)
     _check_regular(task, name, s)
+    _check_cusps(task, name, s)
     for function, derivative in (("q_d", "dq_d"), ("dq_d", "ddq_d"), ("theta", "dtheta")):
         _check_derivative(task, name, s, function, derivative)
 
@@ -74,6 +77,31 @@ def _check_regular(task: PathTask, name: str, s: Array) -> None:
             f"{name}.dq_d(s={s[int(np.argmin(length))]:g}) has length {length.min():.1e}, expected a path that moves "
             "with s everywhere: q_d' = 0 is a cusp or a standstill"
         )
+
+
+def _check_cusps(task: PathTask, name: str, s: Array) -> None:
+    """The path turns back nowhere: between samples its direction does not jump to the opposite one."""
+    directions = _directions(task, s)
+    turns = np.flatnonzero((directions[1:] * directions[:-1]).sum(-1) < 0)
+    if not turns.size:
+        return
+    left, right, before = s[turns], s[turns + 1], directions[turns]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (left + right)
+        ahead = (_directions(task, middle) * before).sum(-1) > 0
+        left, right = np.where(ahead, middle, left), np.where(ahead, right, middle)
+    cosine = (_directions(task, left) * _directions(task, right)).sum(-1)
+    if cosine.min() < _OPPOSITE:
+        raise TaskError(
+            f"{name} turns back at s = {left[int(np.argmin(cosine))]:g}, expected a path without cusps: no arm that "
+            "moves can turn round at once; end the path there, or round the tip"
+        )
+
+
+def _directions(task: PathTask, s: Array) -> Array:
+    """q_d'/‖q_d'‖, (*batch, n)."""
+    tangent = np.asarray(task.dq_d(s))
+    return tangent / np.maximum(np.linalg.norm(tangent, axis=-1, keepdims=True), np.finfo(float).tiny)
 
 
 def _check_derivative(task: PathTask, name: str, s: Array, function: str, derivative: str) -> None:
