@@ -90,7 +90,10 @@ class Chart {
     if (!this.uplot) return;
     const pointed = this.uplot.cursor.idx;
     const i = pointed ?? Math.max(indexAt(this.times, this.time), 0);
-    this.caption.outputs.forEach((output, k) => (output.textContent = written(this.uplot.data[k + 1][i])));
+    this.size ??= largest(extent(this.uplot.data.slice(1), 0, this.times.length - 1));
+    this.caption.outputs.forEach((output, k) => {
+      output.textContent = written(withoutNoise(this.uplot.data[k + 1][i], this.size));
+    });
   }
 
   resize() {

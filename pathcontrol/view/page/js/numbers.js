@@ -32,6 +32,13 @@ function minus(text) {
   return text.replace(/-/g, "\u2212");
 }
 
+const NOISE = 1e-7; // of the largest value: the last digit in single precision
+
+// what is rounding beside the largest value of its chart is 0
+function withoutNoise(value, largest) {
+  return value !== null && Math.abs(value) < NOISE * largest ? 0 : value;
+}
+
 function written(value, digits = 3) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   const size = Math.abs(value);
