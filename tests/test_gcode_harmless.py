@@ -162,6 +162,12 @@ def test_g92_at_the_beginning_says_where_the_tool_is():
             read(HEAD + later)
 
 
+@pytest.mark.parametrize("far", ["9" * 400, "-99999999"])
+def test_g92_leads_nowhere_far(far):
+    with pytest.raises(ToolpathError, match="line 1: X.* leads further than 10000 m from the origin"):
+        read(f"G21 G92 X{far} Y0 Z0\nG1 X1 F60")
+
+
 def test_one_coordinate_system_is_as_good_as_another():
     toolpath = read("G21 G90 G56\nG0 X0 Y0 Z0\nG1 X1 F60")
     same(toolpath, read(HEAD + "G1 X1 F60"))

@@ -140,7 +140,7 @@ class Program:
         named = {axis: letter for axis, letter in enumerate("XYZ") if letter in block.words}
         place = list(self._position)
         for axis, letter in named.items():
-            place[axis] = self.modes.length(letter, block.words[letter])
+            place[axis] = self.modes.coordinate(letter, block.words[letter], 0.0)
         self._frame.shift(self._position, place, self.strokes.begun)
         self._position = place
 
