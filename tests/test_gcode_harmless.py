@@ -164,7 +164,7 @@ def test_g92_at_the_beginning_says_where_the_tool_is():
 
 @pytest.mark.parametrize("far", ["9" * 400, "-99999999"])
 def test_g92_leads_nowhere_far(far):
-    with pytest.raises(ToolpathError, match="line 1: X.* leads further than 10000 m from the origin"):
+    with pytest.raises(ToolpathError, match=r"line 1: X.* leads further than 10000 m from the origin"):
         read(f"G21 G92 X{far} Y0 Z0\nG1 X1 F60")
 
 
