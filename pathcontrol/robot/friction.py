@@ -34,8 +34,18 @@ def _coefficients(name: str, value: ArrayLike) -> Array:
 class FrictionLaw(ABC):
     """Friction torque of the joints as a function of their velocities."""
 
-    #: whether the levels change with velocity
+    #: whether the levels change with velocity; where they do although this is False, the plant notices by trying
     varies: ClassVar[bool] = False
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        own = [name for name in ("torque", "smoothed") if name in cls.__dict__]
+        if own and not {"levels", "viscous"} & cls.__dict__.keys():
+            raise InputError(
+                f"{cls.__name__} overrides {own[0]}(), which the simulated arm does not ask; override levels(qd), the "
+                "dry friction (F⁺, F⁻) ≥ 0 in N m at a velocity, and viscous, the coefficients b: torque() follows "
+                "from them"
+            )
 
     @property
     @abstractmethod
@@ -68,14 +78,20 @@ class FrictionLaw(ABC):
     def select(self, joints: Sequence[int]) -> Self:
         """The same law for some of the joints."""
         index = list(joints)
-        return type(self)(*(getattr(self, f.name)[..., index] for f in fields(self)))
+        return type(self)(*(_of_joints(getattr(self, f.name), index) for f in fields(self)))
 
     def __add__(self, other: FrictionLaw) -> FrictionSum:
         return FrictionSum((self, other))
 
     def describe(self) -> dict[str, object]:
         """The law and its coefficients, for the record of a run."""
-        return {"law": type(self).__name__} | {f.name: getattr(self, f.name).tolist() for f in fields(self)}
+        return {"law": type(self).__name__} | {f.name: np.asarray(getattr(self, f.name)).tolist() for f in fields(self)}
+
+
+def _of_joints(value: ArrayLike, joints: list[int]) -> Any:
+    """The values of some joints, (…, n); a number is that of all joints."""
+    array = np.asarray(value)
+    return array[..., joints] if array.ndim else value
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,6 +273,15 @@ def _stacked(laws: Sequence[FrictionLaw]) -> FrictionLaw:
         terms = zip(*(law.terms for law in laws if isinstance(law, FrictionSum)), strict=True)
         return FrictionSum(tuple(_stacked(term) for term in terms))
     return type(first)(*(np.stack([getattr(law, f.name) for law in laws]) for f in fields(first)))
+
+
+def levels_vary(law: FrictionLaw) -> bool:
+    """Whether the levels change with velocity, as the law says or as it turns out at some velocities."""
+    if law.varies:
+        return True
+    rest = law.levels(np.zeros((1, law.n)))
+    tried = [law.levels(np.full((1, law.n), qd)) for qd in (-3.0, -0.1, -1e-3, 1e-3, 0.1, 3.0)]
+    return any(not np.array_equal(a, b) for pair in tried for a, b in zip(pair, rest, strict=True))
 
 
 def no_friction(n: int) -> FrictionLaw:

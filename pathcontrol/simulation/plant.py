@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.robot.batch import RobotBatch
+from pathcontrol.robot.friction import levels_vary
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.damping import Damping
 from pathcontrol.simulation.dry_friction import stick_slip
@@ -52,7 +53,7 @@ class Plant:
         # rows, (1, n), and numbers as arrays, (), which NumPy joins to those of a single rollout far faster than others
         self._viscous = np.atleast_2d(robot.friction.viscous)
         self._whole, self._half, self._quarter = np.array(step), np.array(0.5 * step), np.array(0.25 * step)
-        self._steady = None if robot.friction.varies else self._levels_at(np.zeros((1, robot.n)))
+        self._steady = None if levels_vary(robot.friction) else self._levels_at(np.zeros((1, robot.n)))
         self._inertia = arm = robot.with_armature(0.5 * step * robot.friction.viscous)
         self._of_one = arm.forward_dynamics if isinstance(arm, RobotBatch) else arm.forward_dynamics_of_one
         self._damped, rows = self._rows_of_strong_friction(), self._viscous
