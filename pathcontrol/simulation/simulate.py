@@ -30,6 +30,7 @@ from pathcontrol.simulation.setup import (
     states_of_each,
 )
 from pathcontrol.simulation.slips import warn_if_still, warn_of_slips
+from pathcontrol.simulation.too_long import warn_of_period
 
 
 def simulate(
@@ -91,6 +92,8 @@ def simulate(
     check_length(duration, loop, len(q0), robot.n, finish is not None and finish.ends_run)
     check_law(controller, q0, qd0)
     slip = warn_of_slips(robot, controller.task, q0, first)
+    if isinstance(loop, SampledLoop):
+        warn_of_period(controller, loop.period)
     arm = simulated_arm(loop, robot, q0, qd0, Outside(disturbance, first))
     settings = {"duration": duration, "laps": laps, "until": until, "first_rollout": first}
     config = record_of(controller.describe(), robot, loop, disturbance, **settings)
