@@ -29,8 +29,21 @@ chunk_option = click.option(
 @resume_option
 @chunk_option
 @click.option("--cluster", metavar="ADDRESS", help="Of a Dask scheduler, as tcp://host:8786, or its scheduler file.")
+@click.option("--tls-ca", metavar="FILE", help="With --cluster tls://…: the certificate of the authority, in PEM.")
+@click.option("--tls-cert", metavar="FILE", help="The certificate of this process.")
+@click.option("--tls-key", metavar="FILE", help="Its key.")
 @json_option
-def command(file: Path, out: Path | None, resume: bool, chunk: int, cluster: str | None, as_json: bool) -> None:
+def command(
+    file: Path,
+    out: Path | None,
+    resume: bool,
+    chunk: int,
+    cluster: str | None,
+    tls_ca: str | None,
+    tls_cert: str | None,
+    tls_key: str | None,
+    as_json: bool,
+) -> None:
     """Simulate every sample of the [sweep] in FILE.toml and keep its numbers.
 
     They are in Parquet files in the folder chunks/, histories that the file asks for in runs/. After Ctrl-C, or a
@@ -38,12 +51,14 @@ def command(file: Path, out: Path | None, resume: bool, chunk: int, cluster: str
     """
     with uninterrupted():
         from pathcontrol.experiments.sweep_runner import run_sweep
+        from pathcontrol.sweeps.cluster import security_of
         from pathcontrol.sweeps.store import parquet
 
         parquet()
     folder = Path("results") / file.stem if out is None else out
     try:
-        result = run_sweep(file, folder, chunk=chunk, resume=resume, cluster=cluster)
+        security = security_of(tls_ca, tls_cert, tls_key)
+        result = run_sweep(file, folder, chunk=chunk, resume=resume, cluster=cluster, security=security)
     except KeyboardInterrupt:
         click.echo(f"--resume goes on with what is in {folder}", err=True)
         raise
@@ -51,6 +66,8 @@ def command(file: Path, out: Path | None, resume: bool, chunk: int, cluster: str
 
 
 def _tell(result: SweepResult, as_json: bool) -> None:
+    from pathcontrol.analysis.metrics import UNITS
+
     table = result.table()
     numbers = {str(name): v for name, v in table.data_vars.items() if v.dtype.kind == "f" and name != "diverged_time"}
     spread = {name: _spread(values.to_numpy()) for name, values in numbers.items()}
@@ -66,7 +83,8 @@ def _tell(result: SweepResult, as_json: bool) -> None:
     for name, values in spread.items():
         if values["median"] is not None:
             line = " ".join(f"{values[key]:12.5g}" for key in ("least", "median", "largest"))
-            click.echo(f"  {name:22} {line}" + (f"  and {values['never']} never" if values["never"] else ""))
+            unit = f" {UNITS[name]}" if UNITS.get(name) else ""
+            click.echo(f"  {name:22} {line}{unit}" + (f"  and {values['never']} never" if values["never"] else ""))
     for sample in result.kept:
         click.echo(f"  history of sample {sample}: {result.history(sample)}")
 

@@ -19,7 +19,7 @@ from pathcontrol.sweeps.run import sweep
 from pathcontrol.sweeps.space import Space
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, Security
 
 
 def run_sweep(
@@ -30,6 +30,7 @@ def run_sweep(
     resume: bool = False,
     progress: bool = True,
     cluster: str | Path | Client | None = None,
+    security: Security | None = None,
 ) -> SweepResult:
     """Run the sweep of an experiment file; every sample is checked before anything is computed.
 
@@ -41,6 +42,7 @@ def run_sweep(
         progress: show a bar with the time left on standard error when it takes longer than two seconds.
         cluster: a Dask cluster whose workers compute the chunks, as :func:`sweep` takes it; files that the experiment
             names are sent to them.
+        security: certificates for TLS, a ``distributed.Security``, where the cluster asks for some.
 
     Raises:
         ClusterError: the cluster does not answer or cannot go on, or a worker has other versions than this process.
@@ -49,7 +51,7 @@ def run_sweep(
         MissingExtraError: the extra ``sweep`` or, for a cluster, ``cluster`` is not installed.
     """
     section = load_experiment(path).sweep
-    with connected(cluster) as client:
+    with connected(cluster, security) as client:
         try:
             if section is None:
                 raise ExperimentError("sweep: missing; add a section [sweep] with its parameters")

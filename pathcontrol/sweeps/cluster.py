@@ -5,34 +5,49 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
+import threading
+import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pathcontrol.errors import ClusterError, MissingExtraError
+from pathcontrol.errors import ClusterError, InputError, MissingExtraError, PathControlWarning
 from pathcontrol.sweeps.manifest import PACKAGES, versions
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, Security
 
 _PATIENCE = 5.0  # s, for what answers at once if it is there
+_ANSWER = 30.0  # s, for a worker that may be busy
+_LOOK = 0.2  # s
+
+
+class NoAnswerError(TimeoutError):
+    """Somebody has not answered in time."""
+
+
+class GoneError(Exception):
+    """What was asked for is not there any more."""
 
 
 @contextmanager
-def connected(cluster: Any) -> Iterator[Client | None]:
+def connected(cluster: Any, security: Security | None = None) -> Iterator[Client | None]:
     """The client of a cluster whose workers have been seen to be fit; ``None`` for no cluster.
 
     Args:
         cluster: the address of a scheduler, its scheduler file, a ``distributed.Client`` or what makes one.
+        security: certificates for TLS; a client has its own.
 
     Raises:
         ClusterError: nobody answers, there is no worker, or one has other versions than this process.
         MissingExtraError: the extra ``cluster`` is not installed.
     """
     if cluster is None:
+        if security is not None:
+            raise InputError("security is given without a cluster; give cluster=, as 'tls://host:8786'")
         yield None
         return
     try:
@@ -43,7 +58,7 @@ def connected(cluster: Any) -> Iterator[Client | None]:
         _check_workers(cluster)
         yield cluster
         return
-    with _client(_address(cluster)) as client:
+    with _client(_address(cluster), security) as client:
         _check_workers(client)
         yield client
 
@@ -60,13 +75,36 @@ def _address(cluster: Any) -> Any:
         ) from error
 
 
-def _client(address: Any) -> Client:
+def security_of(ca: str | Path | None, cert: str | Path | None, key: str | Path | None) -> Security | None:
+    """The certificates for TLS, files in PEM: of the authority, one's own, and its key; ``None`` for none of them.
+
+    Raises:
+        InputError: one of the three is left out, or is no file.
+        MissingExtraError: the extra ``cluster`` is not installed.
+    """
+    given = {"tls-ca": ca, "tls-cert": cert, "tls-key": key}
+    if not any(given.values()):
+        return None
+    for name, file in given.items():
+        if file is None or not Path(file).is_file():
+            raise InputError(
+                f"{name} = {None if file is None else str(file)!r}, expected a file; TLS needs {', '.join(given)}"
+            )
+    try:
+        from distributed.security import Security
+    except ImportError as error:
+        raise MissingExtraError("distributed", "cluster", "a sweep on a cluster") from error
+    files = {"tls_ca_file": str(ca), "tls_client_cert": str(cert), "tls_client_key": str(key)}
+    return Security(require_encryption=True, **files)
+
+
+def _client(address: Any, security: Security | None) -> Client:
     from distributed import Client
 
     try:
         if isinstance(address, str):  # a client that cannot connect takes long, or waits forever for what says nothing
-            _check_scheduler(address)
-        return Client(address, timeout=_PATIENCE, set_as_default=False)
+            _check_scheduler(address, security)
+        return Client(address, timeout=_PATIENCE, set_as_default=False, security=security)
     except Exception as error:  # what answers may be anything
         raise ClusterError(
             f"cluster = {address!r}: no Dask scheduler answers ({str(error) or 'it says nothing'}); start one with "
@@ -74,7 +112,7 @@ def _client(address: Any) -> Client:
         ) from error
 
 
-def _check_scheduler(address: str) -> None:
+def _check_scheduler(address: str, security: Security | None) -> None:
     """Whoever is at the address says that it is a scheduler.
 
     Raises:
@@ -84,8 +122,10 @@ def _check_scheduler(address: str) -> None:
     from distributed.core import rpc
     from distributed.security import Security
 
+    known = Security() if security is None else security
+
     async def asked() -> str:
-        async with rpc(address, timeout=_PATIENCE, connection_args=Security().get_connection_args("client")) as there:
+        async with rpc(address, timeout=_PATIENCE, connection_args=known.get_connection_args("client")) as there:
             return (await asyncio.wait_for(there.identity(), _PATIENCE))["type"]
 
     socket.create_connection(parse_host_port(parse_address(address)[1]), timeout=_PATIENCE).close()  # refused at once
@@ -106,7 +146,7 @@ def _check_workers(client: Client) -> None:
             f"{address} has no workers; start some: `dask worker {address} --nworkers=-1 --nthreads 1`"
         ) from error
     expected, ask = expected_versions(), _asker()
-    found = {"the scheduler": client.run_on_scheduler(ask), **client.run(ask)}
+    found = {"the scheduler": client.run_on_scheduler(ask), **_answers(client, ask)}
     unfit = [f"{name} has {other}" for name, there in found.items() if (other := _differences(expected, there))]
     if unfit:
         raise ClusterError(
@@ -120,6 +160,88 @@ def _check_workers(client: Client) -> None:
             "them as processes: --nworkers=-1 --nthreads 1",
             stacklevel=5,
         )
+
+
+def _answers(client: Client, ask: Callable[[], dict[str, str]]) -> dict[str, Any]:
+    """What the workers answer; those that do not, as they are frozen, are given up.
+
+    Raises:
+        ClusterError: none answers.
+    """
+    try:
+        return within(_ANSWER, lambda: client.run(ask))
+    except NoAnswerError:
+        gone = drop_silent_workers(client, _ANSWER / 2)
+    except OSError:  # one has died meanwhile
+        gone = []
+    warnings.warn(
+        f"{', '.join(gone) or 'a worker'} did not answer, and the sweep goes on without it",
+        PathControlWarning,
+        stacklevel=6,
+    )
+    try:
+        return within(_ANSWER, lambda: client.run(ask, on_error="ignore"))
+    except (NoAnswerError, OSError) as error:
+        raise ClusterError(f"no worker answers within {_ANSWER:g} s; stop those that hang, and start others") from error
+
+
+def within(seconds: float, ask: Callable[[], Any], there: Callable[[], bool] = lambda: True) -> Any:
+    """What ``ask`` gives, in a thread that is left alone if it takes longer, or what is asked for is no longer there.
+
+    Raises:
+        NoAnswerError: it takes longer.
+        GoneError: it is no longer there.
+    """
+    answer: Future[Any] = Future()
+
+    def work() -> None:
+        try:
+            answer.set_result(ask())
+        except BaseException as error:
+            answer.set_exception(error)
+
+    threading.Thread(target=work, daemon=True).start()
+    until = time.monotonic() + seconds
+    while not wait([answer], _LOOK).done:
+        if not there():
+            raise GoneError
+        if time.monotonic() > until:
+            raise NoAnswerError(f"no answer within {seconds:g} s")
+    return answer.result()
+
+
+def drop_silent_workers(client: Client, silence: float) -> list[str]:
+    """Have the scheduler give up workers that have shown no sign of life for so many seconds; others take over.
+
+    Returns:
+        Their addresses.
+    """
+
+    async def drop(dask_scheduler: Any = None) -> list[str]:
+        from time import time
+
+        silent = [a for a, worker in dask_scheduler.workers.items() if time() - worker.last_seen > silence]
+        for address in silent:
+            await dask_scheduler.remove_worker(address, stimulus_id="frozen")
+        return silent
+
+    try:
+        return within(_PATIENCE, lambda: client.run_on_scheduler(drop))
+    except Exception:  # the scheduler has gone, which shows elsewhere
+        return []
+
+
+def all_idle(client: Client) -> bool:
+    """Whether there are workers, and none of them computes anything."""
+
+    def idle(dask_scheduler: Any = None) -> bool:
+        workers = list(dask_scheduler.workers.values())
+        return bool(workers) and not any(worker.executing for worker in workers)
+
+    try:
+        return within(_PATIENCE, lambda: client.run_on_scheduler(idle))
+    except Exception:  # the scheduler has gone, which shows elsewhere
+        return False
 
 
 def expected_versions() -> dict[str, str]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import threading
+import time
 import warnings
+from collections import Counter
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import suppress
 from itertools import chain, islice
@@ -15,7 +17,15 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ClusterError
-from pathcontrol.sweeps.cluster import expected_versions, other_versions
+from pathcontrol.sweeps.cluster import (
+    GoneError,
+    NoAnswerError,
+    all_idle,
+    drop_silent_workers,
+    expected_versions,
+    other_versions,
+    within,
+)
 from pathcontrol.sweeps.compute import Chunk, Job, Piece
 
 if TYPE_CHECKING:
@@ -26,7 +36,11 @@ if TYPE_CHECKING:
 _AHEAD = 2  # chunks for each worker: the one that it computes, and the next
 _PATIENCE = 10.0  # s, for a worker to answer
 _RESTART = 60.0  # s, for workers to be started again when all have died
-_LOSSES = 3  # how often they may all die without a chunk in between
+_LOSSES = 10  # how often they may all die without a chunk in between
+_KILLS = 3  # how often Dask may give up a chunk after its workers died
+_LOOK = 5.0  # s without news, after which workers are looked at that may be frozen
+_SILENCE = 30.0  # s without a sign of life, after which a worker is given up
+_POLL = 0.005  # s
 _KEPT = "finished chunks are kept, resume the sweep"
 _one_at_a_time = threading.Lock()  # neither Pinocchio's data nor what users write is for several threads
 
@@ -35,7 +49,8 @@ class Desk:
     """Gives out pieces, a few for each worker, and takes chunks in.
 
     What computes them goes once to each worker, and chunks come straight from the workers: neither passes the scheduler
-    where this machine can reach the workers. A piece whose worker dies is given to another one.
+    where this machine can reach the workers. A piece whose worker dies, or shows no sign of life, is given to another
+    one.
 
     Args:
         client: of the cluster.
@@ -54,6 +69,7 @@ class Desk:
         self._direct = _reachable(client)
         self._there: Future | None = None  # the parcel, on the workers
         self._out: dict[Any, tuple[Future, Piece]] = {}  # by key
+        self._kills: Counter[int] = Counter()  # by the first sample of a piece
         self._ready = as_completed(loop=client.loop)
         self._pieces: Iterator[Piece] = iter(())
 
@@ -73,15 +89,36 @@ class Desk:
     def _finished(self) -> Iterator[Chunk]:
         losses = 0
         while self._give_out():
-            chunk = self._taken(next(self._ready))
-            losses = losses + 1 if chunk is None else 0
+            future = self._next()
+            if future is None:
+                self._take_back()
+            chunk = None if future is None else self._taken(future)
             if chunk is not None:
+                losses = 0
                 yield chunk
-            elif losses > _LOSSES:
+            elif self._there is None:
+                losses += 1
+            if losses > _LOSSES:
                 raise ClusterError(
                     f"all workers were lost {losses} times one after another, perhaps for lack of memory; make chunks "
                     f"smaller; {_KEPT}"
                 )
+
+    def _next(self) -> Future | None:
+        """The next future that is done, or None if nobody works on any: what they need is with a worker that has gone.
+
+        Meanwhile workers that show no sign of life are given up.
+        """
+        looked, idle = time.monotonic(), 0
+        while not self._ready.has_ready():
+            time.sleep(_POLL)
+            if time.monotonic() - looked > _LOOK:
+                drop_silent_workers(self._client, _SILENCE)
+                idle = idle + 1 if all_idle(self._client) else 0
+                if idle > 1:
+                    return None
+                looked = time.monotonic()
+        return next(self._ready)
 
     def _cancel(self) -> None:
         """Nobody waits for what is out."""
@@ -89,46 +126,105 @@ class Desk:
             self._client.cancel([future for future, _ in self._out.values()], force=True)
 
     def _give_out(self) -> bool:
-        """Whether anything is out."""
+        """Whether anything is out, or has to be given out again."""
         try:
-            if self._there is None:
+            while self._there is None:
                 self._there = self._sent()
             room = _AHEAD * max(1, len(self._client.nthreads())) - len(self._out)
             for parameters, samples in islice(self._pieces, max(0, room)):
-                future = self._client.submit(sweep_chunk, self._there, parameters, samples, pure=False)
-                self._out[future.key] = future, (parameters, samples)
-                self._ready.add(future)
+                self._submit((parameters, samples))
         except OSError as error:
             raise ClusterError(f"the cluster is lost: {error}; {_KEPT}") from error
         return bool(self._out)
 
-    def _sent(self) -> Future:
-        """The parcel, once it is on all workers that there are; others will get it from these."""
+    def _submit(self, piece: Piece) -> None:
+        future = self._client.submit(sweep_chunk, self._there, *piece, pure=False)
+        self._out[future.key] = future, piece
+        self._ready.add(future)
+
+    def _sent(self) -> Future | None:
+        """The parcel, once it is on all workers that there are; others will get it from these. None to try again."""
         try:
             self._client.wait_for_workers(1, timeout=_RESTART)
         except TimeoutError as error:
             raise ClusterError(f"no worker is left, and none has come for {_RESTART:g} s; {_KEPT}") from error
-        return self._client.scatter(self._parcel, broadcast=True, direct=self._direct, hash=False, timeout=_RESTART)
+        try:
+            return within(
+                _RESTART,
+                lambda: self._client.scatter(
+                    self._parcel, broadcast=True, direct=self._direct, hash=False, timeout=_RESTART
+                ),
+            )
+        except (OSError, TimeoutError):  # a worker died, or froze, meanwhile
+            self._check_scheduler()
+            drop_silent_workers(self._client, _SILENCE)
+            time.sleep(_POLL)
+            return None
+
+    def _check_scheduler(self) -> None:
+        """Check that the scheduler lives, where a worker does not answer.
+
+        Raises:
+            ClusterError: it does not.
+        """
+        scheduler: Any = self._client.scheduler
+        try:
+            within(_PATIENCE, lambda: self._client.sync(scheduler.identity))
+        except Exception as error:  # of any kind, as the connection is closed
+            raise ClusterError(f"the cluster is lost: {error}; {_KEPT}") from error
 
     def _taken(self, future: Future) -> Chunk | None:
-        """The chunk of a future, or None where it is lost, and with it all that is out."""
+        """The chunk of a future, or None where it is lost and will be computed again."""
         from distributed import CancelledError, KilledWorker
 
+        _, piece = self._out[future.key]
         try:
-            chunk = self._client.gather(future, direct=self._direct)
+            chunk = within(
+                _SILENCE,
+                lambda: self._client.gather(future, direct=self._direct),
+                lambda: future.status != "pending",
+            )
+        except GoneError:  # with its worker, which is still being called; another one computes it
+            self._ready.add(future)
+            return None
         except CancelledError:
             self._take_back()
             return None
         except KilledWorker as error:
-            _, (_, samples) = self._out[future.key]
+            self._give_again(future, piece, error)
+            return None
+        except ModuleNotFoundError as error:
+            raise ClusterError(f"a worker lacks the module {error.name!r}; install it there; {_KEPT}") from error
+        except (OSError, TimeoutError) as error:
+            if not _of_connection(error):  # the user's own function has failed with it
+                raise
+            self._check_scheduler()
+            drop_silent_workers(self._client, _SILENCE)
+            self._submit_again(future, piece)
+            return None
+        del self._out[future.key]
+        return chunk
+
+    def _give_again(self, future: Future, piece: Piece, error: Exception) -> None:
+        """Give a piece out again whose workers died: they may die of something else.
+
+        Raises:
+            ClusterError: they did too often.
+        """
+        samples = piece[1]
+        self._kills[int(samples[0])] += 1
+        if self._kills[int(samples[0])] >= _KILLS:
             raise ClusterError(
                 f"samples {samples[0]} to {samples[-1]}: every worker that computed them died, perhaps for lack of "
                 f"memory; make chunks smaller; {_KEPT}"
             ) from error
-        except ModuleNotFoundError as error:
-            raise ClusterError(f"a worker lacks the module {error.name!r}; install it there; {_KEPT}") from error
+        self._submit_again(future, piece)
+
+    def _submit_again(self, future: Future, piece: Piece) -> None:
         del self._out[future.key]
-        return chunk
+        with suppress(Exception):  # a cluster that has gone has forgotten it too
+            self._client.cancel([future], force=True)
+        self._pieces = chain([piece], self._pieces)
 
     def _take_back(self) -> None:
         """The parcel died with the last worker that had it, and all that was to be done with it."""
@@ -137,6 +233,13 @@ class Desk:
         self._ready.clear()
         self._out.clear()
         self._there = None
+
+
+def _of_connection(error: Exception) -> bool:
+    """Whether an error is of the connection to a worker, and none that its function raised."""
+    from distributed.comm.core import CommClosedError
+
+    return isinstance(error, CommClosedError | NoAnswerError)
 
 
 def sweep_chunk(parcel: Parcel, parameters: dict[str, Array], samples: NDArray[np.int64]) -> Chunk:

@@ -27,7 +27,7 @@ from pathcontrol.sweeps.space import Space, check_seed, digest
 from pathcontrol.sweeps.store import Store, parquet
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, Security
 
 
 def sweep(
@@ -42,6 +42,7 @@ def sweep(
     resume: bool = False,
     progress: bool = True,
     cluster: str | Path | Client | None = None,
+    security: Security | None = None,
 ) -> SweepResult:
     """Simulate every sample of a space, a chunk at a time, and keep its numbers on disk.
 
@@ -70,6 +71,7 @@ def sweep(
         cluster: a Dask cluster whose workers compute the chunks: the address of its scheduler, as
             ``"tcp://host:8786"``, its scheduler file, or a ``distributed.Client``; default this process. The table and
             the histories are the same.
+        security: certificates for TLS, a ``distributed.Security``, where the cluster asks for some.
 
     Raises:
         ClusterError: the cluster does not answer or cannot go on, or a worker has other versions than this process.
@@ -83,7 +85,7 @@ def sweep(
     keep, measure, seed = Keep() if keep is None else keep, measure_of(metrics), check_seed(seed)
     if not isinstance(keep, Keep):
         raise InputError(f"keep = {keep!r}, expected a Keep, such as Keep(worst=5), or None")
-    with connected(cluster) as client:
+    with connected(cluster, security) as client:
         design = space.design(seed)
         job = Job(build, measure, keep, keep.at_random(space.samples, seed))
         computed = partial(_computed_here, job) if client is None else Desk(client, job).chunks
