@@ -7,7 +7,9 @@ import fcntl
 import glob
 import os
 import secrets
+import shutil
 import stat
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -55,6 +57,17 @@ def locked(path: Path) -> Iterator[bool]:
         yield _lock(descriptor)
     finally:
         os.close(descriptor)
+
+
+@contextlib.contextmanager
+def scratch_folder(prefix: str) -> Iterator[Path]:
+    """Give a temporary folder, which is removed at the end; those that killed processes left are removed before."""
+    for left in Path(tempfile.gettempdir()).glob(f"{glob.escape(prefix)}*"):
+        with contextlib.suppress(OSError), locked(left) as ours:
+            if ours and left.stat().st_uid == os.getuid():
+                shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=prefix) as folder, locked(Path(folder)):
+        yield Path(folder)
 
 
 def _lock(descriptor: int) -> bool:

@@ -8,6 +8,7 @@ import os
 import resource
 import shutil
 import signal
+import tempfile
 import time
 import warnings
 from pathlib import Path
@@ -19,9 +20,10 @@ from click.testing import CliRunner
 from scipy import stats
 
 import pathcontrol as pc
-from pathcontrol._files import locked, whole_file
+from pathcontrol._files import locked, scratch_folder, whole_file
 from pathcontrol.cli import main
 from pathcontrol.errors import InputError, PathControlError, PathControlWarning
+from pathcontrol.experiments.sweep_runner import run_sweep
 from pathcontrol.simulation.saved.netcdf import read_run, write_run
 
 pytest.importorskip("pyarrow")
@@ -370,6 +372,63 @@ def test_what_killed_writers_left_is_removed_and_what_a_living_one_writes_stays(
     assert sorted(tmp_path.iterdir()) == sorted([file, other])
     with locked(file) as one, locked(file) as two:
         assert (one, two) == (True, False)
+
+
+def test_scratch_that_a_killed_process_left_is_removed_and_that_of_a_living_one_stays(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    (tmp_path / "film-left").mkdir()
+    (tmp_path / "film-left" / "film.html").write_text("half")
+    (tmp_path / "other").mkdir()
+    with scratch_folder("film-") as living:
+        assert sorted(path.name for path in tmp_path.iterdir()) == sorted([living.name, "other"])
+        with scratch_folder("film-") as second:
+            assert living.exists()
+            assert second != living
+    assert [path.name for path in tmp_path.iterdir()] == ["other"]
+
+
+# --- bounds ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "space",
+    [
+        lambda: pc.Space.sobol({"k": stats.uniform(1.0, 2.0)}, 10**10),
+        lambda: pc.Space.random({"k": stats.uniform(np.zeros(100), 2.0)}, 2 * 10**6),
+        lambda: pc.Space.grid({f"k{i}": list(range(1000)) for i in range(7)}),
+        lambda: pc.Space.latin_hypercube({"k": stats.uniform(1.0, 2.0)}, 10**300),
+    ],
+)
+def test_more_samples_than_memory_holds_are_refused_at_once(space):
+    with pytest.raises(InputError, match=r"samples = 1?2?0+.*, expected at most \d+, which are in memory together"):
+        space()
+
+
+def test_a_file_names_the_key(tmp_path):
+    (tmp_path / "s.toml").write_text(FILE)
+    with pytest.raises(pc.ExperimentError, match=r"sweep.samples = 10000000000, expected at most 10000000"):
+        run_sweep(tmp_path / "s.toml", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+FILE = """
+duration = 1.0
+[robot]
+source = "cicese_2dof"
+[task]
+type = "circle"
+radius = 1.0
+speed = 2.0
+[controller]
+type = "projection"
+k_p = 800.0
+K_v = [45.0, 100.0]
+[sweep]
+method = "sobol"
+samples = 10000000000
+[sweep.parameters]
+"controller.k_p" = { uniform = [1.0, 2.0] }
+"""
 
 
 # --- names -------------------------------------------------------------------------------------------------------

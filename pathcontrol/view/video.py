@@ -18,7 +18,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, cast
 
 from pathcontrol._arrays import scalar
 from pathcontrol._expect import expect
-from pathcontrol._files import whole_file
+from pathcontrol._files import scratch_folder, whole_file
 from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import check_suffix
 from pathcontrol.errors import InputError, MissingExtraError, PathControlError
@@ -87,8 +87,8 @@ def save_video(
         if find_spec(package) is None:
             raise MissingExtraError(package, "video", "a video")
     program, stop = find_browser(), Event()
-    with whole_file(path) as video, tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(1) as pool:
-        page = animation.save(Path(folder) / "film.html")
+    with whole_file(path) as video, scratch_folder("pathcontrol-film-") as folder, ThreadPoolExecutor(1) as pool:
+        page = animation.save(folder / "film.html")
         # in a thread: there is no loop of asyncio that playwright would trip over, and Ctrl-C does not hit it halfway
         work = pool.submit(_shoot, page, video, clip, program, stop)
         try:
