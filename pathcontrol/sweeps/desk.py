@@ -89,10 +89,7 @@ class Desk:
     def _finished(self) -> Iterator[Chunk]:
         losses = 0
         while self._give_out():
-            future = self._next()
-            if future is None:
-                self._take_back()
-            chunk = None if future is None else self._taken(future)
+            chunk = self._taken(self._next())  # no name for the future, whose task would be kept after Ctrl-C
             if chunk is not None:
                 losses = 0
                 yield chunk
@@ -173,10 +170,13 @@ class Desk:
         except Exception as error:  # of any kind, as the connection is closed
             raise ClusterError(f"the cluster is lost: {error}; {_KEPT}") from error
 
-    def _taken(self, future: Future) -> Chunk | None:
+    def _taken(self, future: Future | None) -> Chunk | None:
         """The chunk of a future, or None where it is lost and will be computed again."""
         from distributed import CancelledError, KilledWorker
 
+        if future is None:
+            self._take_back()
+            return None
         _, piece = self._out[future.key]
         try:
             chunk = within(
