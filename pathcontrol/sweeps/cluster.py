@@ -198,7 +198,8 @@ def within(seconds: float, ask: Callable[[], Any], there: Callable[[], bool] = l
         try:
             answer.set_result(ask())
         except BaseException as error:
-            answer.set_exception(error)
+            own = error.__traceback__  # of this frame, which would keep the answer, and what is asked, alive
+            answer.set_exception(error.with_traceback(None if own is None else own.tb_next))
 
     threading.Thread(target=work, daemon=True).start()
     until = time.monotonic() + seconds
