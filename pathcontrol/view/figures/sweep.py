@@ -74,11 +74,13 @@ def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = 
         bar.outline.set_visible(False)
         lost = {
             _DIVERGED: ((table["status"] == "diverged").to_numpy(), _LOST),
-            "unfinished": ((table["status"] == "unfinished").to_numpy(), _LOST | {"marker": "+"}),
             "never": (never(table, metric), _NEVER),
         }
-        for (rows, look), size in zip(lost.values(), (min(side, 3.5), min(side, 3.5), side), strict=True):
-            axes.plot(right[rows], up[rows], **(look | {"markersize": size}), **many)
+        sizes = {_DIVERGED: min(side, 3.5), "never": side, "unfinished": min(side, 3.5)}
+        if (short := (table["status"] == "unfinished").to_numpy()).any():
+            lost["unfinished"] = (short, _LOST | {"marker": "+"})
+        for word, (rows, look) in lost.items():
+            axes.plot(right[rows], up[rows], **(look | {"markersize": sizes[word]}), **many)
         axes.set(xlabel=x, ylabel=y, xscale=scale(right), yscale=scale(up))
         if entries := {word: Line2D([], [], **look) for word, (rows, look) in lost.items() if rows.any()}:
             legend(figure, entries)
