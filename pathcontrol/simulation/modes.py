@@ -41,7 +41,7 @@ class SampledLoop:
 
     Attributes:
         period: control period [s].
-        substeps: steps of the plant in a period; one is accurate, see :class:`Plant`.
+        substeps: steps of the plant in a period; one does unless the motion is fast, see :class:`Plant`.
         encoders: False for exact positions, True for the resolution of the robot, or counts per
             revolution, (n,), or for each rollout, (N, n).
         velocity: ``"exact"``, or ``"difference"`` of two measured positions over the period.
