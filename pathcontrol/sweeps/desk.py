@@ -118,9 +118,10 @@ class Desk:
         return next(self._ready)
 
     def _cancel(self) -> None:
-        """Nobody waits for what is out."""
+        """Nobody waits for what is out, and nobody needs the parcel."""
         with suppress(Exception):  # a cluster that has gone has forgotten it too
-            self._client.cancel([future for future, _ in self._out.values()], force=True)
+            parcel = [] if self._there is None else [self._there]
+            self._client.cancel([*(future for future, _ in self._out.values()), *parcel], force=True)
 
     def _give_out(self) -> bool:
         """Whether anything is out, or has to be given out again."""
