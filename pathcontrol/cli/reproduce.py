@@ -8,27 +8,64 @@ from typing import Any
 
 import click
 
-from pathcontrol.cli.group import import_all, json_option, open_option, open_page
+from pathcontrol.cli.group import import_all, json_option, open_option, open_page, uninterrupted
 
 
 @click.command("reproduce")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=Path("results"), show_default=True)
+@click.option(
+    "--sensitivity", is_flag=True, help="Also say how sure that is: both experiments with what the paper leaves unsaid."
+)
+@click.option(
+    "--samples", type=click.IntRange(1), metavar="N", help="With --sensitivity: how many combinations; default 300."
+)
 @open_option
 @json_option
-def command(out: Path, opened: bool, as_json: bool) -> None:
+def command(out: Path, sensitivity: bool, samples: int | None, opened: bool, as_json: bool) -> None:
     """Run the paper's two experiments on the bundled arm."""
+    if samples is not None and not sensitivity:
+        raise click.UsageError("--samples counts the combinations of --sensitivity; give that, too")
     import_all()
+    if sensitivity:
+        _import_sweep()
     from pathcontrol.experiments.reproduce import PAPER
     from pathcontrol.experiments.reproduce import reproduce as run_both
 
     summary = run_both(out)
+    if not as_json:
+        _tell(summary, out)
+    if sensitivity:
+        summary |= {"sensitivity": _vary(out, samples, as_json)}
     if as_json:
         click.echo(json.dumps(summary))
-    else:
-        _tell(summary, out)
     if opened:
-        for name in PAPER:
+        for name in (*PAPER, *(["sensitivity"] if sensitivity else [])):
             open_page(out / f"{name}.html")
+
+
+def _import_sweep() -> None:
+    """What a sweep needs beside a simulation; if an extra is missing, that is told before anything is simulated."""
+    with uninterrupted():
+        from pathcontrol.sweeps.store import parquet
+
+        parquet()
+
+
+def _vary(out: Path, samples: int | None, as_json: bool) -> dict[str, Any]:
+    from pathcontrol.experiments.sensitivity import SAMPLES
+    from pathcontrol.experiments.sensitivity_page import sensitivity as vary
+    from pathcontrol.experiments.sensitivity_page import sentences
+
+    try:
+        summary = vary(out, SAMPLES if samples is None else samples)
+    except KeyboardInterrupt:
+        click.echo(f"the same command goes on with what is in {out / 'sensitivity'}", err=True)
+        raise
+    if not as_json:
+        for sentence in sentences(summary):
+            click.echo(sentence)
+        click.echo(f"{out / 'sensitivity.html'} has all of it.")
+    return summary
 
 
 def _tell(summary: dict[str, Any], out: Path) -> None:

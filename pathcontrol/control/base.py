@@ -229,8 +229,8 @@ def _without_matrix(name: str, array: Array, n: int) -> Array:
     diagonal = array.diagonal()
     if np.count_nonzero(array - np.diag(diagonal)):
         raise InputError(
-            f"{name} = {array.tolist()} is a matrix that is not diagonal; the theorems ask for diagonal gains, with "
-            f"which V falls: give its diagonal, as {name} = {diagonal.tolist()} (gains of {n} rollouts are rows, "
+            f"{name} = {array.tolist()} is a matrix that is not diagonal; the theorems ask for diagonal gains: "
+            f"give its diagonal, as {name} = {diagonal.tolist()} (gains of {n} rollouts are rows, "
             f"({n}, 1, {n}))"
         )
     return diagonal

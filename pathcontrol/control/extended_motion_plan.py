@@ -20,8 +20,11 @@ class ExtendedMotionPlan(Controller, single=True):
         σ̇ = ϑ(σ) − k e_pᵀq_d'(σ)
         τ = M(q)[r'(σ)σ̇ + K_v e_v + K_p e_p] + C(q,q̇)q̇ + g(q) + f̂(q̇),   r = q_d'ϑ
 
-    with e_p = q_d(σ) − q and e_v = r(σ) − q̇. V = ½e_pᵀe_p + ½e_vᵀK_p⁻¹e_v falls along the closed loop,
-    V̇ = −e_vᵀK_p⁻¹K_v e_v − k(e_pᵀq_d')². k = 0 is computed torque on the timed trajectory, k → ∞ the projection law.
+    with e_p = q_d(σ) − q and e_v = r(σ) − q̇. Where the law compensates all friction, in continuous time and within the
+    torque limits, V = ½e_pᵀe_p + ½e_vᵀK_p⁻¹e_v does not grow: V̇ = −e_vᵀK_p⁻¹K_v e_v − k(e_pᵀq_d')². With friction that
+    is left, or torques held over a period, V falls only until the errors are as small as these make them.
+
+    k = 0 is computed torque on the timed trajectory, k → ∞ the projection law.
     Over the last stretch of an open path k is 0 (:class:`Ending`), so that the plan cannot wait there for ever for an
     arm that dry friction holds; the theorem asks for no more than k(σ) ≥ 0.
 

@@ -25,13 +25,16 @@ class Projection(Controller):
         (q_d(σ̄) − q)ᵀq_d'(σ̄) = 0,    dσ̄/dt = q_d'ᵀq̇ / (‖q_d'‖² + e_pᵀq_d'')
         τ = M(q)[r'(σ̄)dσ̄/dt + K_v e_v + k_p e_p] + C(q,q̇)q̇ + g(q) + f̂(q̇),   r = q_d'ϑ
 
-    V = ½e_vᵀe_v + ½k_p e_pᵀe_p falls along the closed loop, V̇ = −e_vᵀK_v e_v, because e_p is orthogonal to the path;
-    k_p must be a scalar for that. dσ̄/dt is the exact chain rule and keeps the sign that the square root printed below
-    (39) loses. Where no nearest point is defined (the denominator vanishes, as at the centre of a circle) the last σ̄
-    is kept and ``regular`` is False.
+    Where the law compensates all friction, in continuous time and within the torque limits, V = ½e_vᵀe_v + ½k_p e_pᵀe_p
+    does not grow: V̇ = −e_vᵀK_v e_v, because e_p is orthogonal to the path; k_p must be a scalar for that. With friction
+    that is left, or torques held over a period, V falls only until the errors are as small as these make them.
 
-    Nothing here pulls along the path an arm that dry friction holds, so the end of an open path is reached by the timed
-    plan σ̇ = ϑ(σ), once σ is where :class:`Ending` begins; V̇ is the same. There the arm is held by k_p.
+    dσ̄/dt is the exact chain rule and keeps the sign that the square root printed below (39) loses. Where no
+    nearest point is defined (the denominator vanishes, as at the centre of a circle) the last σ̄ is kept and
+    ``regular`` is False.
+
+    Nothing here pulls along the path an arm that dry friction holds, so the end of an open path is reached by the
+    timed plan σ̇ = ϑ(σ), once σ is where :class:`Ending` begins; V̇ is the same. There the arm is held by k_p.
 
     The state is the last σ̄; it counts laps and tells branches apart. ``branch`` says when one is left for another.
 

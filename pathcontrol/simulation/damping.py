@@ -1,4 +1,4 @@
-"""Viscous friction over one step, condensed into an inertia matrix: exact where it is weak, damped where it is stiff.
+"""Viscous friction over one step, condensed into an inertia matrix: third order where it is weak, damped where stiff.
 
 Under a constant r the velocity of M v̇ = r − B(v − v₀), B = diag(b), changes in h by
 

@@ -37,7 +37,7 @@ class Plant:
 
     where M̃ = M + h/2 B + BXB condenses what viscous friction does in h while all else is constant, as
     :class:`Damping` says: under a constant torque a joint alone gets to v⁺ = v∞ + R(x)(v − v∞) with x = h b/M and
-    |R(x) − e⁻ˣ| < 0.0009. So nothing rings, for any b: 0 < R < 1, and R → 0 for b → ∞. The step is of second order
+    |R(x) − e⁻ˣ| < 0.0009. So nothing rings, for any b: 0 ≤ R < 1, and R → 0 for b → ∞. The step is of second order
     where no joint changes between sticking and slipping, and a joint that sticks does not creep at all.
 
     For arms whose viscous friction is weak, tr(M⁻¹B) ≤ 4 1/s in every posture tried, X is 0: the trapezoidal rule.

@@ -75,7 +75,7 @@ def page(film: Film, title: Sequence[str], sections: Sequence[Section] = ()) -> 
         policy=_policy([_digest(player), viewer_digest]),
         title=list(title),
         sections=sections,
-        styles=Markup("\n".join(_own(name) for name in STYLES)),
+        styles=Markup("\n".join(own_text(name) for name in STYLES)),
         player=Markup(player),
         viewer=viewer,
         film=film.text(),
@@ -83,21 +83,22 @@ def page(film: Film, title: Sequence[str], sections: Sequence[Section] = ()) -> 
     return text.encode(errors="backslashreplace").decode()  # halves of characters cannot be written to a file
 
 
-def _own(name: str) -> str:
+def own_text(name: str) -> str:
+    """The text of a file of the page, by its place beside this module."""
     return resources.files("pathcontrol.view.page").joinpath(*name.split("/")).read_text("utf-8")
 
 
 @cache
 def _template() -> jinja2.Template:
-    return jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(_own("template.html"))
+    return jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(own_text("template.html"))
 
 
 @cache
 def _player() -> str:
     """The charts' library with its licence, and our own parts, which share one scope and leave no trace outside it."""
-    own = "\n".join(_own(f"js/{name}") for name in PARTS)
-    licence = f"/*! uPlot: {_own('vendor/LICENSE')}*/"
-    return _embedded(f'{licence}\n"use strict";\n(() => {{\n{_own("vendor/uPlot.iife.min.js")}\n{own}\n}})();\n')
+    own = "\n".join(own_text(f"js/{name}") for name in PARTS)
+    licence = f"/*! uPlot: {own_text('vendor/LICENSE')}*/"
+    return _embedded(f'{licence}\n"use strict";\n(() => {{\n{own_text("vendor/uPlot.iife.min.js")}\n{own}\n}})();\n')
 
 
 @cache

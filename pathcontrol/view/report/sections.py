@@ -62,21 +62,22 @@ def sections(runs: Mapping[str, Run], made_by: str, sweep: SweepResult | None = 
 
 
 def _section(title: str, **content: Any) -> Section:
-    template = _templates().get_template(f"{title.lower().replace(' ', '_')}.html")
+    template = templates().get_template(f"{title.lower().replace(' ', '_')}.html")
     return Section(title, Markup(template.render(content)))
 
 
 @cache
-def _templates() -> jinja2.Environment:
-    templates = jinja2.Environment(
+def templates() -> jinja2.Environment:
+    """Where the templates of reports are, in which every name is text and never markup."""
+    found = jinja2.Environment(
         loader=jinja2.PackageLoader("pathcontrol.view.report"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    templates.filters["symbols"] = _symbols
-    return templates
+    found.filters["symbols"] = _symbols
+    return found
 
 
 def _symbols(text: str) -> Markup:
