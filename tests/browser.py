@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from patience import PATIENCE
 from PIL import Image
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "microsoft-edge")
@@ -58,9 +59,9 @@ class Opened:
         """What an element looks like, (height, width, 3), 0 to 255."""
         return _colors(self.tab.locator(selector).screenshot())
 
-    def until(self, condition: str, seconds: float = 10.0) -> None:
+    def until(self, condition: str) -> None:
         """Wait until an expression is true in the page, whose policy forbids that playwright waits in it."""
-        end = time.monotonic() + seconds
+        end = time.monotonic() + PATIENCE
         while not self(condition):
             assert time.monotonic() < end, f"it never came to be that {condition}"
             self.tab.wait_for_timeout(20)
@@ -100,6 +101,7 @@ def opened(
     """
     settings = {"viewport": {"width": size[0], "height": size[1]}, "offline": True} | context
     window = _browser().new_context(**settings)
+    window.set_default_timeout(1000 * PATIENCE)
     try:
         page = Opened(window.new_page())
         _listen(page)
@@ -135,7 +137,7 @@ def _browser() -> Any:
     from playwright.sync_api import sync_playwright
 
     playwright = sync_playwright().start()
-    browser = playwright.chromium.launch(executable_path=program, args=list(_FLAGS))
+    browser = playwright.chromium.launch(executable_path=program, args=list(_FLAGS), timeout=1000 * PATIENCE)
     atexit.register(_quietly, playwright.stop)
     atexit.register(_quietly, browser.close)
     return browser

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 import pathcontrol as pc
 from pathcontrol.errors import ExperimentError
@@ -117,7 +118,7 @@ def test_refusing_takes_no_memory(tmp_path):
             [sys.executable, "-m", "pathcontrol", "run", str(file), "--out", str(tmp_path / "out")],
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=PATIENCE,
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30)),
         )
         assert done.returncode == 2, done.stderr

@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from patience import PATIENCE, wait_until
 from scipy import stats
 
 import pathcontrol as pc
@@ -76,11 +77,15 @@ def workers():
         yield started
 
 
+@pytest.fixture(autouse=True)
+def _patient(monkeypatch):
+    """What is there may take its time on a busy machine."""
+    monkeypatch.setattr(cluster_module, "_PATIENCE", PATIENCE)
+
+
 @pytest.fixture
 def address(workers):
-    until = time.monotonic() + 60
-    while len(workers.scheduler.workers) < 2 and time.monotonic() < until:
-        time.sleep(0.05)  # one that was killed before is on its way
+    wait_until(lambda: len(workers.scheduler.workers) >= 2)  # one that was killed before is on its way
     return workers.scheduler_address
 
 
@@ -197,10 +202,7 @@ def test_ctrl_c_cancels_what_is_out_and_keeps_what_is_in(workers, tmp_path):
     with distributed.Client(workers, set_as_default=False) as client:
         with pytest.raises(KeyboardInterrupt):
             swept(folder, space=many, build=endless, cluster=client)
-        until = time.monotonic() + 10
-        while workers.scheduler.tasks and time.monotonic() < until:
-            time.sleep(0.05)
-        assert not workers.scheduler.tasks
+        wait_until(lambda: not workers.scheduler.tasks)
     assert 4 <= pc.SweepResult(folder).finished < 100
     assert not list(folder.rglob("*/.*"))
 
@@ -352,10 +354,7 @@ def test_the_files_of_an_experiment_reach_the_workers(experiment, address, tmp_p
         done = CliRunner().invoke(main, command)
         assert done.exit_code == 0, done.output
         assert content(tmp_path / "there") == content(tmp_path / "here")
-        until = time.monotonic() + 10
-        while any(left(client)) and time.monotonic() < until:
-            time.sleep(0.05)
-        assert not any(left(client))
+        wait_until(lambda: not any(left(client)), pause=0.05)
 
 
 def left(client):
@@ -438,7 +437,7 @@ def test_where_nobody_answers_nothing_is_begun(wrong, message, tmp_path):
     began = time.monotonic()
     with pytest.raises(ClusterError, match=message):
         swept(tmp_path / "out", cluster=wrong.format(port=free_port()))
-    assert time.monotonic() - began < 3
+    assert time.monotonic() - began < PATIENCE / 10  # at once, not after all patience
     assert not (tmp_path / "out").exists()
 
 
@@ -457,7 +456,7 @@ def test_what_is_no_scheduler_is_told(says, tmp_path, monkeypatch):
     began = time.monotonic()
     with pytest.raises(ClusterError, match=r"no Dask scheduler answers .*start one with `dask scheduler`"):
         swept(tmp_path / "out", cluster=f"tcp://127.0.0.1:{listener.getsockname()[1]}")
-    assert time.monotonic() - began < 5
+    assert time.monotonic() - began < 25  # the client by itself waits 30 s
     assert not (tmp_path / "out").exists()
 
 

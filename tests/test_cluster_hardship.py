@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from patience import PATIENCE, wait_until
 from scipy import stats
 
 import pathcontrol as pc
@@ -155,11 +156,9 @@ def test_what_the_page_starts_listens_on_this_machine_only(here, tmp_path):
                     stderr=subprocess.DEVNULL,
                 )
             )
-            until = time.monotonic() + 60
-            while not listening(family(started[-1].pid)) and time.monotonic() < until:
-                time.sleep(0.1)
-        with distributed.Client(f"tcp://127.0.0.1:{port}", set_as_default=False, timeout=60) as client:
-            client.wait_for_workers(1, timeout=60)
+            wait_until(lambda: listening(family(started[-1].pid)), pause=0.1)
+        with distributed.Client(f"tcp://127.0.0.1:{port}", set_as_default=False, timeout=PATIENCE) as client:
+            client.wait_for_workers(1, timeout=PATIENCE)
         assert len(started) == 2
         for process in started:
             assert listening(family(process.pid)) in ({"127.0.0.1"}, {"127.0.0.1", "::1"}, {"::1"})

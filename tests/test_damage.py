@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from patience import PATIENCE
 from scipy import stats
 
 import pathcontrol as pc
@@ -189,7 +190,7 @@ def test_a_second_process_is_refused_and_a_killed_one_leaves_no_lock(tmp_path):
     def waiting(p, samples):
         if os.getpid() != parent:
             inside.touch()
-            time.sleep(60)
+            time.sleep(PATIENCE)
         return circle(p, samples)
 
     process = multiprocessing.get_context("fork").Process(

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = {
@@ -32,7 +33,7 @@ def test_example(name, tmp_path):
     if name == "tune_gains":
         pytest.importorskip("pymoo")
     script = ROOT / "examples" / f"{name}.py"
-    done = subprocess.run([sys.executable, script, tmp_path], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, script, tmp_path], capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
     written = list(tmp_path.iterdir())
     assert len(written) == EXAMPLES[name]
@@ -58,7 +59,7 @@ def test_path_control_keeps_nearer_to_the_path_than_motion_control(tmp_path):
         [sys.executable, ROOT / "examples" / "motion_control.py", tmp_path],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
     )
     errors = {m[1].strip(): float(m[2]) for m in re.finditer(r"^(\S.*?)\s{2,}([\d.]+)$", done.stdout, re.MULTILINE)}
     assert len(errors) == 5

@@ -7,6 +7,7 @@ import warnings
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 import pathcontrol as pc
 
@@ -64,7 +65,7 @@ def test_a_notebook_runs_and_shows_its_figures_and_its_film(notebook, tmp_path):
     content = nbformat.read(notebook, as_version=4)
     nbformat.validate(content)
     assert all(not cell.get("outputs") for cell in content.cells), "committed without outputs"
-    nbclient.NotebookClient(content, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    nbclient.NotebookClient(content, timeout=PATIENCE, resources={"metadata": {"path": str(tmp_path)}}).execute()
     outputs = [output for cell in content.cells if cell.cell_type == "code" for output in cell.outputs]
     assert not [output for output in outputs if output.output_type == "stream" and output.name == "stderr"]
     shown = [output.data for output in outputs if "data" in output]

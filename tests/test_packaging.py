@@ -10,6 +10,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 ROOT = Path(__file__).parent.parent
 PROGRAM = "import sys; sys.argv[0] = 'pathcontrol'; from pathcontrol.cli import main; main(prog_name='pathcontrol')"
@@ -19,7 +20,9 @@ def complete(*words: str) -> list[str]:
     """What Bash is offered for the last of some words."""
     line = {"COMP_WORDS": " ".join(("pathcontrol", *words)), "COMP_CWORD": str(len(words))}
     environment = os.environ | line | {"_PATHCONTROL_COMPLETE": "bash_complete"}
-    done = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, timeout=PATIENCE
+    )
     return [entry.partition(",")[2] or entry for entry in done.stdout.split("\n") if entry]
 
 
@@ -36,7 +39,9 @@ def test_the_lines_of_the_documentation_give_what_the_shells_run(shell):
     page = (ROOT / "docs" / "getting_started.md").read_text(encoding="utf-8")
     assert f"_PATHCONTROL_COMPLETE={shell}_source pathcontrol" in page
     environment = os.environ | {"_PATHCONTROL_COMPLETE": f"{shell}_source"}
-    done = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, timeout=PATIENCE
+    )
     assert f"{shell}_complete" in done.stdout
 
 

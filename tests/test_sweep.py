@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from patience import PATIENCE
 from scipy import stats
 
 import pathcontrol as pc
@@ -195,7 +196,7 @@ def test_killed_at_each_file_and_resumed_the_table_is_the_same(before, undisturb
     while True:
         folder = tmp_path / str(moment)
         process = in_a_process(dying, folder, moment, before)
-        process.join(60)
+        process.join(PATIENCE)
         if process.exitcode == 0:
             break
         assert process.exitcode == -signal.SIGKILL
@@ -210,7 +211,7 @@ def test_killed_at_random_moments_over_and_over(undisturbed, tmp_path):
         process = in_a_process(go_on, tmp_path, chunk)
         time.sleep(rng.uniform(0.02, 0.25))
         process.kill()
-        process.join(60)
+        process.join(PATIENCE)
         deaths += process.exitcode == -signal.SIGKILL
     assert deaths
     assert_undisturbed(go_on(tmp_path), undisturbed)

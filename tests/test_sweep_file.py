@@ -7,13 +7,13 @@ import os
 import signal
 import subprocess
 import sys
-import time
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from patience import PATIENCE, wait_until
 
 import pathcontrol as pc
 from pathcontrol.errors import ExperimentError, InputError
@@ -215,11 +215,9 @@ def test_after_ctrl_c_finished_chunks_stay(experiment, tmp_path):
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background ignore it
     )
-    until = time.monotonic() + 60
-    while not list(out.glob("chunks/0*.parquet")) and time.monotonic() < until:
-        time.sleep(0.05)
+    wait_until(lambda: list(out.glob("chunks/0*.parquet")) or process.poll() is not None, pause=0.05)
     os.kill(process.pid, signal.SIGINT)
-    assert process.wait(60) == 130
+    assert process.wait(PATIENCE) == 130
     told = process.stderr.read()
     assert "interrupted" in told
     assert f"--resume goes on with what is in {out}" in told

@@ -8,13 +8,13 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import browser
 import numpy as np
 import pytest
+from patience import PATIENCE, wait_until
 
 import pathcontrol as pc
 from pathcontrol import Circle, InputError, MissingExtraError, RobotModel, Run
@@ -168,11 +168,9 @@ def test_ctrl_c_leaves_no_half_video(run, tmp_path):
         start_new_session=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background ignore it
     )
-    deadline = time.monotonic() + 60
-    while not list(tmp_path.glob(".a-*.mp4")) and process.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.01)
+    wait_until(lambda: list(tmp_path.glob(".a-*.mp4")) or process.poll() is not None)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the command and all that it has started
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130, err
     assert b"Traceback" not in err
     assert [path.name for path in tmp_path.iterdir()] == ["run.nc"]
