@@ -42,8 +42,8 @@ _INSTEAD = {
 }
 
 
-def expect(name: str, value: Any, *kinds: type, error: type[PathControlError] = InputError) -> None:
-    """Check that the argument ``name`` is of one of the ``kinds``, the usual one first.
+def expect(name: str, value: Any, *kinds: type, error: type[PathControlError] = InputError, also: str = "") -> None:
+    """Check that the argument ``name`` is of one of the ``kinds``, the usual one first; ``also`` says what else may be.
 
     Raises:
         PathControlError: it is not; of the class ``error``.
@@ -56,7 +56,9 @@ def expect(name: str, value: Any, *kinds: type, error: type[PathControlError] = 
         advice = f"make an instance: {value.__name__}(…)" if issubclass(value, kinds) else advice
     if given in _SOURCES and given != wanted:
         advice += "; are arguments swapped?"
-    raise error(f"{name} {described(value)}, expected {_article(wanted)} {wanted}" + (f": {advice}" if advice else ""))
+    raise error(
+        f"{name} {described(value)}, expected {_article(wanted)} {wanted}{also}" + (f": {advice}" if advice else "")
+    )
 
 
 def described(value: Any) -> str:

@@ -112,7 +112,7 @@ def test_the_plane_is_that_of_the_workpiece(film: Reel, run: Run, arm: RobotMode
 def test_metrics_are_those_of_the_drawing(film: Reel) -> None:
     [metrics] = [table for table in film.header["tables"] if table["title"] == "Metrics"]
     rows = dict(metrics["rows"])
-    assert rows["tool from the drawing, peak"].endswith("µm")
+    assert rows["tool from its path, peak"].endswith("µm")
     assert rows["time for the path"].endswith(" s")
 
 

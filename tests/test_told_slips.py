@@ -65,6 +65,57 @@ def test_an_arm_below_its_own_weight_is_told(arm):
     assert told(warn_of_slips, arm, pc.Circle(1.0, 1.0), q)[0] == []
 
 
+def weakened(arm, effort):
+    return pc.load_robot(str(arm.source.text).replace('effort="150"', f'effort="{effort}"'))
+
+
+def peak_of_weight(robot, path):
+    """The largest gravity torque of the first joint on a path [N m] and where it is, by brute force."""
+    s = np.linspace(*path.sampled_interval, 20001)
+    torque = np.abs(robot.gravity(path.q_d(s)))[:, 0]
+    return torque.max(), s[torque.argmax()]
+
+
+def test_weight_is_looked_at_all_along_the_path(arm):
+    """The start hangs straight down, the end is level."""
+    path = pc.Line([0.0, 0.0], [np.pi / 2, 0.3], speed=0.5)
+    weak, q = weakened(arm, 30), np.zeros((1, 2))
+    [sentence], _ = told(warn_of_slips, weak, path, q)
+    needed, s = peak_of_weight(weak, path)
+    words = sentence.split()
+    assert words[:2] == ["joint_1", "needs"]
+    assert float(words[2]) == pytest.approx(needed, rel=1e-3)
+    assert float(sentence.partition("s = ")[2].split()[0]) == pytest.approx(s, abs=0.02 * path.s_end)
+    enough = weakened(arm, float(np.ceil(needed)))
+    assert told(warn_of_slips, enough, path, q)[0] == []
+
+
+def test_every_arm_and_every_task_of_a_batch_is_looked_at(arm):
+    """Twenty paths, of which the last reaches highest; and arms of which the last but one has the least torque."""
+    heights = np.linspace(0.1, np.pi / 2, 20)
+    paths = [pc.Line([0.0, 0.0], [height, 0.0], speed=0.5) for height in heights]
+    limit = float(np.abs(arm.gravity(np.array([heights[16], 0.0])))[0]) + 0.01
+    weak, q = weakened(arm, limit), np.zeros((20, 2))
+    [sentence], _ = told(warn_of_slips, weak, pc.TaskBatch(paths), q)
+    needed, _ = peak_of_weight(weak, paths[-1])
+    assert f"needs {needed:.4g} N m at s = " in sentence
+    assert "in rollout 19, the worst of 3," in sentence
+    arms = [weakened(arm, effort) for effort in (150, 149, 30, 20, 25)]
+    loads = [one.with_payload(mass, frame="tool") for one, mass in zip(arms, (0.0, 1.0, 2.0, 0.5, 0.5), strict=True)]
+    [sentence], _ = told(warn_of_slips, pc.RobotBatch(loads), paths[-1], np.zeros((5, 2)))
+    shares = [peak_of_weight(one, paths[-1])[0] / one.limits.effort[0] for one in loads]
+    assert f"in rollout {np.argmax(shares)}, the worst of {sum(share > 1 for share in shares)}," in sentence
+    assert f"its limit is {loads[int(np.argmax(shares))].limits.effort[0]:.4g} N m" in sentence
+
+
+def test_limits_of_position_are_those_of_each_arm_and_task(ur5):
+    start = np.deg2rad(DEGREES)
+    inside = pc.Line(start, start + 0.1, speed=0.2)
+    beyond = pc.Line(start, start + 6.0 * np.eye(6)[2], speed=0.2)
+    [sentence], _ = told(warn_of_slips, ur5, pc.TaskBatch([inside] * 11 + [beyond]), np.tile(start, (12, 1)))
+    assert "the path of rollout 11 has elbow_joint" in sentence
+
+
 def test_an_arm_that_stands_still_is_told_with_the_remedy(arm):
     line = pc.Line([0.7, 1.2], [0.55, 0.96], speed=0.05)
     sentences, run = told(

@@ -1,18 +1,23 @@
-"""A run along a toolpath contour by contour: how long each took, how fast, how near to the drawing, how much of it."""
+"""A run contour by contour, or path by path: how long each took, how fast, how near to it, how much of it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
 
-from pathcontrol._arrays import Array
-from pathcontrol.analysis.coverage import Points, even_points, passed, refined
+from pathcontrol.analysis.coverage import Points, even_points, passed, refined, traverse
 from pathcontrol.analysis.known import where_known
+from pathcontrol.analysis.tool import LedCurve, feed_along, tool_of, tool_speed
+from pathcontrol.cartesian.path import CartesianPath
+from pathcontrol.cartesian.tool import Tool
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments import Polyline
 
@@ -21,7 +26,7 @@ _FINER = 0.5  # of the tolerance, between points of a drawing
 
 
 class ContourNumbers(NamedTuple):
-    """What a run did on one contour.
+    """What a run did on one contour of a toolpath, or on one path of a sequence.
 
     Attributes:
         name: what the file calls it.
@@ -47,34 +52,38 @@ class ContourNumbers(NamedTuple):
 
 
 def contour_numbers(
-    run: Run, task: ToolpathTask, robot: RobotModel, tolerance: float = 1e-3, stop: int | None = None
+    run: Run, task: PathSequence, robot: RobotModel, tolerance: float = 1e-3, stop: int | None = None
 ) -> list[ContourNumbers]:
     """The numbers of each contour in their order; rapids between them included.
 
+    Of a sequence of other paths each is a contour: the curve on which it leads the tool.
+
     Args:
         run: a run along ``task``, of one rollout.
-        task: the toolpath.
+        task: the toolpath, or a sequence of paths made for a frame of the arm.
         robot: the arm.
         tolerance: how near [m] the tool has to come to a point of the drawing for it to count as passed.
         stop: how many samples count; all by default.
     """
     q = run.array("q")[:, :stop]
-    x = where_known(lambda q: robot.frame_pose(q, task.frame)[..., :3, 3], q)[0]
-    speed = tool_speed(run, robot, task.frame)[0, :stop]
+    tool = Tool(robot, str(task.frame), task.tool_pose)
+    x = where_known(lambda q: tool.kinematics(q).position, q)[0]
+    speed = tool_speed(run, robot, task)[0, :stop]
     which, finish = run["path_index"].to_numpy()[:stop], run.data["path_finish_time"].to_numpy()
     found = []
-    for contour, paths in _grouped(task):
+    for contour, paths in _grouped(task, tool):
         there = np.isin(which, paths)
         begin = 0.0 if paths[0] == 0 else finish[paths[0] - 1]
         way, known = x[there], np.isfinite(x[there]).all(-1)
-        share, missed = passed(contour_points(contour, tolerance), way, tolerance)
+        points = contour.points if isinstance(contour, LedCurve) else contour_points(contour, tolerance)
+        share, missed = passed(points, way, tolerance)
         found.append(
             ContourNumbers(
                 contour.name,
                 contour.rapid,
                 contour.length,
                 float(finish[paths[-1]] - begin),
-                feed_of(contour, task),
+                feed_of(contour, task, paths, robot),
                 float(np.mean(speed[there])) if there.any() else np.nan,
                 float(contour.distance(way[known]).max(initial=0.0)) if known.any() else np.nan,
                 missed,
@@ -98,15 +107,19 @@ HEADS = (
 
 
 def contour_table(run: Run, robot: RobotModel | None = None) -> list[list[str]]:
-    """The numbers of each contour of a run along a toolpath as texts for a reader, heads first; empty for another run.
+    """The numbers of each contour of a run along a toolpath, or of each path of a sequence, as texts for a reader.
+
+    Heads come first; it is empty for a run of another kind.
 
     Raises:
         InputError: the run does not know its robot.
     """
     task = run.task
-    if not isinstance(task, ToolpathTask) or "path_finish_time" not in run.data.coords or "qd" not in run.data:
+    if not isinstance(task, PathSequence) or "path_finish_time" not in run.data.coords or "qd" not in run.data:
         return []
     arm = run.robot if robot is None else robot
+    if tool_of(arm, task) is None:
+        return []
     return [list(HEADS), *(_texts(i, one) for i, one in enumerate(contour_numbers(run, task, arm)))]
 
 
@@ -122,27 +135,20 @@ def _texts(number: int, one: ContourNumbers) -> list[str]:
     ]
 
 
-def feed_of(contour: Contour, task: ToolpathTask) -> float:
-    """The speed [m/s] that is asked for on a contour."""
+def feed_of(contour: Contour | LedCurve, task: PathSequence, paths: Sequence[int], robot: RobotModel) -> float:
+    """The speed [m/s] that is asked for on a contour that some ``paths`` follow; of other paths its mean along them."""
+    if not isinstance(task, ToolpathTask) or isinstance(contour, LedCurve):
+        return _feed_of_path(task.paths[paths[0]], robot)
     if contour.rapid:
         return float(task.rapid_speed)
     return float(contour.feed or task.feed or np.nan)
 
 
-def tool_speed(run: Run, robot: RobotModel, frame: str) -> Array:
-    """‖J(q)q̇‖ [m/s], (rollout, time): how fast the origin of a frame moved."""
-
-    def speed(q: Array, qd: Array) -> Array:
-        _, jacobian = robot.frame_kinematics(q, frame)
-        return np.linalg.norm((jacobian[..., :3, :] @ qd[..., None])[..., 0], axis=-1)
-
-    return where_known(speed, run.array("q"), run.array("qd"))
-
-
-def feed_along(task: ToolpathTask, robot: RobotModel, s: Array) -> Array:
-    """The speed [m/s], (*batch,), at which the plan leads the tool at s: the feed, or less where it is limited."""
-    _, jacobian = robot.frame_kinematics(task.q_d(s), task.frame)
-    return np.linalg.norm((jacobian[..., :3, :] @ task.dq_d(s)[..., None])[..., 0], axis=-1) * task.theta(s)
+def _feed_of_path(path: PathTask, robot: RobotModel) -> float:
+    """The speed [m/s] that a path asks of the tool, its mean over s where it changes."""
+    if isinstance(path, CartesianPath):
+        return path.speed
+    return float(np.mean(feed_along(path, robot, traverse(path))))
 
 
 def contour_points(contour: Contour, tolerance: float) -> Points:
@@ -157,8 +163,10 @@ def contour_points(contour: Contour, tolerance: float) -> Points:
     return even_points(np.concatenate(parts))
 
 
-def _grouped(task: ToolpathTask) -> list[tuple[Contour, list[int]]]:
+def _grouped(task: PathSequence, tool: Tool) -> Sequence[tuple[Contour | LedCurve, list[int]]]:
     """Each contour with the paths that follow it: several where the arm stops at corners."""
+    if not isinstance(task, ToolpathTask):
+        return [(LedCurve(path, tool), [i]) for i, path in enumerate(task.paths)]
     every = list(enumerate(task.contours))
     return [
         (task.contours[paths[0]], paths)

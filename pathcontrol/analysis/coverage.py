@@ -35,11 +35,20 @@ def path_points(task: PathTask) -> Points:
     Raises:
         TaskError: the path goes on for ever without repeating.
     """
+    return even_points(task.q_d(traverse(task)))
+
+
+def traverse(task: PathTask) -> Array:
+    """Increasing parameters (k,) of one traverse of a path, a thousand and its knots.
+
+    Raises:
+        TaskError: the path goes on for ever without repeating.
+    """
     lower, upper = task.one_traverse
     s = np.linspace(lower, upper, _POINTS + 1)
     if task.knots is not None and len(task.knots) <= _MOST:
         s = np.union1d(s, task.knots[(task.knots > lower) & (task.knots < upper)])
-    return even_points(task.q_d(s))
+    return s
 
 
 def even_points(at: Array) -> Points:

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
-from pathcontrol.analysis.contours import contour_numbers, tool_speed
-from pathcontrol.analysis.known import known_task, known_toolpath, where_known
+from pathcontrol.analysis.contours import contour_numbers
+from pathcontrol.analysis.known import known_task, known_toolpath, of_rollouts, where_known
 from pathcontrol.analysis.limit_shares import limit_ratios
 from pathcontrol.analysis.progress import progress
+from pathcontrol.analysis.tool import LedCurve, made_for, orientation_error, tool_speed
 from pathcontrol.analysis.window import Samples, Window, own_samples, samples_of
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour
 
 
@@ -40,7 +42,7 @@ def tool_positions(run: Run, robot: RobotModel | None = None, frame: str | None 
 def tool_deviation(
     run: Run, robot: RobotModel | None = None, frame: str | None = None, contours: Sequence[Contour] | None = None
 ) -> Array:
-    """Distance of the tool from the geometry of a drawing [m], (rollout, time).
+    """Distance of the tool from the geometry of a drawing, or from the curve of its path, [m], (rollout, time).
 
     The lines, arcs and Bézier curves of the file itself are measured against, not curves that were fitted to them.
 
@@ -50,13 +52,43 @@ def tool_deviation(
         frame: the tool's frame; by default the one that the run's path was made for.
         contours: the contour of each path of the run in the robot's base frame, or one for all; a run of several
             paths is measured at each sample against the contour of the path it was on. By default those of the run's
-            toolpath.
+            toolpath; of another path made for a frame of the arm the curve on which it leads the tool.
 
     Raises:
         InputError: something is left out that the run does not know.
     """
-    contours = known_toolpath(run, None).contours if contours is None else contours
-    x = tool_positions(run, robot, frame)
+    if contours is not None:
+        return contour_deviation(run, contours, tool_positions(run, robot, frame))
+
+    def deviation(part: Run, task: PathTask) -> Array:
+        plan = part.model if robot is None else robot
+        return contour_deviation(part, geometry_of(task, plan), tool_positions(part, robot, frame))
+
+    return of_rollouts(deviation, run, None)
+
+
+class Geometry(Protocol):
+    """What a tool may be away from: a contour of a drawing, or the curve of a path."""
+
+    def distance(self, x: Array) -> Array:
+        """Distance of points x (N, 3) from it [m], (N,)."""
+
+
+def geometry_of(task: PathTask, robot: RobotModel) -> Sequence[Geometry]:
+    """What the tool of an arm should be on: the contours of a toolpath, or the curve on which each path leads it.
+
+    Raises:
+        InputError: the path was made for no frame of the arm.
+        TaskError: the path goes on for ever without repeating.
+    """
+    if isinstance(task, ToolpathTask):
+        return task.contours
+    paths, tool = task.paths if isinstance(task, PathSequence) else [task], made_for(robot, task)
+    return [LedCurve(path, tool) for path in paths]
+
+
+def contour_deviation(run: Run, contours: Sequence[Geometry], x: Array) -> Array:
+    """Distance [m], (rollout, time), of x (rollout, time, 3) from the contour of the path that the run was on."""
     if len(contours) == 1 or "path_index" not in run.data.coords:
         return np.min([where_known(contour.distance, x) for contour in contours], axis=0)
     which, deviation = run["path_index"].to_numpy(), np.empty(x.shape[:-1])
@@ -137,32 +169,12 @@ def _of_drawing(run: Run, task: ToolpathTask, robot: RobotModel, tolerance: floa
 
 def _of_tool(run: Run, task: ToolpathTask, robot: RobotModel, counted: Samples, cutting: Array) -> dict[str, Array]:
     """Speed and orientation of the tool over the cuts, (rollout,) each."""
-    speed = tool_speed(run, robot, task.frame) * cutting
+    speed = tool_speed(run, robot, task) * cutting
     values = {"tool_speed_mean": counted.reduced(_mean, speed), "tool_speed_peak": counted.reduced(_largest, speed)}
     if task.rotations:
-        error = orientation_error(run, task, robot, task.frame, task.rotations) * cutting
+        error = orientation_error(run, task, robot) * cutting
         values["orientation_error_peak"] = counted.reduced(_largest, error)
     return values
-
-
-def orientation_error(run: Run, task: PathTask, robot: RobotModel, frame: str, rotations: int = 3) -> Array:
-    """The angle [rad], (rollout, time), between a frame and itself at q_d(s); with 2 ``rotations`` of its z axis only.
-
-    With 3 it is the angle of R R_dᵀ, about whatever axis.
-    """
-
-    def angle(s: Array, q: Array) -> Array:
-        wanted, there = (robot.frame_pose(at, frame)[..., :3, :3] for at in (task.q_d(s), q))
-        if rotations == 2:
-            return np.arctan2(
-                np.linalg.norm(np.cross(wanted[..., 2], there[..., 2]), axis=-1),
-                (wanted[..., 2] * there[..., 2]).sum(-1),
-            )
-        # ‖R − R_d‖ = 2√2 sin(θ/2), which is exact for small angles too
-        chord = np.linalg.norm(there - wanted, axis=(-2, -1)) / np.sqrt(8.0)
-        return 2 * np.arcsin(np.minimum(chord, 1.0))
-
-    return where_known(angle, run.array("s"), run.array("q"))
 
 
 def _largest(values: Array) -> float:

@@ -16,6 +16,7 @@ from pathcontrol.analysis.known import by_task, known_task, of_rollouts, where_k
 from pathcontrol.analysis.limit_shares import limit_ratios
 from pathcontrol.analysis.names import LABELS, UNITS
 from pathcontrol.analysis.progress import progress
+from pathcontrol.analysis.tool_metrics import tool_metrics
 from pathcontrol.analysis.torque import torque_metrics
 from pathcontrol.analysis.window import Samples, Window, samples_of
 from pathcontrol.errors import TaskError
@@ -148,6 +149,12 @@ def metrics(
     the arm came within ``band``; and ``path_deviation_peak`` [rad], how far the farthest point of the path is from
     where the arm was, which is the contour error the other way round.
 
+    Of a path made for a frame of the arm, such as a :class:`CartesianPath` and what is made of one, for the same time
+    as the errors: mean and largest speed of the tool, and the mean ``feed`` that the path asks for at s, all [m/s];
+    ``tool_deviation_peak`` and ``tool_deviation_rms`` [m], from the curve on which q_d leads the tool (of a toolpath
+    from its drawing), and ``orientation_error_peak`` [rad], the largest angle between the tool and itself at q_d(s),
+    of its z axis only where it may turn about that, and left out where its orientation is free.
+
     Contour error, coverage and distance to Γ are left out for paths that neither end nor repeat. Open paths have the
     time [s] after which they were finished, and the :func:`end_error` [rad], each NaN where they were not. All numbers
     of a rollout that diverged are NaN. Of these, those that ``only`` names; the distance to Γ takes the most time.
@@ -183,7 +190,7 @@ def _metrics(run: Run, task: PathTask, counted: Samples, band: float, only: Coll
     theta = where_known(lambda s: planned_rate(task, s), counted.within(run.array("s")))
     values["speed_ratio"] = counted.reduced(np.mean, run.array("sdot")) / counted.reduced(np.mean, theta)
     values["settling_time"] = own.reduced(lambda e, t: settling_time(e[None], t, band)[0], *_over_time(run))
-    values |= torque_metrics(run, own, counted) | limit_ratios(run, own)
+    values |= torque_metrics(run, own, counted) | limit_ratios(run, own) | tool_metrics(run, task, counted, only)
     values["progress"] = progress(run, task)
     if not {"coverage", "path_deviation_peak"}.isdisjoint(only):
         values |= _of_coverage(run, task, own, band)

@@ -32,8 +32,8 @@ UNITS = {
 }
 #: what each metric is called where a person reads, in the order in which they are shown
 LABELS = {
-    "tool_deviation_peak": "tool from the drawing, peak",
-    "tool_deviation_rms": "tool from the drawing, RMS",
+    "tool_deviation_peak": "tool from its path, peak",
+    "tool_deviation_rms": "tool from its path, RMS",
     "drawing_deviation_peak": "drawing from the tool, peak",
     "smoothing_deviation": "smooth curves from the drawing",
     "e_p_peak": "‖e_p‖ peak",

@@ -98,7 +98,7 @@ class CartesianPath(SplinePath):
         constraint = ToolConstraint.of(carried, self.curve, self.orientation, tolerances)
         spline, self.report = solve(constraint, first, closed)
         super().__init__(spline, speed, closed)
-        self.tool_pose = carried.pose
+        self.tool_pose, self.rotations = carried.pose, self.orientation.rows
         self.posture = self.report.posture
         self.start_posture = readonly(self.q_d(np.array(self.s0)))
 

@@ -9,33 +9,29 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import PathControlWarning
 from pathcontrol.robot.batch import RobotBatch
-from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.modes import Arm
 from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.weight import Along, weight_slip
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch import TaskBatch
 
-_SAMPLES = 129  # of a path
-_TASKS = 8  # of a batch that are looked at
 _TURNS = 4 * np.pi  # rad, beyond which a joint without limits hardly starts
-_NO_LIMIT = 1e6  # N m: files that know no limit say some huge number, or zero
 _FAR = 10.0  # rad, beyond which an angle outside its limits is rather one in degrees
 _MOVED, _LONG = 1e-9, 0.25  # rad, s: an arm that has not moved so much in so long
 
 
 def warn_of_slips(robot: Arm, task: PathTask, q: Array, first: int = 0) -> str:
-    """Warn of a start (N, n) or a path outside position limits, and of an arm that cannot hold its own weight.
+    """Warn of a start (N, n) or a path outside position limits, and of an arm that cannot hold its own weight on it.
 
-    Of a larger batch the part with the ``first`` rollout 0 speaks for all.
+    All arms and tasks of a batch are looked at; the worst is told. Of a larger batch the
+    part with the ``first`` rollout 0 speaks for all.
 
     Returns:
         What is wrong with the start, in words, or nothing: if the arm diverges, that is why.
     """
     if first:
         return ""
-    arm = robot.robots[0] if isinstance(robot, RobotBatch) else robot
-    start = _of_start(arm, q)
-    for sentence in (start, _of_path(arm, task), _of_weight(arm, q)):
+    start, along = _of_start(robot, q), Along.of(task)
+    for sentence in (start, _of_path(robot, along), weight_slip(robot, along, q)):
         if sentence:
             warnings.warn(sentence, PathControlWarning, stacklevel=3)
     return start
@@ -56,11 +52,11 @@ def warn_if_still(run: Run, robot: Arm, friction: str) -> None:
         )
 
 
-def _of_start(robot: RobotModel, q: Array) -> str:
+def _of_start(robot: Arm, q: Array) -> str:
     beyond = _beyond(robot, q)
     row, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
     if beyond[row, joint] > 0:
-        return _outside("the start has", robot, int(joint), q[row], "")
+        return _outside("the start has", robot, int(row), int(joint), q[min(int(row), len(q) - 1)], "")
     turns = np.where(np.array(robot.position_units) == "rad", np.abs(q), 0.0)
     row, joint = np.unravel_index(int(turns.argmax()), turns.shape)
     if turns[row, joint] <= _TURNS:
@@ -69,36 +65,22 @@ def _of_start(robot: RobotModel, q: Array) -> str:
     return f"the start has {name} at {value:.4g} rad, which is {abs(value) / 2 / np.pi:.3g} turns{_DEGREES}"
 
 
-def _of_path(robot: RobotModel, task: PathTask) -> str:
-    for one in list(task)[:_TASKS] if isinstance(task, TaskBatch) else [task]:
-        s = np.linspace(*one.sampled_interval, _SAMPLES)
-        q = one.q_d(s)
-        beyond = _beyond(robot, q)
-        row, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
-        if beyond[row, joint] > 0:
-            return _outside("the path has", robot, int(joint), q[row], f" at s = {s[row]:.4g}")
-    return ""
-
-
-def _of_weight(robot: RobotModel, q: Array) -> str:
-    effort = np.abs(robot.limits.effort)
-    limited = (effort > 0) & (effort < _NO_LIMIT)
-    share = np.where(limited, np.abs(robot.gravity(q[:1])[0]) / np.where(limited, effort, 1.0), 0.0)
-    joint = int(share.argmax())
-    if share[joint] <= 1:
+def _of_path(robot: Arm, along: Along) -> str:
+    beyond = _beyond(robot, along.q)
+    sample, row, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
+    if beyond[sample, row, joint] <= 0:
         return ""
-    unit = "N m" if robot.position_units[joint] == "rad" else "N"
-    return (
-        f"{robot.joint_names[joint]} needs {share[joint] * effort[joint]:.4g} {unit} at the start to hold the arm's "
-        f"own weight, its limit is {effort[joint]:.4g} {unit}; check the effort limits of the URDF"
-    )
+    path = min(int(row), along.q.shape[1] - 1)
+    of = f" of rollout {row}" if beyond.shape[1] > 1 else ""
+    where = f" at s = {along.s[sample, path]:.4g}"
+    return _outside(f"the path{of} has", robot, int(row), int(joint), along.q[sample, path], where)
 
 
 _DEGREES = "; did you mean degrees? Then give np.deg2rad(…)"
 
 
-def _outside(begin: str, robot: RobotModel, joint: int, q: Array, where: str) -> str:
-    lower, upper = robot.limits.lower[joint], robot.limits.upper[joint]
+def _outside(begin: str, robot: Arm, row: int, joint: int, q: Array, where: str) -> str:
+    lower, upper = ((ends if ends.ndim == 1 else ends[row])[joint] for ends in _range(robot))
     unit = robot.position_units[joint]
     return (
         f"{begin} {robot.joint_names[joint]} at {q[joint]:.4g} {unit}{where}, outside its limits of {lower:.4g} to "
@@ -106,14 +88,19 @@ def _outside(begin: str, robot: RobotModel, joint: int, q: Array, where: str) ->
     )
 
 
-def _beyond(robot: RobotModel, q: Array) -> Array:
-    """By how much positions (N, n) are outside their limits [rad]; not above 0 inside, or without limits."""
-    lower, upper = robot.limits.lower, robot.limits.upper
+def _range(robot: Arm) -> tuple[Array, Array]:
+    """The lower and the upper limits of the joints [rad], (n,), or (N, n) of arms that differ."""
+    return robot.limits.lower, robot.limits.upper
+
+
+def _beyond(robot: Arm, q: Array) -> Array:
+    """By how much positions (*batch, N, n) are outside their limits [rad]; not above 0 inside, or without limits."""
+    lower, upper = _range(robot)
     limited = lower < upper
     return np.where(limited, np.maximum(lower - q, q - upper), 0.0) - 1e-9
 
 
-def _as_degrees(robot: RobotModel, q: Array) -> bool:
+def _as_degrees(robot: Arm, q: Array) -> bool:
     """Whether a posture (n,) would be within all limits if its angles were in degrees, and is far from it so."""
     turning = np.array(robot.position_units) == "rad"
     meant = np.where(turning, np.deg2rad(q), q)

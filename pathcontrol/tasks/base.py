@@ -59,6 +59,7 @@ class PathTask(ABC):
         frame: name of the frame of the arm that the path was made for, such as its tool; ``None`` where none is said.
             What is made from the path keeps it, and films, figures and metrics show it.
         tool_pose: pose in that frame of what follows the path, (4, 4); ``None`` for the frame itself.
+        rotations: how many rotations of that the path prescribes: 3, 2 where it may turn about its z axis, or 0.
     """
 
     s0: float = 0.0
@@ -66,6 +67,7 @@ class PathTask(ABC):
     period: float | None = None
     frame: str | None = None
     tool_pose: Array | None = None
+    rotations: int = 0
 
     single = False
 
@@ -219,6 +221,7 @@ class PathTask(ABC):
         frame, pose = paths[0].frame, paths[0].tool_pose
         if isinstance(frame, str) and all(path.frame == frame and _same(path.tool_pose, pose) for path in paths):
             self.frame, self.tool_pose = frame, pose
+            self.rotations = min(path.rotations for path in paths)
 
     # --- inside ---------------------------------------------------------------------------------------------
 

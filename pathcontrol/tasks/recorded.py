@@ -90,6 +90,7 @@ class RecordedPath(PathTask):
         original: the name of the class it was.
         frame: the frame of the arm that it was made for.
         tool_pose: pose in that frame of what follows it, (4, 4).
+        rotations: how many of its rotations the path prescribes; older files do not say.
 
     Raises:
         InputError: wrong shapes, values that are not finite, parameters that do not increase.
@@ -108,12 +109,14 @@ class RecordedPath(PathTask):
         original: str = "",
         frame: str | None = None,
         tool_pose: ArrayLike | None = None,
+        rotations: int = 0,
     ) -> None:
         self.samples, self.jets = _checked(samples, jets, 3)
         self.profile, self.endless, self.projects, self.original = profile, endless, projects, original
         self.s0, self._last, self.period = float(self.samples[0]), float(self.samples[-1]), period
         self.s_end = np.inf if endless or period is not None else self._last
         self.frame, self.tool_pose = _checked_tool(frame, tool_pose)
+        self.rotations = _checked_rotations(rotations)
         self._knots = None if knots is None else readonly(finite("knots", as_array("knots", knots)))
 
     @classmethod
@@ -142,6 +145,7 @@ class RecordedPath(PathTask):
             original=type(task).__name__,
             frame=task.frame,
             tool_pose=task.tool_pose,
+            rotations=task.rotations,
         )
 
     @property
@@ -218,6 +222,13 @@ def _within(s: Array, knots: Array, period: float | None) -> Array:
     if period is None:
         return np.clip(s, knots[0], knots[-1])
     return knots[0] + np.mod(s - knots[0], period)
+
+
+def _checked_rotations(rotations: int) -> int:
+    """Check that there are so many rotations of a tool to be prescribed."""
+    if rotations not in (0, 2, 3):
+        raise InputError(f"rotations = {rotations!r}, expected 3, 2 or 0")
+    return rotations
 
 
 def _checked_tool(frame: str | None, tool_pose: ArrayLike | None) -> tuple[str | None, Array | None]:

@@ -43,7 +43,7 @@ _MADE: dict[type, tuple[str, ...]] = {
     PathSequence: ("paths", "gaps"),
     RecordedPath: (
         *("samples", "jets", "profile", "period", "endless", "projects", "knots"),
-        *("original", "frame", "tool_pose"),
+        *("original", "frame", "tool_pose", "rotations"),
     ),
     ConstantRate: ("rate",),
     ConstantSpeed: ("speed",),

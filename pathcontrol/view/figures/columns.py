@@ -24,7 +24,7 @@ def table_of(sweep: SweepResult | xr.Dataset) -> xr.Dataset:
     Raises:
         InputError: it is something else, or empty.
     """
-    expect("sweep", sweep, SweepResult, xr.Dataset)
+    expect("sweep", sweep, SweepResult, xr.Dataset, also=" or its table")
     table = sweep.table() if isinstance(sweep, SweepResult) else sweep
     if "sample" not in table.dims:
         raise InputError(f"sweep = {sweep!r}, expected a SweepResult or its table")

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.contours import feed_along, tool_speed
 from pathcontrol.analysis.known import where_known
+from pathcontrol.analysis.tool import feed_along, tool_speed
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.view.figures.inset import magnified
@@ -80,7 +80,7 @@ def _draw_feed(axes: Axes, one: Shown) -> Array:
     assert isinstance(one.task, ToolpathTask)
     task, robot = one.task, one.run.robot
     wanted = where_known(lambda s: feed_along(task, robot, s), one.run.array("s"))
-    drawn = [drawable(1e3 * tool_speed(one.run, robot, task.frame)[0]), drawable(1e3 * wanted[0])]
+    drawn = [drawable(1e3 * tool_speed(one.run, robot, task)[0]), drawable(1e3 * wanted[0])]
     series(axes, one.run.time, drawn[0], **one.look)
     series(axes, one.run.time, drawn[1], zorder=2.5, **PROFILE_LOOK)
     return np.array(drawn)

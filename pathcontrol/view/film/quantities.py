@@ -8,8 +8,8 @@ from typing import TypeAlias
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.contours import feed_along, tool_speed
 from pathcontrol.analysis.readable import in_degrees
+from pathcontrol.analysis.tool import feed_along, tool_speed
 from pathcontrol.analysis.torque_limits import torque_limits
 from pathcontrol.view.film.charts import Chart, Curve
 from pathcontrol.view.film.error import MILLIMETRE
@@ -67,7 +67,7 @@ def _rates(shot: Shot, index: int, several: bool) -> list[_Entry]:
 def _feeds(take: Take, index: int, several: bool) -> list[_Entry]:
     """The speed of the tool on a toolpath, beside the one that the plan asks for there."""
     assert take.toolpath is not None
-    speed = tool_speed(take.run, take.robot, take.toolpath.frame)[0]
+    speed = tool_speed(take.run, take.robot, take.toolpath)[0]
     wanted = feed_along(take.toolpath, take.robot, take.s)
     curves = [
         Curve(take.name if several else "tool", take.time, MILLIMETRE * speed, index),

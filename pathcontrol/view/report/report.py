@@ -63,8 +63,7 @@ def _named(runs: Any) -> dict[str, Run]:
     if isinstance(runs, Run):
         return {"run": runs}
     if not isinstance(runs, Mapping) or not runs or not all(isinstance(run, Run) for run in runs.values()):
-        if not isinstance(runs, Mapping):
-            expect("runs", runs, Run)
+        expect("runs", runs, Run, Mapping, also=" or several by name, as {'first': run}")
         raise InputError(f"runs = {runs!r}, expected a Run or several by name, as {{'first': run}}")
     return {str(name): run for name, run in runs.items()}
 

@@ -1,0 +1,55 @@
+"""Numbers that sum up what the tool of a run did: its speed beside the feed, its deviation and its orientation."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from contextlib import suppress
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.analysis.deviation import contour_deviation, geometry_of
+from pathcontrol.analysis.tool import tool_signals
+from pathcontrol.analysis.window import Samples
+from pathcontrol.cartesian.path import CartesianPath
+from pathcontrol.errors import TaskError
+from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.base import PathTask
+
+_DEVIATION = ("tool_deviation_peak", "tool_deviation_rms")
+#: the metrics of :func:`tool_metrics`
+NAMES = (*_DEVIATION, "tool_speed_mean", "tool_speed_peak", "feed", "orientation_error_peak")
+
+
+def tool_metrics(run: Run, task: PathTask, counted: Samples, only: Collection[str] = NAMES) -> dict[str, Array]:
+    """What the tool did over the samples that count, (rollout,) each; nothing if the path was made for no tool.
+
+    Mean and largest speed of the tool, and the mean of the ``feed`` that the path asked for at s, all [m/s]; the
+    largest and the RMS distance [m] from the curve on which the path leads the tool, or from the drawing of a toolpath,
+    see :func:`~pathcontrol.analysis.deviation.geometry_of`; and the largest angle [rad] from the orientation at s, as
+    far as the path prescribes it.
+    """
+    if set(only).isdisjoint(NAMES):
+        return {}
+    signals = tool_signals(run, task, *(counted.within(run.array(name)) for name in ("s", "q", "qd")))
+    if signals is None:
+        return {}
+    values = {
+        "tool_speed_mean": counted.reduced(np.mean, signals.speed),
+        "tool_speed_peak": counted.reduced(np.max, signals.speed),
+        "feed": counted.reduced(np.mean, signals.feed),
+    }
+    if isinstance(task, CartesianPath):  # which its joints lead the tool at within 0.1 %
+        values["feed"] = np.where(np.isnan(values["feed"]), np.nan, task.speed)
+    if task.rotations:
+        values["orientation_error_peak"] = counted.reduced(np.max, signals.orientation)
+    if not set(only).isdisjoint(_DEVIATION):
+        with suppress(TaskError):  # an endless path leads the tool on an endless curve
+            away = contour_deviation(run, geometry_of(task, run.model), signals.position)
+            values |= {"tool_deviation_peak": counted.reduced(np.max, away)}
+            values |= {"tool_deviation_rms": counted.reduced(_rms, away)}
+    return values
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

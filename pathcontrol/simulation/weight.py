@@ -1,0 +1,92 @@
+"""Whether arms can hold their own weight, at the start and all along their paths."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pathcontrol._arrays import Array
+from pathcontrol.robot.batch import RobotBatch
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.modes import Arm
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.batch import TaskBatch
+
+_SAMPLES = 129  # of a path
+_FEWEST = 3
+_MOST = 1 << 16  # samples of all paths together
+_NO_LIMIT = 1e6  # N m: files that know no limit say some huge number, or zero
+
+
+class Along(NamedTuple):
+    """Postures along the paths of all rollouts, or along the one path that they have in common.
+
+    Attributes:
+        s: path parameters, (samples, N or 1).
+        q: q_d(s) [rad], (samples, N or 1, n).
+    """
+
+    s: Array
+    q: Array
+
+    @classmethod
+    def of(cls, task: PathTask) -> Along:
+        """Postures along a task or a batch of tasks; the more tasks there are, the fewer of each."""
+        tasks = len(task) if isinstance(task, TaskBatch) else 1
+        share = np.linspace(0.0, 1.0, int(np.clip(_MOST // tasks, _FEWEST, _SAMPLES)))[:, None]
+        lower, upper = (np.broadcast_to(end, tasks) for end in task.sampled_interval)
+        s = lower + share * (upper - lower)
+        q = task.q_d(s if tasks > 1 or isinstance(task, TaskBatch) else s[:, 0])
+        return cls(s, q.reshape(*s.shape, -1))
+
+    def of_rows(self, rows: NDArray[np.intp]) -> Along:
+        """Those of some rollouts."""
+        return self if self.q.shape[1] == 1 else Along(self.s[:, rows], self.q[:, rows])
+
+
+class _Worst(NamedTuple):
+    """Where the weight is largest beside the limit: its share, the rollout, the joint and the place in words."""
+
+    share: float = 0.0
+    rollout: int = 0
+    joint: int = 0
+    place: str = ""
+
+
+def weight_slip(robot: Arm, along: Along, q: Array) -> str:
+    """Say which joint cannot hold the weight of its arm, at the start (N, n) or on its path; nothing if all can.
+
+    Of several arms or places the one is named where the torque is largest beside its limit.
+    """
+    one = [robot], np.zeros(max(len(q), along.q.shape[1]), dtype=np.intp)
+    bodies, body = (robot.bodies, robot.body) if isinstance(robot, RobotBatch) else one
+    effort = np.broadcast_to(np.abs(robot.limits.effort), (len(body), robot.n))
+    limits = np.where((effort > 0) & (effort < _NO_LIMIT), effort, np.inf)
+    starts, worst, weak = np.broadcast_to(q, limits.shape), _Worst(), 0
+    for k, arm in enumerate(bodies):
+        rows = np.flatnonzero(body == k)
+        found, count = _of_body(arm, along.of_rows(rows), starts[rows], limits[rows], rows)
+        worst, weak = max(worst, found, key=lambda one: one.share), weak + count
+    return _told(robot, worst, limits, weak) if weak else ""
+
+
+def _of_body(arm: RobotModel, along: Along, starts: Array, limits: Array, rows: NDArray[np.intp]) -> tuple[_Worst, int]:
+    """The worst of the ``rows`` with one rigid body, with their starts and limits (k, n), and how many are too weak."""
+    path = np.abs(arm.gravity(along.q))
+    shares = np.stack([np.abs(arm.gravity(starts)) / limits, path.max(0) / limits])
+    there, row, joint = np.unravel_index(int(shares.argmax()), shares.shape)
+    column = row if path.shape[1] > 1 else 0
+    place = f"at s = {along.s[path[:, column, joint].argmax(), column]:.4g} of the path" if there else "at the start"
+    worst = _Worst(float(shares[there, row, joint]), int(rows[row]), int(joint), place)
+    return worst, int((shares > 1).any((0, 2)).sum())
+
+
+def _told(robot: Arm, worst: _Worst, limits: Array, weak: int) -> str:
+    unit, limit = "N m" if robot.position_units[worst.joint] == "rad" else "N", limits[worst.rollout, worst.joint]
+    of = f" in rollout {worst.rollout}, the worst of {weak}," if len(limits) > 1 else ""
+    return (
+        f"{robot.joint_names[worst.joint]} needs {worst.share * limit:.4g} {unit} {worst.place}{of} to hold the arm's "
+        f"own weight, its limit is {limit:.4g} {unit}; check the effort limits of the URDF"
+    )
