@@ -60,8 +60,10 @@ def weight_slip(robot: Arm, along: Along, q: Array) -> str:
 
     Of several arms or places the one is named where the torque is largest beside its limit.
     """
-    one = [robot], np.zeros(max(len(q), along.q.shape[1]), dtype=np.intp)
-    bodies, body = (robot.bodies, robot.body) if isinstance(robot, RobotBatch) else one
+    if isinstance(robot, RobotBatch):
+        bodies, body = robot.bodies, robot.body
+    else:
+        bodies, body = [robot], np.zeros(max(len(q), along.q.shape[1]), dtype=np.intp)
     effort = np.broadcast_to(np.abs(robot.limits.effort), (len(body), robot.n))
     limits = np.where((effort > 0) & (effort < _NO_LIMIT), effort, np.inf)
     starts, worst, weak = np.broadcast_to(q, limits.shape), _Worst(), 0
