@@ -1,4 +1,4 @@
-"""Configuration of the documentation. Nothing is fetched while it is built."""
+"""Configuration of the documentation. Nothing is fetched while it is built, or read."""
 
 import re
 import sys
@@ -15,10 +15,12 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
-    "sphinx.ext.mathjax",
     "sphinx.ext.viewcode",
+    "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",  # MathJax and its fonts beside the pages, which so need no network to be read
     "gallery",
 ]
+mathjax_path = "mathjax/tex-chtml.js"
 myst_enable_extensions = ["amsmath", "colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build", "_extensions"]

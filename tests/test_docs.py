@@ -112,3 +112,15 @@ def test_every_finding_is_in_the_robots_page():
     codes = set(re.findall(r'Finding\([^"]*(?:"(?:error|warning|note)", )?"([a-z-]+)"', code)) - {"error", "warning"}
     assert len(codes) > 30
     assert {name for name in codes if f"`{name}`" not in source} == set()
+
+
+def test_pages_load_nothing_from_the_network():
+    """Formulas and the gallery are to be read offline; links may lead anywhere."""
+    configuration = (DOCS / "conf.py").read_text(encoding="utf-8")
+    path = re.search(r'^mathjax_path = "(.*)"$', configuration, re.MULTILINE)
+    assert path, "MathJax would come from the network"
+    assert "//" not in path[1]
+    for page in DOCS.rglob("*.md"):
+        if "_build" not in page.parts:
+            loaded = re.findall(r'src="([^"]*)"|!\[[^]]*\]\(([^)]*)\)', page.read_text(encoding="utf-8"))
+            assert not [a or b for a, b in loaded if re.match(r"(https?:)?//", a or b)], page
