@@ -54,3 +54,60 @@ def test_fields_may_be_tuples_lists_and_numbers():
     law = Falling((1.0, 0.5), [2.0, 1.0])
     assert law.describe() == {"law": "Falling", "coulomb": [1.0, 0.5], "static": [2.0, 1.0], "velocity": 0.1}
     assert_allclose(law.select([1]).levels(np.zeros(1))[0], [1.0])
+
+
+def two_joints(**methods):
+    """An instance of a law with such methods."""
+    return type("Mine", (FrictionLaw,), {"n": 2, **methods})()
+
+
+B, F = np.array([2.0, 0.5]), np.array([1.0, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("methods", "words"),
+    [
+        # the torque of a law whose viscous part was forgotten
+        (
+            {"levels": lambda self, qd: (F, F), "torque": lambda self, qd: B * qd + F * np.sign(qd)},
+            ["Mine.torque gives -5 N m at -2 rad/s for joint 0", "give -1 N m"],
+        ),
+        # levels that were forgotten
+        (
+            {"viscous": B, "torque": lambda self, qd: B * qd + F * np.sign(qd)},
+            ["Mine.torque gives -5 N m at -2 rad/s for joint 0", "give -4 N m"],
+        ),
+        # a sign
+        (
+            {"viscous": B, "torque": lambda self, qd: -B * qd},
+            ["Mine.torque gives 4 N m at -2 rad/s for joint 0", "give -4 N m"],
+        ),
+        # continuous time would have another friction than the sampled loop
+        (
+            {"viscous": B, "levels": lambda self, qd: (F, F), "smoothed": lambda self, qd, width: B * qd},
+            ["Mine.smoothed gives -4 N m", "give -5 N m"],
+        ),
+        ({"levels": lambda self, qd: (F, -F)}, ["Mine.levels gives F⁻ = [-1.0, -3.0] N m", "not negative"]),
+        ({"levels": lambda self, qd: (F * np.nan, F)}, ["Mine.levels gives F⁺ = [nan, nan] N m"]),
+    ],
+)
+def test_methods_that_contradict_one_another_are_refused_with_both_values(methods, words):
+    law = two_joints(**methods)
+    arm = load_robot("cicese_2dof")
+    for given in (law, law + Stribeck([1.0, 0.5], [2.0, 1.0], [0.1, 0.1])):
+        with pytest.raises(InputError) as error:
+            arm.with_friction(given)
+        assert all(word in str(error.value) for word in words), str(error.value)
+
+
+def test_methods_that_agree_may_all_be_overridden():
+    def smoothed(self, qd, width):
+        return B * qd + F * np.arctan(qd / width) * 2 / np.pi
+
+    law = two_joints(
+        viscous=B,
+        levels=lambda self, qd: (F, F),
+        torque=lambda self, qd: B * qd + F * np.sign(qd),
+        smoothed=smoothed,
+    )
+    assert load_robot("cicese_2dof").with_friction(law).friction is law

@@ -284,11 +284,54 @@ def levels_vary(law: FrictionLaw) -> bool:
     return any(not np.array_equal(a, b) for pair in tried for a, b in zip(pair, rest, strict=True))
 
 
+def check_consistent(law: FrictionLaw) -> None:
+    """Check at a few velocities that a law of one's own says one thing in all of its methods.
+
+    The simulated arm asks ``levels`` and ``viscous``, continuous time asks ``smoothed``, and ``torque`` is their sum.
+
+    Raises:
+        InputError: levels are negative or no numbers, or ``torque`` or ``smoothed`` is overridden and differs.
+    """
+    terms = law.terms if isinstance(law, FrictionSum) else [part for part, _ in getattr(law, "parts", ())]
+    for term in terms:
+        check_consistent(term)
+    if not terms and type(law) not in _LAWS.values():
+        for speed in _TRIED:
+            _check_levels(law, np.full(law.n, speed))
+            _check_torque(law, np.full(law.n, speed))
+
+
+def _check_levels(law: FrictionLaw, qd: Array) -> None:
+    """Levels are numbers that are not negative."""
+    for name, level in zip(("F⁺", "F⁻"), law.levels(qd), strict=True):
+        if not (np.asarray(level) >= 0).all() or not np.isfinite(level).all():
+            raise InputError(
+                f"{type(law).__name__}.levels gives {name} = {np.asarray(level).tolist()} N m at {qd[0]:g} rad/s, "
+                "expected numbers that are not negative: the level is a strength, its direction is that of motion"
+            )
+
+
+def _check_torque(law: FrictionLaw, qd: Array) -> None:
+    """``torque`` and, far beyond its width, ``smoothed`` are what ``levels`` and ``viscous`` make."""
+    expected = np.asarray(FrictionLaw.torque(law, qd), dtype=np.float64)
+    for name, torque in (("torque", law.torque(qd)), ("smoothed", law.smoothed(qd, 1e-6 * float(np.abs(qd[0]))))):
+        off = np.abs(torque - expected) > 1e-3 * np.abs(expected) + 1e-9
+        if off.any():
+            i = tuple(np.argwhere(off)[0])
+            said = np.broadcast_to(torque, off.shape)[i]
+            raise InputError(
+                f"{type(law).__name__}.{name} gives {said:g} N m at {qd[0]:g} rad/s for joint {i[-1]}, but levels and "
+                f"viscous, which the simulated arm asks, give {expected[i]:g} N m; leave {name}() out, which follows "
+                "from them, or make them agree"
+            )
+
+
 def no_friction(n: int) -> FrictionLaw:
     """The law of ``n`` joints without any friction."""
     return Viscous(np.zeros(n))
 
 
+_TRIED = (-2.0, -0.3, -0.02, 0.02, 0.3, 2.0)  # rad/s
 _LAWS = {law.__name__: law for law in (Viscous, Coulomb, Stribeck)}
 
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, as_array, finite, joint_array, scalar
 from pathcontrol.errors import InputError, UnknownNameError, UrdfError
 from pathcontrol.robot.actuation import Actuation, Limits
-from pathcontrol.robot.friction import FrictionLaw, no_friction
+from pathcontrol.robot.friction import FrictionLaw, check_consistent, no_friction
 from pathcontrol.robot.lump import rod
 from pathcontrol.robot.rigid_body import RigidBody, together
 from pathcontrol.robot.urdf.locking import locked_angles
@@ -256,10 +256,16 @@ class RobotModel:
     # --- variations -----------------------------------------------------------------------------------------
 
     def with_friction(self, friction: FrictionLaw | None) -> RobotModel:
-        """The same arm with another friction law; ``None`` for no friction at all."""
+        """Return the same arm with another friction law; ``None`` for no friction at all.
+
+        Raises:
+            InputError: the law is for another number of joints, or one of your own says different things in its
+                methods, tried at a few velocities.
+        """
         law = no_friction(self.n) if friction is None else friction
         if law.n != self.n:
             raise InputError(f"the friction law is for {law.n} joints, {self.name} has {self.n}")
+        check_consistent(law)
         actuation = Actuation(self.limits, law, self.actuation.encoder_counts)
         return replace(self, actuation=actuation)
 

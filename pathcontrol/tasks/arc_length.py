@@ -12,8 +12,9 @@ from pathcontrol.errors import InputError, TaskError
 from pathcontrol.tasks.base import PathTask
 
 _NODES, _WEIGHTS = (leggauss(10)[0] + 1) / 2, leggauss(10)[1] / 2
-_FIRST_CELLS, _MOST_CELLS = 16, 1 << 20
+_FIRST_CELLS, _MOST_CELLS = 16, 1 << 17
 _TOLERANCE = 1e-11  # relative, of a cell; its halves are then good to rounding
+_ROUNDING = 2e-16  # relative, of the whole: a cell that is off by less has no share in it
 _NOISE = 1e-8  # disagreements below this that do not fall as cells are halved are rounding of the path itself
 _NEWTON_STEPS = 20
 _COINCIDENT = 1e-13  # relative to the parameter; places nearer to one another are one place
@@ -23,7 +24,7 @@ class ArcLength:
     """The arc length L(s) = ∫‖q_d'‖ds of a path, and its inverse.
 
     The interval is cut, first at the knots of the path, until Gauss–Legendre quadrature of 10 points on a cell agrees
-    with that on its halves to 1e-11. One lap stands for all of a closed path.
+    with that on its halves to 1e-11 of the cell or to rounding of the whole. One lap stands for all of a closed path.
 
     Args:
         path: the path.
@@ -100,19 +101,21 @@ class ArcLength:
         knots = self.path.knots
         if knots is None:
             return ends
-        return _apart(np.union1d(ends, knots[(knots > self.lower) & (knots < self.upper)]))
+        return apart(np.union1d(ends, knots[(knots > self.lower) & (knots < self.upper)]))
 
     def _cells(self, ends: Array) -> tuple[Array, Array]:
         """Ends of the cells, (K + 1,), and their lengths, (K,)."""
         a, b = ends[:-1], ends[1:]
         whole, before = self._quadrature(a, b)[0], np.full(len(a), np.inf)
-        starts, lengths, count = [], [], len(a)
+        starts, lengths, most, least = [], [], _MOST_CELLS + len(a), _ROUNDING * whole.sum()
+        count = len(a)
         while a.size:
             middle = (a + b) / 2
             halves = np.stack([self._quadrature(a, middle)[0], self._quadrature(middle, b)[0]])
-            error = np.abs(halves.sum(0) - whole) / np.maximum(halves.sum(0), np.finfo(float).tiny)
-            falling = (error > _TOLERANCE) & ((error > _NOISE) | (error <= 0.4 * before))
-            done = ~falling | (count > _MOST_CELLS)
+            off = np.abs(halves.sum(0) - whole)
+            error = off / np.maximum(halves.sum(0), np.finfo(float).tiny)
+            falling = (error > _TOLERANCE) & ((error > _NOISE) | (error <= 0.4 * before)) & ~(off <= least)
+            done = ~falling | (count > most)
             starts += [a[done], middle[done]]
             lengths += [*halves[:, done]]
             a, b = np.concatenate([a[~done], middle[~done]]), np.concatenate([middle[~done], b[~done]])
@@ -122,8 +125,8 @@ class ArcLength:
         return np.append(np.concatenate(starts)[order], ends[-1]), np.concatenate(lengths)[order]
 
 
-def _apart(ends: Array) -> Array:
-    """``ends`` (K,), ascending, without those that rounding alone tells from the one before, or from the last."""
+def apart(ends: Array) -> Array:
+    """Return ``ends`` (K,), ascending, without those that only rounding tells from the one before or the last."""
     nearest = _COINCIDENT * np.abs(ends[[0, -1]]).max()
     kept, last_kept = [ends[0]], ends[0]
     for end in ends[1:-1]:

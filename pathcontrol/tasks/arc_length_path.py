@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array
 from pathcontrol.errors import TaskError
-from pathcontrol.tasks.arc_length import ArcLength, curvature_vector, last
+from pathcontrol.tasks.arc_length import ArcLength, apart, curvature_vector, last
 from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.check import check_moves
 from pathcontrol.tasks.derived import DerivedPath
 
 
@@ -19,7 +20,7 @@ class ArcLengthPath(DerivedPath):
     ϑ(s) = ϑ(u)‖q_d'(u)‖ is the path speed [rad/s].
 
     Raises:
-        TaskError: the path neither ends nor repeats, or stands still somewhere.
+        TaskError: the path neither ends nor repeats, stands still somewhere, or turns back, as at a cusp.
     """
 
     def __init__(self, path: PathTask) -> None:
@@ -30,6 +31,7 @@ class ArcLengthPath(DerivedPath):
                 "of it, as in task.between(0.0, 10.0).by_arc_length()"
             )
         self._length = ArcLength(path, path.s0, last(path))
+        check_moves(path)
         self.s0 = 0.0
         if path.closed:
             self.period = self._length.total
@@ -70,11 +72,15 @@ class ArcLengthPath(DerivedPath):
 
     @property
     def knots(self) -> Array | None:
-        return None if self.path.knots is None else self._length(self.path.knots)
+        return self._lengths(self.path.knots)
 
     @property
     def profile_knots(self) -> Array | None:
-        return None if self.path.profile_knots is None else self._length(self.path.profile_knots)
+        return self._lengths(self.path.profile_knots)
+
+    def _lengths(self, knots: Array | None) -> Array | None:
+        """Where on this path some ``knots`` (K,) of the path underneath are, and which of them are one place."""
+        return None if knots is None else apart(self._length(knots)) if len(knots) else knots
 
     def _parameter(self, s: Array) -> Array:
         """The parameter u of the path underneath."""

@@ -46,10 +46,20 @@ def check_task(task: PathTask, n: int) -> None:
     _check_period(task, name)
     for method in ("dq_d", "ddq_d", "dtheta"):
         _check_values(f"{name}.{method}", getattr(task, method), s, None if method == "dtheta" else n)
-    _check_regular(task, name, s)
-    _check_cusps(task, name, s)
+    check_moves(task)
     for function, derivative in (("q_d", "dq_d"), ("dq_d", "ddq_d"), ("theta", "dtheta")):
         _check_derivative(task, name, s, function, derivative)
+
+
+def check_moves(task: PathTask) -> None:
+    """Check that a path moves on with s everywhere on its domain: it neither stands still nor turns back.
+
+    Raises:
+        TaskError: it does, and where.
+    """
+    name, s = type(task).__name__, np.linspace(*task.sampled_interval, _SAMPLES)
+    _check_regular(task, name, s)
+    _check_cusps(task, name, s)
 
 
 def _check_each(batch: TaskBatch, n: int) -> None:

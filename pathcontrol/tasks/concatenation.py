@@ -10,7 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.arc_length import ArcLength
+from pathcontrol.tasks.arc_length import ArcLength, apart
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.batch import refuse_batch
 from pathcontrol.tasks.blend import Blend
@@ -102,7 +102,7 @@ class ConcatenatedPath(PathTask):
             if knots is not None:
                 within = knots[(knots > piece.first) & (knots < piece.last)]
                 ends.append(piece.start + (within - piece.first) / piece.rate)
-        return np.unique(np.concatenate(ends))
+        return apart(np.unique(np.concatenate(ends)))
 
     def describe(self) -> dict[str, Any]:
         return super().describe() | {"paths": [path.describe() for path in self.paths]}
