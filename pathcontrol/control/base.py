@@ -152,6 +152,11 @@ class Controller(ABC):
         sdot = np.where(s >= self.task.s_end, np.minimum(sdot, 0.0), sdot)
         return np.where(s <= self.task.s0, np.maximum(sdot, 0.0), sdot)
 
+    @property
+    def compensated(self) -> Array:
+        """Viscous friction b̂ [N m s/rad] that the law compensates, (n,) or (N, n)."""
+        return np.zeros(self.robot.n) if self.friction == "none" else self._viscous
+
     def friction_torque(self, qd: Array, desired: Array | None = None) -> Array | float:
         """f̂(q̇) [N m], the friction that the law compensates, (*batch, n).
 

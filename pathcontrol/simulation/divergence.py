@@ -67,11 +67,11 @@ class Divergence:
         self.lost = self.lost | rows
         self.any = bool(self.lost.any())
 
-    def explain(self, slip: str) -> None:
-        """Say instead of what to try why states left all bounds, where a ``slip`` in the start is known."""
-        if slip:
+    def explain(self, *causes: str) -> None:
+        """Say instead of what to try why states left all bounds, where ``causes`` are known; empty ones are none."""
+        if why := "; ".join(filter(None, causes)):
             told = self.lost & (self.reason != NO_NUMBERS)
-            self.reason = np.where(told, f"its state left all bounds: {slip}", self.reason).astype(object)
+            self.reason = np.where(told, f"its state left all bounds: {why}", self.reason).astype(object)
 
     def home(self, q: Array, qd: Array) -> tuple[Array, Array]:
         """(q, q̇), each (N, n), with lost rollouts where they started."""

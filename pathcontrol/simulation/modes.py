@@ -16,7 +16,7 @@ from pathcontrol.simulation.disturbance import Disturbance
 from pathcontrol.simulation.noise import SensorNoise
 from pathcontrol.simulation.sensors import Sensors
 
-_MOST_SUBSTEPS = 10_000
+MOST_SUBSTEPS = 10_000
 
 
 class Outside(NamedTuple):
@@ -64,8 +64,8 @@ class SampledLoop:
     def __post_init__(self) -> None:
         scalar("period", self.period, positive=True)
         scalar("delay", self.delay, least=0.0)
-        if not isinstance(self.substeps, int | np.integer) or not 1 <= self.substeps <= _MOST_SUBSTEPS:
-            raise InputError(f"substeps = {self.substeps!r:.80}, expected a whole number from 1 to {_MOST_SUBSTEPS}")
+        if not isinstance(self.substeps, int | np.integer) or not 1 <= self.substeps <= MOST_SUBSTEPS:
+            raise InputError(f"substeps = {self.substeps!r:.80}, expected a whole number from 1 to {MOST_SUBSTEPS}")
         if self.velocity not in ("exact", "difference"):
             raise InputError(f"velocity = {self.velocity!r}, expected 'exact' or 'difference'")
         if self.filter_hz is not None:

@@ -31,6 +31,7 @@ from pathcontrol.simulation.setup import (
     simulated_arm,
 )
 from pathcontrol.simulation.slips import warn_of_slips
+from pathcontrol.simulation.too_long import warn_of_steps
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import refuse_batch
 from pathcontrol.tasks.laps import Laps
@@ -105,12 +106,13 @@ def simulate_sequence(
         check_law(law, q0, qd0)
     slip = warn_of_slips(robot, whole, q0)
     arm, legs = simulated_arm(loop, robot, q0, qd0, Outside(disturbance)), []
+    slow = warn_of_steps(laws, loop, robot, q0, qd0, disturbance, float(durations.sum()))
     for law, longest, finish in zip(laws, durations, ends, strict=True):
         arrays = arm.run(law, longest, finish, progress)
         legs.append(_Leg(arrays, float(finish.time[0]), law.task.s0, _length(law.task, laps)))
         if arm.divergence.any or np.isnan(legs[-1].finish_time):
             break
-    arm.divergence.explain(slip)
+    arm.divergence.explain(slow, slip)
     arrays, outcome = _joined(legs, len(laws), period, arm.divergence)
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws))
     paths = f"{len(laws)} path{'s' if len(laws) > 1 else ''}"

@@ -30,7 +30,7 @@ from pathcontrol.simulation.setup import (
     states_of_each,
 )
 from pathcontrol.simulation.slips import warn_if_still, warn_of_slips
-from pathcontrol.simulation.too_long import warn_of_period
+from pathcontrol.simulation.too_long import warn_of_steps
 
 
 def simulate(
@@ -76,7 +76,8 @@ def simulate(
         progress: show a bar on standard error when it takes longer than two seconds.
 
     A start or a path outside position limits, an arm that cannot hold its own weight, and one that never moved, held by
-    its friction, are told by a :class:`PathControlWarning`.
+    its friction, are told by a :class:`PathControlWarning`; so are periods too long for the gains, and steps of the
+    plant too long for what is fast in it, with the number of ``substeps`` to take.
 
     Raises:
         InputError: an argument has the wrong shape or value.
@@ -92,13 +93,12 @@ def simulate(
     check_length(duration, loop, len(q0), robot.n, finish is not None and finish.ends_run)
     check_law(controller, q0, qd0)
     slip = warn_of_slips(robot, controller.task, q0, first)
-    if isinstance(loop, SampledLoop):
-        warn_of_period(controller, loop.period)
     arm = simulated_arm(loop, robot, q0, qd0, Outside(disturbance, first))
+    slow = "" if first else warn_of_steps([controller], loop, robot, q0, qd0, disturbance, duration)
     settings = {"duration": duration, "laps": laps, "until": until, "first_rollout": first}
     config = record_of(controller.describe(), robot, loop, disturbance, **settings)
     arrays = arm.run(controller, duration, finish, progress)
-    arm.divergence.explain(slip)
+    arm.divergence.explain(slow, slip)
     outcome = arm.divergence.outcome() | ({} if finish is None else {"finish_time": finish.time})
     if controller.task.closed:
         outcome["laps"] = whole_laps(controller.task, *first_and_last(arrays["s"]))

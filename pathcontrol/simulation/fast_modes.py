@@ -1,0 +1,106 @@
+"""What is fast in the arm and in its disturbance, and is not resolved by the explicit part of a step of the plant.
+
+Viscous friction is exact in a step of any length (:class:`Damping`). Gravity, Coriolis forces and the slope of dry
+friction are taken by the midpoint rule, and a disturbance is held over a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.robot.friction import levels_vary
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.disturbance import Disturbance
+
+_NUDGE = 1e-5  # rad and rad/s
+_TRIED_SPEED, _TRIED_ANGLE = 0.1, 1e-3  # rad/s and rad, by which a disturbance is tried
+_TIMES = 65
+_SPEEDS = np.geomspace(1e-4, 10.0, 41)  # rad/s, at which the slope of friction is looked for
+
+
+def with_damping(robot: RobotModel, step: float) -> RobotModel:
+    """Return the arm with M̂ = M + hB/2, the inertia that a ``step`` of h [s] feels at least."""
+    return robot.with_armature(0.5 * step * np.atleast_2d(robot.friction.viscous)[0])
+
+
+def rate_of_arm(arm: RobotModel, q: Array, qd: Array) -> float:
+    """Return the fastest mode [1/s] of an arm with M̂ under gravity and Coriolis forces, at the states (k, n).
+
+    It is the largest |λ| of δq̈ = −M̂⁻¹ ∂(Cq̇ + g)/∂(q, q̇) (δq, δq̇), by central differences.
+    """
+    n = arm.n
+    nudges = _NUDGE * np.concatenate([np.eye(2 * n), -np.eye(2 * n)])
+    tau = arm.nonlinear_effects(q, qd)
+    q, qd = q[:, None] + nudges[:, :n], qd[:, None] + nudges[:, n:]
+    qdd = arm.forward_dynamics(q, qd, np.broadcast_to(tau[:, None], q.shape))
+    slope = np.swapaxes(qdd[:, : 2 * n] - qdd[:, 2 * n :], -1, -2) / (2 * _NUDGE)
+    upper = np.broadcast_to(np.eye(n, 2 * n, n), slope.shape)
+    return float(np.abs(np.linalg.eigvals(np.concatenate([upper, slope], axis=-2))).max())
+
+
+def rate_of_friction(robot: RobotModel, q: Array) -> tuple[float, int]:
+    """Return how fast [1/s] falling dry friction (Stribeck) accelerates a joint at most, −F'(q̇)/M̂, and which joint."""
+    if not levels_vary(robot.friction):
+        return 0.0, 0
+    mobility = np.diagonal(np.linalg.inv(robot.mass_matrix(q)), axis1=-2, axis2=-1).max(0)
+    rates = np.zeros(robot.n)
+    for sign in (1.0, -1.0):
+        plus, minus = robot.friction.levels(np.broadcast_to(sign * _SPEEDS[:, None], (len(_SPEEDS), robot.n)))
+        level = np.broadcast_to(plus if sign > 0 else minus, (len(_SPEEDS), robot.n))
+        rates = np.maximum(rates, (-np.diff(level, axis=0) / np.diff(_SPEEDS)[:, None]).max(0) * mobility)
+    joint = int(rates.argmax())
+    return float(rates[joint]), joint
+
+
+def rates_of_disturbance(
+    disturbance: Disturbance, robot: RobotModel, q: Array, qd: Array, duration: float
+) -> tuple[float, float]:
+    """Return the fastest damping and the fastest oscillation [1/s] that a disturbance gives the arm.
+
+    They are the largest |λ| of M̂⁻¹ ∂d/∂q̇, and the root of that of M̂⁻¹ ∂d/∂q. The torques d are tried at some times,
+    at velocities and positions beside those of the start, (N, n).
+    """
+    inverse = np.linalg.inv(robot.mass_matrix(q))
+    damping = stiffness = 0.0
+    for t in _times(disturbance, duration):
+        slopes = _slopes(disturbance, t, q, qd)
+        if slopes is None:
+            continue
+        by_speed, by_angle = slopes
+        damping = max(damping, _largest(inverse @ by_speed))
+        stiffness = max(stiffness, _largest(inverse @ by_angle))
+    return damping, float(np.sqrt(stiffness))
+
+
+def _times(disturbance: Disturbance, duration: float) -> Iterator[float]:
+    """Times [s] at which a disturbance is looked at: evenly spread, and between its jumps."""
+    jumps = disturbance.jumps
+    ends = np.concatenate([[0.0], jumps[(jumps > 0) & (jumps < duration)], [duration]])
+    between = 0.5 * (ends[1:] + ends[:-1])
+    yield from np.union1d(np.linspace(0.0, duration, _TIMES), between[:_TIMES]).tolist()
+
+
+def _slopes(disturbance: Disturbance, t: float, q: Array, qd: Array) -> tuple[Array, Array] | None:
+    """∂d/∂q̇ and ∂d/∂q at t [s], (N, n, n) each; ``None`` where there is none, or it cannot be told, as of noise."""
+
+    def torque(q: Array, qd: Array) -> Array:
+        return np.broadcast_to(np.asarray(disturbance.torque(t, q, qd), dtype=np.float64), q.shape)
+
+    here = torque(q, qd)
+    moved = torque(q + _TRIED_ANGLE, qd + _TRIED_SPEED), torque(q - _TRIED_ANGLE, qd - _TRIED_SPEED)
+    if all(np.array_equal(here, there) for there in moved) or not np.array_equal(here, torque(q, qd)):
+        return None
+    by_speed, by_angle = np.zeros((2, len(q), q.shape[1], q.shape[1]))
+    for j, one in enumerate(np.eye(q.shape[1])):
+        for slopes, dq, dv in ((by_speed, 0.0, _TRIED_SPEED * one), (by_angle, _TRIED_ANGLE * one, 0.0)):
+            change = torque(q + dq, qd + dv) - torque(q - dq, qd - dv)
+            slopes[:, :, j] = change / (2 * max(np.max(dq), np.max(dv)))
+    return by_speed, by_angle
+
+
+def _largest(matrices: Array) -> float:
+    finite = matrices[np.isfinite(matrices).all((-2, -1))]
+    return float(np.abs(np.linalg.eigvals(finite)).max(initial=0.0)) if finite.any() else 0.0

@@ -1,0 +1,108 @@
+"""The gains of a law whose torque is held over a period: how long the period may be."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array
+from pathcontrol.control.base import Controller
+from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
+from pathcontrol.control.motion import ComputedTorque, PDPlus, SlotineLi
+from pathcontrol.control.projection import Projection
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.damping import Damping
+from pathcontrol.tasks.base import PathTask
+
+_HALVINGS = 30
+_SHORTEST = 1e-6  # of the period that is tried
+
+
+class Feedback(NamedTuple):
+    """A law near its path at some postures, τ = G_p e_p + G_v e_v, each (k, n, n) [N m/rad, N m s/rad]."""
+
+    G_p: Array
+    G_v: Array
+
+
+def feedbacks(controller: Controller, q: Array) -> list[Feedback]:
+    """Return the feedback of a law of the library at q (k, n): of one gain, or of those gains of a batch that matter.
+
+    Of a law of one's own nothing is known, and none is returned.
+    """
+    M = controller.robot.mass_matrix(q)
+    if isinstance(controller, SlotineLi):
+        pairs = _extremes(controller.Lambda, controller.K_d, controller.robot.n)
+        return [Feedback(_on(K_d * Lambda, M), _on(K_d, M) + M * Lambda) for Lambda, K_d in pairs]
+    if isinstance(controller, PDPlus):
+        pairs = _extremes(controller.K_p, controller.K_v, controller.robot.n)
+        return [Feedback(_on(K_p, M), _on(K_v, M)) for K_p, K_v in pairs]
+    if isinstance(controller, ComputedTorque | ExtendedMotionPlan | Projection):
+        position = controller.k_p if isinstance(controller, Projection) else controller.K_p
+        pairs = _extremes(position, controller.K_v, controller.robot.n)
+        return [Feedback(M * K_p, M * K_v) for K_p, K_v in pairs]
+    return []
+
+
+def longest_period(feedback: Feedback, robot: RobotModel, uncompensated: Array, q: Array, period: float) -> float:
+    """Return how long a period [s] may be at most for a stable loop, or infinity if ``period`` is short enough.
+
+    With M̃ and X of :class:`Damping` for a step of h, an arm near its path obeys
+
+        v⁺ = v − h M̃⁻¹(G_p e + (G_v + B − B̂)v),    e⁺ = e + h(v + v⁺)/2 + XB(v⁺ − v).
+
+    For computed torque without friction that is, joint by joint, the characteristic polynomial
+    z² − (2 − K_v h − K_p h²/2) z + 1 − K_v h + K_p h²/2, stable (Jury) where K_v h < 2 and K_p h < 2 K_v.
+
+    Args:
+        feedback: the law, at q.
+        robot: the arm that is really there.
+        uncompensated: b − b̂ [N m s/rad], the viscous friction that the law leaves, (n,).
+        q: postures [rad], (k, n).
+        period: h [s].
+    """
+    M = robot.mass_matrix(q)
+    damping = np.broadcast_to(robot.friction.viscous, (len(q), robot.n))
+    G_v = feedback.G_v + _on(uncompensated, M)
+
+    def stable(h: float) -> bool:
+        inertia, travel = Damping(damping, h).condense(M, np.ones(q.shape, dtype=bool))
+        change = -h * np.linalg.solve(inertia, np.concatenate([feedback.G_p, G_v], axis=-1))
+        one, none = np.eye(robot.n), np.zeros((robot.n, robot.n))
+        position = (0.5 * h * one + h * travel) @ change + np.concatenate([one, h * one], axis=-1)
+        velocity = change + np.concatenate([none, one], axis=-1)
+        return bool(np.abs(np.linalg.eigvals(np.concatenate([position, velocity], axis=-2))).max() < 1)
+
+    if stable(period):
+        return np.inf
+    low, high = _SHORTEST * period, period
+    for _ in range(_HALVINGS):
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low
+
+
+def plan_kick(task: PathTask, s: Array) -> float:
+    """Return the largest ½‖q_d'‖‖r'‖ at s (m,); times k h² it is what one period's acceleration does to the next.
+
+    A tangential acceleration a leaves the extended motion plan, which knows the velocity at a tick only, h²a/2 behind;
+    that changes σ̇ by k‖q_d'‖h²a/2, and the acceleration r'σ̇ that the law asks for by ‖r'‖ times as much. Where that
+    exceeds a the loop is unstable, unless torque limits end it.
+    """
+    point = task.at(s)
+    slope = np.linalg.norm(point.dq_d, axis=-1) * np.linalg.norm(point.velocity_slope, axis=-1)
+    return 0.5 * float(slope.max())
+
+
+def _extremes(position: ArrayLike, velocity: ArrayLike, n: int) -> list[tuple[Array, Array]]:
+    """Pairs of gains, (n,) each: of a batch those with the largest gain of a joint, and the largest ratio of both."""
+    p, v = np.broadcast_arrays(np.atleast_2d(position), np.atleast_2d(velocity), np.empty((1, n)))[:2]
+    rows = np.unique([np.argmax(values, axis=0) for values in (p, v, p / v)])
+    return [(p[row], v[row]) for row in rows]
+
+
+def _on(diagonal: Array, M: Array) -> Array:
+    """A diagonal matrix as often as there are matrices M."""
+    return np.broadcast_to(np.diag(diagonal), M.shape)
