@@ -20,6 +20,7 @@ from pathcontrol.simulation.sensors import Reading
 
 _WATCHED = 2000  # steps of the integrator
 _SHORTEST = 1e-6  # s, the mean step of so many below which a run is given up: a second of it would take minutes
+_MOST_WORK = 400_000  # evaluations of the closed loop that a simulated second may take, half a minute or more
 
 
 class ClosedLoop:
@@ -126,6 +127,7 @@ class _Solution:
         self._push = push
         self._loop, self._start, self._lost = loop, start, lost
         self._steps, self._since = 0, 0.0  # since when it is watched whether the integrator crawls
+        self._work, self._second = 0, 0.0  # evaluations, and when the second began in which they are counted
         self._odd = lost.lost  # rows whose rate was no number in the last step
         # the integrator's norm averages over rollouts: tighten it so that each one alone keeps the tolerance
         share, band = np.sqrt(max(1, len(start))), start.shape[1] - 1
@@ -144,6 +146,7 @@ class _Solution:
                 solver.step()
                 crawls = self._crawls(solver.t)
                 if crawls or self._in_trouble(solver):
+                    self._work = 0  # the others have a budget of their own
                     self._take_out(t, solver.y, y, CRAWLED if crawls else STOPPED)
                     y = self._lost.replaced(y.reshape(self._start.shape), self._start)
                     break
@@ -155,13 +158,18 @@ class _Solution:
 
     def _rate(self, t: float, y: Array, update: Callable[[float], None]) -> Array:
         update(t)
+        self._work += 1
         rate = self._loop.rate(t, y.reshape(self._start.shape))
         if not np.isfinite(np.vdot(rate, rate)):
             self._odd = self._odd | ~np.isfinite(rate).all(-1)
         return (self._lost.replaced(rate, 0.0) if self._lost.any else rate).reshape(-1)
 
     def _crawls(self, t: float) -> bool:
-        """Whether the last steps, now that t [s] is reached, took the integrator hardly anywhere."""
+        """Whether the last steps, now that t [s] is reached, took the integrator hardly anywhere for the work done."""
+        if self._work > _MOST_WORK:
+            return True
+        if t - self._second >= 1.0:
+            self._work, self._second = 0, t
         self._steps += 1
         if self._steps < _WATCHED:
             return False
