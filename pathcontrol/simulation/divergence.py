@@ -19,8 +19,8 @@ BEYOND = (
 )
 NO_NUMBERS = "its law asks for torques that are no numbers; look for a NaN in the task, q_d or ϑ, near where the arm is"
 CRAWLED = (
-    "the integrator crawls, by steps of a few µs at most; start away from where the law is not defined, such as the centre "
-    "of a circle, lower the gains, widen friction_width, or use a SampledLoop"
+    "the integrator crawls, by steps of a few µs at most; start away from where the law is not defined, such as the "
+    "centre of a circle, lower the gains, widen friction_width, or use a SampledLoop"
 )
 STOPPED = "the integrator gave up; lower the gains, or widen friction_width"
 
