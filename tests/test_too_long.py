@@ -92,11 +92,11 @@ def test_a_joint_that_friction_damps_bears_a_higher_gain():
 
 @pytest.mark.parametrize(("h", "radius", "rate"), [(2.5e-3, 1.0, 2.0), (5e-3, 1.0, 2.0), (2.5e-3, 0.5, 2.0)])
 def test_the_gain_of_the_plan_that_a_period_bears(h, radius, rate):
-    """½ k h²‖q_d'‖‖r'‖ = 1 divides gains with which all starts end on the path from those with which some diverge."""
+    """k h²‖q_d'‖‖r'‖ = 1 divides gains with which all starts end on the path from those with which some diverge."""
     free, task = ARM.with_friction(None), Circle(radius, radius * rate)
-    bound = 2 / (h**2 * radius**2 * rate)
+    bound = 1 / (h**2 * radius**2 * rate)
     loop, outcomes = SampledLoop(period=h), []
-    for k in (0.4 * bound, 2.5 * bound):
+    for k in (0.9 * bound, 5.0 * bound):
         law = ExtendedMotionPlan(free, task, 800.0, [45.0, 100.0], k)
         assert ("k = " in told(law, loop, free)) == (k > bound)
         runs = []
@@ -193,7 +193,7 @@ class Noise(Disturbance):
 
 
 @pytest.mark.parametrize("disturbance", [None, Push([5.0, 1.0], 0.2, 0.1), Noise(), Held([0.0, 20.0])])
-@pytest.mark.parametrize("k", [20.0, 1e4, 1e5])
+@pytest.mark.parametrize("k", [20.0, 1e4, 7e4])
 def test_nothing_is_told_of_what_is_resolved(disturbance, k):
     assert told(ExtendedMotionPlan(ARM, CIRCLE, 800.0, [45.0, 100.0], k), disturbance=disturbance) == ""
     assert told(LAW, disturbance=disturbance) == ""

@@ -85,15 +85,15 @@ def longest_period(feedback: Feedback, robot: RobotModel, uncompensated: Array, 
 
 
 def plan_kick(task: PathTask, s: Array) -> float:
-    """Return the largest ½‖q_d'‖‖r'‖ at s (m,); times k h² it is what one period's acceleration does to the next.
+    """Return the largest ‖q_d'‖‖r'‖ at s (m,); times k h²/2 it is what one period's acceleration does to the next.
 
     A tangential acceleration a leaves the extended motion plan, which knows the velocity at a tick only, h²a/2 behind;
     that changes σ̇ by k‖q_d'‖h²a/2, and the acceleration r'σ̇ that the law asks for by ‖r'‖ times as much. Where that
-    exceeds a the loop is unstable, unless torque limits end it.
+    exceeds a the loop is unstable, unless torque limits end it; k h²‖q_d'‖‖r'‖ < 1 keeps half the distance.
     """
     point = task.at(s)
     slope = np.linalg.norm(point.dq_d, axis=-1) * np.linalg.norm(point.velocity_slope, axis=-1)
-    return 0.5 * float(slope.max())
+    return float(slope.max())
 
 
 def _extremes(position: ArrayLike, velocity: ArrayLike, n: int) -> list[tuple[Array, Array]]:
