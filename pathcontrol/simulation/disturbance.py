@@ -19,7 +19,8 @@ class Disturbance(ABC):
     """Torques on the joints that no controller knows of; disturbances add up with ``+``.
 
     The sampled loop holds a disturbance over each step of the plant, at its value in the middle of the step; so a push
-    is as long as the steps whose middle it covers. Torque limits are those of the motors and do not limit it.
+    is as long as the steps whose middle it covers. Torque limits are those of the motors and do not limit it. Before a
+    run it is tried at some times and states, to see whether it fits and how long a step it bears.
     """
 
     @abstractmethod
