@@ -59,11 +59,13 @@ def test_what_numpy_writes_is_read(values, delimiter):
 
 
 def test_a_comment_that_sounds_like_a_unit_is_told():
-    toolpath = read("# all in mm\n0 0 0\n1 0 0")
-    assert toolpath.unit == "m"
-    (note,) = toolpath.notes
-    assert note.startswith("line 1 speaks of 'mm', but the coordinates are taken for metres")
-    assert not read("# all in mm\n0 0 0\n1 0 0", unit="mm").notes
+    for comment in ("tool of 6 mm", "speeds of all points in mm/s", "exported in 3 mm steps"):
+        toolpath = read(f"# {comment}\n0 0 0\n1 0 0")
+        assert toolpath.unit == "m"
+        (note,) = toolpath.notes
+        assert note.startswith("line 1 speaks of 'mm', but the coordinates are taken for metres")
+        assert not read(f"# {comment}\n0 0 0\n1 0 0", unit="mm").notes
+    assert not read("# exported by a plugin\n0 0 0\n1 0 0").notes
     assert not read("# no word of it\n0 0 0\n1 0 0").notes
 
 
@@ -88,8 +90,7 @@ def test_columns_are_found_by_their_names_and_others_passed_over(values, order, 
     )
     assert np.array_equal(points(toolpath), values)
     assert np.allclose(toolpath[0].normals, [0, 0.6, 0.8])
-    place = "'speed'" if by_name else f"'{said.index('speed')}'"
-    assert toolpath.notes == (f"column {place} is passed over",)
+    assert toolpath.notes == ("column 'speed' is passed over",)
 
 
 WRITTEN = "N;Pos X [mm];Höhe [mm];Part;y (mm)\n1;10;0.5;a;0\n2;20;0.5;a;0\n3;30;0.5;b;1\n4;40;0.5;b;2\n"
@@ -129,7 +130,7 @@ def test_columns_may_be_chosen_by_order_number_or_name(columns):
         ({"x": 0, "y": 1, "z": "height"}, ToolpathError, "names a column 'height', the file has none that have names"),
         (["x", "y", "z", "i", "j"], ToolpathError, "names 5 columns, the file has 4"),
         (["x", "y", "y", "z"], ToolpathError, "each once"),
-        (["x", "y"], ToolpathError, "expected x, y and z"),
+        (["x", "y"], ToolpathError, "expected z too; a table of x and y alone needs z="),
     ],
 )
 def test_wrong_choices_are_refused(columns, error, message):
@@ -140,7 +141,36 @@ def test_wrong_choices_are_refused(columns, error, message):
 def test_what_is_not_a_normal_is_passed_over_when_the_caller_says_so():
     toolpath = read("0,0,0,180,0,0\n1,0,0,180,0,0", columns=["x", "y", "z", "roll", "pitch", "yaw"])
     assert toolpath[0].normals is None
-    assert toolpath.notes == ("columns '3', '4', '5' are passed over",)
+    (note,) = toolpath.notes
+    assert note.startswith("columns 'roll', 'pitch', 'yaw' are passed over: of angles nothing is read")
+    assert read("0,0,0,255,9,0\n1,0,0,255,9,0", columns="x,y,z,_,_,_").notes == (
+        "columns '3', '4', '5' are passed over",
+    )
+
+
+@pytest.mark.parametrize("names", ["roll,pitch,yaw", "rx,ry,rz", "A,B,C", "W,P,R", "roll [deg],pitch [deg],yaw [deg]"])
+def test_angles_are_said_to_be_unread(names):
+    assert "of angles nothing is read" in read(f"x,y,z,{names}\n0,0,0,1,2,3\n1,0,0,1,2,3").notes[0]
+    assert "angles" not in read("x,y,z,r,g,b\n0,0,0,1,2,3\n1,0,0,1,2,3").notes[0]
+
+
+UNITS_SAID = {"mm": "mm", "millimetres": "mm", "inch": "in", "inches": "in", "centimeter": "cm", "microns": "um"}
+
+
+@pytest.mark.parametrize("unit", UNITS_SAID)
+def test_a_unit_is_heeded_wherever_it_is_said(unit):
+    metres = {"mm": 1e-3, "in": 25.4e-3, "cm": 1e-2, "um": 1e-6}[UNITS_SAID[unit]]
+    heads = [f"# {unit}", f"# x y z in {unit}", f"# x, y, z in {unit}", f"# all lengths are in {unit}", f"# ({unit})"]
+    heads += [f"# coordinates in {unit}", ",".join(f"{c} / {unit}" for c in "xyz")]
+    heads += [",".join(name.format(c) for c in "XYZ") for name in (f"{{}} in {unit}", f"{{}} Position ({unit})")]
+    for head in heads:
+        assert np.allclose(points(read(head + "\n0,0,0\n10,0,5\n")), np.array([[0, 0, 0], [10, 0, 5]]) * metres)
+
+
+@pytest.mark.parametrize("name", ["{}_pos", "{} Position", "{}-coord", "{}coordinate"])
+def test_names_that_begin_with_the_letter(name):
+    head = ",".join(name.format(c) for c in "zxy")
+    assert np.array_equal(points(read(head + "\n3,1,2\n6,4,5")), [[1, 2, 3], [4, 5, 6]])
 
 
 @pytest.mark.parametrize("name", ["pose.position.{}", "field.pose.position.{}", "pos_{}", "Position {}", "pos{}"])

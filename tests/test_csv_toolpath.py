@@ -124,7 +124,7 @@ REFUSED = {
     "a b c\n0 0 0": "line 1: columns 'a b c', expected x, y and z, .* say which they are by columns= and unit=",
     "x_ft y_ft z_ft\n0 0 0": "line 1: columns 'x_ft y_ft z_ft', expected x, y and z",
     "x y z i_mm j k\n0 0 0 0 0 1": "line 1: columns 'x y z i_mm j k', expected .* none or all of i, j and k",
-    "x y\n0 0": "line 1: columns 'x y', expected x, y and z",
+    "x y\n0 0": "line 1: columns 'x y', expected z too; .* needs z=",
     "x y z i j\n0 0 0 0 0": "line 1: columns 'x y z i j', expected x, y and z, and none or all of i, j and k",
     "x y z qx qy qz\n0 0 0 0 0 1": "line 1: columns 'x y z qx qy qz', expected .* or of qx, qy, qz and qw",
     "x y z i j k qx qy qz qw\n0": "line 1: columns .* expected a normal or an orientation, not both",

@@ -99,3 +99,17 @@ def test_drawings_with_a_part_renamed_are_read_or_refused_with_their_name(tmp_pa
         except ToolpathError as error:
             refused = str(error)
         assert refused is None or "renamed.dxf" in refused
+
+
+@pytest.mark.parametrize("degrees", [1e-3, 4e-3, 0.02])
+@pytest.mark.parametrize("radius", [1e-3, 1e-2, 1.0])
+def test_an_arc_as_short_as_a_gap_is_no_closed_contour(read, radius, degrees):
+    (contour,) = (toolpath := read(lambda m: m.add_arc((1, 2), radius, 30, 30 + degrees))).contours
+    assert not contour.closed
+    assert contour.length == pytest.approx(radius * np.radians(degrees), rel=1e-6)
+    assert toolpath.notes == ()  # and none of a gap between its own ends
+
+
+def test_a_gap_in_an_arc_is_told(read):
+    toolpath = read(lambda m: m.add_arc((1, 2), 0.01, 0, 359.9))
+    assert "1 gap between ends of contours, of up to 17.5 µm, stays open" in toolpath.notes[0]

@@ -48,6 +48,9 @@ UNSEEN = [
     'fill="none" stroke="#12"',
     'fill="none" stroke="inherit"',
     'class="unseen"',
+    'fill="url(#gone)"',
+    'fill="url(#gone) none"',
+    'style="fill:url(#gone) rgba(0,0,0,0)"',
 ]
 
 
@@ -67,6 +70,7 @@ SEEN_SOMEHOW = [
     'fill="none" stroke="#000"',
     'fill="nonsense"',
     'fill="url(#gradient)"',
+    'fill="url(#gone) red"',
     'opacity="0.01"',
     'fill="none" stroke="red" stroke-width="1e-3"',
     'fill="none" style="fill:#000"',
@@ -83,7 +87,8 @@ SEEN_SOMEHOW = [
 
 @pytest.mark.parametrize("attributes", SEEN_SOMEHOW)
 def test_what_is_painted_is_cut(read, attributes):
-    found = read(f'<rect id="yes" width="30" height="20" {attributes}/>')
+    gradient = '<linearGradient id="gradient"><stop stop-color="red"/></linearGradient>'
+    found = read(f'{gradient}<rect id="yes" width="30" height="20" {attributes}/>')
     assert ids(found) == ["yes"]
     assert found.notes == ()
 
@@ -299,3 +304,16 @@ def test_random_circles_in_a_turned_clip(read):
         else:
             with pytest.raises(ToolpathError, match="cuts part of it off"):
                 read(body)
+
+
+@pytest.mark.parametrize(
+    "text", ["<text/>", '<text x="3"> </text>', "<text><tspan/>\n</text>", "<flowRoot><flowPara/></flowRoot>"]
+)
+def test_texts_without_words_are_no_obstacle(read, text):
+    assert ids(read(text + SEEN)) == ["seen"]
+
+
+def test_a_kind_that_is_not_there_is_answered_by_those_that_are(read):
+    with pytest.raises(UnknownNameError, match=r"'txt' is no kind .* 'text', .* a type such as 'circle'") as caught:
+        read("<text>a</text>" + SEEN, skip=["txt"])
+    assert "3dface" not in str(caught.value)

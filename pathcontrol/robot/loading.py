@@ -18,7 +18,7 @@ from pathcontrol.robot.friction import Coulomb, FrictionLaw, Viscous
 from pathcontrol.robot.model import RobotModel, UrdfSource, build_model
 from pathcontrol.robot.urdf import UrdfReport, check_urdf, parse_urdf
 from pathcontrol.robot.urdf.extension import extension_values
-from pathcontrol.robot.urdf.locking import locked_angles
+from pathcontrol.robot.urdf.locking import locked_angles, locked_beyond_limits
 from pathcontrol.robot.urdf.parse import Parsed, parse_and_mend
 
 TOLD = ("inertia-negative",)  # warnings of the check that are worth hearing of each time, beside those of its XML
@@ -67,6 +67,8 @@ def load_robot(
     report = _checked(urdf, label, tuple(locked))
     for finding in (*mended, *(finding for finding in report.warnings if finding.code in TOLD)):
         warnings.warn(f"{label}: {finding.where}: {finding.message}", PathControlWarning, stacklevel=2)
+    for told in locked_beyond_limits(root, lock or {}):
+        warnings.warn(f"{label}: {told}", PathControlWarning, stacklevel=2)
     robot = _build(urdf, threads)
     return robot.reduced(locked) if locked else robot
 

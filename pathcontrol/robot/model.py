@@ -322,24 +322,23 @@ class RobotModel:
         return self._changed(model, "with_armature", {"armature": added.tolist()})
 
     def with_masses(
-        self, scale: Mapping[str, float] | None = None, kg: Mapping[str, float] | None = None
+        self,
+        scale: Mapping[str, float] | Sequence[float] | None = None,
+        kg: Mapping[str, float] | Sequence[float] | None = None,
     ) -> RobotModel:
         """The same arm with heavier or lighter bodies: what moves with a joint, up to the next joint.
 
         Args:
             scale: factors on mass and inertia by the joint's name: ``{"joint_2": 1.1}`` for 10 % more, with the same
-                centre of mass.
-            kg: masses [kg] by the joint's name. A body that has one already keeps its form; one without becomes a rod
+                centre of mass. A list has one for each joint.
+            kg: masses [kg], likewise. A body that has one already keeps its form; one without becomes a rod
                 from its joint to what is farthest on it.
 
         Raises:
             InputError: a factor of a body that has no mass, or a number that is not above 0.
         """
         model = pin.Model(self.pinocchio_model)
-        factors = {
-            joint: scalar(f"scale of {joint}", value, positive=True) for joint, value in dict(scale or {}).items()
-        }
-        masses = {joint: scalar(f"kg of {joint}", value, positive=True) for joint, value in dict(kg or {}).items()}
+        factors, masses = self._positive("scale", scale), self._positive("kg", kg)
         for joint, value in (*factors.items(), *masses.items()):
             i = self.joint_index(joint) + 1
             body = model.inertias[i]
@@ -351,6 +350,18 @@ class RobotModel:
             else:
                 raise InputError(f"scale of {joint} = {value:g}, but it moves no mass; say how many with kg={{...}}")
         return self._changed(model, "with_masses", {"scale": factors, "kg": masses})
+
+    def _positive(self, name: str, given: Mapping[str, float] | Sequence[float] | None) -> dict[str, float]:
+        """Numbers above 0 by the names of joints, from such, or from one for each joint."""
+        if given is not None and not isinstance(given, Mapping):
+            values = as_array(name, given)
+            if values.shape != (self.n,):
+                raise InputError(
+                    f"{name} = {given!r}, expected numbers by joint, as {{{self.joint_names[0]!r}: 2.0}}, or one for "
+                    f"each of the {self.n} joints"
+                )
+            given = dict(zip(self.joint_names, values.tolist(), strict=True))
+        return {joint: scalar(f"{name} of {joint}", value, positive=True) for joint, value in (given or {}).items()}
 
     def with_threads(self, threads: int) -> RobotModel:
         """The same arm whose batched calls use ``threads`` threads."""

@@ -104,12 +104,12 @@ def chained(strands: Sequence[Strand], gap: float | None, passed: Passed) -> lis
 
 def _tell_gaps(chains: Sequence[Strand], tolerance: float, passed: Passed) -> None:
     """Note the gaps, up to 50 µm, that are left open, with the option that closes them."""
-    layers: dict[str, list[tuple[Array, Array]]] = {}
+    layers: dict[str, list[Strand]] = {}
     for chain in chains:
         start, end = chain.ends
         if np.linalg.norm(end - start) > NOTHING:
-            layers.setdefault(chain.layer, []).append((start, end))
-    gaps = [gap for ends in layers.values() for gap in _open_gaps(np.array(ends).reshape(-1, 3), tolerance)]
+            layers.setdefault(chain.layer, []).append(chain)
+    gaps = [gap for layer in layers.values() for gap in _open_gaps(layer, tolerance)]
     if gaps:
         unit = 10.0 ** np.floor(np.log10(max(gaps)) - 1)
         suffices = float(f"{unit * np.ceil(1.001 * max(gaps) / unit):.2g}")
@@ -119,17 +119,25 @@ def _tell_gaps(chains: Sequence[Strand], tolerance: float, passed: Passed) -> No
         )
 
 
-def _open_gaps(ends: Array, tolerance: float) -> list[float]:
-    """Widths [m] of the gaps between ends (2n, 3) that a larger tolerance, up to 50 µm, would close."""
+def _open_gaps(strands: Sequence[Strand], tolerance: float) -> list[float]:
+    """Widths [m] of the gaps between ends that a larger tolerance, up to 50 µm, would close."""
+    ends = np.array([end for strand in strands for end in strand.ends])
     apart = cKDTree(ends).query(ends, k=2, distance_upper_bound=_WIDEST_TOLD)[0][:, 1]
     apart = apart[(apart > tolerance) & np.isfinite(apart)]
     for larger in (apart.max(initial=0.0), apart.min(initial=np.inf)):
         if tolerance < larger < np.inf:
             meets = _meets(ends, min(1.05 * larger, _WIDEST_TOLD))
             first = np.flatnonzero(meets > np.arange(len(meets)))
-            if len(first):
-                return np.linalg.norm(ends[first] - ends[meets[first]], axis=-1).tolist()
+            widths = np.linalg.norm(ends[first] - ends[meets[first]], axis=-1).tolist()
+            gaps = [gap for i, gap in zip(first, widths, strict=True) if not _is_short(strands, i, meets[i], gap)]
+            if gaps:
+                return gaps
     return []
+
+
+def _is_short(strands: Sequence[Strand], end: int, other: int, apart: float) -> bool:
+    """Whether two ends are those of one strand that is hardly longer than they are apart: nothing to be closed."""
+    return end // 2 == other // 2 and strands[end // 2].extent < 2 * apart
 
 
 def _chains(strands: Sequence[Strand], tolerance: float) -> list[Strand]:
@@ -207,7 +215,7 @@ def _size(strands: Sequence[Strand]) -> float:
 
 def _frame(segment: Segment) -> Array:
     if isinstance(segment, Arc):
-        return segment.center + np.stack([segment.x, -segment.x, segment.y, -segment.y])
+        return np.stack(segment.bounds)
     assert isinstance(segment, Polyline | Bezier)
     return segment.points
 

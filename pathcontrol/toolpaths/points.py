@@ -34,7 +34,7 @@ def read_csv(
     """Contours from a table of points, a point a line: ``x y z``, with the tool's axis or orientation if it has them.
 
     Semicolons, tabs, commas or blanks separate the values; the first line says which. It may name the columns, in any
-    order and with the unit: ``x [mm]``, ``x (mm)`` or ``x_mm``, and so may a comment above, or a line of units below.
+    order and with the unit: ``x [mm]``, ``x / mm`` or ``x_mm``, and so may a comment above, or a line of units below.
     Three columns need no names, others do. A ``#`` begins a comment. Values may be quoted, lines may end in separators.
 
     - ``x y z``: the point. ``i j k``, also called ``nx ny nz``: the tool's axis, the direction that stands on the

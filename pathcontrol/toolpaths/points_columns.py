@@ -17,6 +17,11 @@ from pathcontrol.toolpaths.points_rows import Rows
 #: what a caller may say of columns
 Chosen = Sequence[str] | Mapping[str, int | str]
 _MOST_TOLD = 8
+_ANGLES = ({"roll", "pitch", "yaw"}, {"rx", "ry", "rz"}, {"a", "b", "c"}, {"w", "p", "r"})
+_ANGLES_UNREAD = (
+    ": of angles nothing is read, as programs differ in their order and unit; orientations are read as i j k, the "
+    "direction away from the surface, or as quaternions qx qy qz qw"
+)
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ class Columns:
         if (mistake := _mistake(names, places, flat=flat)) is not None:
             there = reprlib.repr(" ".join(name.text for name in header.names) or " ".join(names))
             raise ToolpathError(f"line {header.line}: columns {there}, {mistake}")
-        _tell(header, places, passed)
+        _tell(_called(header, chosen), places, passed)
         rows.trim(header.width)
         return cls(places, header.width, header.unit(places))
 
@@ -106,6 +111,8 @@ def _names(rows: Rows, header: Header, chosen: Chosen | None, *, flat: bool) -> 
         return [name.name for name in header.names]
     if header.width != (2 if flat else 3):
         reason = "x y alone need z=, their height in metres" if header.width == 2 else _UNNAMED
+        if flat and header.width == 3:
+            reason = "z= is for tables of x and y alone: leave it out"
         raise ToolpathError(
             f"line {header.line}: {header.width} values between {rows.between} and no names of columns, expected "
             f"{'2 (x y)' if flat else '3 (x y z)'}; {reason}"
@@ -126,6 +133,8 @@ def _mistake(names: list[str], places: Mapping[str, int], *, flat: bool) -> str 
     parts = [len(places.keys() & group) in (0, len(group)) for group in (set(AXIS), set(QUATERNION))]
     if flat and "z" in places:
         return "expected no z where z= is given"
+    if not flat and {"x", "y"} <= places.keys() and "z" not in places:
+        return "expected z too; a table of x and y alone needs z=, their height in metres"
     if set(AXIS) | set(QUATERNION) <= places.keys():
         return "expected a normal or an orientation, not both: choose by columns="
     if once and point <= places.keys() and all(parts):
@@ -136,10 +145,20 @@ def _mistake(names: list[str], places: Mapping[str, int], *, flat: bool) -> str 
     )
 
 
-def _tell(header: Header, places: Mapping[str, int], passed: Passed) -> None:
+def _called(header: Header, chosen: Chosen | None) -> list[str]:
+    """What to call each column: as the file does, else as the caller does, else by its number."""
+    if header.names:
+        return [name.text for name in header.names]
+    said = [] if chosen is None or isinstance(chosen, Mapping) else chosen
+    return [said[k] if k < len(said) and said[k].strip("_- ") else str(k) for k in range(header.width)]
+
+
+def _tell(texts: Sequence[str], places: Mapping[str, int], passed: Passed) -> None:
     """Tell which columns are passed over."""
-    texts = [name.text for name in header.names] or [str(k) for k in range(header.width)]
-    over = [reprlib.repr(text) for k, text in enumerate(texts) if k not in places.values()]
-    if over:
-        listed = ", ".join(over[:_MOST_TOLD]) + (", …" if len(over) > _MOST_TOLD else "")
-        passed.tell(f"column{'s' * (len(over) > 1)} {listed} {'are' if len(over) > 1 else 'is'} passed over")
+    unread = [text for k, text in enumerate(texts) if k not in places.values()]
+    if unread:
+        listed = ", ".join(map(reprlib.repr, unread[:_MOST_TOLD])) + (", …" if len(unread) > _MOST_TOLD else "")
+        many = len(unread) > 1
+        stems = {re.split(r"[\s_(\[]", text.lower())[0] for text in unread}
+        why = _ANGLES_UNREAD if any(angles <= stems for angles in _ANGLES) else ""
+        passed.tell(f"column{'s' * many} {listed} {'are' if many else 'is'} passed over{why}")

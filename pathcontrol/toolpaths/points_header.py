@@ -40,7 +40,10 @@ class Header:
             return cls(names, len(names), line, unit or said or _unit_of(above[1] if above else []))
         width = len(names)
         above = _in_comments(rows, width)
-        return cls(above[1], width, above[0], said) if above else cls([], width, line, said)
+        if above is None:
+            return cls([], width, line, said)
+        names = [name._replace(unit=name.unit or said) if name.name in POINT else name for name in above[1]]
+        return cls(names, width, above[0], said)
 
     def place(self, at: int | str) -> int:
         """The column of a number, or of a name in the file.

@@ -13,17 +13,32 @@ POINT, AXIS, QUATERNION = ["x", "y", "z"], ["i", "j", "k"], ["qx", "qy", "qz", "
 CONTOUR = "contour"
 KNOWN = (*POINT, *AXIS, *QUATERNION, CONTOUR)
 
-_UNIT_ALIASES = {"inch": "in", "inches": "in", "µm": "um", "μm": "um", "meter": "m", "metre": "m", "millimeter": "mm"}
+_SPELT = {"m": "met", "cm": "centimet", "mm": "millimet", "um": "micromet"}
+_UNIT_ALIASES = {"inch": "in", "inches": "in", "µm": "um", "μm": "um", "micron": "um", "microns": "um"} | {
+    stem + end: unit for unit, stem in _SPELT.items() for end in ("er", "ers", "re", "res")
+}
 #: names as other programs write them: position.x and pose.orientation.w of ROS, pos_x, nx, normal_z
 _LONG = re.compile(
     r"(?:.*[._/])?(?=.+(?P<letter>[xyzw])\Z)(?:(?P<point>pos(?:ition)?)|(?P<quaternion>orientation)|(?P<axis>n(?:ormal)?))"
     r"[._/]?[xyzw]"
 )
+#: x_pos, X Position, x coordinate
+_POINT_FIRST = re.compile(r"(?P<letter>[xyz])[._/-]?(?:pos(?:ition)?|coord(?:inate)?)")
 _LONGEST = 100  # characters of a name that is looked at closer
 _PREFIX = {"point": "", "quaternion": "q", "axis": "n"}
 _NORMAL = {"nx": "i", "ny": "j", "nz": "k"}
-_COLUMN = re.compile(r"([^\[\]()]*?)(?:_([^\W\d_]+)|\[([^\[\]()]*)\]|\(([^\[\]()]*)\))?")
-_IN_A_COMMENT = re.compile(r"\bunits?(?: ?[:=] ?| (?:in|is|are) )\[?([a-zµμ]+)\b", re.IGNORECASE)
+#: x_mm, x/mm, x-mm, x in mm, xmm, x [mm] and x (mm), without their blanks
+_COLUMN = re.compile(
+    r"([^\[\]()]*?)(?:(?:[_/-]|(?<=[a-z])in)([^\W\d_]+)|(?<=[xyz])(mm|cm|[uµμ]m)|\[([^\[\]()]*)\]|\(([^\[\]()]*)\))?"
+)
+_WORD = "|".join(sorted({*UNITS, *_UNIT_ALIASES}, key=len, reverse=True))
+_WHAT = r"(?:x[ ,]*y(?:[ ,]*z)?|coordinates?|points?|positions?|lengths?|dimensions?|distances?|values|data|all)"
+#: units: mm, lengths are in mm, x y z in mm; not: speeds in mm/s
+_IN_A_COMMENT = re.compile(
+    rf"\bunits?(?: ?[:=] ?| (?:in|is|are) )\[?({_WORD})\b|\b{_WHAT}(?: [\w,]+){{0,3}} in \[?({_WORD})\b(?!/)",
+    re.IGNORECASE,
+)
+_ALONE = re.compile(rf"\W*({_WORD})\W*", re.IGNORECASE)
 _HINT = re.compile(r"\b(mm|cm|inch(?:es)?|millimet(?:er|re)s?|µm)\b", re.IGNORECASE)
 
 
@@ -69,6 +84,8 @@ def _known(plain: str) -> str:
     """The known name that a text is another spelling of, or an empty string."""
     if plain in KNOWN:
         return plain
+    if first := _POINT_FIRST.fullmatch(plain):
+        return first["letter"]
     found = _LONG.fullmatch(plain)
     name = "" if found is None else _PREFIX[str(found.lastgroup)] + found["letter"]
     name = _NORMAL.get(name, name)
@@ -89,10 +106,10 @@ def unit_of_row(fields: list[str]) -> str | None:
 
 
 def unit_in(comment: str) -> str | None:
-    """The unit that a comment such as ``units: mm`` names."""
-    found = _IN_A_COMMENT.search(comment)
-    unit = _UNIT_ALIASES.get(found[1].lower(), found[1].lower()) if found else None
-    return unit if unit in UNITS else None
+    """The unit that a comment such as ``units: mm``, ``x y z in mm`` or ``mm`` names."""
+    found = _ALONE.fullmatch(comment) or _IN_A_COMMENT.search(comment)
+    unit = next(filter(None, found.groups())).lower() if found else None
+    return None if unit is None else _UNIT_ALIASES.get(unit, unit)
 
 
 def hint_of_unit(comment: str) -> str | None:

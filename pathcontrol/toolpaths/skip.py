@@ -60,14 +60,15 @@ def skipped(names: str | Sequence[str] | None, known: Iterable[str]) -> frozense
         UnknownNameError: a name stands for none.
         InputError: ``names`` are no names.
     """
-    single = {kind.lower() for kind in known} | {kind for kinds in KINDS.values() for kind in kinds}
+    there = {kind.lower() for kind in known}
+    single = there | {kind for kinds in KINDS.values() for kind in kinds}
     found: set[str] = set()
     for name in [name.strip() for some in names_of("skip", names) or () for name in some.split(",")]:
         kinds = KINDS.get(name.lower(), (name.lower(),))
         if not single.issuperset(kinds):
             raise UnknownNameError(
                 f"skip: {name[:60]!r} is no kind of thing in this drawing, expected some of "
-                f"{', '.join(map(repr, KINDS))}, or a type such as {', '.join(map(repr, sorted(single)[:12]))}"
+                f"{', '.join(map(repr, KINDS))}, or a type such as {', '.join(map(repr, sorted(there)[:12]))}"
             )
         found.update(kinds)
     return frozenset(found)

@@ -65,7 +65,7 @@ def read_svg(
     gap = checked_gap(gap)
     passed, names = Passed(unknown), names_of("layers", layers)
     document = Document(path)
-    tags = {tag_of(element) or "" for element in document.root.iter("*")} if skip else set()
+    tags = {tag for element in document.root.iter("*") if (tag := tag_of(element))} if skip else set()
     walk = Walk(document, Chosen(document, names), skipped(skip, tags | SHAPES), passed)
     strands = list(walk.strands(ppi))
     if not strands:

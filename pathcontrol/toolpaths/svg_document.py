@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -14,6 +15,9 @@ from pathcontrol.toolpaths.text import read_text
 
 _NAMESPACES = ("", "http://www.w3.org/2000/svg")
 _MOST_ELEMENTS = 1_000_000
+_SERVER = re.compile(
+    r"""url\(\s*["']?(?P<link>[^"')]*?)["']?\s*\)(?P<otherwise>.*)""", re.DOTALL
+)  # of a gradient or pattern
 _HREF = ("href", "{http://www.w3.org/1999/xlink}href")
 
 
@@ -56,7 +60,9 @@ class Document:
     def style(self, element: Any) -> dict[str, str]:
         """The properties of an element that have a say in the geometry."""
         if element not in self._styles:
-            self._styles[element] = self._sheet.of(element)
+            style = self._sheet.of(element)
+            painted = {name: self._paint(style[name]) for name in ("fill", "stroke") if name in style}
+            self._styles[element] = style | painted
         return self._styles[element]
 
     def attributes(self, element: Any) -> Attributes:
@@ -73,6 +79,13 @@ class Document:
         if link.startswith("#") and link[1:] in self._targets:
             return self._targets[link[1:]]
         raise ToolpathError(f"it refers to {link[:60]!r}, expected # and the id of an element in this file")
+
+    def _paint(self, value: str) -> str:
+        """A paint; of one that refers to nothing in this file what is written behind it, or none."""
+        found = _SERVER.fullmatch(value.strip())
+        if found is None or not found["link"].startswith("#") or found["link"][1:] in self._targets:
+            return value
+        return found["otherwise"].strip() or "none"
 
     def _parsed(self, text: str) -> Any:
         from lxml import etree

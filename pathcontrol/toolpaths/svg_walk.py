@@ -108,7 +108,7 @@ class Walk:
             self._passed.over("a hidden element", self._where(element))
             return []
         if tag not in SHAPES and not group:
-            if place.visible and (place.paint.seen if tag in _WORDS else place.paint.opacity > 0):
+            if place.visible and (_has_words(element, place) if tag in _WORDS else place.paint.opacity > 0):
                 self._passed.unless_refused(tag, self._where(element), _cannot_cut(tag))
             return []
         return self._entered(element, style, place, sized)
@@ -212,6 +212,11 @@ def _refuse(style: dict[str, str], element: Any) -> None:
                 f"{name} = {style[name][:60]!r} is not understood: apply it to the shapes in the drawing program, "
                 "or take it away"
             )
+
+
+def _has_words(element: Any, place: _Place) -> bool:
+    """Whether anything is seen of a text, which drawing programs leave behind empty."""
+    return place.paint.seen and bool("".join(element.itertext()).strip())
 
 
 def _flat(matrix: Array) -> bool:

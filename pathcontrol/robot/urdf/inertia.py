@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 INERTIA_TOLERANCE = 1e-6  # of the largest principal moment: what rounding in a file may cost
 NO_INERTIA = 1e-15  # kg m^2, far below any finger joint
+_ROUNDING = 1e-12  # of the largest moment: what the computation of moments may cost
 _TINY_SHARE = 0.05  # of the largest moment: a negative one that is smaller may be forgiven
 _TINY_MOMENT = 1e-4  # kg m^2, likewise
 NO_MASS = 1e-15  # kg
@@ -44,8 +45,9 @@ def check_inertias(arm: Arm) -> Iterator[Finding]:
         moments = np.linalg.eigvalsh(inertial.inertia)
         slack = max(NO_INERTIA, INERTIA_TOLERANCE * np.abs(moments).max())
         given = f"the principal moments are {', '.join(f'{moment:g}' for moment in moments)} kg m^2"
-        if moments[0] < -slack:
+        if moments[0] < -NO_INERTIA - _ROUNDING * moments[2]:
             tiny = -moments[0] <= max(_TINY_SHARE * moments[2], _TINY_MOMENT) and is_positive_definite()
+            tiny = tiny or -moments[0] <= slack
             level: Level = "error" if name in moving and not tiny else "warning"
             message = f"{given}; expected none below zero, check signs and products of inertia"
             yield Finding(level, "inertia-negative", place("link", name), message)

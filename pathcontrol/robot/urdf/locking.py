@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from lxml import etree
@@ -44,6 +45,22 @@ def locked_angles(
     wanted = [name for name in joints if name in given or (chosen and name not in kept)]
     wanted += [name for name in joints if not given.keys().isdisjoint(_leaders(name, joints))]
     return {name: _position(name, joints, given, frozenset()) for name in wanted}
+
+
+def locked_beyond_limits(root: etree._Element, lock: Mapping[str, float]) -> Iterator[str]:
+    """A sentence for each joint that is to be locked outside its limits: likely degrees, or millimetres."""
+    for joint in root.iterfind("joint"):
+        name, limit = joint.get("name", ""), joint.find("limit")
+        if name not in lock or limit is None or joint.get("type") == "continuous":
+            continue
+        lower, upper, at = _number(limit, "lower", 0.0), _number(limit, "upper", 0.0), float(lock[name])
+        slack = 1e-6 * max(1.0, abs(lower), abs(upper))
+        if lower < upper and not lower - slack <= at <= upper + slack:
+            slides = joint.get("type") == "prismatic"
+            unit, smaller = ("m", "millimetres") if slides else ("rad", "degrees")
+            scaled = at / 1000 if slides else at * math.pi / 180
+            meant = f"; did you mean {smaller}?" if lower <= scaled <= upper and abs(at) >= 1 else ""
+            yield f"lock: {name} = {at:g} {unit} is outside its limits of {lower:g} to {upper:g} {unit}{meant}"
 
 
 def _positions(lock: Mapping[str, float] | None, joints: Collection[str]) -> dict[str, float]:

@@ -50,6 +50,9 @@ def write_run(path: Path, data: xr.Dataset, config: Mapping[str, Any], stored: S
         written.write(seal(content))
 
 
+_TOOLPATHS = (".csv", ".tsv", ".txt", ".xyz", ".ngc", ".gcode", ".gc", ".tap", ".cnc", ".svg", ".dxf")
+
+
 def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], Stored | None]:
     """Read data, configuration, and robot and path if the file has them.
 
@@ -69,7 +72,8 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], Stored | None]:
         _check_digest(digest, lambda: _digest_of_run(data, text))
         stored = _read_origin(path)
     except Exception as error:  # a broken file makes those who read it stumble anywhere
-        raise InputError(f"{str(path)!r} is not a run saved by Run.save: {error}") from error
+        reason = str(error) if "file signature not found" not in str(error) else f"it is no HDF5 file{_remedy(path)}"
+        raise InputError(f"{str(path)!r} is not a run saved by Run.save: {reason}") from error
     if digest is None:
         warnings.warn(
             f"{str(path)!r} has no checksum, as it was written by an earlier version: damage would not be noticed; "
@@ -78,6 +82,14 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], Stored | None]:
             stacklevel=3,
         )
     return data, config, stored
+
+
+def _remedy(path: Path) -> str:
+    """Advice for files that other functions read."""
+    suffix = path.suffix.lower()
+    if suffix in (".urdf", ".xacro"):
+        return "; a URDF is loaded by load_robot"
+    return "; a toolpath is read by read_toolpath" if suffix in _TOOLPATHS else ""
 
 
 def _read_origin(path: Path) -> Stored | None:
