@@ -129,7 +129,9 @@ def _open_gaps(strands: Sequence[Strand], tolerance: float) -> list[float]:
             meets = _meets(ends, min(1.05 * larger, _WIDEST_TOLD))
             first = np.flatnonzero(meets > np.arange(len(meets)))
             widths = np.linalg.norm(ends[first] - ends[meets[first]], axis=-1).tolist()
-            gaps = [gap for i, gap in zip(first, widths, strict=True) if not _is_short(strands, i, meets[i], gap)]
+            gaps = [
+                gap for i, gap in zip(first, widths, strict=True) if not _is_short(strands, int(i), int(meets[i]), gap)
+            ]
             if gaps:
                 return gaps
     return []
