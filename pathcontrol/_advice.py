@@ -17,7 +17,13 @@ _WORD = re.compile(
 )
 _BREAK = re.compile(r"; |, | \(")
 _END = re.compile(r"; |, |\n|$")
-_SETTING = re.compile(r"(?P<name>[a-z]\w*) = (?P<value>'[^']*'|[^,;]+)(?=[,;])")
+_SETTING = re.compile(
+    r"""(?P<name>[a-z]\w*)\ =\                                   # as Python shows the value: a text, a list, …
+    (?P<value>'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"|\([^()]*\)|\[[^][]*\]|\{[^{}]*\}|<[^<>]*>|[^,;'"([{<]+?)
+    (?=[,;]|:\ )
+    """,
+    re.VERBOSE,
+)
 
 
 def in_words_of(message: str, speak: Speak) -> str:
@@ -35,7 +41,7 @@ def in_words_of(message: str, speak: Speak) -> str:
             end = word.end()
             continue
         starts = [found.start() for found in _BREAK.finditer(message, end, word.start())]
-        starts = [start for start in starts if not _depth(message[end:start])]
+        starts = [start for start in starts if _depth(message[end:start]) <= 0]
         if starts:
             parts.append(message[end : starts[-1]])
             end = _end_of_advice(message, starts[-1], word.end())
@@ -47,8 +53,13 @@ def setting_in_words_of(message: str, speak: Speak) -> str:
     if (named := re.match(r"([a-z]\w*)(?=: )", message)) and (said := speak(named[1], "")) is not None:
         return said + message[named.end() :]
     found = _SETTING.match(message)
-    said = None if found is None else speak(found["name"], found["value"].strip("'"))
+    said = None if found is None else speak(found["name"], _unquoted(found["value"]))
     return message if found is None or said is None else said + message[found.end() :]
+
+
+def _unquoted(value: str) -> str:
+    """The text in quotation marks, or the value itself."""
+    return value[1:-1] if value[0] in "'\"" else value
 
 
 def _end_of_advice(message: str, start: int, after: int) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import fcntl
 import glob
@@ -16,6 +17,7 @@ from pathlib import Path
 from pathcontrol.errors import InputError, PathControlError
 
 _HEX = "[0-9a-f]" * 8
+_parts: set[Path] = set()  # temporary files that this process has, or is about to have
 
 
 @contextlib.contextmanager
@@ -84,13 +86,28 @@ def _lock(descriptor: int) -> bool:
 def _part_of(target: Path) -> Iterator[Path]:
     """Make a temporary file beside ``target``, locked to show that its writer lives, and remove it at the end."""
     temporary = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
-    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    descriptor = None
     try:
+        _parts.add(temporary)
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
         _lock(descriptor)
         yield temporary
     finally:
-        os.close(descriptor)
+        if descriptor is not None:
+            os.close(descriptor)
         temporary.unlink(missing_ok=True)
+        _parts.discard(temporary)
+
+
+def _remove_own_parts() -> None:
+    """Remove the temporary files that Ctrl-C has kept this process from removing at once."""
+    for temporary in list(_parts):
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        _parts.discard(temporary)
+
+
+atexit.register(_remove_own_parts)
 
 
 def _remove_left_parts(target: Path) -> None:

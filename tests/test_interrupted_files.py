@@ -1,0 +1,87 @@
+"""Ctrl-C at any moment of writing leaves the old file or the new one, and nothing beside it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from pathcontrol import _files
+from pathcontrol._files import whole_file, write_whole
+
+
+def interrupted_at(step, act):
+    """Run ``act`` with a KeyboardInterrupt before the ``step``-th instruction of the module; whether it came to that."""
+    left = step
+
+    def trace(frame, event, argument):
+        nonlocal left
+        if frame.f_code.co_filename != _files.__file__:
+            return None
+        frame.f_trace_opcodes = True
+        if event == "opcode":
+            left -= 1
+            if left == 0:
+                raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        act()
+    except KeyboardInterrupt:
+        return True
+    finally:
+        sys.settrace(before)
+    return False
+
+
+def test_an_interrupt_before_any_instruction_leaves_the_old_file_or_the_new_one(tmp_path):
+    target, step = tmp_path / "run.nc", 0
+    found = set()
+    while True:
+        step += 1
+        target.write_bytes(b"old")
+        if not interrupted_at(step, lambda: write_whole(target, b"new")):
+            break
+        _files._remove_own_parts()  # as the interpreter does at its end
+        assert [file.name for file in tmp_path.iterdir()] == ["run.nc"], step
+        found.add(target.read_bytes())
+    assert found == {b"old", b"new"}
+    assert step > 100
+
+
+def test_what_could_not_be_removed_at_once_goes_with_the_process(tmp_path):
+    program = """
+import os, sys
+from pathlib import Path
+from pathcontrol._files import whole_file
+
+close = os.close
+
+def interrupted(descriptor):
+    close(descriptor)
+    os.close = close
+    raise KeyboardInterrupt
+
+try:
+    with whole_file(sys.argv[1]) as temporary:
+        temporary.write_bytes(b"half")
+        os.close = interrupted
+        raise KeyboardInterrupt
+except KeyboardInterrupt:
+    assert temporary.exists()
+"""
+    subprocess.run([sys.executable, "-c", program, str(tmp_path / "run.nc")], check=True, timeout=60)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_whole_file_is_written_after_one_that_was_interrupted(tmp_path):
+    target = tmp_path / "run.nc"
+    with pytest.raises(KeyboardInterrupt), whole_file(target) as temporary:
+        temporary.write_bytes(b"half")
+        raise KeyboardInterrupt
+    assert not list(tmp_path.iterdir())
+    write_whole(target, b"whole")
+    assert [file.read_bytes() for file in tmp_path.iterdir()] == [b"whole"]
