@@ -71,7 +71,7 @@ def test_there_are_such_messages():
         ("toolpath", "read the file with start=(x, y, z)", "read the file with --start x y z"),
         ("toolpath", "ppi = -1, expected a number", "--ppi -1, expected a number"),
         ("sweep", "cluster = '127.0.0.1:1': no Dask, (a, b); c", "--cluster 127.0.0.1:1: no Dask, (a, b); c"),
-        ("sweep", "cluster = \"it's:1\": no Dask; start one", "--cluster it's:1: no Dask; start one"),
+        ("sweep", 'cluster = "it\'s:1": no Dask; start one', "--cluster it's:1: no Dask; start one"),
         ("sweep", "cluster = <Client: 'tcp://a, b'>: no Dask; c", "--cluster <Client: 'tcp://a, b'>: no Dask; c"),
         ("sweep", "chunk = 1 s is less: than, it", "--chunk 1 s is less: than, it"),
         ("toolpath", "start = [1, 2], expected more", "--start 1 2, expected more"),

@@ -12,7 +12,7 @@ from pathcontrol._files import whole_file, write_whole
 
 
 def interrupted_at(step, act):
-    """Run ``act`` with a KeyboardInterrupt before the ``step``-th instruction of the module; whether it came to that."""
+    """Run ``act`` with a KeyboardInterrupt before the ``step``-th instruction of the module; whether there is one."""
     left = step
 
     def trace(frame, event, argument):
@@ -79,9 +79,14 @@ except KeyboardInterrupt:
 
 def test_a_whole_file_is_written_after_one_that_was_interrupted(tmp_path):
     target = tmp_path / "run.nc"
-    with pytest.raises(KeyboardInterrupt), whole_file(target) as temporary:
-        temporary.write_bytes(b"half")
-        raise KeyboardInterrupt
+
+    def write_half():
+        with whole_file(target) as temporary:
+            temporary.write_bytes(b"half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_half()
     assert not list(tmp_path.iterdir())
     write_whole(target, b"whole")
     assert [file.read_bytes() for file in tmp_path.iterdir()] == [b"whole"]

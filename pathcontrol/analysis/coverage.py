@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from pathcontrol._arrays import Array
 from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.closest_point.everywhere import FARTHEST
 
 _POINTS = 1000  # of a path, at least
 _MOST = 200_000  # points that a trace is refined to
@@ -71,7 +72,7 @@ def distance_to_trace(x: Array, trace: Array, resolution: float) -> Array:
     The trace is refined until its points are half of the ``resolution`` apart; then the straight lines on either side
     of the nearest point count.
     """
-    fine = refined(trace[np.isfinite(trace).all(-1)], _FINER * resolution)
+    fine = refined(trace[(np.abs(trace) < FARTHEST).all(-1)], _FINER * resolution)
     if not len(fine):
         return np.full(len(x), np.inf)
     nearest = cKDTree(fine, balanced_tree=False).query(x)[1]

@@ -14,6 +14,7 @@ from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import TaskBatch
+from pathcontrol.tasks.closest_point.everywhere import FARTHEST
 
 
 def known_task(run: Run, task: PathTask | None) -> PathTask:
@@ -27,6 +28,8 @@ def known_task(run: Run, task: PathTask | None) -> PathTask:
     if task is None:
         raise InputError("the run does not know its path, as it holds data only; give task=…")
     expect("task", task, PathTask)
+    if task.n != run.data.sizes["joint"]:
+        raise InputError(f"the task has {task.n} joints, the run {run.data.sizes['joint']}; expected as many")
     return task
 
 
@@ -76,10 +79,11 @@ def by_task(run: Run, task: PathTask) -> Iterator[tuple[Run, PathTask, NDArray[n
 def where_known(function: Callable[..., Array], *arrays: Array) -> Array:
     """``function`` (k,) or (k, n) of arrays (rollout, time, …), one moment a row, where all are numbers; else NaN.
 
-    So no path is asked where it is at a NaN, which a rollout that diverged leaves behind.
+    So no path is asked where it is at a NaN, which a rollout that diverged leaves behind. Numbers with squares that are
+    not finite count as none.
     """
     moments = arrays[0].shape[:2]
-    known = np.all([np.isfinite(a).reshape(*moments, -1).all(-1) for a in arrays], axis=0)
+    known = np.all([(np.abs(a) < FARTHEST).reshape(*moments, -1).all(-1) for a in arrays], axis=0)
     if known.all():
         return function(*arrays)
     found = function(*(a[known] for a in arrays)) if known.any() else np.empty(0)

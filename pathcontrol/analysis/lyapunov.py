@@ -12,6 +12,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
+from pathcontrol.analysis.known import known_task
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.projection import Projection
@@ -49,13 +50,14 @@ def projection_lyapunov(controller: Projection, e_p: Array, e_v: Array) -> Lyapu
     return _projected(controller.k_p, controller.K_v, e_p, e_v)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of numbers from a file, which may be huge
 def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     """V and V̇ of the controller's theorem along a run, each (rollout, time).
 
     V is evaluated at the errors of the run; V̇ is what the theorem gives there, not a difference of V.
     """
     expect("controller", controller, Controller)
-    expect("run", run, Run)
+    known_task(run, controller.task)
     e_p, e_v = run.array("e_p"), run.array("e_v")
     if isinstance(controller, ExtendedMotionPlan):
         s, K_p, K_v = run.array("s").T, _over_time(controller.K_p), _over_time(controller.K_v)

@@ -171,14 +171,17 @@ def metrics(
             rollout's time. A rollout that was finished before has NaN there.
 
     Raises:
-        InputError: no task is known, or a setting is something else.
+        InputError: no task is known, it has other joints, or a setting is something else.
+        UnknownNameError: a variable is missing in the run.
         TaskError: the task returns something it must not.
     """
     band = scalar("band", band, positive=True)
     values: dict[str, Array] = {}
     for part, own, rows in by_task(run, known_task(run, task)):
         counted = samples_of(part, window, fraction)
-        for name, value in _metrics(part, own, counted, band, only).items():
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers from a file, which may be huge
+            found = _metrics(part, own, counted, band, only)
+        for name, value in found.items():
             values.setdefault(name, np.full(run.rollouts, np.nan))[rows] = value
     return {name: value.tolist() for name, value in values.items()}
 

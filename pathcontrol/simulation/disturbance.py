@@ -150,6 +150,10 @@ class FrameForce(_Timed):
         jacobian = self._robot.frame_jacobian(q, self.frame)[..., :3, :]
         return (jacobian * (share * self.force)[..., None]).sum(-2)
 
+    def describe(self) -> dict[str, Any]:
+        """Name and public parameters, and the name of the arm."""
+        return super().describe() | {"robot": self._robot.name}
+
 
 def check_disturbance(disturbance: Any, q: Array, qd: Array) -> None:
     """A disturbance gives torques for the rollouts at (q, q̇), (N, n) each.

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol._suffixes import check_suffix
-from pathcontrol.errors import InputError
+from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.origin import Origin, Stored
-from pathcontrol.simulation.record import table
+from pathcontrol.simulation.record import laws, table
 from pathcontrol.simulation.saved.netcdf import read_run, write_run
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 from pathcontrol.tasks.base import PathTask
@@ -32,6 +32,8 @@ class Run:
     """
 
     def __init__(self, data: xr.Dataset, config: Mapping[str, Any], origin: Origin | None = None) -> None:
+        if missing := [name for name in ("rollout", "time", "joint") if not data.sizes.get(name)]:
+            raise InputError(f"the data of the run have no {' and no '.join(missing)}; expected at least one of each")
         self.data, self.config = data, dict(config)
         self._origin = Origin.of(None, None) if origin is None else origin
 
@@ -72,8 +74,21 @@ class Run:
         return cls(data, config, Origin.of(robot, task, first_rollout, model))
 
     def __getitem__(self, name: str) -> xr.DataArray:
-        """One variable by its name."""
-        return self.data[name]
+        """One variable by its name.
+
+        Raises:
+            UnknownNameError: the run has no such variable.
+            InputError: it has one over other dimensions.
+        """
+        try:
+            found = self.data[name]
+        except KeyError as error:
+            known = ", ".join(map(str, self.data.variables))
+            raise UnknownNameError(f"the run has no variable {name!r}; there are {known}") from error
+        dims, *_ = (VARIABLES | OUTCOMES).get(name, (found.dims,))
+        if found.dims != dims:
+            raise InputError(f"{name} of the run is over {found.dims}, expected {dims}")
+        return found
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{name}: {size}" for name, size in self.data.sizes.items())
@@ -133,7 +148,7 @@ class Run:
     @property
     def time(self) -> Array:
         """Time [s], (time,)."""
-        return self.data["time"].to_numpy()
+        return self.array("time")
 
     @property
     def rollouts(self) -> int:
@@ -143,12 +158,12 @@ class Run:
     @property
     def status(self) -> NDArray[np.str_]:
         """``"finished"``, ``"diverged"``, or ``"running"`` when the time was up, (rollout,)."""
-        return self.data["status"].to_numpy()
+        return self.array("status")
 
     @property
     def finish_time(self) -> Array:
         """When each rollout was finished [s], NaN where it was not, (rollout,)."""
-        return self.data["finish_time"].to_numpy()
+        return self.array("finish_time")
 
     @property
     def diverged_time(self) -> Array:
@@ -175,12 +190,21 @@ class Run:
         return self.data["laps"].to_numpy()
 
     def array(self, name: str) -> Array:
-        """One variable as a plain array, (rollout, time, …)."""
-        return self.data[name].to_numpy()
+        """One variable as a plain array, (rollout, time, …).
+
+        Raises:
+            UnknownNameError: the run has no such variable.
+        """
+        return self[name].to_numpy()
 
     def norm(self, name: str) -> Array:
-        """Euclidean norm over the joints, (rollout, time), as ‖e_p‖ of ``run.norm("e_p")``."""
-        return np.linalg.norm(self.array(name), axis=-1)
+        """Euclidean norm over the joints, (rollout, time), as ‖e_p‖ of ``run.norm("e_p")``; inf beyond 1e154.
+
+        Raises:
+            UnknownNameError: the run has no such variable.
+        """
+        with np.errstate(over="ignore"):
+            return np.linalg.norm(self.array(name), axis=-1)
 
     def rollout(self, index: int) -> Run:
         """One of the rollouts as a run of its own."""
@@ -193,17 +217,18 @@ class Run:
         """One path of a sequence as a run of its own, that begins at 0 s and where the path before was finished."""
         if "path_status" not in self.data.coords:
             raise InputError("the run is no sequence of paths; make one with simulate_sequence")
-        status = self.data["path_status"].to_numpy()
-        if not 0 <= index < len(status) or status[index] == "waiting":
+        status, among, ends = (self.array(f"path_{name}") for name in ("status", "index", "finish_time"))
+        if not 0 <= index < len(status) or status[index] == "waiting" or not (among == index).any():
             followed = int((status != "waiting").sum())
             raise InputError(f"path {index} was not followed: the run has {followed} paths, counted from 0")
-        data = self.data.isel(time=self.data["path_index"].to_numpy() == index)
-        begin, finished = data["time"].to_numpy()[0], data["path_finish_time"].to_numpy()[[index]]
-        data = data.assign(s=data["s"].copy(data=data["s"] - data["path_offset"].to_numpy()[index]))
+        data, s = self.data.isel(time=among == index), self["s"][:, among == index]
+        begin = data["time"].to_numpy()[0]
+        data = data.assign(s=s - self.array("path_offset")[index])
+        data["s"].attrs = s.attrs
         data = data.drop_vars(name for name in OUTCOMES if name in data.coords)
         data = data.assign_coords(time=("time", data["time"].to_numpy() - begin, data["time"].attrs))
-        config = self.config | {"controller": self.config["controller"]["sequence"][index]}
-        outcome = {"finish_time": finished - begin}
+        config = self.config | {"controller": dict(enumerate(laws(self.config))).get(index, {})}
+        outcome = {"finish_time": ends[[index]] - begin}
         if status[index] == "diverged":
             outcome |= {"diverged_time": self.diverged_time - begin, "reason": self.reason}
         data = data.assign_coords(_outcome(1, outcome))

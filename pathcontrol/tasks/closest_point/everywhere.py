@@ -16,6 +16,8 @@ from pathcontrol.tasks.closest_point.curve import Curve
 _TURN = 1 / 8  # rad over a piece of a cell, which is taken to hold one minimum at most
 _SIZES, _RATIO = 6, 4.0  # how many groups of cells by size, and their sizes
 _BLOCK = 1 << 18  # pairs of a point and a cell held at once
+#: numbers whose squares, and sums of many of these, are finite
+FARTHEST = 1e150
 _TIE = 1e-12  # by how much a sample must be nearer than a root: not by rounding alone
 
 
@@ -33,8 +35,8 @@ class Everywhere:
         self._rounding = 1e-13 * float(np.abs(cells.p).max())
 
     def __call__(self, x: Array) -> Array:
-        """Parameter (N,) of the point nearest to each row of x (N, m); NaN where x is not finite."""
-        nearest, known = np.full(len(x), np.nan), np.flatnonzero(np.isfinite(x).all(-1))
+        """Parameter (N,) of the point nearest to each row of x (N, m); NaN where x, or its square, is not finite."""
+        nearest, known = np.full(len(x), np.nan), np.flatnonzero((np.abs(x) < FARTHEST).all(-1))
         x = x[known]
         bound = np.min([group.tree.query(x)[0] for group in self._groups], axis=0) * (1 + _TIE) + self._rounding
         for rows in self._blocks(x, bound):

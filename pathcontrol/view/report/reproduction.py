@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -10,6 +9,8 @@ from typing import Any, NamedTuple
 from pathcontrol.simulation.described import is_whole
 from pathcontrol.simulation.record import laws, table
 from pathcontrol.simulation.run import Run
+from pathcontrol.view.report.code import Name, call
+from pathcontrol.view.report.disturbance import disturbance_code
 from pathcontrol.view.report.downloads import Download, file_name, text_file
 from pathcontrol.view.report.settings import Setting
 
@@ -17,7 +18,6 @@ _LOOPS = {"sampled": "SampledLoop", "continuous": "ContinuousTime"}
 #: the laws of this package; of another one only its user knows where it is
 _LAWS = ("ExtendedMotionPlan", "Projection", "ComputedTorque", "PDPlus", "SlotineLi")
 _NOT_ARGUMENTS = ("controller", "robot", "task")
-_LONGEST_LINE = 100
 
 
 class Recipe(NamedTuple):
@@ -53,7 +53,7 @@ def versions(configs: Sequence[Mapping[str, Any]]) -> list[Setting]:
 
 
 def script(name: str, run: Run) -> str:
-    """Python that simulates a run again from its file, with the law, gains and loop of its configuration.
+    """Python that simulates a run again from its file, with the law, gains, loop and disturbance of its configuration.
 
     Empty where the configuration is not one that :func:`simulate` or :func:`simulate_sequence` has written.
     """
@@ -61,46 +61,48 @@ def script(name: str, run: Run) -> str:
     sequence = isinstance(run.config.get("duration"), list)
     if run.task is None or not _known(several, loop) or not _ended(run.config, sequence):
         return ""
-    if "disturbance" in run.config or table(run.config, "plant").get("arms", 1) != 1:
+    outside = disturbance_code(run.config["disturbance"], run) if "disturbance" in run.config else None
+    if (outside is None and "disturbance" in run.config) or table(run.config, "plant").get("arms", 1) != 1:
         return ""
-    same = run.model is run.robot
+    more = {} if run.model is run.robot else {"plant": Name("saved.robot")}
+    if outside is not None:
+        more["disturbance"] = Name("disturbance")
     settings = _without(loop, ["loop"])
     if "noise" in settings:
-        settings["noise"] = _Name(_call("pc.SensorNoise", [], settings["noise"]))
-    closed = _call(f"pc.{_LOOPS[loop['loop']]}", [], settings)
+        settings["noise"] = Name(call("pc.SensorNoise", [], settings["noise"]))
+    closed = call(f"pc.{_LOOPS[loop['loop']]}", [], settings)
     lines = [
         "import pathcontrol as pc\n",
         f'saved = pc.Run.load("{file_name(name)}.nc")  # knows its robot, the model of its law and its path',
         f"loop = {closed}",
         'q, qd = saved.array("q")[:, 0], saved.array("qd")[:, 0]',
-        *(_of_sequence if sequence else _of_one)(
-            several[0], run.config, {} if same else {"plant": _Name("saved.robot")}
-        ),
+        *([] if outside is None else [f"disturbance = {outside}"]),
+        *(_of_sequence if sequence else _of_one)(several[0], run.config, more),
     ]
     text = "\n".join(lines) + "\n"
     return f"from math import inf\n\n{text}" if re.search(r"\binf\b", text) else text
 
 
-def _of_one(law: Mapping[str, Any], config: Mapping[str, Any], plant: Mapping[str, Any]) -> list[str]:
-    made = _call(f"pc.{law['controller']}", ["saved.model", "saved.task"], _without(law, _NOT_ARGUMENTS))
-    settings = {key: config[key] for key in ("duration", "laps", "until")} | {**plant, "loop": _Name("loop")}
+def _of_one(law: Mapping[str, Any], config: Mapping[str, Any], more: Mapping[str, Any]) -> list[str]:
+    made = call(f"pc.{law['controller']}", ["saved.model", "saved.task"], _without(law, _NOT_ARGUMENTS))
+    settings = {key: config[key] for key in ("duration", "laps", "until")} | {**more, "loop": Name("loop")}
     if config.get("first_rollout"):
         settings["first_rollout"] = config["first_rollout"]
-    return [f"law = {made}", f"run = {_call('pc.simulate', ['law', 'q', 'qd'], settings)}"]
+    return [f"law = {made}", f"run = {call('pc.simulate', ['law', 'q', 'qd'], settings)}"]
 
 
-def _of_sequence(law: Mapping[str, Any], config: Mapping[str, Any], plant: Mapping[str, Any]) -> list[str]:
-    made = _call(f"pc.{law['controller']}", ["saved.model", "path"], _without(law, _NOT_ARGUMENTS))
+def _of_sequence(law: Mapping[str, Any], config: Mapping[str, Any], more: Mapping[str, Any]) -> list[str]:
+    made = call(f"pc.{law['controller']}", ["saved.model", "path"], _without(law, _NOT_ARGUMENTS))
     times = config["duration"]
     duration = times[0] if all(each == times[0] for each in times) else times
     settings = {
         "duration": duration,
         "laps": config["laps"],
-        "task": _Name("saved.task"),
-        **plant,
-        "loop": _Name("loop"),
+        "task": Name("saved.task"),
+        **more,
+        "loop": Name("loop"),
     }
-    run = _call("pc.simulate_sequence", ["laws", "q", "qd"], settings)
+    run = call("pc.simulate_sequence", ["laws", "q", "qd"], settings)
     return [f"laws = [{made} for path in saved.task]", f"run = {run}"]
 
 
@@ -132,23 +134,3 @@ def _ended(config: Mapping[str, Any], sequence: bool) -> bool:
 
 def _without(entries: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
     return {key: value for key, value in entries.items() if key not in keys}
-
-
-class _Name(str):
-    """The name of a variable in a script."""
-
-
-def _literal(value: Any) -> str:
-    """A value as Python writes it, texts between double quotes."""
-    if isinstance(value, _Name):
-        return value
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
-
-
-def _call(function: str, positional: Sequence[str], named: Mapping[str, Any]) -> str:
-    """A call in Python, on one line if it is short."""
-    arguments = [*positional, *(f"{key}={_literal(value)}" for key, value in named.items())]
-    line = f"{function}({', '.join(arguments)})"
-    if len(line) <= _LONGEST_LINE:
-        return line
-    return f"{function}(\n" + "".join(f"    {argument},\n" for argument in arguments) + ")"
