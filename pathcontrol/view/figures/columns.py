@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
@@ -14,6 +16,7 @@ from pathcontrol.analysis.readable import reading
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.sweeps import goals
 from pathcontrol.sweeps.result import SweepResult
+from pathcontrol.view.figures.ticks import label_plainly
 
 _DECADES = 30.0  # ratio of the largest to the smallest value from which a scale is logarithmic
 
@@ -76,9 +79,18 @@ def wide(values: Array) -> bool:
     return bool(known.size and known.min() > 0 and known.max() > _DECADES * known.min())
 
 
-def scale(values: Array) -> str:
-    """The scale of an axis for these values."""
-    return "log" if wide(values) else "linear"
+def set_scales(axes: Axes, right: Array, up: Array) -> None:
+    """Scales of both axes for these values: logarithmic where they are :func:`wide`."""
+    axes.set(**{f"{letter}scale": "log" if wide(values) else "linear" for letter, values in (("x", right), ("y", up))})
+    for axis in (axes.xaxis, axes.yaxis):
+        label_plainly(axis)
+
+
+def colour_bar(figure: Figure, points: Any, axes: Axes, words: str) -> None:
+    """What the colours of ``points`` stand for, beside the axes."""
+    bar = figure.colorbar(points, ax=axes, label=words)
+    bar.outline.set_visible(False)
+    label_plainly(bar.ax.yaxis)
 
 
 def label(metric: str, unit: str) -> str:

@@ -20,11 +20,12 @@ from pathcontrol.sweeps.goals import Limits, check_limits, front, within
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.tuning.result import Tuning
 from pathcontrol.view.figures.columns import (
+    colour_bar,
     column_of_parameter,
     label,
     readable_factor,
     readable_metric,
-    scale,
+    set_scales,
     table_of,
     wide,
 )
@@ -104,7 +105,7 @@ def pareto_figure(
         figure = new_figure(COLUMN, 2.7 + 0.14 * len(words))
         axes = dressed(figure.add_subplot())
         kept = within(table, others)
-        axes.set(xscale=scale(right), yscale=scale(up))
+        set_scales(axes, right, up)
         axes.margins(0.09)  # for letters at the ends
         _draw_points(figure, axes, (right, up), kept, None if colour is None else (colour, table))
         axes.plot(right[rows], up[rows], drawstyle="steps-post", marker="o", markersize=2.6, **_FRONT)
@@ -152,7 +153,7 @@ def _draw_points(
     shade = column_of_parameter(table, name)[kept]
     norm = LogNorm() if wide(shade) else None
     points = axes.scatter(right[kept], up[kept], c=shade, s=7, lw=0, cmap=error_colours(), norm=norm, zorder=2, **many)
-    figure.colorbar(points, ax=axes, label=plain(name)).outline.set_visible(False)
+    colour_bar(figure, points, axes, plain(name))
 
 
 def _draw_limits(axes: Axes, table: xr.Dataset, choice: _Choice) -> None:

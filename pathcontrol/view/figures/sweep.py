@@ -11,7 +11,16 @@ from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
 from pathcontrol.sweeps.result import SweepResult
-from pathcontrol.view.figures.columns import column_of_parameter, label, never, readable_metric, scale, table_of, wide
+from pathcontrol.view.figures.columns import (
+    colour_bar,
+    column_of_parameter,
+    label,
+    never,
+    readable_metric,
+    set_scales,
+    table_of,
+    wide,
+)
 from pathcontrol.view.figures.style import (
     BLUE,
     COLUMN,
@@ -70,8 +79,7 @@ def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = 
             lw=0,
             **many,
         )
-        bar = figure.colorbar(points, ax=axes, label=label(metric, unit))
-        bar.outline.set_visible(False)
+        colour_bar(figure, points, axes, label(metric, unit))
         lost = {
             _DIVERGED: ((table["status"] == "diverged").to_numpy(), _LOST),
             "never": (never(table, metric), _NEVER),
@@ -81,7 +89,8 @@ def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = 
             lost["unfinished"] = (short, _LOST | {"marker": "+"})
         for word, (rows, look) in lost.items():
             axes.plot(right[rows], up[rows], **(look | {"markersize": sizes[word]}), **many)
-        axes.set(xlabel=x, ylabel=y, xscale=scale(right), yscale=scale(up))
+        axes.set(xlabel=x, ylabel=y)
+        set_scales(axes, right, up)
         if entries := {word: Line2D([], [], **look) for word, (rows, look) in lost.items() if rows.any()}:
             legend(figure, entries)
     return figure
@@ -116,7 +125,8 @@ def robustness_figure(sweep: SweepResult | xr.Dataset, parameter: str, metric: s
         axes.fill_between(where, low, high, color=BLUE, alpha=0.25, lw=0)
         axes.plot(where, middle, color=BLUE)
         axes.plot(where, worst, color=ORANGE)
-        axes.set(ylabel=label(metric, unit), xscale=scale(where), yscale=scale(value))
+        axes.set_ylabel(label(metric, unit))
+        set_scales(axes, where, value)
         if below:
             axes = _draw_lost(dressed(figure.add_subplot(grid[1], sharex=axes)), where, lost | unsettled, bins)
             axes.set_ylabel("diverged [%]" if not unsettled.any() else "diverged, never [%]")

@@ -6,10 +6,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.ticker import AutoLocator
+from matplotlib.axis import Axis
+from matplotlib.ticker import AutoLocator, LogFormatterSciNotation
 
 _DIGIT = 0.64  # width of a digit in the default font, of its size
 _GAP = 1.2  # digits between numbers
+_PLAIN = (1e-3, 1e4)  # from and to which numbers along a logarithmic axis are not powers of ten
 
 
 class SpacedLocator(AutoLocator):
@@ -36,6 +38,21 @@ class SpacedLocator(AutoLocator):
         assert self.axis is not None
         length = self.axis.get_tick_space() * 3 * self._size  # pt, which Matplotlib divides by three sizes
         return (_figures(ticks, step) + _GAP) * _DIGIT * self._size <= length * step / max(span, step)
+
+
+class PlainLogFormatter(LogFormatterSciNotation):
+    """Numbers along a logarithmic axis as one writes them, ``6`` or ``0.02``; only far from 1 as powers of ten."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        text = super().__call__(x, pos)
+        return f"{x:.4g}" if text and _PLAIN[0] <= abs(x) < _PLAIN[1] else text
+
+
+def label_plainly(axis: Axis) -> None:
+    """Plain numbers along an axis if it is logarithmic; between powers of ten where there are few of these."""
+    if axis.get_scale() == "log":
+        axis.set_major_formatter(PlainLogFormatter())
+        axis.set_minor_formatter(PlainLogFormatter(labelOnlyBase=False))
 
 
 def _figures(ticks: np.ndarray, step: float) -> int:

@@ -1,0 +1,39 @@
+"""Numbers along logarithmic axes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pathcontrol.view.figures.style import new_figure, style
+from pathcontrol.view.figures.ticks import label_plainly
+
+
+def labels(low, high):
+    """Positions and words along an axis from one value to another."""
+    with style():
+        figure = new_figure(3.5, 2.5)
+        axes = figure.add_subplot()
+        axes.set(xscale="log", xlim=(low, high))
+        label_plainly(axes.xaxis)
+        figure.canvas.draw()
+        ticks = [*axes.xaxis.get_major_ticks(), *axes.xaxis.get_minor_ticks()]
+        return [(tick.get_loc(), tick.label1.get_text()) for tick in ticks if tick.label1.get_text()]
+
+
+@settings(max_examples=25, deadline=None)
+@given(low=st.floats(1e-3, 100), decades=st.floats(0.2, 1.9))
+def test_numbers_near_1_are_written_out_and_are_what_they_stand_at(low, decades):
+    found = labels(low, low * 10**decades)
+    assert found
+    for place, text in found:
+        assert float(text) == pytest.approx(place, rel=1e-9)
+
+
+def test_numbers_far_from_1_are_powers_of_ten():
+    found = dict(labels(1e-6, 1e7))
+    assert any("^{6}" in text for text in found.values())
+    assert all("mathdefault" not in text for place, text in found.items() if 1e-3 <= place < 1e4)
+    assert np.isclose(min(found), 1e-6)
