@@ -27,7 +27,9 @@ from .control.motion import PDPlus as PDPlus
 from .control.motion import SlotineLi as SlotineLi
 from .control.motion import Tracking as Tracking
 from .control.projection import Projection as Projection
+from .engine.control_tick import ControlTick as ControlTick
 from .errors import ClusterError as ClusterError
+from .errors import EngineError as EngineError
 from .errors import ExperimentError as ExperimentError
 from .errors import InputError as InputError
 from .errors import MissingExtraError as MissingExtraError

@@ -57,6 +57,10 @@ class ClusterError(PathControlError, RuntimeError):
     """A cluster cannot be reached, or cannot go on; the message says which machine and why."""
 
 
+class EngineError(PathControlError, RuntimeError):
+    """The compiled engine cannot be used, or not for what is asked of it; the message says why and what to do."""
+
+
 class SimulationError(PathControlError, RuntimeError):
     """A simulation cannot go on; the message says at which time and why.
 

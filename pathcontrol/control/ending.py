@@ -12,6 +12,7 @@ from pathcontrol.tasks.batch import TaskBatch, of_each
 from pathcontrol.tasks.profile import END_TIME
 
 _SAMPLES = 257  # of the path, for its average speed
+_REMAINING = 1e-4  # rad (or m) of joint path that a plan at the end may have left
 
 
 class Ending(NamedTuple):
@@ -52,3 +53,8 @@ class Ending(NamedTuple):
         left = (self.s_end - s) / self.braking
         share, slope = np.minimum(np.maximum(left, 0.0), 1.0), np.where(left < 1.0, -1.0 / self.braking, 0.0)
         return point._replace(theta=point.theta * share, dtheta=point.dtheta * share + point.theta * slope)
+
+
+def arrival_parameter(task: PathTask) -> float:
+    """Return the s from which on the plan of an open path counts as arrived: 0.1 mrad of the path are left there."""
+    return task.s_end - _REMAINING / float(np.linalg.norm(task.dq_d(np.array(task.s_end))))

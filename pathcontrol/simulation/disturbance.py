@@ -42,20 +42,20 @@ class Disturbance(ABC):
 
 class _Sum(Disturbance):
     def __init__(self, terms: tuple[Disturbance, ...]) -> None:
-        self._terms = terms
+        self.terms = terms
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
-        total = self._terms[0].torque(t, q, qd)
-        for term in self._terms[1:]:
+        total = self.terms[0].torque(t, q, qd)
+        for term in self.terms[1:]:
             total = total + term.torque(t, q, qd)
         return total
 
     @property
     def jumps(self) -> Array:
-        return np.concatenate([term.jumps for term in self._terms])
+        return np.concatenate([term.jumps for term in self.terms])
 
     def describe(self) -> dict[str, Any]:
-        return {"disturbance": "sum", "terms": [term.describe() for term in self._terms]}
+        return {"disturbance": "sum", "terms": [term.describe() for term in self.terms]}
 
 
 class _Timed(Disturbance):
@@ -143,6 +143,11 @@ class FrameForce(_Timed):
         if self.force.shape[-1:] != (3,):
             raise InputError(f"force has shape {self.force.shape}, expected (3,), or (N, 3) for each rollout")
 
+    @property
+    def robot(self) -> RobotModel:
+        """The arm whose kinematics the force acts through."""
+        return self._robot
+
     def torque(self, t: float, q: Array, qd: Array) -> Array:
         share = self.share(t)
         if not share.any():
@@ -155,12 +160,23 @@ class FrameForce(_Timed):
         return super().describe() | {"robot": self._robot.name}
 
 
+def terms_of(disturbance: Disturbance | None) -> tuple[Disturbance, ...]:
+    """Return the disturbances that a sum is made of, or the one there is."""
+    if disturbance is None:
+        return ()
+    if isinstance(disturbance, _Sum):
+        return tuple(part for term in disturbance.terms for part in terms_of(term))
+    return (disturbance,)
+
+
 def check_disturbance(disturbance: Any, q: Array, qd: Array) -> None:
-    """A disturbance gives torques for the rollouts at (q, q̇), (N, n) each.
+    """Check that a disturbance, if there is one, gives torques for the rollouts at (q, q̇), (N, n) each.
 
     Raises:
         InputError: it is none, or its torques do not fit.
     """
+    if disturbance is None:
+        return
     if not isinstance(disturbance, Disturbance):
         raise InputError(f"disturbance = {disturbance!r}, expected a Disturbance, such as Push(...) or a sum of them")
     name = type(disturbance).__name__

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
+from pathcontrol.control.ending import arrival_parameter
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import of_each
 
 Until = Literal["end", "duration"]
 
-_REMAINING = 1e-4  # rad (or m) of joint path that a plan at the end may have left
 _AT_REST = 1e-2  # rad/s (or m/s), the speed ‖q̇‖ of an arm at rest
 _REST = 0.05  # s at rest; a shorter one may be the turning point of an oscillation
 
@@ -56,7 +56,7 @@ class AtEnd(Finish):
 
     def __init__(self, task: PathTask, rollouts: int, ends_run: bool = True) -> None:
         super().__init__(rollouts, ends_run)
-        self._arrival = of_each(task, _arrival)
+        self._arrival = of_each(task, arrival_parameter)
         self._since = np.full(rollouts, np.inf)
 
     def finished(self, t: float, s: Array, qd: Array) -> Array | None:
@@ -68,22 +68,17 @@ class AtEnd(Finish):
         return np.where(t - self._since >= _REST * (1 - 1e-9), self._since, np.nan)
 
 
-def _arrival(task: PathTask) -> float:
-    """The s from which on an arm has arrived."""
-    return task.s_end - _REMAINING / float(np.linalg.norm(task.dq_d(np.array(task.s_end))))
-
-
 class AfterLaps(Finish):
     """A closed path is finished when s has grown by so many periods since the start; the arm goes on moving."""
 
     def __init__(self, task: PathTask, laps: int, rollouts: int, ends_run: bool = True) -> None:
         super().__init__(rollouts, ends_run)
-        self._task, self._laps = task, laps
+        self._task, self.laps = task, laps
         self._start: Array | None = None
 
     def finished(self, t: float, s: Array, qd: Array) -> Array | None:
         self._start = s if self._start is None else self._start
-        done = whole_laps(self._task, self._start, s) >= self._laps
+        done = whole_laps(self._task, self._start, s) >= self.laps
         return np.where(done, t, np.nan) if done.any() else None
 
 
@@ -128,3 +123,12 @@ def _check_laps(task: PathTask, laps: Any) -> None:
         raise InputError(f"laps = {laps!r}, expected a whole number from 1")
     if not task.closed:
         raise InputError(f"laps = {laps}, but {type(task).__name__} is no closed path; leave laps out")
+
+
+def known_finished(finish: Finish | None, finish_time: Array, period: float) -> NDArray[np.int64]:
+    """Return the ticks, of ``period`` [s], at which it is known that rollouts finished at ``finish_time`` [s], (N,)."""
+    wait = _REST * (1 - 1e-9) if isinstance(finish, AtEnd) else 0.0
+    tick = np.floor((np.nan_to_num(finish_time) + wait) / period) - 1
+    for _ in range(3):
+        tick = np.where(tick * period - np.nan_to_num(finish_time) >= wait, tick, tick + 1)
+    return tick.astype(np.int64)

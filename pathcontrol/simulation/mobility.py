@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, readonly
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 
 _POSTURES = 32
+_KNOWN: WeakKeyDictionary[RobotModel, Array] = WeakKeyDictionary()
 
 
 def mobility(robot: RobotModel | RobotBatch) -> Array:
@@ -18,6 +21,13 @@ def mobility(robot: RobotModel | RobotBatch) -> Array:
     """
     if isinstance(robot, RobotBatch):
         return np.concatenate([mobility(body) for body in robot.bodies], axis=1)[:, robot.body]
+    if robot not in _KNOWN:
+        _KNOWN[robot] = readonly(_mobility(robot))
+    return _KNOWN[robot]
+
+
+def _mobility(robot: RobotModel) -> Array:
+    """The mobility of one arm, (postures, 1, n)."""
     lower, upper = robot.limits.lower, robot.limits.upper
     span = np.random.default_rng(0).uniform(-np.pi, np.pi, (_POSTURES, robot.n))
     try:

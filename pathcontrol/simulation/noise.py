@@ -71,11 +71,22 @@ class NoiseSource:
 
     def disturbed(self, q: Array, qd: Array) -> tuple[Array, Array]:
         """Positions and velocities (N, n) with the next sample of noise."""
+        sample = self.sample()
+        return q + sample[0], qd + sample[1]
+
+    def samples(self, count: int) -> Array:
+        """Return the next ``count`` samples, (count, 2, N, n)."""
+        ahead = np.empty((count, *self._ahead.shape[1:]))
+        for row in ahead:
+            row[...] = self.sample()
+        return ahead
+
+    def sample(self) -> Array:
+        """Return the next sample of the noise of positions and velocities, (2, N, n), until it is asked again."""
         if self._left == 0:
             self._draw()
-        sample = self._ahead[len(self._ahead) - self._left]
         self._left -= 1
-        return q + sample[0], qd + sample[1]
+        return self._ahead[len(self._ahead) - self._left - 1]
 
     def _draw(self) -> None:
         """More samples; a generator gives the same ones one by one or many at once."""

@@ -56,15 +56,9 @@ class Plant:
         self._steady = None if levels_vary(robot.friction) else self._levels_at(np.zeros((1, robot.n)))
         self._inertia = arm = robot.with_armature(0.5 * step * robot.friction.viscous)
         self._of_one = arm.forward_dynamics if isinstance(arm, RobotBatch) else arm.forward_dynamics_of_one
-        self._damped, rows = self._rows_of_strong_friction(), self._viscous
+        strong, rows = has_strong_friction(robot), self._viscous
+        self._damped: _Rows = slice(None) if strong.all() else np.flatnonzero(strong)
         self._damping = Damping(rows if len(rows) == 1 else rows[self._damped], step)
-
-    def _rows_of_strong_friction(self) -> _Rows:
-        """The rows for which the trapezoidal rule does not do."""
-        if not self._viscous.any():
-            return np.arange(0)
-        strong = (mobility(self.robot) * self._viscous).sum(-1).max(0) > _WEAK
-        return slice(None) if strong.all() else np.flatnonzero(strong)
 
     def _levels_at(self, qd: Array) -> tuple[Array, Array]:
         """Dry friction of forward and of backward motion, F⁺ and −F⁻ [N m], as rows."""
@@ -141,6 +135,14 @@ class Plant:
         if others.any():
             M[others] = _mass_matrix(self._inertia, q[rows[others]], rows[others])
         return M
+
+
+def has_strong_friction(robot: RobotModel | RobotBatch) -> NDArray[np.bool_]:
+    """Return for which arms the trapezoidal rule of viscous friction does not do, (N,), or (1,) for the arm of all."""
+    viscous = np.atleast_2d(robot.friction.viscous)
+    if not viscous.any():
+        return np.zeros(1, dtype=bool)
+    return np.asarray((mobility(robot) * viscous).sum(-1).max(0) > _WEAK)
 
 
 def _mass_matrix(robot: RobotModel | RobotBatch, q: Array, rows: NDArray[np.intp]) -> Array:

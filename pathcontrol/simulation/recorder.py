@@ -44,6 +44,25 @@ class Recorder:
             array[i] = value
         self._samples += 1
 
+    @property
+    def samples(self) -> int:
+        """How many samples are stored."""
+        return self._samples
+
+    def room_for(self, samples: int) -> dict[str, Array]:
+        """Return views of the room for the next ``samples``, (samples, rollout, …), to be written and then added."""
+        while self._samples + samples > self._room:
+            self._grow()
+        return {name: array[self._samples : self._samples + samples] for name, array in self._arrays.items()}
+
+    def add(self, samples: int) -> None:
+        """Count ``samples`` that have been written into the room for them."""
+        self._samples += samples
+
+    def cut(self, samples: int) -> None:
+        """Drop all but the first ``samples``."""
+        self._samples = min(self._samples, samples)
+
     def arrays(self) -> dict[str, Array]:
         """Everything stored, rollouts first; the room that was not needed is given back."""
         self._room = self._samples

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -22,15 +23,31 @@ from pathcontrol.simulation.sensors import Reading
 _UPDATE_EVERY = 64  # ticks between updates of the progress bar
 
 
+class Stepper(Protocol):
+    """The simulated arm, a step at a time."""
+
+    step: float
+
+    def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
+        """Return (q, q̇) one step later under the constant torque ``tau``; all (N, n)."""
+
+
 class Actuator:
-    """Torque limits and the delay between measuring and acting."""
+    """Torque limits and the delay between measuring and acting.
+
+    Attributes:
+        limits: torque limits [N m], (1, n) or (N, n), or None.
+        waiting: how many torques are computed but do not act yet.
+    """
 
     def __init__(self, loop: SampledLoop, robot: Arm, shape: tuple[int, int]) -> None:
         limits = torque_limits(loop, robot)
         check_rows(limits, "torque_limits", shape[0])
-        self._limits = None if limits is None else (-np.atleast_2d(limits), np.atleast_2d(limits))
+        self.limits = None if limits is None else np.atleast_2d(limits)
+        self._limits = None if self.limits is None else (-self.limits, self.limits)
         whole, late = _periods_and_rest(loop.delay, loop.period)
-        self._queue = deque([np.zeros(shape)] * (whole + (late > 0)))
+        self.waiting = whole + (late > 0)
+        self._queue = deque([np.zeros(shape)] * self.waiting)
         self._parts = [late, loop.period - late] if late else [loop.period]
 
     @property
@@ -64,16 +81,25 @@ class SampledArm:
         q: joint positions it starts at [rad], (N, n).
         qd: joint velocities it starts with [rad/s], (N, n).
         outside: what disturbs it, and the number of the first rollout, for its noise.
+        plant: what steps the arm, made of the robot and a step [s].
 
     Attributes:
         divergence: which rollouts have diverged, at the time since the present controller took over.
     """
 
-    def __init__(self, loop: SampledLoop, robot: Arm, q: Array, qd: Array, outside: Outside) -> None:
+    def __init__(
+        self,
+        loop: SampledLoop,
+        robot: Arm,
+        q: Array,
+        qd: Array,
+        outside: Outside,
+        plant: Callable[[Arm, float], Stepper] = Plant,
+    ) -> None:
         self.q, self.qd, self._period, self._substeps = q, qd, loop.period, loop.substeps
         self._sensors, self._actuator = loop.sensors(robot), Actuator(loop, robot, q.shape)
         check_rows(self._sensors.resolution, "encoders", len(q))
-        self._plants = [Plant(robot, part / loop.substeps) for part in self._actuator.parts]
+        self._plants = [plant(robot, part / loop.substeps) for part in self._actuator.parts]
         self._noise = None if loop.noise is None else NoiseSource(loop.noise, q.shape, outside.first)
         self._reading = self._sensors.start(*self._seen())
         self._reading = self._sensors.read(*self._seen(), self._reading)

@@ -13,8 +13,9 @@ from pathcontrol._expect import described, expect
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.disturbance import Disturbance
+from pathcontrol.simulation.disturbance import Disturbance, check_disturbance
 from pathcontrol.simulation.divergence import Divergence
+from pathcontrol.simulation.engines import Engine, check_engine, choose_engine
 from pathcontrol.simulation.finish import Finish, finish_of
 from pathcontrol.simulation.modes import ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.run import Run
@@ -28,7 +29,6 @@ from pathcontrol.simulation.setup import (
     period_of,
     plant_of,
     record_of,
-    simulated_arm,
 )
 from pathcontrol.simulation.slips import warn_of_slips
 from pathcontrol.simulation.too_long import warn_of_steps
@@ -59,6 +59,7 @@ def simulate_sequence(
     plant: RobotModel | None = None,
     loop: SampledLoop | ContinuousTime | None = None,
     disturbance: Disturbance | None = None,
+    engine: Engine = "auto",
     progress: bool = True,
 ) -> Run:
     """Simulate several paths of one arm, each from where the arm is when the one before is finished.
@@ -85,13 +86,16 @@ def simulate_sequence(
         plant: the arm that is really there; default the model of the first controller.
         loop: how the loop is closed, as for :func:`simulate`.
         disturbance: what else pushes the arm, such as :class:`Push`, or a sum; its time counts from the start.
+        engine: as for :func:`simulate`, one for all paths.
         progress: show a bar on standard error when it takes longer than two seconds.
 
     Raises:
+        EngineError: the engine is to be the compiled one, and something of the run is beyond it.
         InputError: an argument has the wrong shape or value, a path neither ends nor repeats, or one does not begin
             where the one before it ends and ``gaps`` are not allowed.
         SimulationError: the arm diverged; ``run`` of the error holds what happened until then.
     """
+    check_engine(engine)
     laws = _checked_controllers(controllers)
     robot = plant_of(plant, laws[0])
     if not isinstance(robot, RobotModel):
@@ -105,7 +109,8 @@ def simulate_sequence(
         check_joints(law, robot)
         check_law(law, q0, qd0)
     slip = warn_of_slips(robot, whole, q0)
-    arm, legs = simulated_arm(loop, robot, q0, qd0, Outside(disturbance)), []
+    check_disturbance(disturbance, q0, qd0)
+    (arm, said), legs = choose_engine(engine, laws, loop, robot, q0, qd0, Outside(disturbance)), []
     slow = warn_of_steps(laws, loop, robot, q0, qd0, disturbance, float(durations.sum()))
     for law, longest, finish in zip(laws, durations, ends, strict=True):
         arrays = arm.run(law, longest, finish, progress)
@@ -117,7 +122,7 @@ def simulate_sequence(
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws))
     paths = f"{len(laws)} path{'s' if len(laws) > 1 else ''}"
     described = {"controller": f"{paths} with {names}", "sequence": [law.describe() for law in laws]}
-    config = record_of(described, robot, loop, disturbance, duration=durations.tolist(), laps=laps)
+    config = record_of(described, robot, loop, disturbance, duration=durations.tolist(), laps=laps, **said)
     time = period * np.arange(arrays["s"].shape[1])
     run = Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=whole, model=laws[0].robot)
     arm.divergence.check(run)

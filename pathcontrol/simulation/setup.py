@@ -17,11 +17,9 @@ from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.errors import InputError, PathControlError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.continuous import ContinuousArm
 from pathcontrol.simulation.described import in_short
-from pathcontrol.simulation.disturbance import Disturbance, check_disturbance
-from pathcontrol.simulation.modes import Arm, ContinuousTime, Outside, SampledLoop
-from pathcontrol.simulation.sampled import SampledArm
+from pathcontrol.simulation.disturbance import Disturbance
+from pathcontrol.simulation.modes import Arm, ContinuousTime, SampledLoop
 from pathcontrol.simulation.variables import bytes_of_sample
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import TaskBatch
@@ -189,19 +187,6 @@ def check_law(controller: Controller, q: Array, qd: Array) -> None:
         sound = np.isfinite(np.reshape(value, (len(q), -1))).all(-1)
         if not sound.any():  # where some are no numbers, those rollouts diverge
             raise InputError(f"{name}.law gives {field} = {np.asarray(value).tolist()} at the start, expected numbers")
-
-
-def simulated_arm(loop: Loop, robot: Arm, q: Array, qd: Array, outside: Outside) -> SampledArm | ContinuousArm:
-    """The arm that controllers drive, at rest or not, (N, n) each.
-
-    Raises:
-        InputError: what is said of each rollout is said of another number of them.
-    """
-    if outside.disturbance is not None:
-        check_disturbance(outside.disturbance, q, qd)
-    if isinstance(loop, SampledLoop):
-        return SampledArm(loop, robot, q, qd, outside)
-    return ContinuousArm(loop, robot, q, qd, outside)
 
 
 def record_of(

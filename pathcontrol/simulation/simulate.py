@@ -11,7 +11,8 @@ from pathcontrol._arrays import scalar
 from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.disturbance import Disturbance
+from pathcontrol.simulation.disturbance import Disturbance, check_disturbance
+from pathcontrol.simulation.engines import Engine, check_engine, choose_engine
 from pathcontrol.simulation.finish import Until, finish_of, first_and_last, whole_laps
 from pathcontrol.simulation.modes import ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.run import Run
@@ -26,7 +27,6 @@ from pathcontrol.simulation.setup import (
     plant_of,
     record_of,
     rollout_number,
-    simulated_arm,
     states_of_each,
 )
 from pathcontrol.simulation.slips import warn_if_still, warn_of_slips
@@ -45,6 +45,7 @@ def simulate(
     loop: SampledLoop | ContinuousTime | None = None,
     disturbance: Disturbance | None = None,
     first_rollout: int = 0,
+    engine: Engine = "auto",
     progress: bool = True,
 ) -> Run:
     """Simulate a control law on an arm.
@@ -73,6 +74,8 @@ def simulate(
         disturbance: what else pushes the arm, such as :class:`Push`, or a sum; its time counts from the start.
         first_rollout: number of the first rollout, where this is a part of a larger batch: rollouts are numbered from
             it, and their random numbers depend on their numbers.
+        engine: ``"compiled"``, ``"pinocchio"`` (NumPy and Pinocchio, the reference), or ``"auto"``: compiled where that
+            can be, else the reference. ``run.config`` says which it was, and why not the compiled one.
         progress: show a bar on standard error when it takes longer than two seconds.
 
     A start or a path outside position limits, an arm that cannot hold its own weight, and one that never moved, held by
@@ -80,10 +83,12 @@ def simulate(
     plant too long for what is fast in it, with the number of ``substeps`` to take.
 
     Raises:
+        EngineError: the engine is to be the compiled one, and something of the run is beyond it.
         InputError: an argument has the wrong shape or value.
         SimulationError: all rollouts diverged, as a single one does; its ``run`` holds what happened until then.
     """
     expect("controller", controller, Controller)
+    check_engine(engine)
     duration = scalar("duration", duration, positive=True)
     robot, first = plant_of(plant, controller), rollout_number(first_rollout)
     check_joints(controller, robot)
@@ -93,9 +98,10 @@ def simulate(
     check_length(duration, loop, len(q0), robot.n, finish is not None and finish.ends_run)
     check_law(controller, q0, qd0)
     slip = warn_of_slips(robot, controller.task, q0, first)
-    arm = simulated_arm(loop, robot, q0, qd0, Outside(disturbance, first))
+    check_disturbance(disturbance, q0, qd0)
+    arm, said = choose_engine(engine, [controller], loop, robot, q0, qd0, Outside(disturbance, first))
     slow = "" if first else warn_of_steps([controller], loop, robot, q0, qd0, disturbance, duration)
-    settings = {"duration": duration, "laps": laps, "until": until, "first_rollout": first}
+    settings = {"duration": duration, "laps": laps, "until": until, "first_rollout": first} | said
     config = record_of(controller.describe(), robot, loop, disturbance, **settings)
     arrays = arm.run(controller, duration, finish, progress)
     arm.divergence.explain(slow, slip)

@@ -1,0 +1,104 @@
+// The functions that Python calls.
+#include "loop.hpp"
+
+#define EXPORT extern "C" __attribute__((visibility("default")))
+
+// Which size is known to the compiler: that of the common arms. ONE_SIZE leaves these out, to compile fast.
+template <class V, class C>
+static integer run_sized(const Setup &setup, const State &state, const Record &record, const double *noise, const Span &span, integer begin, integer end) {
+  switch (setup.joints) {
+#ifndef ONE_SIZE
+    case 2: return run_packs<2, V, C>(setup, state, record, noise, span, begin, end);
+    case 6: return run_packs<6, V, C>(setup, state, record, noise, span, begin, end);
+    case 7: return run_packs<7, V, C>(setup, state, record, noise, span, begin, end);
+#endif
+    default: return run_packs<0, V, C>(setup, state, record, noise, span, begin, end);
+  }
+}
+
+// Run rollouts begin … end over a span of ticks; return how many samples were recorded of the last pack.
+EXPORT integer pathcontrol_run(const Setup *setup, const State *state, const Record *record, const double *noise, const Span *span, integer begin, integer end) {
+  if (end - begin == 1) return run_sized<double, double>(*setup, *state, *record, noise, *span, begin, end);
+  if (setup->law_arms.index || setup->plant_arms.index) return run_sized<pack, pack>(*setup, *state, *record, noise, *span, begin, end);
+  return run_sized<pack, double>(*setup, *state, *record, noise, *span, begin, end);
+}
+
+// One step of the plant alone, of rollouts begin … end.
+EXPORT void pathcontrol_advance(const Setup *setup, double step, double *q, double *qd, const double *tau, integer begin, integer end) {
+  if (end - begin == 1) return advance_packs<0, double, double>(*setup, step, q, qd, tau, begin, end);
+  if (setup->plant_arms.index) return advance_packs<0, pack, pack>(*setup, step, q, qd, tau, begin, end);
+  return advance_packs<0, pack, double>(*setup, step, q, qd, tau, begin, end);
+}
+
+// --- for tests and checks, one configuration after the other ----------------------------------------------------------
+EXPORT void pathcontrol_inverse_dynamics(const Arm<double> *arm, integer rows, const double *q, const double *qd, const double *qdd, double *tau) {
+  Body<double> bodies[MOST_JOINTS];
+  for (integer r = 0; r < rows; r++) {
+    const integer at = r * arm->joints;
+    place<0>(*arm, q + at, bodies);
+    inverse_dynamics<0, ALL_TERMS>(*arm, qd + at, qdd + at, bodies, tau + at);
+  }
+}
+EXPORT void pathcontrol_mass_matrix(const Arm<double> *arm, integer rows, const double *q, double *M) {
+  const int n = arm->joints;
+  Body<double> bodies[MOST_JOINTS];
+  double own[MOST_JOINTS][MOST_JOINTS];
+  for (integer r = 0; r < rows; r++) {
+    place<0>(*arm, q + r * n, bodies);
+    mass_matrix<0>(*arm, bodies, own);
+    for (int i = 0; i < n; i++)
+      for (int j = 0; j < n; j++) M[(r * n + i) * n + j] = own[i][j];
+  }
+}
+EXPORT void pathcontrol_stick_slip(int n, integer rows, const double *M, const double *p, const double *low, const double *high, const double *guess, double *v) {
+  for (integer r = 0; r < rows; r++) {
+    double own[MOST_JOINTS][MOST_JOINTS], sign[MOST_JOINTS];
+    for (int i = 0; i < n; i++) {
+      sign[i] = guess[r * n + i];
+      for (int j = 0; j < n; j++) own[i][j] = M[(r * n + i) * n + j];
+    }
+    stick_slip<0>(n, own, p + r * n, low + r * n, high + r * n, sign, v + r * n);
+  }
+}
+EXPORT void pathcontrol_evaluate(const Path *path, integer rows, const double *s, double *out) {
+  const int n = path->joints;
+  for (integer r = 0; r < rows; r++) {
+    Point<double> at;
+    evaluate(&path, s[r], at);
+    double *row = out + r * (3 * n + 2);
+    for (int i = 0; i < n; i++) row[i] = at.q_d[i], row[n + i] = at.dq_d[i], row[2 * n + i] = at.ddq_d[i];
+    row[3 * n] = at.theta, row[3 * n + 1] = at.dtheta;
+  }
+}
+EXPORT void pathcontrol_nearest(const Path *path, integer rows, const double *q, const double *near, double *s) {
+  for (integer r = 0; r < rows; r++) s[r] = near ? followed_point(*path, q + r * path->joints, near[r]) : nearest_point(*path, q + r * path->joints);
+}
+
+// One tick of the law alone: `io` holds q, q̇ and s, and then gets τ, with s one period on in its place.
+EXPORT void pathcontrol_control_tick(const Setup *setup, double *io) {
+  const int n = setup->joints;
+  const Place<double> place = {0, 1};
+  const Path *path = setup->paths;
+  Gains<double> gains;
+  Friction<double> friction;
+  load(place, setup->position_gain, n, gains.position), load(place, setup->velocity_gain, n, gains.velocity), load(place, setup->plan_gain, 1, &gains.plan);
+  load_friction(place, setup->law_friction, n, friction);
+  Output<double> out;
+  control<0>(*setup, setup->law_arms.arms[0], friction, gains, &path, io, io + n, io[2 * n], out);
+  for (int i = 0; i < n; i++) io[2 * n + 1 + i] = out.tau[i];
+  io[2 * n] = advance_parameter(*setup, &path, out);
+}
+
+// Sizes of the structs and constants, compared with those of Python when the library is loaded.
+EXPORT integer pathcontrol_layout(int which) {
+  const integer sizes[] = {sizeof(Arm<double>), sizeof(Path), sizeof(Disturbance), sizeof(Setup), sizeof(State), sizeof(Record), sizeof(Span), MOST_JOINTS, MOST_STRIBECK, LANES};
+  return which >= 0 && which < (int)(sizeof(sizes) / sizeof(sizes[0])) ? sizes[which] : -1;
+}
+// Which instruction sets this processor has: 2 for AVX-512, 1 for AVX2, else 0.
+EXPORT int pathcontrol_instructions() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")) return 2;
+  if (__builtin_cpu_supports("avx2")) return 1;
+#endif
+  return 0;
+}

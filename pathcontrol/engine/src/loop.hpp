@@ -1,0 +1,286 @@
+// The sampled loop of simulation/sampled.py, for one rollout or a pack of them: measure, compute, hold.
+#pragma once
+#include <vector>
+#include "law.hpp"
+#include "plant.hpp"
+
+// --- from arrays to lanes ---------------------------------------------------------------------------------------------
+template <class V> struct Place { integer first, live; };  // rollouts first, first + 1, …; lanes beyond `live` repeat the first
+
+template <class V> ALWAYS_INLINE integer rollout_of(const Place<V> &place, int lane) { return place.first + (lane < place.live ? lane : 0); }
+template <class V> static void load(const Place<V> &place, const double *from, integer stride, int count, V *to) {
+  for (int lane = 0; lane < Lanes<V>::count; lane++)
+    for (int i = 0; i < count; i++) set_lane(to[i], lane, from[rollout_of(place, lane) * stride + i]);
+}
+template <class V> static void load(const Place<V> &place, const Rows &rows, int count, V *to) {
+  if (rows.data) load(place, rows.data, rows.stride, count, to);
+}
+template <class V> static Mask<V> load_mask(const Place<V> &place, const Rows &rows) {
+  V flag;
+  load(place, rows, 1, &flag);
+  return less(V{}, flag);
+}
+template <class V> ALWAYS_INLINE void store(const Place<V> &place, const V *from, int count, double *to) {
+  for (int lane = 0; lane < place.live; lane++)
+    for (int i = 0; i < count; i++) to[(place.first + lane) * count + i] = lane_of(from[i], lane);
+}
+template <class V> static void load_friction(const Place<V> &place, const FrictionRows &rows, int n, Friction<V> &law) {
+  load(place, rows.viscous, n, law.viscous), load(place, rows.forward, n, law.forward), load(place, rows.backward, n, law.backward);
+  law.stribeck = (int)rows.stribeck;
+  for (int j = 0; j < law.stribeck; j++) load(place, rows.fall[j], n, law.fall[j]), load(place, rows.velocity[j], n, law.velocity[j]);
+}
+template <class V> static void load_arm(const Place<V> &place, const Arms &arms, Arm<V> &to) {
+  const Arm<double> &one = arms.arms[0];
+  to.joints = one.joints;
+  for (int i = 0; i < one.joints; i++) to.parent[i] = one.parent[i], to.slides[i] = one.slides[i];
+  for (int k = 0; k < 3; k++) to.gravity[k] = one.gravity[k];
+  for (int lane = 0; lane < Lanes<V>::count; lane++) {
+    const Arm<double> &arm = arms.arms[arms.index ? arms.index[rollout_of(place, lane)] : 0];
+    for (int i = 0; i < one.joints; i++) {
+      for (int k = 0; k < 9; k++) set_lane(to.rotation[i][k], lane, arm.rotation[i][k]);
+      for (int k = 0; k < 6; k++) set_lane(to.inertia[i][k], lane, arm.inertia[i][k]);
+      for (int k = 0; k < 3; k++) set_lane(to.origin[i][k], lane, arm.origin[i][k]), set_lane(to.moment[i][k], lane, arm.moment[i][k]);
+      set_lane(to.mass[i], lane, arm.mass[i]), set_lane(to.armature[i], lane, arm.armature[i]);
+    }
+  }
+}
+// The arm of all lanes: the shared one itself, or a copy with one in each lane.
+template <class V, class C> struct ArmOf {
+  Arm<C> own;
+  const Arm<C> &operator()(const Place<V> &place, const Arms &arms) { return load_arm(place, arms, own), own; }
+};
+template <class V> struct ArmOf<V, double> {
+  Arm<double> own;
+  const Arm<double> &operator()(const Place<V> &place, const Arms &arms) { return arms.arms[arms.index ? arms.index[place.first] : 0]; }
+};
+
+// --- the rollouts of a pack -------------------------------------------------------------------------------------------
+template <class V> struct Rollouts {
+  V q[MOST_JOINTS], qd[MOST_JOINTS], q_read[MOST_JOINTS], qd_read[MOST_JOINTS], home_q[MOST_JOINTS], home_qd[MOST_JOINTS];
+  V s, first_s, rest_since, lap_start, finish_time, diverged_time, reason, lost;  // lost: 1 where a rollout has diverged
+};
+template <class V> static void load_state(const Place<V> &place, const State &state, int n, Rollouts<V> &r) {
+  const double *vectors[] = {state.q, state.qd, state.q_read, state.qd_read, state.home_q, state.home_qd};
+  V *lanes[] = {r.q, r.qd, r.q_read, r.qd_read, r.home_q, r.home_qd};
+  for (int k = 0; k < 6; k++) load(place, vectors[k], n, n, lanes[k]);
+  const double *numbers[] = {state.s, state.first_s, state.rest_since, state.lap_start, state.finish_time, state.diverged_time, state.reason};
+  V *single[] = {&r.s, &r.first_s, &r.rest_since, &r.lap_start, &r.finish_time, &r.diverged_time, &r.reason};
+  for (int k = 0; k < 7; k++) load(place, numbers[k], 1, 1, single[k]);
+  r.lost = select(equal(r.diverged_time, r.diverged_time), number<V>(1.0), V{});
+}
+template <class V> static void store_state(const Place<V> &place, const Rollouts<V> &r, int n, const State &state) {
+  store(place, r.q, n, state.q), store(place, r.qd, n, state.qd), store(place, r.q_read, n, state.q_read), store(place, r.qd_read, n, state.qd_read);
+  store(place, &r.s, 1, state.s), store(place, &r.rest_since, 1, state.rest_since), store(place, &r.lap_start, 1, state.lap_start);
+  store(place, &r.finish_time, 1, state.finish_time), store(place, &r.diverged_time, 1, state.diverged_time), store(place, &r.reason, 1, state.reason);
+}
+template <class V> ALWAYS_INLINE Mask<V> lost_lanes(const Rollouts<V> &r) { return less(V{}, r.lost); }
+
+// Mark lanes that have diverged now, at t.
+template <class V> static void mark(Rollouts<V> &r, Mask<V> lanes, double t, Reason reason) {
+  const Mask<V> news = lanes & ~lost_lanes(r);
+  r.diverged_time = select(news, number<V>(t), r.diverged_time), r.reason = select(news, number<V>((double)reason), r.reason);
+  r.lost = select(lanes, number<V>(1.0), r.lost);
+}
+// Lost rollouts are put back to where they started and held there, where their law is known to work.
+template <class V> static void hold_lost(const Setup &setup, Rollouts<V> &r) {
+  const Mask<V> lost = lost_lanes(r);
+  for (int i = 0; i < setup.joints; i++) {
+    r.q[i] = select(lost, r.home_q[i], r.q[i]), r.qd[i] = select(lost, r.home_qd[i], r.qd[i]);
+    r.q_read[i] = select(lost, r.home_q[i], r.q_read[i]), r.qd_read[i] = select(lost, r.home_qd[i], r.qd_read[i]);
+  }
+  r.s = select(lost, r.first_s, r.s);
+}
+template <class V> static void look_at_state(const Setup &setup, Rollouts<V> &r, double t) {
+  constexpr double ABSURD = 1e6;
+  Mask<V> sound = ~Mask<V>{};
+  for (int i = 0; i < setup.joints; i++)
+    sound &= less(absolute(r.q[i]), number<V>(ABSURD)) & less(absolute(r.qd[i]), number<V>(ABSURD));
+  if (any(~sound)) mark(r, ~sound, t, BEYOND_BOUNDS);
+  if (any(lost_lanes(r))) hold_lost(setup, r);
+}
+template <class V> static void look_at_torque(const Setup &setup, Rollouts<V> &r, const V *tau, double t) {
+  Mask<V> sound = ~Mask<V>{};
+  for (int i = 0; i < setup.joints; i++) sound &= less(absolute(tau[i]), number<V>(INFINITY));
+  if (any(~sound)) mark(r, ~sound, t, NO_NUMBERS);
+}
+
+// Note when lanes finish: at rest at the end of an open path for 50 ms, or after so many laps; see simulation/finish.py.
+template <class V> static void look_at_finish(const Setup &setup, const Path *const *paths, Rollouts<V> &r, V s, double t) {
+  constexpr double AT_REST = 1e-2, REST = 0.05 * (1 - 1e-9);
+  if (setup.finish == NEVER) return;
+  const V never = number<V>(NAN);
+  V news;
+  if (setup.finish == AT_END) {
+    const Mask<V> arrived = lanes_where(paths, s, [](const Path &path, double x) { return x >= path.arrival; });
+    if (!any(arrived)) { r.rest_since = number<V>(INFINITY); return; }
+    const Mask<V> rests = arrived & less_equal(square_root(dot(setup.joints, r.qd, r.qd)), number<V>(AT_REST));
+    r.rest_since = select(rests, smaller(r.rest_since, number<V>(t)), number<V>(INFINITY));
+    news = select(less_equal(number<V>(REST), t - r.rest_since), r.rest_since, never);
+  } else {
+    r.lap_start = select(equal(r.lap_start, r.lap_start), r.lap_start, s);
+    V laps = s - r.lap_start;
+    for (int lane = 0; lane < Lanes<V>::count; lane++) set_lane(laps, lane, std::trunc(lane_of(laps, lane) / paths[lane]->period));
+    news = select(less_equal(number<V>(setup.laps), laps), number<V>(t), never);
+  }
+  const Mask<V> open = ~equal(r.finish_time, r.finish_time) & ~lost_lanes(r);
+  r.finish_time = select(open, news, r.finish_time);
+}
+
+// --- sensors, disturbances, record ------------------------------------------------------------------------------------
+template <class V> struct Senses { V resolution[MOST_JOINTS], limit[MOST_JOINTS]; };
+
+// The next reading; `noise` holds this sample's noise of positions and velocities, or is null.
+template <class V> static void read_sensors(const Setup &setup, const Senses<V> &senses, Rollouts<V> &r, const V *q_noise, const V *qd_noise) {
+  for (int i = 0; i < setup.joints; i++) {
+    V q = q_noise ? r.q[i] + q_noise[i] : r.q[i], qd = qd_noise ? r.qd[i] + qd_noise[i] : r.qd[i];
+    if (setup.encoders) q = rounded(q / senses.resolution[i]) * senses.resolution[i];
+    if (setup.differentiates) qd = (q - r.q_read[i]) / setup.period;
+    if (setup.filters) qd = setup.keep * r.qd_read[i] + (1 - setup.keep) * qd;
+    r.q_read[i] = q, r.qd_read[i] = qd;
+  }
+}
+
+// Torques of the disturbances at time t, added to `tau`.
+template <int N, class V> static NOINLINE void add_disturbances(const Setup &setup, const Place<V> &place_, const V *q, double t, V *tau) {
+  const int n = size<N>(setup.joints);
+  for (int d = 0; d < setup.disturbances; d++) {
+    const Disturbance &one = setup.disturbance[d];
+    V magnitude[MOST_JOINTS], start, duration, frequency, phase, share = number<V>(1.0);
+    load(place_, one.magnitude, one.kind == FRAME_FORCE ? 3 : n, magnitude);
+    if (one.kind == HARMONIC) {
+      V cosine;
+      load(place_, one.frequency, 1, &frequency), load(place_, one.phase, 1, &phase);
+      sine_cosine(V(2 * M_PI * frequency * t + phase), share, cosine);
+    } else {
+      load(place_, one.start, 1, &start), load(place_, one.duration, 1, &duration);
+      const V since = t - start;
+      share = select(less_equal(V{}, since) & less(since, duration), share, V{});
+    }
+    if (one.kind != FRAME_FORCE) {
+      for (int i = 0; i < n; i++) tau[i] += share * magnitude[i];
+      continue;
+    }
+    if (!any(less(V{}, share))) continue;
+    Body<V> bodies[room<N>()];
+    V force[3], torque[MOST_JOINTS];
+    for (int k = 0; k < 3; k++) force[k] = share * magnitude[k];
+    place<N>(*one.arm, q, bodies);
+    point_force_torque<N>(*one.arm, bodies, one.body, one.offset, force, torque);
+    for (int i = 0; i < n; i++) tau[i] += torque[i];
+  }
+}
+
+// Write one sample, NaN for lost rollouts.
+template <class V> ALWAYS_INLINE void record_vector(double *to, integer at, const Place<V> &place, int n, const V *values, Mask<V> lost) {
+  if (!to) return;
+  for (int lane = 0; lane < place.live; lane++)
+    for (int i = 0; i < n; i++) to[(at + place.first + lane) * n + i] = lane_of(lost, lane) ? NAN : lane_of(values[i], lane);
+}
+template <class V>
+static void write_sample(const Record &record, integer at, const Place<V> &place, int n, const Rollouts<V> &r, const Output<V> &out, const V *acting) {
+  const Mask<V> lost = lost_lanes(r);
+  record_vector(record.q, at, place, n, r.q, lost), record_vector(record.qd, at, place, n, r.qd, lost);
+  record_vector(record.q_measured, at, place, n, r.q_read, lost), record_vector(record.qd_measured, at, place, n, r.qd_read, lost);
+  record_vector(record.tau_demand, at, place, n, out.tau, lost), record_vector(record.tau, at, place, n, acting, lost);
+  record_vector(record.e_p, at, place, n, out.e_p, lost), record_vector(record.e_v, at, place, n, out.e_v, lost);
+  record_vector(record.s, at, place, 1, &out.s, lost), record_vector(record.sdot, at, place, 1, &out.sdot, lost);
+  if (record.regular)
+    for (int lane = 0; lane < place.live; lane++) record.regular[at + place.first + lane] = !lane_of(lost, lane) && lane_of(out.regular, lane);
+}
+
+// --- the loop ---------------------------------------------------------------------------------------------------------
+// Which ticks a call takes: `ticks` of them with a period after each and, at the end of all, one `last` without.
+struct Span { integer law_tick, arm_tick, ticks, rollouts; int last, stops; };
+
+// Run the rollouts of a pack; return how many samples were recorded.
+template <int N, class V, class C>
+static NOINLINE integer run_pack(const Setup &setup, const State &state, const Record &record, const double *noise, const Span &span, const Place<V> &place) {
+  const int n = size<N>(setup.joints);
+  ArmOf<V, C> law_copy, plant_copy;
+  const Arm<C> &law_arm = law_copy(place, setup.law_arms), &plant_arm = plant_copy(place, setup.plant_arms);
+  Gains<V> gains;
+  Senses<V> senses;
+  Friction<V> law_friction, plant_friction;
+  Rollouts<V> r;
+  const Path *paths[Lanes<V>::count];
+  load(place, setup.position_gain, n, gains.position), load(place, setup.velocity_gain, n, gains.velocity), load(place, setup.plan_gain, 1, &gains.plan);
+  load(place, setup.resolution, n, senses.resolution), load(place, setup.torque_limit, n, senses.limit);
+  load_friction(place, setup.law_friction, n, law_friction), load_friction(place, setup.plant_friction, n, plant_friction);
+  const Mask<V> damped = load_mask<V>(place, setup.damped);
+  load_state(place, state, n, r);
+  for (int lane = 0; lane < Lanes<V>::count; lane++) paths[lane] = setup.paths + (setup.path_index ? setup.path_index[rollout_of(place, lane)] : 0);
+  const integer waiting = setup.delayed * n;
+  std::vector<V> queue(waiting ? waiting : 1);  // a ring of torques that wait, the oldest at `head`
+  for (int k = 0; k < setup.delayed; k++) load(place, state.queue + k * span.rollouts * n, n, n, &queue[k * n]);
+  integer head = 0, sample = 0;
+  for (;; sample++) {
+    const bool final = sample == span.ticks;
+    if (final && !span.last) break;
+    const double t = (span.law_tick + sample) * setup.period;
+    look_at_state(setup, r, t);
+    Output<V> out;
+    V held[room<N>()], acting[2][room<N>()];
+    control<N>(setup, law_arm, law_friction, gains, paths, r.q_read, r.qd_read, r.s, out);
+    look_at_torque(setup, r, out.tau, t);
+    const Mask<V> lost = lost_lanes(r);
+    for (int i = 0; i < n; i++) {
+      held[i] = setup.limited ? clamped(out.tau[i], V(-senses.limit[i]), senses.limit[i]) : out.tau[i];
+      held[i] = select(lost, V{}, held[i]);
+      for (int part = 0; part < setup.parts; part++) acting[part][i] = part < setup.delayed ? queue[(head + part) % setup.delayed * n + i] : held[i];
+    }
+    write_sample(record, sample * span.rollouts, place, n, r, out, acting[0]);
+    look_at_finish(setup, paths, r, out.s, t);
+    const Mask<V> going = ~lost & (setup.ends_run && setup.finish != NEVER ? ~equal(r.finish_time, r.finish_time) : ~Mask<V>{});
+    if (final || (span.stops && !any(going))) { sample++; break; }
+    r.s = select(lost, r.first_s, advance_parameter(setup, paths, out));
+    double now = (span.arm_tick + sample) * setup.period;
+    for (int part = 0; part < setup.parts; part++) {
+      const double step = setup.part[part] / setup.substeps;
+      for (int k = 0; k < setup.substeps; k++, now += step) {
+        V pushed[room<N>()];
+        for (int i = 0; i < n; i++) pushed[i] = acting[part][i];
+        if (setup.disturbances) add_disturbances<N>(setup, place, r.q, now + 0.5 * step, pushed);
+        advance_plant<N>(plant_arm, plant_friction, damped, step, r.q, r.qd, pushed);
+      }
+    }
+    if (setup.delayed) {
+      for (int i = 0; i < n; i++) queue[head * n + i] = held[i];
+      head = (head + 1) % setup.delayed;
+    }
+    V q_noise[room<N>()], qd_noise[room<N>()];
+    if (noise) {
+      load(place, noise + 2 * sample * span.rollouts * n, n, n, q_noise), load(place, noise + (2 * sample + 1) * span.rollouts * n, n, n, qd_noise);
+    }
+    read_sensors(setup, senses, r, noise ? q_noise : nullptr, noise ? qd_noise : nullptr);
+  }
+  store_state(place, r, n, state);
+  for (int k = 0; k < setup.delayed; k++) store(place, &queue[(head + k) % setup.delayed * n], n, state.queue + k * span.rollouts * n);
+  return sample;
+}
+
+template <int N, class V, class C>
+static integer run_packs(const Setup &setup, const State &state, const Record &record, const double *noise, const Span &span, integer begin, integer end) {
+  integer samples = 0;
+  for (integer first = begin; first < end; first += Lanes<V>::count) {
+    const integer left = end - first;
+    const Place<V> place = {first, left < Lanes<V>::count ? left : Lanes<V>::count};
+    samples = run_pack<N, V, C>(setup, state, record, noise, span, place);
+  }
+  return samples;
+}
+
+// Take (q, q̇) of rollouts begin … end one step on under the torques `tau`, (rollouts, joints) each, for laws in Python.
+template <int N, class V, class C>
+static void advance_packs(const Setup &setup, double step, double *q, double *qd, const double *tau, integer begin, integer end) {
+  const int n = size<N>(setup.joints);
+  for (integer first = begin; first < end; first += Lanes<V>::count) {
+    const Place<V> place = {first, end - first < Lanes<V>::count ? end - first : Lanes<V>::count};
+    ArmOf<V, C> copy;
+    Friction<V> friction;
+    V own_q[room<N>()], own_qd[room<N>()], own_tau[room<N>()];
+    load_friction(place, setup.plant_friction, n, friction);
+    load(place, q, n, n, own_q), load(place, qd, n, n, own_qd), load(place, tau, n, n, own_tau);
+    advance_plant<N>(copy(place, setup.plant_arms), friction, load_mask<V>(place, setup.damped), step, own_q, own_qd, own_tau);
+    store(place, own_q, n, q), store(place, own_qd, n, qd);
+  }
+}

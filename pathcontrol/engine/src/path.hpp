@@ -1,0 +1,176 @@
+// The path of a task: quintic pieces of q_d(s) and ϑ(s), and the point of it that is nearest to an arm.
+#pragma once
+#include "arm.hpp"
+
+// A table that is made once of any task; see engine/table.py. All parameters s are those of the task.
+struct Path {
+  int joints, cells, buckets, closed, brakes;
+  double s0, s_end, period;          // s_end is that of the first lap of a closed path
+  double braking, begin;             // of the ending of an open path: see control/ending.py
+  double arrival;                    // s from which on an arm has arrived
+  double buckets_per_s;
+  const double *knots;               // (cells + 1,)
+  const int *bucket;                 // (buckets,), the cell in which each of equal parts of the domain begins
+  const double *coefficients;        // (cells, 6, joints + 1): from the fifth power of s − knot down; ϑ comes last
+  const double *centre, *radius;     // (cells, joints) and (cells,): a ball around the points of each cell
+};
+
+// A task at one path parameter.
+template <class V> struct Point { V q_d[MOST_JOINTS], dq_d[MOST_JOINTS], ddq_d[MOST_JOINTS], theta, dtheta; };
+
+// s in the first lap of a closed path.
+static inline double in_first_lap(const Path &path, double s) {
+  double lap = (s - path.s0) / path.period;
+  return path.s0 + (lap - std::floor(lap)) * path.period;
+}
+// The cell that holds s, which is in the domain.
+static inline int cell_of(const Path &path, double s) {
+  double place = (s - path.s0) * path.buckets_per_s;
+  int k = place > 0 ? (place < path.buckets - 1 ? (int)place : path.buckets - 1) : 0, cell = path.bucket[k];  // NaN: 0
+  while (cell + 1 < path.cells && s >= path.knots[cell + 1]) cell++;
+  while (cell > 0 && s < path.knots[cell]) cell--;
+  return cell;
+}
+// q_d, q_d', q_d'', ϑ and ϑ' of one lane at s, which open paths bound to their domain.
+template <class V> static inline void evaluate_lane(const Path &path, double s, int lane, Point<V> &out) {
+  const int n = path.joints, columns = n + 1;
+  s = path.closed ? in_first_lap(path, s) : s < path.s0 ? path.s0 : s > path.s_end ? path.s_end : s;
+  const int cell = cell_of(path, s);
+  const double x = s - path.knots[cell], *c = path.coefficients + (integer)cell * 6 * columns;
+  double value[MOST_JOINTS + 1], slope[MOST_JOINTS + 1], bend[MOST_JOINTS + 1];
+  for (int k = 0; k < columns; k++) {
+    double c5 = c[k], c4 = c[columns + k], c3 = c[2 * columns + k], c2 = c[3 * columns + k], c1 = c[4 * columns + k];
+    value[k] = ((((c5 * x + c4) * x + c3) * x + c2) * x + c1) * x + c[5 * columns + k];
+    slope[k] = (((5 * c5 * x + 4 * c4) * x + 3 * c3) * x + 2 * c2) * x + c1;
+    bend[k] = ((20 * c5 * x + 12 * c4) * x + 6 * c3) * x + 2 * c2;
+  }
+  for (int k = 0; k < n; k++) set_lane(out.q_d[k], lane, value[k]), set_lane(out.dq_d[k], lane, slope[k]), set_lane(out.ddq_d[k], lane, bend[k]);
+  set_lane(out.theta, lane, value[n]), set_lane(out.dtheta, lane, slope[n]);
+}
+
+// The task at s as laws see it: on open paths ϑ comes to rest at the end, (ϑ(s)/T ϑ(s_end)) (s_end − s).
+template <class V> static NOINLINE void evaluate(const Path *const *paths, V s, Point<V> &out) {
+  for (int lane = 0; lane < Lanes<V>::count; lane++) {
+    const Path &path = *paths[lane];
+    evaluate_lane(path, lane_of(s, lane), lane, out);
+    if (!path.brakes) continue;
+    double left = (path.s_end - lane_of(s, lane)) / path.braking, share = left < 0 ? 0.0 : left > 1 ? 1.0 : left;
+    double theta = lane_of(out.theta, lane), slope = left < 1 ? -1.0 / path.braking : 0.0;
+    set_lane(out.theta, lane, theta * share);
+    set_lane(out.dtheta, lane, lane_of(out.dtheta, lane) * share + theta * slope);
+  }
+}
+
+// --- the nearest point ------------------------------------------------------------------------------------------------
+// The squared distance ½‖q_d(s) − q‖² about s: its slope g = (q_d − q)ᵀq_d', g' = ‖q_d'‖² + (q_d − q)ᵀq_d'', and ‖q_d'‖², ‖q_d''‖².
+struct Distance { double square, slope, curvature, gradient, bend; };
+
+static inline Distance distance_at(const Path &path, double s, const double *q) {
+  Point<double> point;
+  evaluate_lane(path, s, 0, point);
+  Distance d = {0, 0, 0, 0, 0};
+  for (int k = 0; k < path.joints; k++) {
+    double away = point.q_d[k] - q[k];
+    d.square += away * away, d.slope += away * point.dq_d[k], d.curvature += away * point.ddq_d[k];
+    d.gradient += point.dq_d[k] * point.dq_d[k], d.bend += point.ddq_d[k] * point.ddq_d[k];
+  }
+  d.curvature += d.gradient;
+  return d;
+}
+static inline double bounded(const Path &path, double s) {
+  return path.closed ? s : s < path.s0 ? path.s0 : s > path.s_end ? path.s_end : s;
+}
+// The root of g between low, where g < 0, and high, where g > 0: Newton's method, and halving where it leaves the bracket.
+static inline double root_of_slope(const Path &path, const double *q, double low, double high) {
+  double s = 0.5 * (low + high);
+  for (int step = 0; step < 100; step++) {
+    Distance d = distance_at(path, s, q);
+    (d.slope > 0 ? high : low) = s;
+    double next = d.curvature > 0 ? s - d.slope / d.curvature : low - 1.0;
+    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    if (std::fabs(next - s) <= 1e-15 * (1 + std::fabs(s)) || next == low || next == high) return next;
+    s = next;
+  }
+  return s;
+}
+// The nearest point of all, in [s0, s_end]: roots of g in the cells whose ball may hold it. NaN where q is not finite.
+static NOINLINE double nearest_point(const Path &path, const double *q) {
+  double best = INFINITY, found = NAN;
+  const int pieces = 8, n = path.joints;
+  double bound = INFINITY;  // the nearest point is no farther than the middle of any ball plus its radius
+  for (int cell = 0; cell < path.cells; cell++) {
+    double square = 0;
+    for (int k = 0; k < n; k++) { double x = path.centre[cell * n + k] - q[k]; square += x * x; }
+    double farthest = std::sqrt(square) + path.radius[cell];
+    if (farthest < bound) bound = farthest;
+  }
+  for (int cell = 0; cell < path.cells; cell++) {
+    double square = 0;
+    for (int k = 0; k < n; k++) { double x = path.centre[cell * n + k] - q[k]; square += x * x; }
+    if (std::sqrt(square) - path.radius[cell] > bound * (1 + 1e-12)) continue;
+    double low = path.knots[cell], width = (path.knots[cell + 1] - low) / pieces;
+    Distance before = distance_at(path, low, q);
+    for (int piece = 1; piece <= pieces; piece++) {
+      double s = piece == pieces ? path.knots[cell + 1] : path.knots[cell] + piece * width;
+      Distance here = distance_at(path, s, q);
+      double candidates[3] = {low, s, NAN};
+      if (before.slope < 0 && here.slope > 0) candidates[2] = root_of_slope(path, q, low, s);
+      for (double candidate : candidates) {
+        if (candidate != candidate) continue;
+        double square_there = candidate == low ? before.square : candidate == s ? here.square : distance_at(path, candidate, q).square;
+        if (square_there < best) best = square_there, found = candidate;
+      }
+      low = s, before = here;
+    }
+  }
+  return path.closed ? in_first_lap(path, found) : found;
+}
+// s in the lap in which it is nearest to `near`.
+static inline double in_lap_of(const Path &path, double s, double near) {
+  return path.closed ? s + path.period * std::nearbyint((near - s) / path.period) : s;
+}
+// The first local minimum downhill from `near`, piece by piece, or NaN where a lap holds none.
+static NOINLINE double downhill_point(const Path &path, const double *q, double near) {
+  const double direction = distance_at(path, near, q).slope > 0 ? -1.0 : 1.0, length = path.s_end - path.s0;
+  double s = near, gone = 0;
+  while (gone < length) {
+    double inside = path.closed ? in_first_lap(path, s) : s;
+    int cell = cell_of(path, inside);
+    double step = (path.knots[cell + 1] - path.knots[cell]) / 8, next = bounded(path, s + direction * step);
+    double slope = direction * distance_at(path, next, q).slope;
+    if (slope > 0) return direction > 0 ? root_of_slope(path, q, s, next) : root_of_slope(path, q, next, s);
+    if (next == s) return s;  // an end of an open path
+    gone += std::fabs(next - s), s = next;
+  }
+  return NAN;
+}
+// The local minimum downhill from `near`, the nearest point of a moment ago; the nearest of all only where `near` cannot have
+// been that. As PathTask.sigma_bar(q, near): see tasks/closest_point/downhill.py for the bounds on a step.
+static NOINLINE double followed_point(const Path &path, const double *q, double near) {
+  constexpr double TURN = 0.5, WINDOW = 0.125, CONVERGED = 1e-9;
+  const double length = path.s_end - path.s0;
+  near = bounded(path, near);
+  double s = near;
+  Distance d = distance_at(path, s, q);
+  bool convex = true;
+  const double reach = std::fmin(WINDOW * length, M_PI * std::sqrt(d.square / d.gradient) + CONVERGED);
+  for (int step = 0; step < 12; step++) {
+    convex = convex && d.curvature > 0;
+    double longest = std::fmin(reach, TURN * std::sqrt(d.gradient) / std::fmax(std::sqrt(d.bend), 1e-300));
+    double change = -d.slope / std::fmax(d.curvature, 0.1 * d.gradient);
+    double next = bounded(path, s + (change > longest ? longest : change < -longest ? -longest : change));
+    bool arrived = !(std::fabs(next - s) > 1e-14 * (1 + std::fabs(next)));
+    s = next;
+    if (arrived) break;
+    d = distance_at(path, s, q);
+  }
+  bool held = !path.closed && ((s <= path.s0 && d.slope > 0) || (s >= path.s_end && d.slope < 0));
+  bool minimum = std::fabs(d.slope) <= CONVERGED * std::sqrt(d.gradient) && d.curvature > 0;
+  if ((minimum || held) && convex && std::fabs(s - near) <= reach) return s;
+  double below = downhill_point(path, q, near);
+  if (std::fabs(below - near) <= WINDOW * length) return below;
+  Distance at_near = distance_at(path, near, q);
+  bool steady = std::fabs(at_near.slope) <= 0.5 * std::sqrt(at_near.square * at_near.gradient);
+  if (steady && below == below) return below;
+  return in_lap_of(path, nearest_point(path, q), near);
+}

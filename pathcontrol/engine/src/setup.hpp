@@ -1,0 +1,55 @@
+// What Python hands over: the settings of a run, its state, and room for what is recorded. engine/structs.py has the same
+// fields in the same order; sizes are compared when the library is loaded.
+#pragma once
+#include "friction.hpp"
+#include "path.hpp"
+
+// Values of each rollout, (rollouts, …) with `stride` from one to the next; stride 0: the same for all.
+struct Rows { const double *data; integer stride; };
+
+struct FrictionRows { Rows viscous, forward, backward; integer stribeck; Rows fall[MOST_STRIBECK], velocity[MOST_STRIBECK]; };
+
+// Arms and which of them each rollout has; no index: all have the first.
+struct Arms { const Arm<double> *arms; const int *index; };
+
+enum LawKind { COMPUTED_TORQUE, PD_PLUS, SLOTINE_LI, EXTENDED_MOTION_PLAN, PROJECTION };
+enum Compensation { NO_FRICTION, VISCOUS_FRICTION, FULL_FRICTION };
+enum Branch { FOLLOW, NEAREST, LOCAL };
+enum FinishKind { NEVER, AT_END, AFTER_LAPS };
+enum DisturbanceKind { PUSH, HARMONIC, FRAME_FORCE };
+enum Reason { SOUND, BEYOND_BOUNDS, NO_NUMBERS };
+
+struct Disturbance {
+  int kind, body;               // the body that carries the frame of a force
+  double offset[3];             // of the frame's origin in it [m]
+  const Arm<double> *arm;       // whose kinematics the force acts through
+  Rows magnitude;               // torque [N m] or force [N]
+  Rows start, duration;         // [s]
+  Rows frequency, phase;        // [Hz], [rad]
+};
+
+struct Setup {
+  int joints, law, compensation, branch, finish, ends_run, laps;
+  int substeps, parts, delayed;       // parts of a period with torques of their own; periods that a torque waits
+  int encoders, differentiates, filters, limited, disturbances;
+  double period, part[2], keep, capture;  // keep: share of the last velocity that the filter keeps
+  Arms law_arms, plant_arms;
+  const Path *paths;
+  const int *path_index;              // none: all have the first
+  Rows position_gain, velocity_gain, plan_gain, resolution, torque_limit;
+  FrictionRows law_friction, plant_friction;
+  Rows damped;                        // 1 for rollouts whose viscous friction is condensed, see plant.hpp
+  const Disturbance *disturbance;
+};
+
+// (rollouts, joints) or (rollouts,) each; `queue` is (delayed, rollouts, joints).
+struct State {
+  double *q, *qd, *q_read, *qd_read, *home_q, *home_qd, *queue;
+  double *s, *first_s, *rest_since, *lap_start, *finish_time, *diverged_time, *reason;
+};
+
+// (time, rollouts, joints) or (time, rollouts) each, from the first sample of this call on.
+struct Record {
+  double *q, *qd, *q_measured, *qd_measured, *tau_demand, *tau, *s, *sdot, *e_p, *e_v;
+  unsigned char *regular;
+};

@@ -1,0 +1,169 @@
+"""The structs of ``src/setup.hpp``, ``arm.hpp`` and ``path.hpp``, field by field, and how arrays are put into them."""
+
+from __future__ import annotations
+
+from ctypes import Structure, c_double, c_int, c_longlong, c_void_p
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+
+MOST_JOINTS, MOST_STRIBECK = 16, 4
+
+_Doubles = c_void_p  # address of an array of doubles
+
+
+class Arm(Structure):
+    """Constants of an arm; see :class:`~pathcontrol.robot.constants.ArmConstants`."""
+
+    _fields_ = [
+        ("joints", c_int),
+        ("parent", c_int * MOST_JOINTS),
+        ("slides", c_int * MOST_JOINTS),
+        ("rotation", c_double * 9 * MOST_JOINTS),
+        ("origin", c_double * 3 * MOST_JOINTS),
+        ("mass", c_double * MOST_JOINTS),
+        ("moment", c_double * 3 * MOST_JOINTS),
+        ("inertia", c_double * 6 * MOST_JOINTS),
+        ("armature", c_double * MOST_JOINTS),
+        ("gravity", c_double * 3),
+    ]
+
+
+class Path(Structure):
+    """The table of a task; see :class:`~pathcontrol.engine.table.PathTable`."""
+
+    _fields_ = [
+        *((name, c_int) for name in ("joints", "cells", "buckets", "closed", "brakes")),
+        *((name, c_double) for name in ("s0", "s_end", "period", "braking", "begin", "arrival", "buckets_per_s")),
+        *((name, _Doubles) for name in ("knots", "bucket", "coefficients", "centre", "radius")),
+    ]
+
+
+class Rows(Structure):
+    """Values of each rollout, with the distance from one to the next; 0: the same for all."""
+
+    _fields_ = [("data", _Doubles), ("stride", c_longlong)]
+
+
+class FrictionRows(Structure):
+    """Coefficients of friction of each rollout."""
+
+    _fields_ = [
+        ("viscous", Rows),
+        ("forward", Rows),
+        ("backward", Rows),
+        ("stribeck", c_longlong),
+        ("fall", Rows * MOST_STRIBECK),
+        ("velocity", Rows * MOST_STRIBECK),
+    ]
+
+
+class Arms(Structure):
+    """Several arms, and which one each rollout has."""
+
+    _fields_ = [("arms", c_void_p), ("index", c_void_p)]
+
+
+class Disturbance(Structure):
+    """A push, a sinusoid or a force on a frame."""
+
+    _fields_ = [
+        ("kind", c_int),
+        ("body", c_int),
+        ("offset", c_double * 3),
+        ("arm", c_void_p),
+        *((name, Rows) for name in ("magnitude", "start", "duration", "frequency", "phase")),
+    ]
+
+
+class Setup(Structure):
+    """All settings of a run."""
+
+    _fields_ = [
+        *((name, c_int) for name in ("joints", "law", "compensation", "branch", "finish", "ends_run", "laps")),
+        *((name, c_int) for name in ("substeps", "parts", "delayed")),
+        *((name, c_int) for name in ("encoders", "differentiates", "filters", "limited", "disturbances")),
+        ("period", c_double),
+        ("part", c_double * 2),
+        ("keep", c_double),
+        ("capture", c_double),
+        ("law_arms", Arms),
+        ("plant_arms", Arms),
+        ("paths", c_void_p),
+        ("path_index", c_void_p),
+        *((name, Rows) for name in ("position_gain", "velocity_gain", "plan_gain", "resolution", "torque_limit")),
+        ("law_friction", FrictionRows),
+        ("plant_friction", FrictionRows),
+        ("damped", Rows),
+        ("disturbance", c_void_p),
+    ]
+
+
+STATE = ("q", "qd", "q_read", "qd_read", "home_q", "home_qd", "queue")
+STATE_NUMBERS = ("s", "first_s", "rest_since", "lap_start", "finish_time", "diverged_time", "reason")
+
+
+class State(Structure):
+    """Addresses of the arrays that hold the state of all rollouts."""
+
+    _fields_ = [(name, _Doubles) for name in STATE + STATE_NUMBERS]
+
+
+RECORDED = ("q", "qd", "q_measured", "qd_measured", "tau_demand", "tau", "s", "sdot", "e_p", "e_v", "regular")
+
+
+class Record(Structure):
+    """Addresses at which the next samples are written."""
+
+    _fields_ = [(name, c_void_p) for name in RECORDED]
+
+
+class Span(Structure):
+    """Which ticks a call takes."""
+
+    _fields_ = [
+        *((name, c_longlong) for name in ("law_tick", "arm_tick", "ticks", "rollouts")),
+        ("last", c_int),
+        ("stops", c_int),
+    ]
+
+
+#: what ``pathcontrol_layout`` says, in its order, but for the number of lanes
+LAYOUT = (Arm, Path, Disturbance, Setup, State, Record, Span)
+
+
+class Memory:
+    """Arrays and structs that C++ has addresses of, kept alive together."""
+
+    def __init__(self) -> None:
+        self._kept: list[Any] = []
+
+    def keep(self, value: Any) -> Any:
+        """Keep ``value`` alive and return it."""
+        self._kept.append(value)
+        return value
+
+    def address(self, array: Any, dtype: Any = np.float64) -> int:
+        """Return the address of a contiguous copy, or of the array itself where it is one."""
+        return self.keep(np.ascontiguousarray(array, dtype=dtype)).ctypes.data
+
+    def rows(self, values: Any, columns: int) -> Rows:
+        """Return values (), (columns,), (N, 1) or (N, columns) as rows of so many columns."""
+        array = np.asarray(values, dtype=np.float64)
+        several = array.ndim > 1 and len(array) > 1
+        wide = np.broadcast_to(array, (len(array) if several else 1, columns))
+        return Rows(self.address(wide), columns if several else 0)
+
+    def numbers(self, values: Any) -> Rows:
+        """Return values () or (N,) as rows of one number."""
+        array = np.asarray(values, dtype=np.float64).reshape(-1)
+        return Rows(self.address(array), 1 if len(array) > 1 else 0)
+
+
+def fill(field: Any, values: Array) -> None:
+    """Copy an array into the beginning of an array field of doubles or ints."""
+    flat = np.ascontiguousarray(values).reshape(-1)
+    kind = np.float64 if flat.dtype.kind == "f" else np.int32
+    np.frombuffer(field, dtype=kind)[: flat.size] = flat

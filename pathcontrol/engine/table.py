@@ -1,0 +1,220 @@
+"""A task as a table of quintic pieces of q_d(s) and ϑ(s): the one kind of path that the compiled engine knows."""
+
+from __future__ import annotations
+
+from ctypes import addressof
+from math import comb
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pathcontrol._arrays import Array
+from pathcontrol.control.ending import Ending, arrival_parameter
+from pathcontrol.engine.library import load_library
+from pathcontrol.engine.structs import Memory, Path
+from pathcontrol.errors import EngineError
+from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.hermite import piecewise
+from pathcontrol.tasks.profile import ConstantRate
+from pathcontrol.tasks.recorded import RecordedPath
+
+_NODES = np.array([0.0, 1 / 3, 2 / 3, 1.0])  # of a cell, where ϑ is met; ϑ' at the first and the last
+_PROBES = np.array([0.15, 0.5, 0.85])  # of a cell, where table and task are compared
+_VALUE, _SLOPE = 1e-11, 1e-9  # allowed differences, of the extent of q_d or the largest ϑ, and of the largest slopes
+_RATE, _RATE_SLOPE = 1e-13, 1e-11  # the same of ϑ and ϑ' where cells are halved: ϑ moves the arm at once
+_ROUNDING = 64 * np.finfo(np.float64).eps
+_HALVINGS, _MOST_CELLS = 40, 1 << 16
+_DEGREE = 5
+_PLACES = np.modf((5**0.5 - 1) / 2 * np.arange(1, 65))[0]  # of the domain, spread evenly
+
+
+class PathTable(NamedTuple):
+    """Quintic pieces of a path between increasing ``knots`` (K + 1,).
+
+    Attributes:
+        knots: parameters at which the pieces meet; the last one is s_end, or s0 + period.
+        coefficients: (K, 6, n + 1): powers of s − knot from the fifth down, of the n joints and of ϑ.
+        closed: whether the path repeats.
+        ending: how the plan of an open path comes to rest, else ``None``.
+        arrival: the s from which on an arm has arrived at the end of an open path; ∞ for a closed one.
+    """
+
+    knots: Array
+    coefficients: Array
+    closed: bool
+    ending: Ending | None
+    arrival: float
+
+    def struct(self, memory: Memory) -> Path:
+        """Return the table for the engine; its arrays live as long as ``memory``."""
+        cells, columns = len(self.knots) - 1, self.coefficients.shape[-1]
+        s0, s_end = self.knots[0], self.knots[-1]
+        starts = np.linspace(s0, s_end, 2 * cells, endpoint=False)
+        bucket = np.clip(np.searchsorted(self.knots, starts, side="right") - 1, 0, cells - 1)
+        centre, radius = _balls(self.knots, self.coefficients[..., :-1])
+        path = Path(joints=columns - 1, cells=cells, buckets=2 * cells, closed=self.closed, brakes=not self.closed)
+        path.s0, path.s_end, path.period, path.arrival = s0, s_end, s_end - s0, self.arrival
+        path.buckets_per_s = 2 * cells / (s_end - s0)
+        if self.ending is not None:
+            path.braking, path.begin = self.ending.braking, self.ending.begin
+        path.knots, path.bucket = memory.address(self.knots), memory.address(bucket, np.int32)
+        path.coefficients = memory.address(self.coefficients)
+        path.centre, path.radius = memory.address(centre), memory.address(radius)
+        return path
+
+    def evaluate(self, s: Array) -> tuple[Array, Array]:
+        """Return values and slopes (2 of (m, n + 1)) at s (m,) inside the domain: q_d, and ϑ last."""
+        cell = np.clip(np.searchsorted(self.knots, s, side="right") - 1, 0, len(self.knots) - 2)
+        return _horner(np.moveaxis(self.coefficients[cell], 1, 0), (s - self.knots[cell])[:, None])
+
+
+_TABLES: WeakKeyDictionary[PathTask, tuple[PathTable, Memory, Path]] = WeakKeyDictionary()
+
+
+def path_struct(task: PathTask) -> tuple[Path, Memory]:
+    """Return the table of ``task`` for the engine, made once; it is looked at again, as tasks may be changed.
+
+    Raises:
+        EngineError: the path goes on for ever without repeating, or is not smooth enough for a table.
+    """
+    known = _TABLES.get(task)
+    if known is None or not _is_like(known[0], task):
+        table, memory = make_table(task), Memory()
+        known = _TABLES[task] = table, memory, table.struct(memory)
+    return known[2], known[1]
+
+
+def make_table(task: PathTask) -> PathTable:
+    """Return quintic pieces that are within 1e-11 of the extent of q_d and of the largest ϑ.
+
+    Raises:
+        EngineError: the path goes on for ever without repeating, or is not smooth enough for a table.
+    """
+    name = type(task).__name__
+    if not task.closed and not np.isfinite(task.s_end):
+        raise EngineError(f"{name} neither ends nor repeats, so it has no table; give it an s_end or a period")
+    recorded = RecordedPath.of(task, ConstantRate(1.0))
+    knots = _refined(task, recorded.samples if task.knots is not None else _halved(recorded.samples))
+    jets = recorded.jets if len(knots) == len(recorded.samples) else _jets(task, knots)
+    rate = _rate_pieces(task, knots[:-1], knots[1:])
+    coefficients = np.concatenate([piecewise(knots, jets).c, rate[..., None]], axis=-1)
+    ending = Ending.of(task)
+    arrival = np.inf if task.closed else arrival_parameter(task)
+    table = PathTable(knots, np.moveaxis(coefficients, 0, 1), task.closed, ending, arrival)
+    if not _is_like(table, task):
+        raise EngineError(
+            f"{name} is not smooth enough for a table of quintics: q_d must have two derivatives that fit"
+        )
+    return table
+
+
+def same_projection(task: PathTask, path: Path) -> bool:
+    """Return whether σ̄ of a task, where its class says it, is the nearest point of its table near by the path."""
+    if type(task).sigma_bar is PathTask.sigma_bar:
+        return True
+    s = path.s0 + (path.s_end - path.s0) * np.array([0.13, 0.38, 0.61, 0.87])
+    q_d, aside = task.q_d(s), np.roll(task.dq_d(s), 1, axis=-1)
+    aside /= np.maximum(np.linalg.norm(aside, axis=-1, keepdims=True), 1e-12)
+    q = np.ascontiguousarray(q_d + 1e-2 * np.ptp(q_d) * aside)  # beside the path, by a hundredth of its size
+    found = np.empty(len(s))
+    load_library().pathcontrol_nearest(addressof(path), len(s), q.ctypes.data, s.ctypes.data, found.ctypes.data)
+    return bool(np.allclose(task.sigma_bar(q, near=s), found, rtol=0, atol=1e-7 * (path.s_end - path.s0)))
+
+
+def _jets(task: PathTask, s: Array) -> Array:
+    """q_d, q_d' and q_d'' at s (m,), (3, m, n)."""
+    return np.stack([task.q_d(s), task.dq_d(s), task.ddq_d(s)])
+
+
+def _theta(task: PathTask, s: Array) -> tuple[Array, Array]:
+    """ϑ and ϑ' at s, each of the shape of s."""
+    zero = np.zeros_like(s)
+    return task.theta(s) + zero, task.dtheta(s) + zero
+
+
+def _rate_pieces(task: PathTask, left: Array, right: Array) -> Array:
+    """Quintics (6, K) that meet ϑ at the ends and thirds of cells ``left`` to ``right`` (K,), and ϑ' at the ends."""
+    width = right - left
+    s = left + _NODES[:, None] * width
+    s[-1] = right
+    theta, slope = (part.reshape(s.shape) for part in _theta(task, s.reshape(-1)))
+    powers = np.arange(_DEGREE, -1, -1)
+    slopes = powers * np.array([[0.0], [1.0]]) ** np.maximum(powers - 1, 0)
+    matrix = np.concatenate([_NODES[:, None] ** powers, slopes])
+    return np.linalg.solve(matrix, np.concatenate([theta, slope[[0, -1]] * width])) / width ** powers[:, None]
+
+
+def _horner(coefficients: Array, x: Array) -> tuple[Array, Array]:
+    """Value and slope of polynomials, coefficients (6, …) from the highest power down, at x."""
+    value, slope = coefficients[0], np.zeros_like(coefficients[0])
+    for coefficient in coefficients[1:]:
+        slope = slope * x + value
+        value = value * x + coefficient
+    return value, slope
+
+
+def _halved(knots: Array) -> Array:
+    """``knots`` with one more in the middle of each cell: q_d'' of a smooth path is 16 times closer then."""
+    return np.sort(np.concatenate([knots, 0.5 * (knots[1:] + knots[:-1])]))
+
+
+def _refined(task: PathTask, knots: Array) -> Array:
+    """``knots`` with cells halved until quintics follow ϑ in them."""
+    coarse, most = _coarse(task, knots, np.arange(len(knots) - 1)), len(knots) + _MOST_CELLS
+    for _ in range(_HALVINGS):
+        if not coarse.size or len(knots) + len(coarse) > most:
+            break
+        knots = np.insert(knots, coarse + 1, 0.5 * (knots[coarse] + knots[coarse + 1]))
+        halves = coarse + np.arange(len(coarse))
+        coarse = _coarse(task, knots, np.sort(np.concatenate([halves, halves + 1])))
+    return knots
+
+
+def _coarse(task: PathTask, knots: Array, cells: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Those of the ``cells`` in which ϑ and its quintic differ too much."""
+    left, right = knots[cells], knots[cells + 1]
+    x = _PROBES[:, None] * (right - left)
+    theta, slope = (part.reshape(x.shape) for part in _theta(task, (left + x).reshape(-1)))
+    value, rise = _horner(_rate_pieces(task, left, right)[:, None], x)
+    largest, steepest = np.abs(theta).max(initial=0.0), np.abs(slope).max(initial=0.0)
+    apart = np.abs(value - theta).max(0, initial=0.0) > _RATE * largest + _ROUNDING * largest
+    bent = np.abs(rise - slope).max(0, initial=0.0) > _RATE_SLOPE * steepest + _ROUNDING * largest / (right - left)
+    return cells[apart | bent]
+
+
+def _is_like(table: PathTable, task: PathTask) -> bool:
+    """Whether table and task agree at places spread over the domain."""
+    domain = (task.s0, task.s_end if task.period is None else task.s0 + task.period)
+    if (table.knots[0], table.knots[-1], table.closed) != (*domain, task.closed):
+        return False
+    s = domain[0] + (domain[1] - domain[0]) * _PLACES
+    found, expected = table.evaluate(s), _row(task, s)
+    if found[0].shape != expected[0].shape:
+        return False
+    extent, steepest = np.ptp(expected[0], axis=0), np.abs(expected[1]).max(0)
+    extent[:-1], steepest[:-1] = extent[:-1].max(), steepest[:-1].max()
+    extent[-1] = expected[0][:, -1].max()
+    rounding = _ROUNDING * np.abs(expected[0]).max()
+    close = np.abs(found[0] - expected[0]) <= 2 * _VALUE * extent + rounding
+    along = np.abs(found[1] - expected[1]) <= 4 * _SLOPE * steepest + rounding / np.median(np.diff(table.knots)) + 1e-12
+    return bool(close.all() and along.all())
+
+
+def _row(task: PathTask, s: Array) -> tuple[Array, Array]:
+    """Values and slopes (m, n + 1) of q_d, and of ϑ last, at s (m,)."""
+    theta, dtheta = _theta(task, s)
+    return np.column_stack([task.q_d(s), theta]), np.column_stack([task.dq_d(s), dtheta])
+
+
+def _balls(knots: Array, coefficients: Array) -> tuple[Array, Array]:
+    """A ball around each piece of q_d, centres (K, n) and radii (K,), from its Bézier points, which enclose it."""
+    width = np.diff(knots)
+    to_bezier = np.array(
+        [[comb(j, i) / comb(_DEGREE, i) if i <= j else 0.0 for i in range(_DEGREE + 1)] for j in range(_DEGREE + 1)]
+    )
+    rising = coefficients[:, ::-1] * (width[:, None] ** np.arange(_DEGREE + 1))[..., None]
+    points = np.einsum("ji,kin->kjn", to_bezier, rising)
+    centre = 0.5 * (points.min(1) + points.max(1))
+    return centre, np.linalg.norm(points - centre[:, None], axis=-1).max(1) * (1 + 1e-12)

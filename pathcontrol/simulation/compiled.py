@@ -1,0 +1,271 @@
+"""The sampled loop by the compiled engine: :class:`SampledArm` at the speed of the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from ctypes import addressof
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol._progress import progress_bar
+from pathcontrol.control.base import Controller
+from pathcontrol.engine.arms import arm_struct
+from pathcontrol.engine.library import load_library
+from pathcontrol.engine.settings import add_law, add_plant, rows_or_none
+from pathcontrol.engine.structs import (
+    RECORDED,
+    STATE,
+    STATE_NUMBERS,
+    Arm,
+    Memory,
+    Record,
+    Setup,
+    Span,
+    State,
+)
+from pathcontrol.engine.structs import Disturbance as DisturbanceStruct
+from pathcontrol.errors import EngineError
+from pathcontrol.robot.constants import frame_carrier
+from pathcontrol.simulation.disturbance import Disturbance, FrameForce, Harmonic, Push, terms_of
+from pathcontrol.simulation.divergence import BEYOND, NO_NUMBERS, Divergence
+from pathcontrol.simulation.finish import AfterLaps, AtEnd, Finish, known_finished
+from pathcontrol.simulation.modes import Arm as SimulatedArm
+from pathcontrol.simulation.modes import Outside, SampledLoop, check_rows
+from pathcontrol.simulation.noise import NoiseSource
+from pathcontrol.simulation.plant import has_strong_friction
+from pathcontrol.simulation.recorder import Recorder
+from pathcontrol.simulation.sampled import Actuator
+
+_BLOCK = 1 << 16  # ticks of all rollouts together between looks at Ctrl-C and the progress bar
+_REASONS = {1: BEYOND, 2: NO_NUMBERS}
+
+
+class CompiledPlant:
+    """The plant by the engine, a step at a time, for laws and disturbances that are asked in Python.
+
+    Args:
+        robot: the arm, or one for each rollout, with its friction.
+        step: h [s].
+
+    Raises:
+        EngineError: an arm or its friction is beyond the engine.
+    """
+
+    def __init__(self, robot: SimulatedArm, step: float) -> None:
+        self.step, self._memory, self._setup = step, Memory(), Setup(joints=robot.n)
+        add_plant(self._setup, robot, has_strong_friction(robot), self._memory)
+        self._advance = load_library().pathcontrol_advance
+
+    def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
+        """Return (q, q̇) one step later under the constant torque ``tau``; all (N, n)."""
+        q, qd = np.array(q), np.array(qd)
+        torque = np.ascontiguousarray(tau)
+        self._advance(addressof(self._setup), self.step, q.ctypes.data, qd.ctypes.data, torque.ctypes.data, 0, len(q))
+        return q, qd
+
+
+class CompiledArm:
+    """The arm behind its sensors and actuators, run by the engine; what it does is what :class:`SampledArm` does.
+
+    Args:
+        loop: the control computer.
+        robot: the arm, or one for each rollout.
+        q: joint positions it starts at [rad], (N, n).
+        qd: joint velocities it starts with [rad/s], (N, n).
+        outside: what disturbs it, and the number of the first rollout, for its noise.
+        controllers: the laws that are to drive it.
+
+    Raises:
+        EngineError: a law, an arm, its friction or the disturbance is beyond the engine.
+    """
+
+    def __init__(
+        self,
+        loop: SampledLoop,
+        robot: SimulatedArm,
+        q: Array,
+        qd: Array,
+        outside: Outside,
+        controllers: Sequence[Controller],
+    ) -> None:
+        self._library, self._memory, self._setup = load_library(), Memory(), Setup(joints=robot.n)
+        self._loop, self._shape, self._ticks = loop, q.shape, 0
+        self._threads = max(1, min(_threads(robot), -(-len(q) // self._library.pathcontrol_layout(9))))
+        self._noise = None if loop.noise is None else NoiseSource(loop.noise, q.shape, outside.first)
+        sensors, actuator = loop.sensors(robot), Actuator(loop, robot, q.shape)
+        check_rows(sensors.resolution, "encoders", len(q))
+        self._add_loop(sensors.resolution, actuator)
+        add_plant(self._setup, robot, has_strong_friction(robot), self._memory)
+        _add_disturbances(self._setup, outside.disturbance, self._memory)
+        self._laws = {controller: self._with_law(controller) for controller in controllers}
+        reading = sensors.start(*self._seen(q, qd))
+        reading = sensors.read(*self._seen(q, qd), reading)
+        self._state = {"q": q, "qd": qd, "q_read": reading.q, "qd_read": reading.qd}
+        self._state = {name: np.array(value, dtype=np.float64) for name, value in self._state.items()}
+        self._state["queue"] = np.zeros((actuator.waiting, *q.shape))
+        self.divergence = Divergence(q, qd)
+
+    def run(self, controller: Controller, duration: float, finish: Finish | None, progress: bool) -> dict[str, Array]:
+        """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
+        setup, period = self._laws[controller], self._loop.period
+        _add_finish(setup, finish)
+        self._take_over(controller)
+        ticks, rollouts = max(1, round(duration / period)), self._shape[0]
+        recorder = Recorder(rollouts, self._shape[1], ticks + 1)
+        block = max(1, _BLOCK // rollouts)
+        done, over = 0, False
+        with progress_bar("simulating", ticks, progress) as update:
+            while not over:
+                count = min(block, ticks - done)
+                last = done + count == ticks
+                samples = self._block(setup, recorder, done, count, last)
+                done += count
+                update(min(done, ticks))
+                over = last or samples < count or self._all_over(finish, setup)
+        return self._finished(recorder, finish, setup)
+
+    def _with_law(self, controller: Controller) -> Setup:
+        """The settings with those of a law."""
+        setup = Setup.from_buffer_copy(self._setup)
+        add_law(setup, controller, self._memory)
+        return setup
+
+    def _take_over(self, controller: Controller) -> None:
+        """Begin with the state of the law, and with no rollout finished or lost."""
+        rollouts, state = self._shape[0], self._state
+        state["home_q"], state["home_qd"] = state["q"].copy(), state["qd"].copy()
+        s = controller.start(state["q"], state["qd"])[..., 0]
+        state["s"], state["first_s"] = np.array(s, dtype=np.float64), np.array(s, dtype=np.float64)
+        state["rest_since"], state["reason"] = np.full(rollouts, np.inf), np.zeros(rollouts)
+        for name in ("lap_start", "finish_time", "diverged_time"):
+            state[name] = np.full(rollouts, np.nan)
+        self.divergence = Divergence(state["home_q"], state["home_qd"])
+
+    def _block(self, setup: Setup, recorder: Recorder, done: int, count: int, last: bool) -> int:
+        """Run so many ticks and return how many samples were recorded."""
+        rollouts = self._shape[0]
+        width = self._library.pathcontrol_layout(9)
+        noise = None if self._noise is None else self._noise.samples(count)
+        arrays = recorder.room_for(count + last)
+        record = Record(**{name: arrays[name].ctypes.data for name in RECORDED})
+        state = State(**{name: self._state[name].ctypes.data for name in STATE + STATE_NUMBERS})
+        span = Span(done, self._ticks, count, rollouts, last, rollouts <= width)
+        pointers = [addressof(setup), addressof(state), addressof(record)]
+        tail = [None if noise is None else noise.ctypes.data, addressof(span)]
+
+        def work(begin: int, end: int) -> int:
+            return int(self._library.pathcontrol_run(*pointers, *tail, begin, end))
+
+        if self._threads == 1:
+            samples = work(0, rollouts)
+        else:
+            packs = -(-rollouts // width)
+            cuts = [min(rollouts, width * round(packs * i / self._threads)) for i in range(self._threads + 1)]
+            with ThreadPoolExecutor(self._threads) as pool:
+                samples = max(pool.map(work, cuts[:-1], cuts[1:]))
+        self._ticks += min(samples, count)
+        recorder.add(samples)
+        return samples
+
+    def _all_over(self, finish: Finish | None, setup: Setup) -> bool:
+        """Whether no rollout goes on."""
+        lost = np.isfinite(self._state["diverged_time"])
+        if lost.all():
+            return True
+        return bool(setup.ends_run and finish is not None and (lost | np.isfinite(self._state["finish_time"])).all())
+
+    def _finished(self, recorder: Recorder, finish: Finish | None, setup: Setup) -> dict[str, Array]:
+        """Cut what was recorded where the run ended, and say of each rollout how it went."""
+        period, state = self._loop.period, self._state
+        lost_time, finish_time = state["diverged_time"], state["finish_time"]
+        if self._all_over(finish, setup):
+            known = np.where(np.isfinite(finish_time), known_finished(finish, finish_time, period), 0)
+            lost = np.where(np.isfinite(lost_time) & ~np.isfinite(finish_time), np.round(lost_time / period), 0)
+            recorder.cut(int(max(known.max(), lost.max())) + 1)
+            end = period * (recorder.samples - 1)
+            lost_time = np.where(lost_time > end * (1 + 1e-12), np.nan, lost_time)
+        for code, reason in _REASONS.items():
+            for row in np.flatnonzero(np.isfinite(lost_time) & (state["reason"] == code)):
+                self.divergence.mark(lost_time[row], np.arange(self._shape[0]) == row, reason)
+        if finish is not None:
+            finish.time = finish_time
+        arrays = recorder.arrays()
+        self.divergence.erase(arrays, period * np.arange(arrays["s"].shape[1]))
+        return arrays
+
+    def _seen(self, q: Array, qd: Array) -> tuple[Array, Array]:
+        return (q, qd) if self._noise is None else self._noise.disturbed(q, qd)
+
+    def _add_loop(self, resolution: Array | None, actuator: Actuator) -> None:
+        loop, setup, n = self._loop, self._setup, self._shape[1]
+        setup.period, setup.substeps, setup.delayed = loop.period, loop.substeps, actuator.waiting
+        setup.parts = len(actuator.parts)
+        for k, part in enumerate(actuator.parts):
+            setup.part[k] = part
+        setup.encoders, setup.limited = resolution is not None, actuator.limits is not None
+        setup.differentiates, setup.filters = loop.velocity == "difference", loop.filter_hz is not None
+        if loop.filter_hz is not None:
+            setup.keep = np.exp(-2 * np.pi * loop.filter_hz * loop.period)
+        setup.resolution = rows_or_none(resolution, n, self._memory)
+        setup.torque_limit = rows_or_none(actuator.limits, n, self._memory)
+
+
+def _threads(robot: SimulatedArm) -> int:
+    """How many threads a robot, or the first of several, allows."""
+    return getattr(robot, "threads", None) or robot.robots[0].threads  # type: ignore[union-attr]
+
+
+def _add_finish(setup: Setup, finish: Finish | None) -> None:
+    """Set what to look for.
+
+    Raises:
+        EngineError: a rule that the engine does not know.
+    """
+    if finish is None:
+        return
+    setup.ends_run = finish.ends_run
+    if type(finish) is AtEnd:
+        setup.finish = 1
+    elif type(finish) is AfterLaps:
+        setup.finish, setup.laps = 2, finish.laps
+    else:
+        raise EngineError(f"the engine does not know when {type(finish).__name__} ends a run")
+
+
+def _add_disturbances(setup: Setup, disturbance: Disturbance | None, memory: Memory) -> None:
+    """Set pushes, sinusoids and forces on frames.
+
+    Raises:
+        EngineError: one of them is the user's own.
+    """
+    structs = [_disturbance_struct(term, setup.joints, memory) for term in terms_of(disturbance)]
+    setup.disturbances = len(structs)
+    if structs:
+        setup.disturbance = addressof(memory.keep((DisturbanceStruct * len(structs))(*structs)))
+
+
+def _disturbance_struct(term: Disturbance, n: int, memory: Memory) -> DisturbanceStruct:
+    kinds = (Push, Harmonic, FrameForce)
+    if type(term) not in kinds:
+        raise EngineError(f"the disturbance {type(term).__name__} is not one of the library")
+    struct = DisturbanceStruct(kind=kinds.index(type(term)))
+    if isinstance(term, Harmonic):
+        struct.magnitude = memory.rows(term.amplitude, n)
+        struct.frequency, struct.phase = memory.numbers(term.frequency), memory.numbers(term.phase)
+    elif isinstance(term, Push):
+        struct.magnitude = memory.rows(term.magnitude, n)
+        struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)
+    elif isinstance(term, FrameForce):
+        struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)
+        _set_frame(struct, term, memory)
+    return struct
+
+
+def _set_frame(struct: DisturbanceStruct, term: FrameForce, memory: Memory) -> None:
+    """Set where a force acts, and through which arm."""
+    body, offset = frame_carrier(term.robot, term.frame)
+    struct.magnitude, struct.body = memory.rows(term.force, 3), body
+    struct.offset[:] = offset.tolist()
+    struct.arm = addressof(memory.keep((Arm * 1)(arm_struct(term.robot))))

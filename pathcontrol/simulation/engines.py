@@ -1,0 +1,100 @@
+"""Which engine runs a simulation: the compiled one where it can, else the reference on NumPy and Pinocchio."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from functools import cache
+from typing import Literal, NamedTuple, get_args
+
+from pathcontrol._arrays import Array
+from pathcontrol.control.base import Controller
+from pathcontrol.engine.library import load_library
+from pathcontrol.errors import EngineError, PathControlWarning, UnknownNameError
+from pathcontrol.simulation.compiled import CompiledArm, CompiledPlant
+from pathcontrol.simulation.continuous import ContinuousArm
+from pathcontrol.simulation.modes import Arm, ContinuousTime, Outside, SampledLoop
+from pathcontrol.simulation.sampled import SampledArm
+
+Engine = Literal["auto", "compiled", "pinocchio"]
+
+
+class Choice(NamedTuple):
+    """The arm that runs, and what ``run.config`` says of it.
+
+    Attributes:
+        arm: the simulated arm behind its sensors and actuators.
+        config: ``engine``, and where that is not the compiled one ``engine_reason``.
+    """
+
+    arm: SampledArm | CompiledArm | ContinuousArm
+    config: dict[str, str]
+
+
+def check_engine(engine: str) -> None:
+    """Check that ``engine`` is one of the choices.
+
+    Raises:
+        UnknownNameError: it is not.
+    """
+    if engine not in get_args(Engine):
+        raise UnknownNameError(f"engine = {engine!r}, expected one of {', '.join(map(repr, get_args(Engine)))}")
+
+
+def choose_engine(
+    engine: str,
+    controllers: Sequence[Controller],
+    loop: SampledLoop | ContinuousTime,
+    robot: Arm,
+    q: Array,
+    qd: Array,
+    outside: Outside,
+) -> Choice:
+    """Return the arm (N, n) that is to run all ``controllers``.
+
+    Raises:
+        EngineError: ``engine`` is ``"compiled"`` and something of the run is beyond the compiled engine.
+        InputError: a setting of the loop does not fit the rollouts.
+    """
+    reason = "asked for"
+    if engine != "pinocchio":
+        try:
+            return _compiled(controllers, loop, robot, q, qd, outside)
+        except EngineError as error:
+            if engine == "compiled":
+                raise
+            reason = str(error)
+    arm: SampledArm | ContinuousArm
+    if isinstance(loop, SampledLoop):
+        arm = SampledArm(loop, robot, q, qd, outside)
+    else:
+        arm = ContinuousArm(loop, robot, q, qd, outside)
+    return Choice(arm, {"engine": "pinocchio", "engine_reason": reason})
+
+
+def _compiled(
+    controllers: Sequence[Controller],
+    loop: SampledLoop | ContinuousTime,
+    robot: Arm,
+    q: Array,
+    qd: Array,
+    outside: Outside,
+) -> Choice:
+    """All of the loop compiled, or where a law or a disturbance is in Python only the plant."""
+    if not isinstance(loop, SampledLoop):
+        raise EngineError("continuous time is integrated by SciPy")
+    try:
+        load_library()
+    except EngineError as error:
+        _warn_once(str(error))
+        raise
+    try:
+        return Choice(CompiledArm(loop, robot, q, qd, outside, controllers), {"engine": "compiled"})
+    except EngineError as error:
+        arm = SampledArm(loop, robot, q, qd, outside, CompiledPlant)
+        return Choice(arm, {"engine": "compiled", "engine_reason": f"only the plant is compiled: {error}"})
+
+
+@cache
+def _warn_once(message: str) -> None:
+    warnings.warn(message, PathControlWarning, stacklevel=6)
