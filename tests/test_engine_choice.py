@@ -134,3 +134,54 @@ def test_a_control_tick_is_the_law_and_a_step_of_its_plan():
         pc.ControlTick(pc.ComputedTorque(ROBOT, TASK, np.ones((3, 1)), 1.0), 1e-3)
     with pytest.raises(pc.EngineError, match="the law Own"):
         pc.ControlTick(Own(ROBOT, TASK, 800.0, [45.0, 100.0], k=20.0), 1e-3)
+
+
+EXPERIMENT = """
+duration = 0.3
+{engine}
+[robot]
+name = "cicese_2dof"
+[task]
+type = "circle"
+radius = 1.0
+speed = 2.0
+[controller]
+type = "projection"
+k_p = 800.0
+K_v = [45.0, 100.0]
+[start]
+q = [0.9, 0.1]
+[output]
+"""
+
+
+def test_experiment_files_and_the_command_line_choose_the_engine(tmp_path):
+    from pathcontrol.experiments.runner import run_experiment
+
+    file = tmp_path / "one.toml"
+    file.write_text(EXPERIMENT.format(engine=""))
+    assert run_experiment(file, tmp_path / "a", progress=False).run.config["engine"] == "compiled"
+    assert run_experiment(file, tmp_path / "b", engine="pinocchio").run.config["engine"] == "pinocchio"
+    file.write_text(EXPERIMENT.format(engine='engine = "pinocchio"'))
+    assert run_experiment(file, tmp_path / "c", progress=False).run.config["engine"] == "pinocchio"
+    file.write_text(EXPERIMENT.format(engine='engine = "fast"'))
+    with pytest.raises(pc.ExperimentError, match=r"engine.*'fast'"):
+        run_experiment(file, tmp_path / "d")
+
+
+def test_sweeps_choose_the_engine(tmp_path):
+    pytest.importorskip("pyarrow")
+
+    def build(parameters, samples):
+        law = pc.Projection(ROBOT, TASK, parameters["k_p"][:, None], [45.0, 100.0])
+        return {"controller": law, "q": [0.9, 0.1], "duration": 0.3}
+
+    space = pc.Space.grid({"k_p": [400.0, 800.0]})
+    tables = [
+        pc.sweep(build, space, tmp_path / engine, metrics=["contour_error_peak"], engine=engine).table()
+        for engine in ("compiled", "pinocchio")
+    ]
+    peaks = [table["contour_error_peak"].to_numpy() for table in tables]
+    assert np.abs(peaks[0] - peaks[1]).max() < 1e-10
+    with pytest.raises(pc.UnknownNameError, match="engine = 'fast'"):
+        pc.sweep(build, space, tmp_path / "no", engine="fast")

@@ -75,4 +75,14 @@ def _tell(summary: dict[str, Any], out: Path) -> None:
 
     console = Console()
     console.print(peaks_table(summary))
+    console.print(_engine_line(summary["compiled_engine"]))
     console.print(f"Figures 7 to 10, data, animations and summary.json are in {out}/ ({summary['seconds']} s).")
+
+
+def _engine_line(compared: dict[str, Any]) -> str:
+    """Say how far the compiled engine is from these numbers, which are the reference's."""
+    if "missing" in compared:
+        return f"These are Pinocchio's; they could not be compared: {compared['missing']}"
+    q = max(values["q_rad"] for values in compared.values())
+    peak = max(values["e_p_peak_deg"] for values in compared.values())
+    return f"These are Pinocchio's; the compiled engine differs by {q:.0e} rad in q and {peak:.0e} deg in the peaks."

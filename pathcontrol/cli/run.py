@@ -8,19 +8,23 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pathcontrol.cli.group import import_all, json_option, open_option, open_page
+from pathcontrol.cli.group import engine_option, import_all, json_option, open_option, open_page
 
 if TYPE_CHECKING:
     from pathcontrol.experiments.runner import Outcome
+    from pathcontrol.simulation.engines import Engine
 
 
 @click.command("run")
 @click.argument("file", type=click.Path(exists=False, path_type=Path), required=False)
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Default: results/ and the file's name.")
 @click.option("--example", is_flag=True, help="Print a commented experiment file and stop.")
+@engine_option
 @open_option
 @json_option
-def command(file: Path | None, out: Path | None, example: bool, opened: bool, as_json: bool) -> None:
+def command(
+    file: Path | None, out: Path | None, example: bool, engine: Engine | None, opened: bool, as_json: bool
+) -> None:
     """Run the experiment that FILE.toml describes."""
     if example:
         from pathcontrol.experiments.template import example_text
@@ -33,7 +37,7 @@ def command(file: Path | None, out: Path | None, example: bool, opened: bool, as
     from pathcontrol.experiments.runner import run_experiment
 
     out = Path("results") / file.stem if out is None else out
-    done = run_experiment(file, out)
+    done = run_experiment(file, out, engine=engine)
     if opened and "html" not in done.written:  # not asked for by the file, but now
         done.written["html"] = _animation(done, out)
     _tell(done, as_json)

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pathcontrol.cli.group import json_option, uninterrupted
+from pathcontrol.cli.group import engine_option, json_option, uninterrupted
 
 if TYPE_CHECKING:
+    from pathcontrol.simulation.engines import Engine
     from pathcontrol.sweeps.result import SweepResult
 
 
@@ -32,6 +33,7 @@ chunk_option = click.option(
 @click.option("--tls-ca", metavar="FILE", help="With --cluster tls://…: the certificate of the authority, in PEM.")
 @click.option("--tls-cert", metavar="FILE", help="The certificate of this process.")
 @click.option("--tls-key", metavar="FILE", help="Its key.")
+@engine_option
 @json_option
 def command(
     file: Path,
@@ -42,6 +44,7 @@ def command(
     tls_ca: str | None,
     tls_cert: str | None,
     tls_key: str | None,
+    engine: Engine | None,
     as_json: bool,
 ) -> None:
     """Simulate every sample of the [sweep] in FILE.toml and keep its numbers.
@@ -58,7 +61,7 @@ def command(
     folder = Path("results") / file.stem if out is None else out
     try:
         security = security_of(tls_ca, tls_cert, tls_key)
-        result = run_sweep(file, folder, chunk=chunk, resume=resume, cluster=cluster, security=security)
+        result = run_sweep(file, folder, chunk=chunk, resume=resume, cluster=cluster, security=security, engine=engine)
     except KeyboardInterrupt:
         click.echo(f"--resume goes on with what is in {folder}", err=True)
         raise

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pathcontrol.cli.group import json_option, uninterrupted
+from pathcontrol.cli.group import engine_option, json_option, uninterrupted
 from pathcontrol.cli.sweep import chunk_option, out_option, resume_option
 
 if TYPE_CHECKING:
+    from pathcontrol.simulation.engines import Engine
     from pathcontrol.tuning.result import Candidate, Tuning
 
 
@@ -20,8 +21,9 @@ if TYPE_CHECKING:
 @out_option
 @resume_option
 @chunk_option
+@engine_option
 @json_option
-def command(file: Path, out: Path | None, resume: bool, chunk: int, as_json: bool) -> None:
+def command(file: Path, out: Path | None, resume: bool, chunk: int, engine: Engine | None, as_json: bool) -> None:
     """Search what the [tune] in FILE.toml asks for.
 
     Prints the best candidates and what the limits cost, and draws the front as front.svg and front.png in the folder,
@@ -32,7 +34,7 @@ def command(file: Path, out: Path | None, resume: bool, chunk: int, as_json: boo
         from pathcontrol.view.figures.pareto import pareto_figure
         from pathcontrol.view.figures.style import save_figure
     out = Path("results") / file.stem if out is None else out
-    tuning = run_tune(file, out, chunk=chunk, resume=resume)
+    tuning = run_tune(file, out, chunk=chunk, resume=resume, engine=engine)
     figures = []
     if len(tuning.directions) > 1 and tuning.front().sizes["sample"]:
         figures = [str(path) for path in save_figure(pareto_figure(tuning), out / "front")]

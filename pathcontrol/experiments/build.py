@@ -22,6 +22,7 @@ from pathcontrol.experiments.controller_sections import ContinuousSection
 from pathcontrol.experiments.keyed import keyed, refuse_unit, users_code
 from pathcontrol.experiments.schema import Experiment, Output
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.modes import ContinuousTime, SampledLoop, torque_limits
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.sequence import PathSequence
@@ -48,6 +49,7 @@ class Setup(NamedTuple):
         qd: initial joint velocities [rad/s], (n,).
         duration: longest simulated time [s]: one number, or one for each path of a sequence.
         laps: how many times a closed path is gone round, or None.
+        engine: which engine runs it.
         output: the files to write.
     """
 
@@ -59,6 +61,7 @@ class Setup(NamedTuple):
     qd: Array
     duration: float | Array
     laps: int | None
+    engine: Engine
     output: Output
 
     @property
@@ -86,7 +89,7 @@ def build(experiment: Experiment, base_dir: str | Path = ".") -> Setup:
         duration, laps = build_duration(experiment, task)
         loop = _loop(experiment, plant, float(np.max(duration)))
         q, qd = _state(experiment, controllers[0])
-    return Setup(controllers, task, plant, loop, q, qd, duration, laps, experiment.output)
+    return Setup(controllers, task, plant, loop, q, qd, duration, laps, experiment.engine, experiment.output)
 
 
 def _controllers(experiment: Experiment, model: RobotModel, task: PathTask) -> tuple[Controller, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,10 @@ from pathcontrol.analysis.metrics import peak, steady_state
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.projection import Projection
+from pathcontrol.errors import EngineError
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.modes import SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
@@ -74,11 +77,11 @@ def paper_controllers(robot: RobotModel) -> dict[str, Controller]:
     }
 
 
-def paper_experiment(name: str, robot: RobotModel, progress: bool = True) -> Experiment:
-    """Run one of the two, by its name in :data:`PAPER`."""
+def paper_experiment(name: str, robot: RobotModel, progress: bool = True, engine: Engine = "pinocchio") -> Experiment:
+    """Run one of the two, by its name in :data:`PAPER`; on the reference engine unless told otherwise."""
     controller = paper_controllers(robot)[name]
     start = np.deg2rad(START_DEG)
-    run = simulate(controller, start, duration=DURATION, loop=paper_loop(), progress=progress)
+    run = simulate(controller, start, duration=DURATION, loop=paper_loop(), engine=engine, progress=progress)
     return Experiment(name, controller, run)
 
 
@@ -96,10 +99,28 @@ def reproduce(out: str | Path) -> dict[str, Any]:
             update(2 * i + 1)
             _write(experiments[name], robot, out)
             update(2 * i + 2)
-    summary = summarise(experiments) | {"seconds": round(time.perf_counter() - began, 2)}
+    summary = summarise(experiments) | {"compiled_engine": compare_engines(experiments.values(), robot)}
+    summary |= {"seconds": round(time.perf_counter() - began, 2)}
     with whole_file(out / "summary.json") as temporary:
         temporary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary
+
+
+def compare_engines(experiments: Iterable[Experiment], robot: RobotModel) -> dict[str, Any]:
+    """Return how far the compiled engine is from the runs of the reference: ``{name: {…}}``, or ``{"missing": why}``.
+
+    For each experiment the largest difference of a joint position over the run, ``q_rad``, and those of the two peaks.
+    """
+    apart: dict[str, Any] = {}
+    for reference in experiments:
+        try:
+            other = paper_experiment(reference.name, robot, progress=False, engine="compiled")
+        except EngineError as error:
+            return {"missing": str(error)}
+        q = float(np.abs(other.run.array("q") - reference.run.array("q")).max())
+        peaks = {name: abs(other.peaks[name] - value) for name, value in reference.peaks.items()}
+        apart[reference.name] = {"q_rad": q, **peaks}
+    return apart
 
 
 def _write(experiment: Experiment, robot: RobotModel, out: Path) -> None:

@@ -9,6 +9,7 @@ from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.build import Setup, build
 from pathcontrol.experiments.load import invalid, load_experiment, read_text
 from pathcontrol.experiments.outputs import check_folder, measured, write_outputs
+from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.sequence import simulate_sequence
 from pathcontrol.simulation.simulate import simulate
@@ -29,29 +30,33 @@ class Outcome(NamedTuple):
     written: dict[str, Path]
 
 
-def run_experiment(path: str | Path, out_dir: str | Path, progress: bool = True) -> Outcome:
+def run_experiment(
+    path: str | Path, out_dir: str | Path, progress: bool = True, engine: Engine | None = None
+) -> Outcome:
     """Run the experiment of a file; everything it says is checked before anything is computed.
 
     Args:
         path: the experiment file; paths in it are relative to its folder.
         out_dir: the folder to write to, made if need be.
         progress: show a bar on standard error when it takes longer than two seconds.
+        engine: which engine runs it, instead of what the file says.
 
     Raises:
+        EngineError: the compiled engine is asked for and cannot run it.
         ExperimentError: the file is invalid.
         InputError: ``out_dir`` cannot be written to.
         SimulationError: the simulation diverged.
     """
     setup, text, out_dir = load_setup(path), read_text(path), Path(out_dir)
     check_folder(out_dir, setup.output)
-    run = _simulated(setup, progress)
+    run = _simulated(setup if engine is None else setup._replace(engine=engine), progress)
     run.config["experiment"] = text
     numbers = measured(run, setup)
     return Outcome(run, numbers, write_outputs(run, numbers, setup, out_dir))
 
 
 def _simulated(setup: Setup, progress: bool) -> Run:
-    options: dict[str, Any] = {"plant": setup.plant, "loop": setup.loop, "progress": progress}
+    options: dict[str, Any] = {"plant": setup.plant, "loop": setup.loop, "engine": setup.engine, "progress": progress}
     if isinstance(setup.task, PathSequence):
         options["task"] = setup.task
         return simulate_sequence(setup.controllers, setup.q, setup.qd, duration=setup.duration, **options)

@@ -74,6 +74,7 @@ class Experiment(Section):
         duration: longest simulated time [s]; left out, a path that ends has twice its time by ϑ and 5 s more, each
             path of a toolpath for itself.
         laps: how many times a closed path is gone round; left out, as often as ``duration`` allows.
+        engine: which engine runs the simulation, see :func:`pathcontrol.simulate`.
         angle_unit: of all angles and angular rates: ``lock``, the task's lengths, speeds and phases,
             ``start``, the Stribeck velocity and ``friction_width``. All else is in SI units, as gains are, or
             taken as it is, as ``task.parameters`` are.
@@ -85,6 +86,7 @@ class Experiment(Section):
     angle_unit: Literal["rad", "deg"] = "rad"
     duration: Positive | None = None
     laps: Whole | None = None
+    engine: Literal["auto", "compiled", "pinocchio"] = "auto"
     robot: Robot
     task: Task
     controller: Law

@@ -12,6 +12,7 @@ from pathcontrol.experiments.keyed import keyed
 from pathcontrol.experiments.load import invalid, load_experiment, read_toml
 from pathcontrol.experiments.sweep_section import SweepSection
 from pathcontrol.experiments.swept import SweptExperiment
+from pathcontrol.simulation.engines import Engine
 from pathcontrol.sweeps.cluster import connected
 from pathcontrol.sweeps.keep import Keep
 from pathcontrol.sweeps.result import SweepResult
@@ -31,6 +32,7 @@ def run_sweep(
     progress: bool = True,
     cluster: str | Path | Client | None = None,
     security: Security | None = None,
+    engine: Engine | None = None,
 ) -> SweepResult:
     """Run the sweep of an experiment file; every sample is checked before anything is computed.
 
@@ -43,6 +45,7 @@ def run_sweep(
         cluster: a Dask cluster whose workers compute the chunks, as :func:`sweep` takes it; files that the experiment
             names are sent to them.
         security: certificates for TLS, a ``distributed.Security``, where the cluster asks for some.
+        engine: which engine runs the simulations, instead of what the file says.
 
     Raises:
         ClusterError: the cluster does not answer or cannot go on, or a worker has other versions than this process.
@@ -55,7 +58,7 @@ def run_sweep(
         try:
             if section is None:
                 raise ExperimentError("sweep: missing; add a section [sweep] with its parameters")
-            data = of_samples(read_toml(path))
+            data = of_samples(read_toml(path)) | ({} if engine is None else {"engine": engine})
             build = SweptExperiment(data, Path(path).parent.absolute(), section.parameters)
             space = space_of(section)
             with keyed("sweep"):

@@ -226,6 +226,7 @@ def _arguments(
         "duration": tasks[0].duration,
         "laps": tasks[0].laps,
         "loop": setup.loop,
+        "engine": setup.engine,
     }
 
 

@@ -12,13 +12,20 @@ from pathcontrol.experiments.load import invalid, load_experiment, read_toml
 from pathcontrol.experiments.sweep_runner import of_samples, values_of
 from pathcontrol.experiments.swept import SweptExperiment
 from pathcontrol.experiments.tune_section import TuneSection
+from pathcontrol.simulation.engines import Engine
 from pathcontrol.sweeps.space import Space
 from pathcontrol.tuning.result import Tuning
 from pathcontrol.tuning.tune import tune
 
 
 def run_tune(
-    path: str | Path, out: str | Path, *, chunk: int = 500, resume: bool = False, progress: bool = True
+    path: str | Path,
+    out: str | Path,
+    *,
+    chunk: int = 500,
+    resume: bool = False,
+    progress: bool = True,
+    engine: Engine | None = None,
 ) -> Tuning:
     """Run the tuning of an experiment file; both ends of what is searched are checked before anything is computed.
 
@@ -28,6 +35,7 @@ def run_tune(
         chunk: how many rollouts are simulated together at most.
         resume: go on with the tuning in ``out``, if there is one.
         progress: show a bar with the time left on standard error when it takes longer than two seconds.
+        engine: which engine runs the simulations, instead of what the file says.
 
     Raises:
         ExperimentError: the file is invalid.
@@ -39,7 +47,8 @@ def run_tune(
         if section is None:
             raise ExperimentError("tune: missing; add a section [tune] with parameters and objectives")
         varied = {"parameters": section.parameters, "scenarios": section.scenarios}
-        build = SweptExperiment(of_samples(read_toml(path)), Path(path).parent.absolute(), varied, "tune")
+        data = of_samples(read_toml(path)) | ({} if engine is None else {"engine": engine})
+        build = SweptExperiment(data, Path(path).parent.absolute(), varied, "tune")
         space = _space(section)
         with keyed("tune"):
             scenarios = None if section.scenarios is None else Space.given(section.scenarios)

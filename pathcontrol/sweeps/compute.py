@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from pathcontrol.analysis.metrics import UNITS, metrics
 from pathcontrol.analysis.progress import unfinished
 from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError, SimulationError, UnknownNameError
+from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.modes import SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
@@ -55,6 +57,25 @@ class Job(NamedTuple):
 
     def __call__(self, parameters: Mapping[str, Array], samples: NDArray[np.int64]) -> Chunk:
         return compute(self.build, parameters, samples, self.measure, self.keep, self.at_random)
+
+
+def on_engine(build: Build, engine: Engine) -> Build:
+    """Return what builds a chunk, for simulations that run on ``engine`` where it says none itself."""
+    return build if engine == "auto" else OnEngine(build, engine)
+
+
+@dataclass(frozen=True)
+class OnEngine:
+    """What builds a chunk, with the engine that its simulations run on where it says none itself."""
+
+    build: Build
+    engine: Engine
+
+    def __call__(self, parameters: Mapping[str, Array], samples: NDArray[np.int64]) -> Arguments | Parts:
+        built = self.build(parameters, samples)
+        if isinstance(built, Mapping):
+            return {"engine": self.engine, **built}
+        return [(rows, {"engine": self.engine, **arguments}) for rows, arguments in built]
 
 
 def measure_of(wanted: Sequence[str] | Measure | None) -> Measure:

@@ -17,6 +17,7 @@ from pathcontrol._files import locked
 from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.errors import InputError
+from pathcontrol.simulation.engines import Engine, check_engine
 from pathcontrol.sweeps.cluster import connected
 from pathcontrol.sweeps.compute import Build, Chunk, Job, Measure, Piece, measure_of
 from pathcontrol.sweeps.desk import Desk
@@ -43,6 +44,7 @@ def sweep(
     progress: bool = True,
     cluster: str | Path | Client | None = None,
     security: Security | None = None,
+    engine: Engine = "auto",
 ) -> SweepResult:
     """Simulate every sample of a space, a chunk at a time, and keep its numbers on disk.
 
@@ -72,6 +74,7 @@ def sweep(
             ``"tcp://host:8786"``, its scheduler file, or a ``distributed.Client``; default this process. The table and
             the histories are the same.
         security: certificates for TLS, a ``distributed.Security``, where the cluster asks for some.
+        engine: which engine runs the simulations, as :func:`simulate` takes it, where ``build`` says none.
 
     Raises:
         ClusterError: the cluster does not answer or cannot go on, or a worker has other versions than this process.
@@ -82,14 +85,18 @@ def sweep(
     expect("space", space, Space)
     if isinstance(chunk, bool) or not isinstance(chunk, int) or chunk < 1:
         raise InputError(f"chunk = {chunk!r}, expected a whole number from 1")
+    check_engine(engine)
     keep, measure, seed = Keep() if keep is None else keep, measure_of(metrics), check_seed(seed)
     if not isinstance(keep, Keep):
         raise InputError(f"keep = {keep!r}, expected a Keep, such as Keep(worst=5), or None")
     with connected(cluster, security) as client:
         design = space.design(seed)
-        job = Job(build, measure, keep, keep.at_random(space.samples, seed))
+        job = Job(
+            build if engine == "auto" else OnEngine(build, engine), measure, keep, keep.at_random(space.samples, seed)
+        )
         computed = partial(_computed_here, job) if client is None else Desk(client, job).chunks
         definition = _definition(build, space, design, metrics, keep, seed)
+        definition |= {} if engine == "auto" else {"engine": engine}
         with opened(Path(out), space.samples, definition, resume) as store:
             store.tidy(keep, job.at_random)
             missing, done = store.missing(chunk), 0
