@@ -140,7 +140,7 @@ EXPERIMENT = """
 duration = 0.3
 {engine}
 [robot]
-name = "cicese_2dof"
+source = "cicese_2dof"
 [task]
 type = "circle"
 radius = 1.0

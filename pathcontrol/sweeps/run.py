@@ -91,9 +91,7 @@ def sweep(
         raise InputError(f"keep = {keep!r}, expected a Keep, such as Keep(worst=5), or None")
     with connected(cluster, security) as client:
         design = space.design(seed)
-        job = Job(
-            build if engine == "auto" else OnEngine(build, engine), measure, keep, keep.at_random(space.samples, seed)
-        )
+        job = Job(on_engine(build, engine), measure, keep, keep.at_random(space.samples, seed))
         computed = partial(_computed_here, job) if client is None else Desk(client, job).chunks
         definition = _definition(build, space, design, metrics, keep, seed)
         definition |= {} if engine == "auto" else {"engine": engine}

@@ -110,9 +110,7 @@ def tune(
     folder = nullcontext() if out is None else opened(Path(out), total, json.loads(json.dumps(definition)), resume)
     tables: list[xr.Dataset] = []
     with folder as store, progress_bar("tune", generations, progress) as update:
-        cases = Cases(
-            build if engine == "auto" else OnEngine(build, engine), design, count, measure, chunk, store, _noted(store)
-        )
+        cases = Cases(on_engine(build, engine), design, count, measure, chunk, store, _noted(store))
         try:
             for _ in range(generations):
                 tables.append(_generation(search, space, cases, terms, sum(table.sizes["sample"] for table in tables)))
