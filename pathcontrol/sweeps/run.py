@@ -19,7 +19,7 @@ from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.engines import Engine, check_engine
 from pathcontrol.sweeps.cluster import connected
-from pathcontrol.sweeps.compute import Build, Chunk, Job, Measure, Piece, measure_of
+from pathcontrol.sweeps.compute import Build, Chunk, Job, Measure, Piece, measure_of, on_engine
 from pathcontrol.sweeps.desk import Desk
 from pathcontrol.sweeps.keep import Keep
 from pathcontrol.sweeps.manifest import MANIFEST

@@ -16,7 +16,7 @@ from pathcontrol._expect import expect
 from pathcontrol._progress import progress_bar
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.simulation.engines import Engine, check_engine
-from pathcontrol.sweeps.compute import OUTCOME, Build, Measure, measure_of
+from pathcontrol.sweeps.compute import OUTCOME, Build, Measure, measure_of, on_engine
 from pathcontrol.sweeps.goals import Limits, Objectives, check_limits, check_objectives
 from pathcontrol.sweeps.keep import Keep
 from pathcontrol.sweeps.result import dataset
