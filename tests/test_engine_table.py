@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pathcontrol as pc
+from pathcontrol.engine.gamma import distances_to_gamma
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.table import make_table, path_struct, same_projection
 from pathcontrol.errors import EngineError
@@ -135,3 +136,45 @@ def test_a_path_with_a_corner_has_no_table():
 
     with pytest.raises(EngineError, match="not smooth enough"):
         make_table(Corner())
+
+
+@pytest.mark.parametrize("braking", [False, True])
+@pytest.mark.parametrize("name", TASKS)
+def test_distances_to_gamma_are_the_global_minima_of_a_dense_search(name, braking):
+    """Against samples of Γ: no farther than the nearest of them, and no nearer than that by more than their spacing."""
+    task, rng = TASKS[name], np.random.default_rng(2)
+    lower, upper = task.sampled_interval
+    s = np.linspace(lower, upper, 20001)
+    law = pc.ComputedTorque(_arm(task.n), task, 100.0, 10.0)
+    point = law.point(s) if braking else task.at(s)
+    gamma = np.concatenate([point.q_d, point.velocity], axis=-1)
+    along = np.linspace(lower, upper, 300)
+    walk = np.cumsum(rng.normal(0, 0.02, (300, 2 * task.n)), axis=0)
+    here = law.point(along) if braking else task.at(along)
+    states = np.concatenate([here.q_d, here.velocity], axis=-1) + walk
+    states[100] = rng.normal(0, 1, 2 * task.n)  # a jump
+    q, qd = states[:, : task.n], states[:, task.n :]
+    distance, found = distances_to_gamma(task, q, qd, 1.0, braking)
+    sampled = np.min(np.linalg.norm(gamma[None, ::4] - states[:, None], axis=-1), axis=1)
+    spacing = np.linalg.norm(np.diff(gamma[::4], axis=0), axis=-1).max()
+    assert (distance <= sampled + 1e-9).all()
+    assert (distance >= sampled - spacing).all()
+    there = law.point(found) if braking else task.at(found)
+    stated = np.linalg.norm(np.concatenate([there.q_d, there.velocity], axis=-1) - states, axis=-1)
+    assert np.abs(stated - distance).max() < 1e-8
+    order = rng.permutation(300)
+    assert np.array_equal(distances_to_gamma(task, q[order], qd[order], 1.0, braking)[0], distance[order])
+
+
+def test_distances_to_gamma_are_those_of_the_search_in_python(monkeypatch):
+    from pathcontrol.analysis import gamma
+
+    task, rng = Rose(), np.random.default_rng(3)
+    q, qd = rng.normal(0, 0.8, (2, 200, 2))
+    fast = pc.distance_to_gamma(task, q, qd, 0.3)
+
+    def refuse(*_):
+        raise EngineError("no")
+
+    monkeypatch.setattr(gamma, "distances_to_gamma", refuse)
+    assert np.abs(pc.distance_to_gamma(task, q, qd, 0.3) - fast).max() < 1e-9

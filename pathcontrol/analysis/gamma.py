@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, joint_array, scalar
 from pathcontrol._expect import expect
 from pathcontrol.control.ending import Ending
-from pathcontrol.errors import InputError, TaskError
+from pathcontrol.engine.gamma import distances_to_gamma
+from pathcontrol.errors import EngineError, InputError, TaskError
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.batch import TaskBatch
 from pathcontrol.tasks.closest_point import ClosestPoint, Curve
@@ -61,6 +62,12 @@ def _nearest(task: PathTask, q: Array, qd: Array, weight: float, braking: bool) 
     """Distance and parameter, (*batch,) each, for one task."""
     if isinstance(task, PathSequence):
         return _nearest_of(task, q, qd, weight, braking)
+    try:
+        if q.ndim > 1:
+            found = distances_to_gamma(task, q.reshape(-1, task.n), qd.reshape(-1, task.n), weight, braking)
+            return found[0].reshape(q.shape[:-1]), found[1].reshape(q.shape[:-1])
+    except EngineError:
+        pass  # the search below is for any task, and needs no compiled library
     ending = Ending.of(task) if braking else None
     state, gamma = np.concatenate([q, weight * qd], axis=-1), _curve(_planned(task, ending), weight)
     lower, upper = task.one_traverse

@@ -31,6 +31,11 @@ def load_library(build: str | None = None) -> CDLL:
     return plain if wanted == BUILDS[0] else _open(wanted)
 
 
+def lanes(library: CDLL) -> int:
+    """Return how many rollouts a build runs side by side."""
+    return int(library.pathcontrol_layout(len(LAYOUT) + 2))
+
+
 def _file(build: str) -> Path:
     return _FOLDER / f"engine_{build}.so"
 
@@ -71,6 +76,7 @@ def _declare(library: CDLL) -> None:
         "mass_matrix": [c_void_p, c_longlong, array, array],
         "stick_slip": [c_int, c_longlong, array, array, array, array, array, array],
         "evaluate": [c_void_p, c_longlong, array, array],
+        "gamma": [c_void_p, c_longlong, c_longlong, array, array, array],
         "nearest": [c_void_p, c_longlong, array, array, array],
         "control_tick": [c_void_p, c_void_p],
     }.items():

@@ -130,8 +130,21 @@ class Span(Structure):
     ]
 
 
+class Gamma(Structure):
+    """The curve Γ of a task, with what bounds it."""
+
+    _fields_ = [
+        ("path", c_void_p),
+        ("weight", c_double),
+        ("brakes", c_int),
+        ("centre", _Doubles),
+        ("radius", _Doubles),
+        ("pieces", c_void_p),
+    ]
+
+
 #: what ``pathcontrol_layout`` says, in its order, but for the number of lanes
-LAYOUT = (Arm, Path, Disturbance, Setup, State, Record, Span)
+LAYOUT = (Arm, Path, Disturbance, Setup, State, Record, Span, Gamma)
 
 
 class Memory:

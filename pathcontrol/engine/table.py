@@ -70,11 +70,20 @@ class PathTable(NamedTuple):
         return _horner(np.moveaxis(self.coefficients[cell], 1, 0), (s - self.knots[cell])[:, None])
 
 
-_TABLES: WeakKeyDictionary[PathTask, tuple[PathTable, Memory, Path]] = WeakKeyDictionary()
+_TABLES: WeakKeyDictionary[PathTask, tuple[PathTable, Path, Memory]] = WeakKeyDictionary()
 
 
 def path_struct(task: PathTask) -> tuple[Path, Memory]:
-    """Return the table of ``task`` for the engine, made once; it is looked at again, as tasks may be changed.
+    """Return the table of ``task`` as the engine takes it, with what its arrays are kept alive by.
+
+    Raises:
+        EngineError: the path goes on for ever without repeating, or is not smooth enough for a table.
+    """
+    return task_table(task)[1:]
+
+
+def task_table(task: PathTask) -> tuple[PathTable, Path, Memory]:
+    """Return the table of ``task``, also as the engine takes it; made once, and looked at again as tasks may change.
 
     Raises:
         EngineError: the path goes on for ever without repeating, or is not smooth enough for a table.
@@ -82,8 +91,8 @@ def path_struct(task: PathTask) -> tuple[Path, Memory]:
     known = _TABLES.get(task)
     if known is None or not _is_like(known[0], task):
         table, memory = make_table(task), Memory()
-        known = _TABLES[task] = table, memory, table.struct(memory)
-    return known[2], known[1]
+        known = _TABLES[task] = table, table.struct(memory), memory
+    return known
 
 
 def make_table(task: PathTask) -> PathTable:
@@ -208,13 +217,17 @@ def _row(task: PathTask, s: Array) -> tuple[Array, Array]:
     return np.column_stack([task.q_d(s), theta]), np.column_stack([task.dq_d(s), dtheta])
 
 
+def bezier_points(knots: Array, coefficients: Array) -> Array:
+    """Return the Bézier points of polynomials of s − knot, both (K, d + 1, n): their hull encloses the curve."""
+    width, degree = np.diff(knots), coefficients.shape[1] - 1
+    powers = range(degree + 1)
+    weights = np.array([[comb(j, i) / comb(degree, i) if i <= j else 0.0 for i in powers] for j in powers])
+    rising = coefficients[:, ::-1] * (width[:, None] ** np.arange(degree + 1))[..., None]
+    return np.einsum("ji,kin->kjn", weights, rising)
+
+
 def _balls(knots: Array, coefficients: Array) -> tuple[Array, Array]:
-    """A ball around each piece of q_d, centres (K, n) and radii (K,), from its Bézier points, which enclose it."""
-    width = np.diff(knots)
-    to_bezier = np.array(
-        [[comb(j, i) / comb(_DEGREE, i) if i <= j else 0.0 for i in range(_DEGREE + 1)] for j in range(_DEGREE + 1)]
-    )
-    rising = coefficients[:, ::-1] * (width[:, None] ** np.arange(_DEGREE + 1))[..., None]
-    points = np.einsum("ji,kin->kjn", to_bezier, rising)
+    """A ball around each piece of q_d, centres (K, n) and radii (K,)."""
+    points = bezier_points(knots, coefficients)
     centre = 0.5 * (points.min(1) + points.max(1))
     return centre, np.linalg.norm(points - centre[:, None], axis=-1).max(1) * (1 + 1e-12)

@@ -12,7 +12,7 @@ from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
 from pathcontrol.engine.arms import arm_struct
-from pathcontrol.engine.library import load_library
+from pathcontrol.engine.library import lanes, load_library
 from pathcontrol.engine.settings import add_law, add_plant, rows_or_none
 from pathcontrol.engine.structs import (
     RECORDED,
@@ -92,7 +92,7 @@ class CompiledArm:
     ) -> None:
         self._library, self._memory, self._setup = load_library(), Memory(), Setup(joints=robot.n)
         self._loop, self._shape, self._ticks = loop, q.shape, 0
-        self._threads = max(1, min(_threads(robot), -(-len(q) // self._library.pathcontrol_layout(9))))
+        self._threads = max(1, min(_threads(robot), -(-len(q) // lanes(self._library))))
         self._noise = None if loop.noise is None else NoiseSource(loop.noise, q.shape, outside.first)
         sensors, actuator = loop.sensors(robot), Actuator(loop, robot, q.shape)
         check_rows(sensors.resolution, "encoders", len(q))
@@ -146,7 +146,7 @@ class CompiledArm:
     def _block(self, setup: Setup, recorder: Recorder, done: int, count: int, last: bool) -> int:
         """Run so many ticks and return how many samples were recorded."""
         rollouts = self._shape[0]
-        width = self._library.pathcontrol_layout(9)
+        width = lanes(self._library)
         noise = None if self._noise is None else self._noise.samples(count)
         arrays = recorder.room_for(count + last)
         record = Record(**{name: arrays[name].ctypes.data for name in RECORDED})

@@ -1,4 +1,5 @@
 // The functions that Python calls.
+#include "gamma.hpp"
 #include "loop.hpp"
 
 #define EXPORT extern "C" __attribute__((visibility("default")))
@@ -74,6 +75,13 @@ EXPORT void pathcontrol_nearest(const Path *path, integer rows, const double *q,
   for (integer r = 0; r < rows; r++) s[r] = near ? followed_point(*path, q + r * path->joints, near[r]) : nearest_point(*path, q + r * path->joints);
 }
 
+// Distances to Γ of several series of states, (series, rows, 2 joints) each.
+EXPORT void pathcontrol_gamma(const Gamma *gamma, integer series, integer rows, const double *states, double *distance, double *parameter) {
+  const integer width = 2 * gamma->path->joints;
+  for (integer k = 0; k < series; k++)
+    distances_to_gamma(*gamma, rows, states + k * rows * width, distance + k * rows, parameter + k * rows);
+}
+
 // One tick of the law alone: `io` holds q, q̇ and s, and then gets τ, with s one period on in its place.
 EXPORT void pathcontrol_control_tick(const Setup *setup, double *io) {
   const int n = setup->joints;
@@ -91,7 +99,7 @@ EXPORT void pathcontrol_control_tick(const Setup *setup, double *io) {
 
 // Sizes of the structs and constants, compared with those of Python when the library is loaded.
 EXPORT integer pathcontrol_layout(int which) {
-  const integer sizes[] = {sizeof(Arm<double>), sizeof(Path), sizeof(Disturbance), sizeof(Setup), sizeof(State), sizeof(Record), sizeof(Span), MOST_JOINTS, MOST_STRIBECK, LANES};
+  const integer sizes[] = {sizeof(Arm<double>), sizeof(Path), sizeof(Disturbance), sizeof(Setup), sizeof(State), sizeof(Record), sizeof(Span), sizeof(Gamma), MOST_JOINTS, MOST_STRIBECK, LANES};
   return which >= 0 && which < (int)(sizeof(sizes) / sizeof(sizes[0])) ? sizes[which] : -1;
 }
 // Which instruction sets this processor has: 2 for AVX-512, 1 for AVX2, else 0.

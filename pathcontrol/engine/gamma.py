@@ -1,0 +1,104 @@
+"""The distance of states to the curve Γ of a task by the engine, which follows the nearest point along a run."""
+
+from __future__ import annotations
+
+from ctypes import addressof
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.engine.library import load_library
+from pathcontrol.engine.structs import Gamma, Memory
+from pathcontrol.engine.table import PathTable, bezier_points, task_table
+from pathcontrol.tasks.base import PathTask
+
+_TURN = 1 / 8  # rad over a piece of a cell, which is taken to hold one minimum at most
+_MOST_PIECES = 256
+_SAMPLES = 9  # of a cell, to see how far Γ turns in it
+
+
+class _Ready(NamedTuple):
+    table: PathTable
+    gamma: Gamma
+    memory: Memory
+
+
+_READY: WeakKeyDictionary[PathTask, dict[tuple[float, bool], _Ready]] = WeakKeyDictionary()
+
+
+def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braking: bool) -> tuple[Array, Array]:
+    """Return the distances [rad] of states (m, n) to Γ, and the parameters of the nearest points, (m,) each.
+
+    It is the global minimum at every state. States that follow one another, as those of a run, are fastest.
+
+    Args:
+        task: path and velocity profile.
+        q: joint positions [rad], (m, n).
+        qd: joint velocities [rad/s], (m, n).
+        weight: w [s], how much a velocity counts beside a position.
+        braking: take ϑ with the ending of the controllers' plan.
+
+    Raises:
+        EngineError: there is no compiled library, or the task has no table.
+    """
+    library = load_library()
+    table, path, kept = task_table(task)
+    known = _READY.setdefault(task, {}).get((weight, braking))
+    if known is None or known.table is not table:
+        memory = Memory()
+        gamma = Gamma(addressof(memory.keep(path)), weight, braking)
+        centre, radius = _balls(table, weight, braking)
+        gamma.centre, gamma.radius = memory.address(centre), memory.address(radius)
+        gamma.pieces = memory.address(_pieces(table, weight), np.int32)
+        memory.keep(kept)
+        known = _READY[task][weight, braking] = _Ready(table, gamma, memory)
+    states = np.concatenate([q, weight * qd], axis=-1)
+    distance, s = np.empty((2, len(states)))
+    arrays = (states, distance, s)
+    library.pathcontrol_gamma(addressof(known.gamma), 1, len(states), *(a.ctypes.data for a in arrays))
+    return distance, s
+
+
+def _velocity(table: PathTable) -> Array:
+    """r = q_d'ϑ as polynomials (K, 10, n) of s − knot, from the highest power down."""
+    c = table.coefficients
+    slope, rate = c[:, :-1, :-1] * np.arange(5, 0, -1)[:, None], c[..., -1]
+    r = np.zeros((len(c), 10, slope.shape[-1]))
+    for i in range(5):
+        r[:, i : i + 6] += slope[:, i, None] * rate[..., None]
+    return r
+
+
+def _balls(table: PathTable, weight: float, braking: bool) -> tuple[Array, Array]:
+    """A ball around [q_d; w r] in each cell, centres (K, 2n) and radii (K,), by Bézier points, which enclose curves."""
+    q, r = bezier_points(table.knots, table.coefficients[..., :-1]), bezier_points(table.knots, _velocity(table))
+    if braking and table.ending is not None:  # r times something between the shares at both ends
+        left = (table.ending.s_end - table.knots) / table.ending.braking
+        share = np.clip(left, 0.0, 1.0)[:, None, None]
+        r = np.concatenate([r * share[:-1], r * share[1:]], axis=1)
+    centres = [0.5 * (points.min(1) + points.max(1)) for points in (q, weight * r)]
+    radii = [
+        np.linalg.norm(points - centre[:, None], axis=-1).max(1)
+        for points, centre in zip((q, weight * r), centres, strict=True)
+    ]
+    return np.concatenate(centres, axis=-1), np.hypot(*radii) * (1 + 1e-12)
+
+
+def _pieces(table: PathTable, weight: float) -> Array:
+    """Into how many pieces each cell is cut so that Γ turns little over each, (K,)."""
+    width = np.diff(table.knots)
+    x = np.linspace(0.0, 1.0, _SAMPLES)[:, None] * width
+    tangents = []
+    for polynomials, factor in ((table.coefficients[..., :-1], 1.0), (_velocity(table), weight)):
+        degree = polynomials.shape[1] - 1
+        slope = np.zeros((_SAMPLES, len(width), polynomials.shape[-1]))
+        for power in range(degree):
+            slope = slope * x[..., None] + (degree - power) * polynomials[:, power]
+        tangents.append(factor * slope)
+    tangent = np.concatenate(tangents, axis=-1)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=-1, keepdims=True), np.finfo(float).tiny)
+    chord = np.linalg.norm(np.diff(tangent, axis=0), axis=-1)
+    turn = 2 * np.arcsin(np.minimum(chord / 2, 1.0)).sum(0)
+    return np.clip(np.ceil(turn / _TURN), 1, _MOST_PIECES).astype(np.int32)
