@@ -20,7 +20,7 @@ from pathcontrol.tasks.hermite import piecewise
 from pathcontrol.tasks.profile import ConstantRate
 from pathcontrol.tasks.recorded import RecordedPath
 
-_NODES = np.array([0.0, 1 / 3, 2 / 3, 1.0])  # of a cell, where ϑ is met; ϑ' at the first and the last
+_NODES = 0.5 - 0.5 * np.cos(np.pi * (2 * np.arange(6) + 1) / 12)  # of a cell, where ϑ is met
 _PROBES = np.array([0.15, 0.5, 0.85])  # of a cell, where table and task are compared
 _VALUE, _SLOPE = 1e-11, 1e-9  # allowed differences, of the extent of q_d or the largest ϑ, and of the largest slopes
 _RATE, _RATE_SLOPE = 1e-13, 1e-11  # the same of ϑ and ϑ' where cells are halved: ϑ moves the arm at once
@@ -105,8 +105,9 @@ def make_table(task: PathTask) -> PathTable:
     if not task.closed and not np.isfinite(task.s_end):
         raise EngineError(f"{name} neither ends nor repeats, so it has no table; give it an s_end or a period")
     recorded = RecordedPath.of(task, ConstantRate(1.0))
-    knots = _refined(task, recorded.samples if task.knots is not None else _halved(recorded.samples))
-    jets = recorded.jets if len(knots) == len(recorded.samples) else _jets(task, knots)
+    samples = recorded.samples if task.knots is not None else _halved(recorded.samples)
+    knots = _refined(task, _with_corners(task, samples))
+    jets = recorded.jets if np.array_equal(knots, recorded.samples) else _jets(task, knots)
     rate = _rate_pieces(task, knots[:-1], knots[1:])
     coefficients = np.concatenate([piecewise(knots, jets).c, rate[..., None]], axis=-1)
     ending = Ending.of(task)
@@ -144,15 +145,12 @@ def _theta(task: PathTask, s: Array) -> tuple[Array, Array]:
 
 
 def _rate_pieces(task: PathTask, left: Array, right: Array) -> Array:
-    """Quintics (6, K) that meet ϑ at the ends and thirds of cells ``left`` to ``right`` (K,), and ϑ' at the ends."""
+    """Quintics (6, K) that meet ϑ at the Chebyshev nodes of the cells from ``left`` to ``right``, (K,) each."""
     width = right - left
     s = left + _NODES[:, None] * width
-    s[-1] = right
-    theta, slope = (part.reshape(s.shape) for part in _theta(task, s.reshape(-1)))
+    theta = _theta(task, s.reshape(-1))[0].reshape(s.shape)
     powers = np.arange(_DEGREE, -1, -1)
-    slopes = powers * np.array([[0.0], [1.0]]) ** np.maximum(powers - 1, 0)
-    matrix = np.concatenate([_NODES[:, None] ** powers, slopes])
-    return np.linalg.solve(matrix, np.concatenate([theta, slope[[0, -1]] * width])) / width ** powers[:, None]
+    return np.linalg.solve(_NODES[:, None] ** powers, theta) / width ** powers[:, None]
 
 
 def _horner(coefficients: Array, x: Array) -> tuple[Array, Array]:
@@ -164,32 +162,49 @@ def _horner(coefficients: Array, x: Array) -> tuple[Array, Array]:
     return value, slope
 
 
+def _with_corners(task: PathTask, knots: Array) -> Array:
+    """``knots`` and those of the profile, where ϑ' may jump, in the first lap of a closed path."""
+    if task.profile_knots is None:
+        return knots
+    lower, upper = knots[0], knots[-1]
+    corners = np.asarray(task.profile_knots, dtype=np.float64)
+    if task.period is not None:
+        corners = lower + np.mod(corners - lower, task.period)
+    every = np.union1d(knots, corners[(corners > lower) & (corners < upper)])
+    apart = np.diff(every) > 1e-12 * (upper - lower)
+    return np.append(every[:-1][apart], upper)
+
+
 def _halved(knots: Array) -> Array:
     """``knots`` with one more in the middle of each cell: q_d'' of a smooth path is 16 times closer then."""
     return np.sort(np.concatenate([knots, 0.5 * (knots[1:] + knots[:-1])]))
 
 
 def _refined(task: PathTask, knots: Array) -> Array:
-    """``knots`` with cells halved until quintics follow ϑ in them."""
-    coarse, most = _coarse(task, knots, np.arange(len(knots) - 1)), len(knots) + _MOST_CELLS
+    """``knots`` with cells halved until quintics follow ϑ in them, within shares of the largest ϑ and |ϑ'|."""
+    theta, slope = _theta(task, 0.5 * (knots[1:] + knots[:-1]))
+    scale = np.abs(theta).max(), np.abs(slope).max()
+    coarse, most = _coarse(task, knots, np.arange(len(knots) - 1), *scale), len(knots) + _MOST_CELLS
     for _ in range(_HALVINGS):
         if not coarse.size or len(knots) + len(coarse) > most:
             break
         knots = np.insert(knots, coarse + 1, 0.5 * (knots[coarse] + knots[coarse + 1]))
         halves = coarse + np.arange(len(coarse))
-        coarse = _coarse(task, knots, np.sort(np.concatenate([halves, halves + 1])))
+        coarse = _coarse(task, knots, np.sort(np.concatenate([halves, halves + 1])), *scale)
     return knots
 
 
-def _coarse(task: PathTask, knots: Array, cells: NDArray[np.intp]) -> NDArray[np.intp]:
+def _coarse(task: PathTask, knots: Array, cells: NDArray[np.intp], largest: float, steepest: float) -> NDArray[np.intp]:
     """Those of the ``cells`` in which ϑ and its quintic differ too much."""
     left, right = knots[cells], knots[cells + 1]
     x = _PROBES[:, None] * (right - left)
     theta, slope = (part.reshape(x.shape) for part in _theta(task, (left + x).reshape(-1)))
     value, rise = _horner(_rate_pieces(task, left, right)[:, None], x)
-    largest, steepest = np.abs(theta).max(initial=0.0), np.abs(slope).max(initial=0.0)
-    apart = np.abs(value - theta).max(0, initial=0.0) > _RATE * largest + _ROUNDING * largest
-    bent = np.abs(rise - slope).max(0, initial=0.0) > _RATE_SLOPE * steepest + _ROUNDING * largest / (right - left)
+    local = np.abs(slope).max(0, initial=0.0)
+    # what is asked for cannot be less than what ϑ changes by in the rounding of s
+    rounding = _ROUNDING * (largest + local * np.abs(right))
+    apart = np.abs(value - theta).max(0, initial=0.0) > _RATE * largest + rounding
+    bent = np.abs(rise - slope).max(0, initial=0.0) > _RATE_SLOPE * (steepest + local) + 8 * rounding / (right - left)
     return cells[apart | bent]
 
 
