@@ -415,12 +415,13 @@ def test_a_run_is_the_same_however_often_its_room_grows(arm, circle, room, monke
         np.testing.assert_array_equal(run().array(name), plenty.array(name), err_msg=name)
 
 
-def test_a_run_that_ends_long_before_its_time_keeps_no_room_for_the_rest(arm, circle, monkeypatch):
-    recorders = []
+@pytest.mark.parametrize("engine", ["compiled", "pinocchio"])
+def test_a_run_that_ends_long_before_its_time_keeps_no_room_for_the_rest(arm, circle, engine, monkeypatch):
+    recorders, module = [], {"compiled": "compiled", "pinocchio": "sampled"}[engine]
     monkeypatch.setattr(
-        "pathcontrol.simulation.sampled.Recorder", lambda *a: recorders.append(Recorder(*a)) or recorders[-1]
+        f"pathcontrol.simulation.{module}.Recorder", lambda *a: recorders.append(Recorder(*a)) or recorders[-1]
     )
-    run = simulate(paper_law(arm, circle), START, duration=1e7, laps=1, progress=False)
+    run = simulate(paper_law(arm, circle), START, duration=1e7, laps=1, engine=engine, progress=False)
     assert run.finish_time[0] < 5
     kept = sum(array.nbytes for array in recorders[0].arrays().values())
     owned = sum(array.base.nbytes for array in recorders[0].arrays().values())

@@ -104,7 +104,10 @@ def make_table(task: PathTask) -> PathTable:
     name = type(task).__name__
     if not task.closed and not np.isfinite(task.s_end):
         raise EngineError(f"{name} neither ends nor repeats, so it has no table; give it an s_end or a period")
-    recorded = RecordedPath.of(task, ConstantRate(1.0))
+    try:
+        recorded = RecordedPath.of(task, ConstantRate(1.0))
+    except Exception as error:  # code of the user, which need not answer everywhere
+        raise EngineError(f"{name} cannot be tabulated: {error}") from error
     samples = recorded.samples if task.knots is not None else _halved(recorded.samples)
     knots = _refined(task, _with_corners(task, samples))
     jets = recorded.jets if np.array_equal(knots, recorded.samples) else _jets(task, knots)

@@ -75,5 +75,5 @@ class Recorder:
         self._room = min(2 * self._room, self._most)
         for name, array in self._arrays.items():
             larger = np.empty((self._room, *array.shape[1:]), dtype=array.dtype)
-            larger[: self._samples] = array
+            larger[: self._samples] = array[: self._samples]
             self._arrays[name] = larger
