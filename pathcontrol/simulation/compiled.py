@@ -60,7 +60,7 @@ class CompiledPlant:
 
     def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
         """Return (q, q̇) one step later under the constant torque ``tau``; all (N, n)."""
-        q, qd = np.array(q), np.array(qd)
+        q, qd = np.array(q, order="C"), np.array(qd, order="C")
         torque = np.ascontiguousarray(tau)
         self._advance(addressof(self._setup), self.step, q.ctypes.data, qd.ctypes.data, torque.ctypes.data, 0, len(q))
         return q, qd
@@ -103,7 +103,7 @@ class CompiledArm:
         reading = sensors.start(*self._seen(q, qd))
         reading = sensors.read(*self._seen(q, qd), reading)
         self._state = {"q": q, "qd": qd, "q_read": reading.q, "qd_read": reading.qd}
-        self._state = {name: np.array(value, dtype=np.float64) for name, value in self._state.items()}
+        self._state = {name: np.array(value, dtype=np.float64, order="C") for name, value in self._state.items()}
         self._state["queue"] = np.zeros((actuator.waiting, *q.shape))
         self.divergence = Divergence(q, qd)
 
