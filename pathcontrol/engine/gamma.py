@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from ctypes import addressof
 from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol._identity import KnownOf
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.structs import Gamma, Memory
 from pathcontrol.engine.table import PathTable, bezier_points, task_table
@@ -25,7 +25,7 @@ class _Ready(NamedTuple):
     memory: Memory
 
 
-_READY: WeakKeyDictionary[PathTask, dict[tuple[float, bool], _Ready]] = WeakKeyDictionary()
+_READY: KnownOf[PathTask, dict[tuple[float, bool], _Ready]] = KnownOf()
 
 
 def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braking: bool) -> tuple[Array, Array]:
@@ -45,7 +45,8 @@ def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braki
     """
     library = load_library()
     table, path, kept = task_table(task)
-    known = _READY.setdefault(task, {}).get((weight, braking))
+    ready = _READY.get(task) or _READY.keep(task, {})
+    known = ready.get((weight, braking))
     if known is None or known.table is not table:
         memory = Memory()
         gamma = Gamma(addressof(memory.keep(path)), weight, braking)
@@ -53,7 +54,7 @@ def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braki
         gamma.centre, gamma.radius = memory.address(centre), memory.address(radius)
         gamma.pieces = memory.address(_pieces(table, weight), np.int32)
         memory.keep(kept)
-        known = _READY[task][weight, braking] = _Ready(table, gamma, memory)
+        known = ready[weight, braking] = _Ready(table, gamma, memory)
     states = np.concatenate([q, weight * qd], axis=-1)
     distance, s = np.empty((2, len(states)))
     arrays = (states, distance, s)

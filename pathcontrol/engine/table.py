@@ -5,12 +5,12 @@ from __future__ import annotations
 from ctypes import addressof
 from math import comb
 from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
+from pathcontrol._identity import KnownOf
 from pathcontrol.control.ending import Ending, arrival_parameter
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.structs import Memory, Path
@@ -70,7 +70,7 @@ class PathTable(NamedTuple):
         return _horner(np.moveaxis(self.coefficients[cell], 1, 0), (s - self.knots[cell])[:, None])
 
 
-_TABLES: WeakKeyDictionary[PathTask, tuple[PathTable, Path, Memory]] = WeakKeyDictionary()
+_TABLES: KnownOf[PathTask, tuple[PathTable, Path, Memory]] = KnownOf()
 
 
 def path_struct(task: PathTask) -> tuple[Path, Memory]:
@@ -91,7 +91,7 @@ def task_table(task: PathTask) -> tuple[PathTable, Path, Memory]:
     known = _TABLES.get(task)
     if known is None or not _is_like(known[0], task):
         table, memory = make_table(task), Memory()
-        known = _TABLES[task] = table, table.struct(memory), memory
+        known = _TABLES.keep(task, (table, table.struct(memory), memory))
     return known
 
 
