@@ -52,7 +52,8 @@ def test_what_continuous_time_cannot_is_an_error_when_asked_for():
     ],
 )
 def test_laws_and_disturbances_in_python_run_on_the_compiled_plant(options, name):
-    runs = [_run(**options, engine=engine) for engine in ("auto", "pinocchio")]
+    starts = np.array([[0.9, 0.1], [0.8, 0.2], [1.0, -0.1]])  # with the same q̇, whose array has another layout
+    runs = [_run(q=starts, **options, engine=engine) for engine in ("auto", "pinocchio")]
     assert runs[0].config["engine"] == "compiled"
     assert name in runs[0].config["engine_reason"]
     assert np.abs(runs[0].array("q") - runs[1].array("q")).max() < 1e-12
@@ -185,3 +186,22 @@ def test_sweeps_choose_the_engine(tmp_path):
     assert np.abs(peaks[0] - peaks[1]).max() < 1e-10
     with pytest.raises(pc.UnknownNameError, match="engine = 'fast'"):
         pc.sweep(build, space, tmp_path / "no", engine="fast")
+
+
+def test_a_task_without_a_hash_has_a_table_too():
+    from dataclasses import dataclass
+
+    @dataclass
+    class Round(pc.PathTask):
+        radius: float
+        period = 2 * np.pi
+
+        def q_d(self, s):
+            return self.radius * np.stack([np.cos(s), np.sin(s)], axis=-1)
+
+        def theta(self, s):
+            return 2.0 + 0.0 * s
+
+    law = pc.ExtendedMotionPlan(ROBOT, Round(1.0), 800.0, [45.0, 100.0], k=20.0)
+    assert _run(law).config["engine"] == "compiled"
+    assert np.abs(_run(law).array("q") - _run().array("q")).max() < 1e-10
