@@ -25,7 +25,7 @@ class Wind(pc.Disturbance):
 
 
 def _run(law=LAW, q=(0.9, 0.1), **options):
-    return pc.simulate(law, np.asarray(q), duration=0.5, progress=False, **options)
+    return pc.simulate(law, np.asarray(q), duration=0.5, progress=False, **{"engine": "auto"} | options)
 
 
 def test_auto_is_compiled_where_that_can_be_and_says_so():
@@ -161,10 +161,10 @@ def test_experiment_files_and_the_command_line_choose_the_engine(tmp_path):
 
     file = tmp_path / "one.toml"
     file.write_text(EXPERIMENT.format(engine=""))
-    assert run_experiment(file, tmp_path / "a", progress=False).run.config["engine"] == "compiled"
-    assert run_experiment(file, tmp_path / "b", engine="pinocchio").run.config["engine"] == "pinocchio"
-    file.write_text(EXPERIMENT.format(engine='engine = "pinocchio"'))
-    assert run_experiment(file, tmp_path / "c", progress=False).run.config["engine"] == "pinocchio"
+    assert run_experiment(file, tmp_path / "a", progress=False).run.config["engine"] == "pinocchio"
+    assert run_experiment(file, tmp_path / "b", engine="auto").run.config["engine"] == "compiled"
+    file.write_text(EXPERIMENT.format(engine='engine = "compiled"'))
+    assert run_experiment(file, tmp_path / "c", progress=False).run.config["engine"] == "compiled"
     file.write_text(EXPERIMENT.format(engine='engine = "fast"'))
     with pytest.raises(pc.ExperimentError, match=r"engine.*'fast'"):
         run_experiment(file, tmp_path / "d")

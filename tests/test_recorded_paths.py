@@ -346,7 +346,7 @@ def test_the_samples_are_values_of_the_function(task):
         ({"class": "ConstantRate", "rate": 1.0}, "expected one of a task"),
         ({"class": "Line", "start": {"shape": [9], "at": 0}, "end": 0, "speed": 1}, r"shape \[9\] is said to be at 0"),
         ({"class": "Line", "start": {"shape": [-1], "at": 0}, "end": 0, "speed": 1}, r"shape \[-1\]"),
-        ({"class": "Line", "start": {"shape": [2], "at": -1}, "end": 0, "speed": 1}, "is said to be at -1"),
+        ({"class": "Line", "start": {"shape": [2], "at": -1}, "end": 0, "speed": 1}, "to be at -1"),
         ([], "expected one of a task"),
         ("Circle", "expected one of a task"),
     ],

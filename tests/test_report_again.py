@@ -13,8 +13,9 @@ from lxml import html
 import pathcontrol as pc
 from pathcontrol import Circle, RobotModel, Run
 from pathcontrol.simulation.origin import Origin
+from pathcontrol.view.report.code import call
 from pathcontrol.view.report.report import report
-from pathcontrol.view.report.reproduction import _call, recipe
+from pathcontrol.view.report.reproduction import recipe
 
 LAWS = {
     "plan": lambda robot, task: pc.ExtendedMotionPlan(robot, task, K_p=[800.0, 600.0], K_v=45.0, k=20.0),
@@ -89,7 +90,7 @@ def test_names_that_are_no_arguments_get_into_no_script(arm, circle):
 @given(st.text(), st.lists(st.one_of(st.floats(allow_nan=False), st.none(), st.text(), st.booleans()), max_size=3))
 def test_values_in_a_script_stay_values(text, values):
     namespace = {"inf": np.inf}
-    exec(f"made = {_call('dict', [], {'text': text, 'values': values})}", namespace)
+    exec(f"made = {call('dict', [], {'text': text, 'values': values})}", namespace)
     assert namespace["made"] == {"text": text, "values": values}
 
 

@@ -42,7 +42,7 @@ class Divergence:
     def __init__(self, q: Array, qd: Array) -> None:
         self._home, rollouts = Reading(q, qd), len(q)
         self.time, self.reason = np.full(rollouts, np.nan), np.full(rollouts, "", dtype=object)
-        self.lost, self.any = np.zeros(rollouts, dtype=bool), False
+        self.lost, self.any, self._why = np.zeros(rollouts, dtype=bool), False, ""
 
     @property
     def all(self) -> bool:
@@ -68,10 +68,17 @@ class Divergence:
         self.any = bool(self.lost.any())
 
     def explain(self, *causes: str) -> None:
-        """Say instead of what to try why states left all bounds, where ``causes`` are known; empty ones are none."""
-        if why := "; ".join(filter(None, causes)):
-            told = self.lost & (self.reason != NO_NUMBERS)
-            self.reason = np.where(told, f"its state left all bounds: {why}", self.reason).astype(object)
+        """Say in the error of :meth:`check` why states left all bounds, where ``causes`` are known, which may be empty.
+
+        ``reason`` stays what it is: the causes are those of a batch, and a rollout has the same reason alone.
+        """
+        self._why = "; ".join(filter(None, causes))
+
+    def _told(self, row: int) -> str:
+        """The reason of a rollout with what is known of its cause."""
+        if not self._why or self.reason[row] == NO_NUMBERS:
+            return str(self.reason[row])
+        return f"its state left all bounds: {self._why}"
 
     def home(self, q: Array, qd: Array) -> tuple[Array, Array]:
         """(q, q̇), each (N, n), with lost rollouts where they started."""
@@ -101,12 +108,12 @@ class Divergence:
         if not self.all:
             return
         if len(self.time) == 1:
-            message = f"rollout 0 diverged at t = {self.time[0]:.4g} s: {self.reason[0]}"
+            message = f"rollout 0 diverged at t = {self.time[0]:.4g} s: {self._told(0)}"
         else:
             last = int(np.argmax(self.time))
             message = (
                 f"all {len(self.time)} rollouts diverged, the last one, {last}, at t = {self.time[last]:.4g} s: "
-                f"{self.reason[last]}"
+                f"{self._told(last)}"
             )
         raise SimulationError(message, run)
 

@@ -64,7 +64,7 @@ def longest_period(feedback: Feedback, robot: RobotModel, uncompensated: Array, 
         period: h [s].
     """
     M = robot.mass_matrix(q)
-    damping = np.broadcast_to(robot.friction.viscous, (len(q), robot.n))
+    damping = np.broadcast_to(np.atleast_2d(robot.friction.viscous)[0], (len(q), robot.n))
     G_v = feedback.G_v + _on(uncompensated, M)
 
     def stable(h: float) -> bool:

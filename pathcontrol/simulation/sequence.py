@@ -59,7 +59,7 @@ def simulate_sequence(
     plant: RobotModel | None = None,
     loop: SampledLoop | ContinuousTime | None = None,
     disturbance: Disturbance | None = None,
-    engine: Engine = "auto",
+    engine: Engine = "pinocchio",
     progress: bool = True,
 ) -> Run:
     """Simulate several paths of one arm, each from where the arm is when the one before is finished.
@@ -117,7 +117,7 @@ def simulate_sequence(
         legs.append(_Leg(arrays, float(finish.time[0]), law.task.s0, _length(law.task, laps)))
         if arm.divergence.any or np.isnan(legs[-1].finish_time):
             break
-    arm.divergence.explain(slow, slip)
+    arm.divergence.explain(slip or slow)
     arrays, outcome = _joined(legs, len(laws), period, arm.divergence)
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws))
     paths = f"{len(laws)} path{'s' if len(laws) > 1 else ''}"

@@ -45,7 +45,7 @@ def simulate(
     loop: SampledLoop | ContinuousTime | None = None,
     disturbance: Disturbance | None = None,
     first_rollout: int = 0,
-    engine: Engine = "auto",
+    engine: Engine = "pinocchio",
     progress: bool = True,
 ) -> Run:
     """Simulate a control law on an arm.
@@ -74,7 +74,7 @@ def simulate(
         disturbance: what else pushes the arm, such as :class:`Push`, or a sum; its time counts from the start.
         first_rollout: number of the first rollout, where this is a part of a larger batch: rollouts are numbered from
             it, and their random numbers depend on their numbers.
-        engine: ``"compiled"``, ``"pinocchio"`` (NumPy and Pinocchio, the reference), or ``"auto"``: compiled where that
+        engine: ``"pinocchio"`` (NumPy and Pinocchio, the reference), ``"compiled"``, or ``"auto"``: compiled where that
             can be, else the reference. ``run.config`` says which it was, and why not the compiled one.
         progress: show a bar on standard error when it takes longer than two seconds.
 
@@ -104,7 +104,7 @@ def simulate(
     settings = {"duration": duration, "laps": laps, "until": until, "first_rollout": first} | said
     config = record_of(controller.describe(), robot, loop, disturbance, **settings)
     arrays = arm.run(controller, duration, finish, progress)
-    arm.divergence.explain(slow, slip)
+    arm.divergence.explain(slip or slow)
     outcome = arm.divergence.outcome() | ({} if finish is None else {"finish_time": finish.time})
     if controller.task.closed:
         outcome["laps"] = whole_laps(controller.task, *first_and_last(arrays["s"]))

@@ -61,7 +61,7 @@ class Job(NamedTuple):
 
 def on_engine(build: Build, engine: Engine) -> Build:
     """Return what builds a chunk, for simulations that run on ``engine`` where it says none itself."""
-    return build if engine == "auto" else OnEngine(build, engine)
+    return build if engine == "pinocchio" else OnEngine(build, engine)
 
 
 @dataclass(frozen=True)

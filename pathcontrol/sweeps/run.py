@@ -44,7 +44,7 @@ def sweep(
     progress: bool = True,
     cluster: str | Path | Client | None = None,
     security: Security | None = None,
-    engine: Engine = "auto",
+    engine: Engine = "pinocchio",
 ) -> SweepResult:
     """Simulate every sample of a space, a chunk at a time, and keep its numbers on disk.
 
@@ -94,7 +94,7 @@ def sweep(
         job = Job(on_engine(build, engine), measure, keep, keep.at_random(space.samples, seed))
         computed = partial(_computed_here, job) if client is None else Desk(client, job).chunks
         definition = _definition(build, space, design, metrics, keep, seed)
-        definition |= {} if engine == "auto" else {"engine": engine}
+        definition |= {} if engine == "pinocchio" else {"engine": engine}
         with opened(Path(out), space.samples, definition, resume) as store:
             store.tidy(keep, job.at_random)
             missing, done = store.missing(chunk), 0

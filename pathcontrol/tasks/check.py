@@ -101,6 +101,9 @@ def _check_cusps(task: PathTask, name: str, s: Array) -> None:
         ahead = (_directions(task, middle) * before).sum(-1) > 0
         left, right = np.where(ahead, middle, left), np.where(ahead, right, middle)
     cosine = (_directions(task, left) * _directions(task, right)).sum(-1)
+    # between the paths of a sequence the arm comes to rest, and may turn round
+    rests = np.asarray(getattr(task, "starts", ()))
+    cosine[np.isclose(left[:, None], rests, rtol=0, atol=1e-9 * (s[-1] - s[0])).any(-1)] = 1.0
     if cosine.min() < _OPPOSITE:
         raise TaskError(
             f"{name} turns back at s = {left[int(np.argmin(cosine))]:g}, expected a path without cusps: no arm that "

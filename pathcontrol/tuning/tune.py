@@ -45,7 +45,7 @@ def tune(
     out: str | Path | None = None,
     resume: bool = False,
     progress: bool = True,
-    engine: Engine = "auto",
+    engine: Engine = "pinocchio",
 ) -> Tuning:
     """Search gains, or other parameters, for objectives within limits; all of a generation is one batch of simulations.
 
@@ -104,7 +104,7 @@ def tune(
             "generations": generations,
             "seed": seed,
         }
-        | ({} if engine == "auto" else {"engine": engine})
+        | ({} if engine == "pinocchio" else {"engine": engine})
     )
     total, measure = population * generations * count, measure_of(wanted)
     folder = nullcontext() if out is None else opened(Path(out), total, json.loads(json.dumps(definition)), resume)
