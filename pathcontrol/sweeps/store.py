@@ -283,7 +283,9 @@ class Store:
                 if opened.metadata.num_rows != len(_samples(place)):
                     raise InputError(f"it has {opened.metadata.num_rows} rows")
                 there = opened.schema_arrow.names
-                table = opened.read(columns=None if names is None else [name for name in names if name in there])
+                some = None if names is None else [name for name in names if name in there]
+                # threads of the pool that are still at work when Python ends abort the process
+                table = opened.read(columns=some, use_threads=False)
             columns = {name: _values(table.column(name)) for name in table.column_names}
             _check_samples(columns.get("sample"), self.samples)
         except (InputError, OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
