@@ -205,7 +205,8 @@ def test_ctrl_c_cancels_what_is_out_and_keeps_what_is_in(workers, tmp_path):
         with pytest.raises(KeyboardInterrupt):
             swept(folder, space=many, build=endless, cluster=client)
         wait_until(lambda: not workers.scheduler.tasks)
-    assert 4 <= pc.SweepResult(folder).finished < 100
+    # two files are there: the first of them is noted, the other may not be yet, and then does not count
+    assert 2 <= pc.SweepResult(folder).finished < 100
     assert not list(folder.rglob("*/.*"))
 
 

@@ -153,7 +153,7 @@ class Desk:
                     self._parcel, broadcast=True, direct=self._direct, hash=False, timeout=_RESTART
                 ),
             )
-        except (OSError, TimeoutError):  # a worker died, or froze, meanwhile
+        except (OSError, TimeoutError, KeyError):  # a worker died, or froze, or is gone from the scheduler, meanwhile
             self._check_scheduler()
             drop_silent_workers(self._client, _SILENCE)
             time.sleep(_POLL)
