@@ -181,9 +181,9 @@ def test_a_damped_arm_held_by_stiction_does_not_move_by_one_bit():
     assert_array_equal(speeds, 0.0)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(12))
 def test_peaks_at_one_step_a_period_are_those_of_many(seed):
-    """‖e_p‖ of a sinusoid, of random arms with h b/2M from 0.01 to 100, with dry friction and without."""
+    """‖e_p‖ of a sinusoid from rest, of random arms with h b/2M from 0.01 to 100, with dry friction and without."""
     rng = np.random.default_rng(seed)
     n = 2 + seed % 3
     arm, phases = chain(rng, n), rng.uniform(0, 6, n)
@@ -191,10 +191,10 @@ def test_peaks_at_one_step_a_period_are_those_of_many(seed):
     viscous = Viscous(10 ** rng.uniform(-2, 2, n) * 2 * m / STEP)
     arm = arm.with_friction(viscous + Coulomb(seed % 2 * rng.uniform(0, 3, n) * m))
     task = Lissajous(rng.uniform(0.2, 1.0, n), np.ones(n), phases=phases, speed=rng.uniform(1, 4))
-    law = ComputedTorque(arm, task, 400.0, 40.0) if seed < 2 else ExtendedMotionPlan(arm, task, 400.0, 40.0, k=5.0)
+    law = ComputedTorque(arm, task, 400.0, 40.0) if seed % 4 < 2 else ExtendedMotionPlan(arm, task, 400.0, 40.0, k=5.0)
     start, peaks = task.q_d(np.array(task.s0)) + 0.05, []
     for substeps in (1, 64):
         loop = SampledLoop(period=STEP, substeps=substeps)
         errors = np.linalg.norm(simulate(law, start, duration=0.8, loop=loop, progress=False).array("e_p"), axis=-1)[0]
-        peaks.append(errors[len(errors) // 2 :].max())
-    assert peaks[0] == pytest.approx(peaks[1], rel=0.01)
+        peaks.append([errors.max(), errors[len(errors) // 2 :].max()])
+    assert_allclose(peaks[0], peaks[1], rtol=0.02)

@@ -75,7 +75,7 @@ class Plant:
         middle_q = q + self._quarter * (qd + middle_qd)
         next_qd = self._free(middle_q, middle_qd, qd, drive, dry, self._whole)
         if isinstance(self._damped, slice) or len(self._damped):
-            inertia, travel = self._condense(middle_q, qd, next_qd, dry)
+            inertia, travel = self._condense(middle_q, qd, next_qd, dry, middle_qd)
             self._hinder(next_qd, middle_q, middle_qd, dry, self._whole, inertia)
             next_q = q + self._half * (qd + next_qd)
             next_q[self._damped] += self._whole * _times(travel, (next_qd - qd)[self._damped])
@@ -93,11 +93,11 @@ class Plant:
         forward_dynamics = self._of_one if len(q) == 1 else self._inertia.forward_dynamics
         return start + duration * forward_dynamics(q, u, drive - dry[2])
 
-    def _condense(self, q: Array, qd: Array, v: Array, dry: _Dry) -> tuple[Array, Array]:
+    def _condense(self, q: Array, qd: Array, v: Array, dry: _Dry, middle_qd: Array) -> tuple[Array, Array]:
         """M̃(q) and XB/h, (k, n, n), of rows with strong viscous friction, whose ``v`` becomes what it ought to be."""
         rows, one = self._damped, len(self._viscous) == 1
         M = _mass_matrix(self.robot, q[rows], np.arange(len(q))[rows])
-        inertia, travel = self._damping.condense(M, ((qd != _ZERO) | (dry[0] <= dry[1]))[rows])
+        inertia, travel = self._damping.condense(M, ((qd != _ZERO) | (middle_qd != _ZERO) | (dry[0] <= dry[1]))[rows])
         change = (v - qd)[rows]
         momentum = _times(M, change) + self._half * (self._viscous if one else self._viscous[rows]) * change
         v[rows] = qd[rows] + np.linalg.solve(inertia, momentum[..., None])[..., 0]
