@@ -114,7 +114,7 @@ static NOINLINE void advance_plant(const Arm<C> &arm, const Friction<V> &law, Ma
   dynamics_at<N>(arm, law, middle_q, middle_qd, at);
   if (any(damped)) {
     Mask<V> moving[room<N>()];
-    for (int i = 0; i < n; i++) moving[i] = ~equal(qd[i], V{}) | less_equal(at.forward[i], at.backward[i]);
+    for (int i = 0; i < n; i++) moving[i] = ~equal(qd[i], V{}) | ~equal(middle_qd[i], V{}) | less_equal(at.forward[i], at.backward[i]);
     condense<N>(n, at.M, law.viscous, h, moving, inertia, travel);
     for (int i = 0; i < n; i++)
       for (int j = 0; j < n; j++) {
