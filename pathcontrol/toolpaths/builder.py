@@ -49,6 +49,16 @@ class ContourBuilder:
         if math.dist(target, self._corners[-1]) > _NOTHING:
             self._corners.append(target)
 
+    def lines_to(self, points: Array) -> None:
+        """Straight moves to finite points (k, 3), one after another; those of no length are left out."""
+        steps = np.diff(np.concatenate([self._corners[-1:], points]), axis=0)
+        targets = map(tuple, points.tolist())
+        if (np.abs(steps) > _NOTHING).any(1).all():
+            self._corners.extend(targets)
+            return
+        for target in targets:
+            self.line_to(target)
+
     def add(self, segment: Segment) -> None:
         """A curved piece, which begins where the contour has come to; a gap there is closed by a straight move."""
         self.line_to(segment.first)

@@ -46,7 +46,7 @@ class Modes:
         if "F" in block.words:
             if before not in (None, self.unit):
                 raise ToolpathError("F where the unit changes is another feed on other machines: give it its own line")
-            self.feed = self.length("F", block.words["F"]) / 60
+            self.feed = self.feed_of(block.words["F"])
             if not 0 < self.feed < math.inf:
                 raise ToolpathError(f"F{block.words['F']:g} is no feed, expected a number greater than 0")
         self.motion = codes.get("motion", None if "end of motion" in codes else self.motion)
@@ -59,6 +59,10 @@ class Modes:
     def length(self, letter: str, value: float) -> float:
         """The value of a word [m]."""
         return value * self.known_unit(f"{letter}{value:g}").scale
+
+    def feed_of(self, value: float) -> float:
+        """The value of F [m/s]."""
+        return self.length("F", value) / 60
 
     def known_unit(self, needed_by: str) -> Unit:
         """The unit in force, which must be known by now."""

@@ -12,6 +12,7 @@ from pathcontrol.toolpaths.gcode.cycles import DRILLING, Drilling
 from pathcontrol.toolpaths.gcode.frame import Frame
 from pathcontrol.toolpaths.gcode.harmless import without_codes, without_letters
 from pathcontrol.toolpaths.gcode.modes import Modes
+from pathcontrol.toolpaths.gcode.runs import read_run
 from pathcontrol.toolpaths.gcode.strokes import Strokes
 from pathcontrol.toolpaths.gcode.words import Block
 from pathcontrol.toolpaths.passed import Passed
@@ -62,6 +63,20 @@ class Program:
         else:
             self._leave(block, codes, name)
         return PROGRAM_END.isdisjoint(block.m)
+
+    def follow(self, texts: Sequence[str], first: int) -> int:
+        """Carry out the lines from the index ``first`` on that only go on as the last move did; how many they are."""
+        rapid, feed = self.modes.motion == _RAPID, self.modes.feed
+        straight = rapid or (self.modes.motion == _LINE and feed is not None)
+        if not straight or self._drilling or not self.strokes.goes_on(None if rapid else feed):
+            return 0
+        if any(map(math.isnan, self._position)):
+            return 0
+        count, points = read_run(texts, first, self.strokes.left, self._position, self.modes)
+        if len(points):
+            self.strokes.follow(points)
+            self._position = points[-1].tolist()
+        return count
 
     def _turning(self, block: Block) -> bool:
         """Whether the motion of a block is an arc or a cycle."""

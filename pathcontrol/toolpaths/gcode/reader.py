@@ -68,7 +68,7 @@ def read_gcode(
     if arc_tolerance is not None:
         arc_tolerance = scalar("arc_tolerance", arc_tolerance, positive=True)
     passed = Passed(unknown)
-    texts = [without_comments(line) for line in read_lines(path, "a G-code program")]
+    texts = [without_comments(line).strip(" \t") for line in read_lines(path, "a G-code program")]
     modes = Modes(None if unit is None else UNITS[unit], feed=feed, arc_tolerance=arc_tolerance)
     program = Program(modes, _start(start, texts), passed)
     try:
@@ -96,8 +96,9 @@ def _start(start: ArrayLike | None, texts: list[str]) -> list[float]:
 
 def _run(program: Program, texts: Sequence[str], passed: Passed) -> None:
     """Carry out the lines, each an error by its number, until the program ends."""
-    began = False
-    for number, text in enumerate((text.strip(" \t") for text in texts), 1):
+    began, number = False, 0
+    while number < len(texts):
+        text, number = texts[number], number + 1
         try:
             if PERCENT.fullmatch(text):
                 if began:
@@ -109,5 +110,6 @@ def _run(program: Program, texts: Sequence[str], passed: Passed) -> None:
                 began = True
                 if not program.carry_out(parse(text), number):
                     return
+                number += program.follow(texts, number)
         except ToolpathError as error:
             raise ToolpathError(f"line {number}: {error}") from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.arc import Arc
 from pathcontrol.toolpaths.builder import ContourBuilder
@@ -25,6 +26,21 @@ class Strokes:
     def begun(self) -> bool:
         """Whether there was a move."""
         return self._moves > 0
+
+    @property
+    def left(self) -> int:
+        """How many more moves there may be."""
+        return MAX_SEGMENTS - self._moves
+
+    def goes_on(self, feed: float | None) -> bool:
+        """Whether the next move at ``feed`` [m/s], or None for a rapid, goes on with a contour that has a length."""
+        return self._builder is not None and not self._builder.empty and feed == self._feed
+
+    def follow(self, points: Array) -> None:
+        """Go straight through points (k, 3) [m], as the last move did; they are at most :attr:`left`."""
+        assert self._builder is not None
+        self._moves += len(points)
+        self._builder.lines_to(points)
 
     def move(self, start: Sequence[float], way: Sequence[float] | Arc, feed: float | None, name: str) -> None:
         """Go from ``start`` [m], (3,), along an arc or straight to a point at ``feed`` [m/s], or None for a rapid."""

@@ -19,6 +19,19 @@ _BLOCK = re.compile(
     rf"[ \t]*(?:[A-Za-z][ \t]*{_NUMBER}{_EXPONENT}[ \t]*)*"
 )  # unambiguous, so that matching takes linear time
 
+
+def _optional(letters: str, value: str) -> str:
+    """Return the pattern of a word that may be missing, whose value is a group."""
+    return rf"(?:[{letters}][ \t]*({value})[ \t]*)?"
+
+
+#: a line that says no more than where a straight move leads, if anything: the digit of G0 or G1, then X, Y, Z and F
+PLAIN = re.compile(
+    r"[ \t]*(?:[Nn][ \t]*[0-9]+[ \t]*)?(?:[Gg]0*([01])(?![0-9.])[ \t]*)?"
+    + "".join(_optional(axis + axis.lower(), _NUMBER) for axis in "XYZ")
+    + _optional("Ff", _NUMBER)
+)
+
 #: what the first character that fits into no word stands for
 _REASONS = {
     "#": "parameters are not supported: write the numbers",
