@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from lxml import etree
 
 from pathcontrol.robot.urdf.finding import Finding, shown
+from pathcontrol.robot.urdf.prolog import COMMENT, end_of_prolog
 
-_DECLARATION = re.compile(r"(?P<before>\ufeff?(?:\s|<!--.*?-->)*+)<\?xml\s(?P<inside>.*?)\?>", re.DOTALL)
+_DECLARATION = re.compile(r"<\?xml\s(?P<inside>.*?)\?>", re.DOTALL)
 _VERSION = re.compile(r"""version\s*=\s*["']([^"']*)["']""")
 _ROOT = re.compile(r"<[A-Za-z_][^\s/>]*")
 _PREFIX = re.compile(r"Namespace prefix (\S+) (?:for \S+ )?on \S+ is not defined")
@@ -38,19 +39,20 @@ def parser(*, recover: bool = False) -> etree.XMLParser:
 
 
 def _without_declaration(text: str) -> tuple[str, list[Finding]]:
-    found = _DECLARATION.match(text)
+    start = end_of_prolog(text, COMMENT)
+    found = _DECLARATION.match(text, start)
     if found is None:
         return text, []
+    before = text[:start]
     line = _line(text, found.start("inside"))
     said = []
-    if found["before"].strip("\ufeff") or found["before"].count("\ufeff") != len(found["before"]):
+    if before.strip("\ufeff") or before.count("\ufeff") != len(before):
         said.append(f"line {line}: <?xml ...?> is not at the very start of the file; remove what stands before it")
     version = _VERSION.search(found["inside"])
     if version is not None and version[1] not in ("1.0", "1.1"):
         said.append(f"line {line}: there is no XML version {shown(version[1])}; write 1.0")
     end = found.end()
-    blank = found["before"] + _blank(text[len(found["before"]) : end])
-    return blank + text[end:], [_finding("xml-declaration", message) for message in said]
+    return before + _blank(text[start:end]) + text[end:], [_finding("xml-declaration", message) for message in said]
 
 
 def _without_comments(text: str) -> tuple[str, list[Finding]]:

@@ -36,7 +36,7 @@ _NUMBERS: dict[str, dict[str, dict[str, int]]] = {
     },
 }
 
-_NUMBER = re.compile(r"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 
 def read_numbers(text: str, length: int) -> tuple[float, ...] | None:

@@ -11,11 +11,10 @@ from lxml import etree
 from pathcontrol.errors import UrdfError
 from pathcontrol.robot.urdf.finding import Finding, shown
 from pathcontrol.robot.urdf.mending import mended, parser
+from pathcontrol.robot.urdf.prolog import COMMENT, INSTRUCTION, end_of_prolog
 
 MAX_BYTES = 64 * 2**20
 
-# only the prolog can hold a DOCTYPE, so this sees every one before the parser does
-_DOCTYPE = re.compile(r"\ufeff?(?:\s|<\?.*?\?>|<!--.*?-->)*+<!DOCTYPE", re.DOTALL)
 _NO_DOCTYPE = "a DOCTYPE may define entities and is refused; expected none, remove it"
 _RUN_XACRO = "run xacro first and load what it prints"
 
@@ -48,7 +47,7 @@ def parse_urdf(text: str) -> etree._Element:
 def parse_and_mend(text: str) -> Parsed:
     """Do as :func:`parse_urdf` does, and say what in the XML was put right."""
     data = _encoded(text)
-    if _DOCTYPE.match(text):
+    if text.startswith("<!DOCTYPE", end_of_prolog(text, COMMENT, INSTRUCTION)):  # before the parser sees it
         raise UrdfError(_NO_DOCTYPE)
     root, findings = _parsed(text, data)
     if root.getroottree().docinfo.doctype:
