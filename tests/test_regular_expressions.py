@@ -75,7 +75,7 @@ def test_a_long_prolog_without_its_declaration_is_read():
 
 
 NUMBERS = ["1", "+1.", "-.5", "1e5", "1.5E-03", "01", "0" * 400]
-OTHERS = ["", "+", ".", "e5", "1e", "1.e+", "1_0", "٣", "1.2.3", "0x1", "nan", "inf", "1 ", "1" + "0" * 400, "1" * 399 + "."]
+OTHERS = ["", "+", ".", "e5", "1e", "1.e+", "1_0", "٣", "1.2.3", "0x1", "nan", "inf", "1 ", "1" + "0" * 400]
 
 
 @pytest.mark.parametrize("text", NUMBERS)
