@@ -22,8 +22,15 @@ X86_64 = {
     "avx512": ["-mavx512f", "-mavx512dq", "-mavx512vl", "-mprefer-vector-width=512", "-DLANES=8"],
 }
 ELSEWHERE = {"base": ["-DLANES=4"]}
-#: without contraction to fused operations and without reordering, all builds give the same bits
-FLAGS = ["-std=c++17", "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-w"]
+#: without contraction to fused operations and without reordering, all builds give the same bits; GCC's own vectorisation
+#: fuses all the same where it finds sums beside differences, and kernels are written in vectors already
+FLAGS = [
+    *("-std=c++17", "-O2", "-g0", "-fPIC", "-shared", "-ffp-contract=off"),
+    *("-fno-math-errno", "-fno-tree-vectorize", "-fno-exceptions", "-fno-rtti", "-fvisibility=hidden", "-w"),
+]
+#: not for the processor it runs on, and without a C++ library, which it would compile first for a minute and the engine
+#: does not need
+ZIG = ("-mcpu=baseline", "-nostdlib++")
 
 
 def find_compiler() -> list[str] | None:
@@ -35,7 +42,7 @@ def find_compiler() -> list[str] | None:
         import ziglang  # noqa: F401
     except ImportError:
         return None
-    return [sys.executable, "-m", "ziglang", "c++"]
+    return [sys.executable, "-m", "ziglang", "c++", *ZIG]
 
 
 def compile_engine(root: Path, compiler: list[str]) -> list[Path]:

@@ -7,6 +7,7 @@ import pytest
 
 import pathcontrol as pc
 from pathcontrol.engine import library
+from pathcontrol.engine.gamma import distances_to_gamma
 from pathcontrol.engine.library import BUILDS, load_library
 
 ROBOT, TASK = pc.load_robot("cicese_2dof"), pc.Circle(1.0, 2.0)
@@ -110,6 +111,16 @@ def test_bits_do_not_depend_on_size_order_threads_or_instructions(monkeypatch):
     for build in _available():
         monkeypatch.setattr("pathcontrol.simulation.compiled.load_library", lambda build=build: load_library(build))
         assert np.array_equal(_run(q=starts, loop=loop).array("q"), whole), build
+
+
+def test_bits_of_distances_do_not_depend_on_instructions(monkeypatch):
+    rng = np.random.default_rng(1)
+    q, qd = rng.normal(0, 1, (500, 2)), rng.normal(0, 2, (500, 2))
+    found = []
+    for build in _available():
+        monkeypatch.setattr("pathcontrol.engine.gamma.load_library", lambda build=build: load_library(build))
+        found.append(np.array(distances_to_gamma(TASK, q, qd, 1.0, True)))
+    assert all(np.array_equal(one, found[0]) for one in found)
 
 
 def test_a_control_tick_is_the_law_and_a_step_of_its_plan():

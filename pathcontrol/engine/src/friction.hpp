@@ -16,7 +16,7 @@ template <class V> ALWAYS_INLINE void friction_levels(const Friction<V> &law, in
   V fall = V{};
   for (int j = 0; j < law.stribeck; j++) {
     V x = qd / law.velocity[j][joint];
-    fall += law.fall[j][joint] * exponential(-(x * x));
+    fall += law.fall[j][joint] * small_exponential(-(x * x));
   }
   forward = law.forward[joint] + fall, backward = -(law.backward[joint] + fall);
 }

@@ -4,7 +4,6 @@
 // by no more than the state moves. So the cells that were too far by a margin stay too far until the state has moved by
 // that margin, and only the others are looked at from sample to sample; then all are again.
 #pragma once
-#include <vector>
 #include "path.hpp"
 
 struct Gamma {
@@ -37,7 +36,7 @@ static inline GammaDistance gamma_distance(const Gamma &gamma, double s, const d
 }
 // The root of the slope between low, where it is negative, and high: regula falsi with the Illinois rule, and halving.
 static inline double gamma_root(const Gamma &gamma, const double *x, double low, double slope_low, double high, double slope_high) {
-  for (int step = 0; step < 80 && high - low > 1e-14 * (1 + std::fabs(low)); step++) {
+  for (int step = 0; step < 80 && high - low > 1e-14 * (1 + fabs(low)); step++) {
     double s = step % 4 == 3 ? 0.5 * (low + high) : low - slope_low * (high - low) / (slope_high - slope_low);
     if (!(s > low && s < high)) s = 0.5 * (low + high);
     if (s <= low || s >= high) break;
@@ -54,7 +53,7 @@ static inline double to_ball(const Gamma &gamma, int cell, const double *x) {  /
   const int m = 2 * gamma.path->joints;
   double square = 0;
   for (int k = 0; k < m; k++) { const double y = gamma.centre[(integer)cell * m + k] - x[k]; square += y * y; }
-  return std::sqrt(square) - gamma.radius[cell];
+  return sqrt(square) - gamma.radius[cell];
 }
 static inline void search_cell(const Gamma &gamma, int cell, const double *x, Nearest &best) {
   const double *knots = gamma.path->knots;
@@ -79,34 +78,35 @@ static inline void search_cell(const Gamma &gamma, int cell, const double *x, Ne
 // Distances of states, (rows, 2 joints) each [q; w q̇], to Γ, and the parameters there; NaN where a state is not finite.
 static void distances_to_gamma(const Gamma &gamma, integer rows, const double *states, double *distance, double *parameter) {
   const int m = 2 * gamma.path->joints, cells = gamma.path->cells;
-  std::vector<double> bounds(cells);
-  std::vector<int> near;
+  Buffer<double> bounds(cells);
+  Buffer<int> near(cells);
+  int nearest = 0;  // how many cells are near
   double margin_left = -1.0, step = 0.0;  // how far the state may still move before all cells are looked at again
   for (integer row = 0; row < rows; row++) {
     const double *x = states + row * m;
     double moved = 0;
     bool finite = true;
-    for (int k = 0; k < m; k++) finite = finite && std::isfinite(x[k]);
+    for (int k = 0; k < m; k++) finite = finite && isfinite(x[k]);
     if (!finite) { distance[row] = parameter[row] = NAN, margin_left = -1.0; continue; }
     if (row && margin_left >= 0) {
       for (int k = 0; k < m; k++) { const double y = x[k] - x[k - m]; moved += y * y; }
-      moved = std::sqrt(moved), step = moved, margin_left -= 2 * moved;  // both the nearest and the others may change by it
+      moved = sqrt(moved), step = moved, margin_left -= 2 * moved;  // both the nearest and the others may change by it
     }
     Nearest best = {INFINITY, NAN};
     if (margin_left < 0) {
       double bound = INFINITY;
       for (int cell = 0; cell < cells; cell++) {
         bounds[cell] = to_ball(gamma, cell, x);
-        bound = std::fmin(bound, bounds[cell] + 2 * gamma.radius[cell]);
+        bound = fmin(bound, bounds[cell] + 2 * gamma.radius[cell]);
       }
-      const double margin = std::fmax(40 * step, 0.02 * bound);
-      near.clear();
+      const double margin = fmax(40 * step, 0.02 * bound);
+      nearest = 0;
       for (int cell = 0; cell < cells; cell++)
-        if (bounds[cell] <= bound * (1 + 1e-12) + margin) near.push_back(cell);
+        if (bounds[cell] <= bound * (1 + 1e-12) + margin) near[nearest++] = cell;
       margin_left = margin;
     }
-    for (int cell : near)
-      if (to_ball(gamma, cell, x) <= std::sqrt(best.square)) search_cell(gamma, cell, x, best);
-    distance[row] = std::sqrt(best.square), parameter[row] = best.s;
+    for (int k = 0; k < nearest; k++)
+      if (to_ball(gamma, near[k], x) <= sqrt(best.square)) search_cell(gamma, near[k], x, best);
+    distance[row] = sqrt(best.square), parameter[row] = best.s;
   }
 }

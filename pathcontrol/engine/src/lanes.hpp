@@ -5,8 +5,8 @@
 // same order as a single number, so its result is the same to the last bit. Functions of the C library are called lane
 // by lane for the same reason; compile with -ffp-contract=off and without -ffast-math.
 #pragma once
-#include <cmath>
-#include <cstdint>
+#include <math.h>
+#include <stdlib.h>
 
 #ifndef LANES
 #define LANES 8
@@ -55,10 +55,12 @@ template <class V, class F> ALWAYS_INLINE V lanewise(F f, V x) {
   return x;
 }
 template <class V> ALWAYS_INLINE V number(double x) { return V{} + x; }  // x in all lanes
-template <class V> ALWAYS_INLINE V square_root(V x) { return lanewise([](double a) { return std::sqrt(a); }, x); }
-template <class V> ALWAYS_INLINE V exponential(V x) { return lanewise([](double a) { return std::exp(a); }, x); }
-template <class V> ALWAYS_INLINE V exponential_minus_1(V x) { return lanewise([](double a) { return std::expm1(a); }, x); }
-ALWAYS_INLINE double absolute(double x) { return std::fabs(x); }
+template <class V> ALWAYS_INLINE V square_root(V x) { return lanewise([](double a) { return sqrt(a); }, x); }
+// From the C library only what its compilers do not bring along in a version of their own, as some do with exp.
+template <class V> ALWAYS_INLINE V exponential_minus_1(V x) { return lanewise([](double a) { return expm1(a); }, x); }
+// exp x for x ≤ 0, within 2^-53 of the number itself, not relative to it.
+template <class V> ALWAYS_INLINE V small_exponential(V x) { return 1.0 + exponential_minus_1(x); }
+ALWAYS_INLINE double absolute(double x) { return fabs(x); }
 ALWAYS_INLINE pack absolute(pack x) { return (pack)((pack_mask)x & 0x7fffffffffffffffLL); }
 template <class V> ALWAYS_INLINE V larger(V a, V b) { return select(less(a, b), b, a); }
 template <class V> ALWAYS_INLINE V smaller(V a, V b) { return select(less(b, a), b, a); }
@@ -74,6 +76,15 @@ ALWAYS_INLINE integer as_integer(double x) { return (integer)x; }
 ALWAYS_INLINE pack_mask as_integer(pack x) { return __builtin_convertvector(x, pack_mask); }
 ALWAYS_INLINE integer bit_mask(integer x, integer bit) { return -(integer)((x & bit) != 0); }
 ALWAYS_INLINE pack_mask bit_mask(pack_mask x, integer bit) { return (x & bit) != 0; }
+
+// Room on the heap for numbers or packs, not set to anything; all that would need a runtime library of C++ otherwise.
+template <class T> struct Buffer {
+  T *const at;
+  explicit Buffer(integer count) : at((T *)aligned_alloc(64, (count * (integer)sizeof(T) / 64 + 1) * 64)) { if (!at) abort(); }
+  ~Buffer() { free(at); }
+  Buffer(const Buffer &) = delete;
+  T &operator[](integer i) { return at[i]; }
+};
 
 // sin x and cos x within 1 unit in the last place for |x| < 10^6: Taylor series on ±π/4 after an exact reduction by π/2 in
 // three parts (Cody and Waite, Software Manual for the Elementary Functions, 1980).

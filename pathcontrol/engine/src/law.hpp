@@ -92,8 +92,8 @@ static double projected(const Setup &setup, const Path &path, const double *q, d
   if (setup.branch != FOLLOW || !(found == found)) return found;
   const double square = distance_at(path, found, q).square;
   if (!(square > setup.capture * setup.capture)) return found;
-  const double other = nearest_point(path, q), distance = std::sqrt(square);
-  const bool jumps = std::sqrt(distance_at(path, other, q).square) < 0.5 * distance;
+  const double other = nearest_point(path, q), distance = sqrt(square);
+  const bool jumps = sqrt(distance_at(path, other, q).square) < 0.5 * distance;
   return jumps ? in_lap_of(path, other, found) : found;
 }
 
@@ -105,7 +105,7 @@ static void project(const Setup &setup, const Path *const *paths, const V *q, co
   for (int lane = 0; lane < Lanes<V>::count; lane++) {
     double own[MOST_JOINTS];
     for (int i = 0; i < n; i++) own[i] = lane_of(q[i], lane);
-    const bool known = std::isfinite(lane_of(last, lane));
+    const bool known = isfinite(lane_of(last, lane));
     set_lane(out.s, lane, known ? projected(setup, *paths[lane], own, lane_of(last, lane)) : NAN);
   }
   evaluate(paths, out.s, at);

@@ -1,6 +1,5 @@
 // The sampled loop of simulation/sampled.py, for one rollout or a pack of them: measure, compute, hold.
 #pragma once
-#include <vector>
 #include "law.hpp"
 #include "plant.hpp"
 
@@ -119,7 +118,7 @@ template <class V> static void look_at_finish(const Setup &setup, const Path *co
   } else {
     r.lap_start = select(equal(r.lap_start, r.lap_start), r.lap_start, s);
     V laps = s - r.lap_start;
-    for (int lane = 0; lane < Lanes<V>::count; lane++) set_lane(laps, lane, std::trunc(lane_of(laps, lane) / paths[lane]->period));
+    for (int lane = 0; lane < Lanes<V>::count; lane++) set_lane(laps, lane, trunc(lane_of(laps, lane) / paths[lane]->period));
     news = select(less_equal(number<V>(setup.laps), laps), number<V>(t), never);
   }
   const Mask<V> open = ~equal(r.finish_time, r.finish_time) & ~lost_lanes(r);
@@ -210,7 +209,7 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
   load_state(place, state, n, r);
   for (int lane = 0; lane < Lanes<V>::count; lane++) paths[lane] = setup.paths + (setup.path_index ? setup.path_index[rollout_of(place, lane)] : 0);
   const integer waiting = setup.delayed * n;
-  std::vector<V> queue(waiting ? waiting : 1);  // a ring of torques that wait, the oldest at `head`
+  Buffer<V> queue(waiting);  // a ring of torques that wait, the oldest at `head`
   for (int k = 0; k < setup.delayed; k++) load(place, state.queue + k * span.rollouts * n, n, n, &queue[k * n]);
   integer head = 0, sample = 0;
   for (;; sample++) {

@@ -21,7 +21,7 @@ template <class V> struct Point { V q_d[MOST_JOINTS], dq_d[MOST_JOINTS], ddq_d[M
 // s in the first lap of a closed path.
 static inline double in_first_lap(const Path &path, double s) {
   double lap = (s - path.s0) / path.period;
-  return path.s0 + (lap - std::floor(lap)) * path.period;
+  return path.s0 + (lap - floor(lap)) * path.period;
 }
 // The cell that holds s, which is in the domain.
 static inline int cell_of(const Path &path, double s) {
@@ -88,7 +88,7 @@ static inline double root_of_slope(const Path &path, const double *q, double low
     (d.slope > 0 ? high : low) = s;
     double next = d.curvature > 0 ? s - d.slope / d.curvature : low - 1.0;
     if (!(next > low && next < high)) next = 0.5 * (low + high);
-    if (std::fabs(next - s) <= 1e-15 * (1 + std::fabs(s)) || next == low || next == high) return next;
+    if (fabs(next - s) <= 1e-15 * (1 + fabs(s)) || next == low || next == high) return next;
     s = next;
   }
   return s;
@@ -101,13 +101,13 @@ static NOINLINE double nearest_point(const Path &path, const double *q) {
   for (int cell = 0; cell < path.cells; cell++) {
     double square = 0;
     for (int k = 0; k < n; k++) { double x = path.centre[cell * n + k] - q[k]; square += x * x; }
-    double farthest = std::sqrt(square) + path.radius[cell];
+    double farthest = sqrt(square) + path.radius[cell];
     if (farthest < bound) bound = farthest;
   }
   for (int cell = 0; cell < path.cells; cell++) {
     double square = 0;
     for (int k = 0; k < n; k++) { double x = path.centre[cell * n + k] - q[k]; square += x * x; }
-    if (std::sqrt(square) - path.radius[cell] > bound * (1 + 1e-12)) continue;
+    if (sqrt(square) - path.radius[cell] > bound * (1 + 1e-12)) continue;
     double low = path.knots[cell], width = (path.knots[cell + 1] - low) / pieces;
     Distance before = distance_at(path, low, q);
     for (int piece = 1; piece <= pieces; piece++) {
@@ -127,7 +127,7 @@ static NOINLINE double nearest_point(const Path &path, const double *q) {
 }
 // s in the lap in which it is nearest to `near`.
 static inline double in_lap_of(const Path &path, double s, double near) {
-  return path.closed ? s + path.period * std::nearbyint((near - s) / path.period) : s;
+  return path.closed ? s + path.period * nearbyint((near - s) / path.period) : s;
 }
 // The first local minimum downhill from `near`, piece by piece, or NaN where a lap holds none.
 static NOINLINE double downhill_point(const Path &path, const double *q, double near) {
@@ -140,7 +140,7 @@ static NOINLINE double downhill_point(const Path &path, const double *q, double 
     double slope = direction * distance_at(path, next, q).slope;
     if (slope > 0) return direction > 0 ? root_of_slope(path, q, s, next) : root_of_slope(path, q, next, s);
     if (next == s) return s;  // an end of an open path
-    gone += std::fabs(next - s), s = next;
+    gone += fabs(next - s), s = next;
   }
   return NAN;
 }
@@ -153,24 +153,24 @@ static NOINLINE double followed_point(const Path &path, const double *q, double 
   double s = near;
   Distance d = distance_at(path, s, q);
   bool convex = true;
-  const double reach = std::fmin(WINDOW * length, M_PI * std::sqrt(d.square / d.gradient) + CONVERGED);
+  const double reach = fmin(WINDOW * length, M_PI * sqrt(d.square / d.gradient) + CONVERGED);
   for (int step = 0; step < 12; step++) {
     convex = convex && d.curvature > 0;
-    double longest = std::fmin(reach, TURN * std::sqrt(d.gradient) / std::fmax(std::sqrt(d.bend), 1e-300));
-    double change = -d.slope / std::fmax(d.curvature, 0.1 * d.gradient);
+    double longest = fmin(reach, TURN * sqrt(d.gradient) / fmax(sqrt(d.bend), 1e-300));
+    double change = -d.slope / fmax(d.curvature, 0.1 * d.gradient);
     double next = bounded(path, s + (change > longest ? longest : change < -longest ? -longest : change));
-    bool arrived = !(std::fabs(next - s) > 1e-14 * (1 + std::fabs(next)));
+    bool arrived = !(fabs(next - s) > 1e-14 * (1 + fabs(next)));
     s = next;
     if (arrived) break;
     d = distance_at(path, s, q);
   }
   bool held = !path.closed && ((s <= path.s0 && d.slope > 0) || (s >= path.s_end && d.slope < 0));
-  bool minimum = std::fabs(d.slope) <= CONVERGED * std::sqrt(d.gradient) && d.curvature > 0;
-  if ((minimum || held) && convex && std::fabs(s - near) <= reach) return s;
+  bool minimum = fabs(d.slope) <= CONVERGED * sqrt(d.gradient) && d.curvature > 0;
+  if ((minimum || held) && convex && fabs(s - near) <= reach) return s;
   double below = downhill_point(path, q, near);
-  if (std::fabs(below - near) <= WINDOW * length) return below;
+  if (fabs(below - near) <= WINDOW * length) return below;
   Distance at_near = distance_at(path, near, q);
-  bool steady = std::fabs(at_near.slope) <= 0.5 * std::sqrt(at_near.square * at_near.gradient);
+  bool steady = fabs(at_near.slope) <= 0.5 * sqrt(at_near.square * at_near.gradient);
   if (steady && below == below) return below;
   return in_lap_of(path, nearest_point(path, q), near);
 }
