@@ -22,8 +22,8 @@ X86_64 = {
     "avx512": ["-mavx512f", "-mavx512dq", "-mavx512vl", "-mprefer-vector-width=512", "-DLANES=8"],
 }
 ELSEWHERE = {"base": ["-DLANES=4"]}
-#: without contraction to fused operations and without reordering, all builds give the same bits; GCC's own vectorisation
-#: fuses all the same where it finds sums beside differences, and kernels are written in vectors already
+#: without contraction to fused operations and without reordering, all builds give the same bits; vectorising by GCC
+#: fuses all the same where it finds sums beside differences, and the kernels are written in vectors already
 FLAGS = [
     *("-std=c++17", "-O2", "-g0", "-fPIC", "-shared", "-ffp-contract=off"),
     *("-fno-math-errno", "-fno-tree-vectorize", "-fno-exceptions", "-fno-rtti", "-fvisibility=hidden", "-w"),
