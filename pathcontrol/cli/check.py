@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from pathcontrol.cli.group import json_option, package_option, uninterrupted
+from pathcontrol.cli.group import json_option, package_option
 from pathcontrol.errors import UrdfError
 
 
@@ -34,8 +34,6 @@ def command(
     from pathcontrol.robot.catalogue import find_urdf
     from pathcontrol.robot.urdf import check_urdf
 
-    with uninterrupted():
-        import yourdfpy  # noqa: F401
     urdf = find_urdf(file, package_dir)
     locked = _locked(urdf.text, lock, keep, tip)
     report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=locked)

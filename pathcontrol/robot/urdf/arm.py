@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from copy import deepcopy
 from dataclasses import dataclass
-from io import BytesIO
-from typing import TYPE_CHECKING
 
 import numpy as np
 from lxml import etree
 
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES, names_of
-
-if TYPE_CHECKING:
-    from yourdfpy.urdf import Inertial, Joint, Link
+from pathcontrol.robot.urdf.links import Inertial, Joint, Link, read_joint, read_link
 
 NO_AXIS = 1e-12
-
-_NOT_DYNAMICS = ("visual", "collision", "material", "mimic", "calibration", "safety_controller")
 
 
 @dataclass(frozen=True)
@@ -77,17 +70,11 @@ class Body:
 
 def read_arm(root: etree._Element, locked: Iterable[str] = ()) -> Arm:
     """Read the values of a robot without errors of form, some of its joints locked."""
-    import yourdfpy  # takes a second
-
-    skeleton = deepcopy(root)
-    etree.strip_elements(skeleton, *_NOT_DYNAMICS, with_tail=False)
-    source = BytesIO(etree.tostring(skeleton, encoding="utf-8"))
-    robot = yourdfpy.URDF.load(source, build_scene_graph=False, load_meshes=False).robot
     mimics = {joint.get("name", ""): joint.find("mimic") for joint in root.iterfind("joint")}
     drawn = [link for link in root.iterfind("link") if {"visual", "collision"} & {part.tag for part in link}]
     return Arm(
-        links={link.name: link for link in robot.links},
-        joints=_outwards(robot.joints),
+        links={link.name: link for link in map(read_link, root.iterfind("link"))},
+        joints=_outwards([read_joint(joint) for joint in root.iterfind("joint")]),
         mimics={name: mimic.get("joint", "") for name, mimic in mimics.items() if mimic is not None},
         locked=frozenset(locked),
         shaped=frozenset(names_of(drawn)),

@@ -6,14 +6,12 @@ The model itself is Pinocchio's; these are for a few hundred postures of an arm 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from pathcontrol.robot.urdf.arm import Arm, Body, link_pose, moving_bodies
-
-if TYPE_CHECKING:
-    from yourdfpy.urdf import Inertial
+from pathcontrol.robot.urdf.links import Inertial
 
 GRAVITY = 9.81  # m/s^2, against the z axis of the root link
 POSTURES = 400

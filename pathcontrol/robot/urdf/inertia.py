@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pathcontrol.robot.urdf.arm import Arm, axis_inertia, has_direction, moving_bodies
 from pathcontrol.robot.urdf.dynamics import dynamics, postures
 from pathcontrol.robot.urdf.finding import Finding, Level, place
-
-if TYPE_CHECKING:
-    from yourdfpy.urdf import Link
+from pathcontrol.robot.urdf.links import Link
 
 INERTIA_TOLERANCE = 1e-6  # of the largest principal moment: what rounding in a file may cost
 NO_INERTIA = 1e-15  # kg m^2, far below any finger joint

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,10 +10,8 @@ from pathcontrol.robot.urdf.arm import Arm, has_direction, moving_bodies
 from pathcontrol.robot.urdf.dynamics import dynamics, postures
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES
 from pathcontrol.robot.urdf.finding import Finding, place, shown
+from pathcontrol.robot.urdf.links import Joint, Limit
 from pathcontrol.robot.urdf.numbers import ABSURD
-
-if TYPE_CHECKING:
-    from yourdfpy.urdf import Joint
 
 UNIT_TOLERANCE = 1e-3
 
@@ -61,9 +58,9 @@ def check_limits(arm: Arm) -> Iterator[Finding]:
         if joint.limit is None:
             yield _no_limit(joint)
             continue
-        yield from _wrong_limits(joint)
+        yield from _wrong_limits(joint, joint.limit)
         if joint.name not in arm.locked:
-            yield from _doubtful_limits(joint)
+            yield from _doubtful_limits(joint, joint.limit)
 
 
 def check_dynamics(arm: Arm) -> Iterator[Finding]:
@@ -109,27 +106,27 @@ def _no_limit(joint: Joint) -> Finding:
     return Finding("error", "joint-no-limit", place("joint", joint.name), message)
 
 
-def _wrong_limits(joint: Joint) -> Iterator[Finding]:
-    lower, upper = joint.limit.lower or 0.0, joint.limit.upper or 0.0
+def _wrong_limits(joint: Joint, limit: Limit) -> Iterator[Finding]:
+    lower, upper = limit.lower or 0.0, limit.upper or 0.0
     if joint.type != "continuous" and lower > upper:
         message = f"lower {lower:g} is above upper {upper:g} (a missing one is 0); expected lower below upper"
         yield Finding("error", "limit-inverted", place("joint", joint.name), message)
     for name in ("effort", "velocity"):
-        if (value := getattr(joint.limit, name)) < 0:
+        if (value := getattr(limit, name)) < 0:
             message = f"the limit of {name} is {value:g}; expected a positive number"
             yield Finding("error", f"{name}-negative", place("joint", joint.name), message)
 
 
-def _doubtful_limits(joint: Joint) -> Iterator[Finding]:
-    lower, upper = joint.limit.lower or 0.0, joint.limit.upper or 0.0
+def _doubtful_limits(joint: Joint, limit: Limit) -> Iterator[Finding]:
+    lower, upper = limit.lower or 0.0, limit.upper or 0.0
     if joint.type != "continuous" and lower == upper:
         message = f"lower and upper are both {lower:g} (a missing one is 0); expected a range, give one"
         yield Finding("warning", "limit-no-range", place("joint", joint.name), message)
     for name in ("effort", "velocity"):
-        if getattr(joint.limit, name) == 0:
+        if getattr(limit, name) == 0:
             message = f"the limit of {name} is 0, and clamping to it stops the joint; give a positive number"
             yield Finding("warning", f"{name}-zero", place("joint", joint.name), message)
     for name in ("lower", "upper", "effort", "velocity"):
-        if abs(value := getattr(joint.limit, name) or 0.0) >= ABSURD:
+        if abs(value := getattr(limit, name) or 0.0) >= ABSURD:
             message = f"the limit {name} is {value:g}, which limits nothing; expected what the joint can do"
             yield Finding("warning", "limit-absurd", place("joint", joint.name), message)
