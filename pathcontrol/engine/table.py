@@ -15,8 +15,9 @@ from pathcontrol.control.ending import Ending, arrival_parameter
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.structs import Memory, Path
 from pathcontrol.errors import EngineError
+from pathcontrol.tasks import hermite
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.hermite import piecewise
+from pathcontrol.tasks.hermite import horner
 from pathcontrol.tasks.profile import ConstantRate
 from pathcontrol.tasks.recorded import RecordedPath
 
@@ -67,7 +68,7 @@ class PathTable(NamedTuple):
     def evaluate(self, s: Array) -> tuple[Array, Array]:
         """Return values and slopes (2 of (m, n + 1)) at s (m,) inside the domain: q_d, and ϑ last."""
         cell = np.clip(np.searchsorted(self.knots, s, side="right") - 1, 0, len(self.knots) - 2)
-        return _horner(np.moveaxis(self.coefficients[cell], 1, 0), (s - self.knots[cell])[:, None])
+        return horner(np.moveaxis(self.coefficients[cell], 1, 0), (s - self.knots[cell])[:, None])
 
 
 _TABLES: KnownOf[PathTask, tuple[PathTable, Path, Memory]] = KnownOf()
@@ -112,7 +113,7 @@ def make_table(task: PathTask) -> PathTable:
     knots = _refined(task, _with_corners(task, samples))
     jets = recorded.jets if np.array_equal(knots, recorded.samples) else _jets(task, knots)
     rate = _rate_pieces(task, knots[:-1], knots[1:])
-    coefficients = np.concatenate([piecewise(knots, jets).c, rate[..., None]], axis=-1)
+    coefficients = np.concatenate([hermite.coefficients(knots, jets), rate[..., None]], axis=-1)
     ending = Ending.of(task)
     arrival = np.inf if task.closed else arrival_parameter(task)
     table = PathTable(knots, np.moveaxis(coefficients, 0, 1), task.closed, ending, arrival)
@@ -156,15 +157,6 @@ def _rate_pieces(task: PathTask, left: Array, right: Array) -> Array:
     return np.linalg.solve(_NODES[:, None] ** powers, theta) / width ** powers[:, None]
 
 
-def _horner(coefficients: Array, x: Array) -> tuple[Array, Array]:
-    """Value and slope of polynomials, coefficients (6, …) from the highest power down, at x."""
-    value, slope = coefficients[0], np.zeros_like(coefficients[0])
-    for coefficient in coefficients[1:]:
-        slope = slope * x + value
-        value = value * x + coefficient
-    return value, slope
-
-
 def _with_corners(task: PathTask, knots: Array) -> Array:
     """``knots`` and those of the profile, where ϑ' may jump, in the first lap of a closed path."""
     if task.profile_knots is None:
@@ -202,7 +194,7 @@ def _coarse(task: PathTask, knots: Array, cells: NDArray[np.intp], largest: floa
     left, right = knots[cells], knots[cells + 1]
     x = _PROBES[:, None] * (right - left)
     theta, slope = (part.reshape(x.shape) for part in _theta(task, (left + x).reshape(-1)))
-    value, rise = _horner(_rate_pieces(task, left, right)[:, None], x)
+    value, rise = horner(_rate_pieces(task, left, right)[:, None], x)
     local = np.abs(slope).max(0, initial=0.0)
     # what is asked for cannot be less than what ϑ changes by in the rounding of s
     rounding = _ROUNDING * (largest + local * np.abs(right))

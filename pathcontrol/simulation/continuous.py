@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import LSODA
 
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
@@ -17,6 +17,9 @@ from pathcontrol.simulation.finish import Finish
 from pathcontrol.simulation.modes import Arm, ContinuousTime, Outside, check_rows, torque_limits
 from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sensors import Reading
+
+if TYPE_CHECKING:
+    from scipy.integrate import LSODA
 
 _WATCHED = 2000  # steps of the integrator
 _SHORTEST = 1e-6  # s, the mean step of so many below which a run is given up: a second of it would take minutes
@@ -136,6 +139,8 @@ class _Solution:
 
     def at(self, time: Array, update: Callable[[float], None]) -> Iterator[Array]:
         """States (N, 2n + m) at each of ``time``, no further integrated than they are asked for."""
+        from scipy.integrate import LSODA  # which sampled loops do without
+
         t, y, given = 0.0, self._start, 1
         yield self._start
         while given < len(time) and not self._lost.all:

@@ -8,12 +8,15 @@ functions to O(h⁴) or O(h⁶).
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PPoly
 
 from pathcontrol._arrays import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 #: maps s (m,) to a function and its first, or first two, derivatives there, (2 or 3, m, n)
 Jet = Callable[[Array], Array]
@@ -28,18 +31,34 @@ _MOST_CELLS = 1 << 12  # more than there were at first
 
 def piecewise(s: Array, jets: Array) -> PPoly:
     """The polynomials in the cells between s (m,), from the ``jets`` (2 or 3, m, n) there."""
+    from scipy.interpolate import PPoly  # takes longer to load than a simulation that needs none
+
+    return PPoly(coefficients(s, jets), s)
+
+
+def coefficients(s: Array, jets: Array) -> Array:
+    """Coefficients (4 or 6, m - 1, n) of the polynomials in the cells between s (m,), from the highest power down."""
     h = np.diff(s)[:, None]
     y, dy = jets[0, :-1], jets[1, :-1]
     if len(jets) == 2:
         r, v = jets[0, 1:] - y - h * dy, jets[1, 1:] - dy
-        return PPoly(np.stack([v / h**2 - 2 * r / h**3, 3 * r / h**2 - v / h, dy, y]), s)
+        return np.stack([v / h**2 - 2 * r / h**3, 3 * r / h**2 - v / h, dy, y])
     ddy = jets[2, :-1]
     # what the Taylor polynomial of the left end lacks at the right end
     r, v, a = jets[0, 1:] - y - h * dy - h**2 / 2 * ddy, jets[1, 1:] - dy - h * ddy, jets[2, 1:] - ddy
     fifth = 6 * r / h**5 - 3 * v / h**4 + a / (2 * h**3)
     fourth = -15 * r / h**4 + 7 * v / h**3 - a / h**2
     third = 10 * r / h**3 - 4 * v / h**2 + a / (2 * h)
-    return PPoly(np.stack([fifth, fourth, third, ddy / 2, dy, y]), s)
+    return np.stack([fifth, fourth, third, ddy / 2, dy, y])
+
+
+def horner(coefficients: Array, x: Array) -> tuple[Array, Array]:
+    """Value and slope of polynomials, coefficients (degree + 1, …) from the highest power down, at x."""
+    value, slope = coefficients[0], np.zeros_like(coefficients[0])
+    for coefficient in coefficients[1:]:
+        slope = slope * x + value
+        value = value * x + coefficient
+    return value, slope
 
 
 def sampled(jet: Jet, s: Array) -> tuple[Array, Array]:
@@ -66,12 +85,13 @@ def sampled(jet: Jet, s: Array) -> tuple[Array, Array]:
 def _error(jet: Jet, s: Array, jets: Array, cells: NDArray[np.intp]) -> Array:
     """How many times too far function and polynomial are apart in the ``cells``, (len(cells),)."""
     width = np.diff(s)[cells]
-    inside = s[cells] + _INSIDE[:, None] * width
-    curve, wanted = piecewise(s, jets), jet(inside.reshape(-1))
+    beyond = _INSIDE[:, None] * width
+    wanted = jet((s[cells] + beyond).reshape(-1))
+    found = horner(coefficients(s, jets)[:, None, cells], beyond[..., None])
     size, slope, extent = np.abs(jets[0]).max(), np.abs(jets[1]).max(), np.ptp(jets[0], axis=0).max()
     values, slopes = _ALLOWED[len(jets)]
     allowed = values * extent + _ROUNDING * size, slopes * slope + _ROUNDING * size / width
-    apart = (np.abs(curve(inside, k) - wanted[k].reshape(*inside.shape, -1)).max((0, 2)) for k in (0, 1))
+    apart = (np.abs(found[k] - wanted[k].reshape(found[k].shape)).max((0, 2)) for k in (0, 1))
     return np.max([a / np.maximum(b, np.finfo(float).tiny) for a, b in zip(apart, allowed, strict=True)], axis=0)
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PPoly
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol.errors import InputError, TaskError
@@ -15,6 +14,9 @@ from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 from pathcontrol.tasks.hermite import piecewise, sampled
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, Path, VelocityProfile
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 _CELLS = 256  # of a path that is all of one piece, at first
 _CONSTANT = 1e-13  # by how much what is called constant may vary

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize.elementwise import find_root
 
 from pathcontrol._arrays import Array
 
@@ -24,6 +23,8 @@ class Curve(NamedTuple):
 
     def root(self, x: Array, first: Array, second: Array) -> Array:
         """A root of g for each row of x (N, m) between two parameters (N,) where it has different signs."""
+        from scipy.optimize.elementwise import find_root  # loads all of scipy.optimize
+
         lower, upper = np.minimum(first, second), np.maximum(first, second)
         return find_root(lambda s, row: self.slope(s, x[row]), (lower, upper), args=(np.arange(len(x)),)).x
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import chain
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from pathcontrol._arrays import Array
 from pathcontrol.tasks.closest_point.cells import Cells
 from pathcontrol.tasks.closest_point.curve import Curve
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 _TURN = 1 / 8  # rad over a piece of a cell, which is taken to hold one minimum at most
 _SIZES, _RATIO = 6, 4.0  # how many groups of cells by size, and their sizes
@@ -112,6 +114,8 @@ class _Group(NamedTuple):
 
 
 def _groups(cells: Cells) -> Iterator[_Group]:
+    from scipy.spatial import cKDTree  # loads all of scipy.spatial, which few runs need
+
     largest = cells.radius.max()
     size = np.log(largest / np.maximum(cells.radius, np.finfo(float).tiny)) / np.log(_RATIO)
     size = np.minimum(size, _SIZES - 1).astype(int)
