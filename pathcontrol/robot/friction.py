@@ -275,6 +275,19 @@ def _stacked(laws: Sequence[FrictionLaw]) -> FrictionLaw:
     return type(first)(*(np.stack([getattr(law, f.name) for law in laws]) for f in fields(first)))
 
 
+def of_rollout(law: FrictionLaw, row: int) -> FrictionLaw:
+    """Return the law of one rollout, (n,), of a law with a row of coefficients for each; any other as it is."""
+    if isinstance(law, FrictionSum):
+        return FrictionSum(tuple(of_rollout(term, row) for term in law.terms))
+    if isinstance(law, FrictionOfGroups):
+        [(part, at)] = [(part, np.flatnonzero(rows == row)) for part, rows in law.parts if row in rows]
+        return of_rollout(part, int(at[0]))
+    if type(law) not in _LAWS.values():
+        return law
+    values = (np.asarray(getattr(law, field.name)) for field in fields(law))
+    return type(law)(*(value[row % len(value)] if value.ndim > 1 else value for value in values))
+
+
 def levels_vary(law: FrictionLaw) -> bool:
     """Whether the levels change with velocity, as the law says or as it turns out at some velocities."""
     if law.varies:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.robot.friction import levels_vary
+from pathcontrol.robot.friction import FrictionLaw, levels_vary
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.disturbance import Disturbance
 
@@ -46,13 +46,20 @@ def rate_of_friction(robot: RobotModel, q: Array) -> tuple[float, int]:
     if not levels_vary(robot.friction):
         return 0.0, 0
     mobility = np.diagonal(np.linalg.inv(robot.mass_matrix(q)), axis1=-2, axis2=-1).max(0)
-    rates = np.zeros(robot.n)
-    for sign in (1.0, -1.0):
-        plus, minus = robot.friction.levels(np.broadcast_to(sign * _SPEEDS[:, None], (len(_SPEEDS), robot.n)))
-        level = np.broadcast_to(plus if sign > 0 else minus, (len(_SPEEDS), robot.n))
-        rates = np.maximum(rates, (-np.diff(level, axis=0) / np.diff(_SPEEDS)[:, None]).max(0) * mobility)
+    rates = steepest_fall(robot.friction) * mobility
     joint = int(rates.argmax())
     return float(rates[joint]), joint
+
+
+def steepest_fall(friction: FrictionLaw) -> Array:
+    """Return −F'(q̇) [N m s/rad] where dry friction falls fastest with speed, (n,), or (N, n) of a law of N rollouts."""
+    falls = []
+    for side, sign in enumerate((1.0, -1.0)):
+        level = np.array([friction.levels(np.full((1, friction.n), sign * v))[side] for v in _SPEEDS])
+        steps = np.diff(_SPEEDS).reshape(-1, *[1] * (level.ndim - 1))
+        falls.append((-np.diff(level, axis=0) / steps).max(0))
+    found = np.maximum(0.0, np.maximum(*falls))
+    return found[0] if len(found) == 1 else found
 
 
 def rates_of_disturbance(

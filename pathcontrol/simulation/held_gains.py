@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,28 +22,31 @@ _SHORTEST = 1e-6  # of the period that is tried
 
 
 class Feedback(NamedTuple):
-    """A law near its path at some postures, τ = G_p e_p + G_v e_v, each (k, n, n) [N m/rad, N m s/rad]."""
+    """A law near its path in a rollout, at k postures: τ = G_p e_p + G_v e_v, (k, n, n) [N m/rad, N m s/rad] each."""
 
     G_p: Array
     G_v: Array
+    rollout: int
 
 
-def feedbacks(controller: Controller, q: Array) -> list[Feedback]:
+def feedbacks(controller: Controller, q: Array, rollouts: Sequence[int] = ()) -> list[Feedback]:
     """Return the feedback of a law of the library at q (k, n): of one gain, or of those gains of a batch that matter.
+
+    Those are the extreme ones, and those of some ``rollouts``.
 
     Of a law of one's own nothing is known, and none is returned.
     """
     M = controller.robot.mass_matrix(q)
     if isinstance(controller, SlotineLi):
-        pairs = _extremes(controller.Lambda, controller.K_d, controller.robot.n)
-        return [Feedback(_on(K_d * Lambda, M), _on(K_d, M) + M * Lambda) for Lambda, K_d in pairs]
+        pairs = _extremes(controller.Lambda, controller.K_d, controller.robot.n, rollouts)
+        return [Feedback(_on(K_d * Lambda, M), _on(K_d, M) + M * Lambda, row) for Lambda, K_d, row in pairs]
     if isinstance(controller, PDPlus):
-        pairs = _extremes(controller.K_p, controller.K_v, controller.robot.n)
-        return [Feedback(_on(K_p, M), _on(K_v, M)) for K_p, K_v in pairs]
+        pairs = _extremes(controller.K_p, controller.K_v, controller.robot.n, rollouts)
+        return [Feedback(_on(K_p, M), _on(K_v, M), row) for K_p, K_v, row in pairs]
     if isinstance(controller, ComputedTorque | ExtendedMotionPlan | Projection):
         position = controller.k_p if isinstance(controller, Projection) else controller.K_p
-        pairs = _extremes(position, controller.K_v, controller.robot.n)
-        return [Feedback(M * K_p, M * K_v) for K_p, K_v in pairs]
+        pairs = _extremes(position, controller.K_v, controller.robot.n, rollouts)
+        return [Feedback(M * K_p, M * K_v, row) for K_p, K_v, row in pairs]
     return []
 
 
@@ -84,8 +88,10 @@ def longest_period(feedback: Feedback, robot: RobotModel, uncompensated: Array, 
     return low
 
 
-def plan_kick(task: PathTask, s: Array) -> float:
-    """Return the largest ‖q_d'‖‖r'‖ at s (m,); times k h²/2 it is what one period's acceleration does to the next.
+def plan_kick(task: PathTask, s: Array) -> Array:
+    """Return the largest ‖q_d'‖‖r'‖ at s (m,), a number, or at s (m, N) of N tasks, (N,).
+
+    Times k h²/2 it is what one period's acceleration does to the next.
 
     A tangential acceleration a leaves the extended motion plan, which knows the velocity at a tick only, h²a/2 behind;
     that changes σ̇ by k‖q_d'‖h²a/2, and the acceleration r'σ̇ that the law asks for by ‖r'‖ times as much. Where that
@@ -93,14 +99,18 @@ def plan_kick(task: PathTask, s: Array) -> float:
     """
     point = task.at(s)
     slope = np.linalg.norm(point.dq_d, axis=-1) * np.linalg.norm(point.velocity_slope, axis=-1)
-    return float(slope.max())
+    return slope.max(0)
 
 
-def _extremes(position: ArrayLike, velocity: ArrayLike, n: int) -> list[tuple[Array, Array]]:
-    """Pairs of gains, (n,) each: of a batch those with the largest gain of a joint, and the largest ratio of both."""
+def _extremes(
+    position: ArrayLike, velocity: ArrayLike, n: int, rollouts: Sequence[int]
+) -> list[tuple[Array, Array, int]]:
+    """Pairs of gains, (n,) each, and whose they are: of a batch those with the largest gain or ratio, and some more."""
     p, v = np.broadcast_arrays(np.atleast_2d(position), np.atleast_2d(velocity), np.empty((1, n)))[:2]
-    rows = np.unique([np.argmax(values, axis=0) for values in (p, v, p / v)])
-    return [(p[row], v[row]) for row in rows]
+    if len(p) == 1:
+        return [(p[0], v[0], row) for row in rollouts or (0,)]
+    rows = np.unique([*(row for values in (p, v, p / v) for row in np.argmax(values, axis=0)), *rollouts])
+    return [(p[row], v[row], int(row)) for row in rows]
 
 
 def _on(diagonal: Array, M: Array) -> Array:

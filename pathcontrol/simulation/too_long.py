@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from pathcontrol.errors import PathControlWarning
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.disturbance import Disturbance
+from pathcontrol.simulation.extreme_arms import arm_of, most_mobile
 from pathcontrol.simulation.fast_modes import rate_of_arm, rate_of_friction, rates_of_disturbance, with_damping
 from pathcontrol.simulation.held_gains import feedbacks, longest_period, plan_kick
 from pathcontrol.simulation.modes import MOST_SUBSTEPS, Arm, ContinuousTime, SampledLoop
@@ -23,10 +25,14 @@ from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import TaskBatch
 
 _SAMPLES, _FINE = 9, 65  # of a path, where the arm and where the plan is looked at
-_TASKS = 4  # of a batch that are looked at
+_MOST, _FEWEST = 1 << 16, 3  # samples of all tasks of a batch together, and of each at least
 _SLOW = 1.0  # h times a rate of growth or decay up to which a step resolves it
 _OSCILLATION = 0.3  # h ω up to which the midpoint rule resolves an oscillation, to 1.5 % of ω
 _SPRING = 0.05  # h ω that is advised for a spring that is held over a step, which feeds it with energy at hω²/4
+
+
+class StepWarning(PathControlWarning):
+    """A period or a step is too long for what it simulates."""
 
 
 def warn_of_steps(
@@ -45,7 +51,7 @@ def warn_of_steps(
     Args:
         controllers: the laws, one after the other.
         loop: how the loop is closed; continuous time finds its steps itself.
-        robot: the arm, or one for each rollout, of which the first is looked at.
+        robot: the arm, or one for each rollout, of which those are looked at that feel a step most.
         q: joint positions at the start [rad], (N, n).
         qd: joint velocities at the start [rad/s], (N, n).
         disturbance: what else pushes the arm.
@@ -56,60 +62,72 @@ def warn_of_steps(
     """
     if not isinstance(loop, SampledLoop):
         return ""
-    arm = robot.robots[0] if isinstance(robot, RobotBatch) else robot
-    if not arm.has_mass:
+    if not (robot.robots[0] if isinstance(robot, RobotBatch) else robot).has_mass:
         return ""
-    told = list(dict.fromkeys(_all(controllers, loop, arm, q, qd, disturbance, duration)))
+    told = list(dict.fromkeys(_all(controllers, loop, robot, q, qd, disturbance, duration)))
     for sentence in told:
-        warnings.warn(sentence, PathControlWarning, stacklevel=3)
+        warnings.warn(sentence, StepWarning, stacklevel=3)
     return "; ".join(told)
 
 
 def _all(
     controllers: Sequence[Controller],
     loop: SampledLoop,
-    arm: RobotModel,
+    robot: Arm,
     q: Array,
     qd: Array,
     disturbance: Disturbance | None,
     duration: float,
 ) -> Iterator[str]:
-    felt = with_damping(arm, loop.period / loop.substeps)
+    rows = most_mobile(robot, q[:1])
+    felt = {row: with_damping(arm_of(robot, row), loop.period / loop.substeps) for row in rows}
     for law in controllers:
         postures, speeds = _states(law.task, q, qd)
-        yield from _of_gains(law, loop.period, arm, postures)
+        yield from _of_gains(law, loop.period, robot, rows, postures)
         yield from _of_plan(law, loop.period)
-        yield from _of_arm(loop, felt, postures, speeds)
+        yield from _worst(list(_of_arm(loop, arm, postures, speeds)) for arm in felt.values())
     if disturbance is not None:
-        yield from _of_disturbance(disturbance, loop, felt, q, qd, duration)
+        yield from _worst(list(_of_disturbance(disturbance, loop, a, q, qd, duration)) for a in felt.values())
 
 
 def _states(task: PathTask, q: Array, qd: Array) -> tuple[Array, Array]:
-    """The first start and some states on the path, (k, n) each."""
-    states = [(q[:1], qd[:1])]
-    for one in _some(task):
-        point = one.at(np.linspace(*one.sampled_interval, _SAMPLES))
-        states.append((point.q_d, point.velocity))
-    postures, speeds = zip(*states, strict=True)
-    return np.concatenate(postures), np.concatenate(speeds)
+    """The first start and some states on the path, of a batch on those that are fastest in a joint, (k, n) each."""
+    n = q.shape[-1]
+    if not isinstance(task, TaskBatch):
+        point = task.at(np.linspace(*task.sampled_interval, _SAMPLES))
+        return np.concatenate([q[:1], point.q_d]), np.concatenate([qd[:1], point.velocity])
+    point = task.at(_along(task, _SAMPLES))
+    rows = np.unique(np.abs(point.velocity).max(0).argmax(0))
+    postures, speeds = (np.reshape(part[:, rows], (-1, n)) for part in (point.q_d, point.velocity))
+    return np.concatenate([q[:1], postures]), np.concatenate([qd[:1], speeds])
 
 
-def _some(task: PathTask) -> Iterable[PathTask]:
-    return list(task)[:_TASKS] if isinstance(task, TaskBatch) else [task]
+def _along(task: TaskBatch, samples: int) -> Array:
+    """Parameters of all tasks of a batch, (samples, N), fewer of each the more there are."""
+    lower, upper = (np.broadcast_to(end, len(task)) for end in task.sampled_interval)
+    count = int(np.clip(_MOST // len(task), _FEWEST, samples))
+    return lower + np.linspace(0.0, 1.0, count)[:, None] * (upper - lower)
 
 
-def _of_gains(law: Controller, period: float, arm: RobotModel, q: Array) -> Iterator[str]:
+def _of_gains(law: Controller, period: float, robot: Arm, rows: list[int], q: Array) -> Iterator[str]:
     """The period is too long for the gains."""
-    left = np.atleast_2d(arm.friction.viscous)[0] - np.atleast_2d(law.compensated)[0]
-    longest = min((longest_period(one, arm, left, q, period) for one in feedbacks(law, q)), default=np.inf)
+    compensated, longest, worst = np.atleast_2d(law.compensated), np.inf, 0
+    for one in feedbacks(law, q, rows if isinstance(robot, RobotBatch) else ()):
+        arm = arm_of(robot, one.rollout)
+        left = np.atleast_2d(arm.friction.viscous)[0] - compensated[one.rollout % len(compensated)]
+        if (found := longest_period(one, arm, left, q, period)) < longest:
+            longest, worst = found, one.rollout
     if period < longest:
         return
+    several = any(np.ndim(getattr(law, name)) > 1 and len(getattr(law, name)) > 1 for name in law.gains)
+    where = f" (rollout {worst})" if several or isinstance(robot, RobotBatch) else ""
     gains = " and ".join(f"{name} up to {np.max(getattr(law, name)):g}" for name in law.gains if name != "k")
     torques = isinstance(law, PDPlus | SlotineLi)
     remedy = "K over inertia times h is below 2" if torques else "K_v h < 2 and K_p h < 2 K_v"
     yield (
-        f"gains {gains} of {type(law).__name__} need a period below {longest:.3g} s, the loop has {period:g} s and is "
-        f"likely to be unstable; shorten the period (more substeps do not help), or lower the gains so that {remedy}"
+        f"gains {gains} of {type(law).__name__} need a period below {longest:.3g} s{where}, the loop has {period:g} s "
+        f"and is likely to be unstable; shorten the period (more substeps do not help), or lower the gains so that "
+        f"{remedy}"
     )
 
 
@@ -117,19 +135,36 @@ def _of_plan(law: Controller, period: float) -> Iterator[str]:
     """The period is too long for the gain k of the plan."""
     if not isinstance(law, ExtendedMotionPlan):
         return
-    kick = max(plan_kick(one, np.linspace(*one.sampled_interval, _FINE)) for one in _some(law.task)) * float(
-        law.k.max()
-    )
+    task = law.task
+    s = _along(task, _FINE) if isinstance(task, TaskBatch) else np.linspace(*task.sampled_interval, _FINE)
+    slope, every = np.broadcast_arrays(np.ravel(plan_kick(task, s)), np.ravel(law.k))
+    row = int((slope * every).argmax())
+    kick, k = float(slope[row] * every[row]), float(every[row])
     if kick * period**2 >= 1:
-        k = float(np.max(law.k))
+        where = f" (rollout {row})" if len(every) > 1 else ""
         yield (
-            f"k = {k:g} needs a period below {kick**-0.5:.3g} s, the loop has {period:g} s and is probably unstable "
-            f"without torque limits; take k below {k / (kick * period**2):.3g}, or Projection, which is k → ∞, or "
-            "shorten the period (more substeps do not help)"
+            f"k = {k:g} needs a period below {kick**-0.5:.3g} s{where}, the loop has {period:g} s and is probably "
+            f"unstable without torque limits; take k below {k / (kick * period**2):.3g}, or Projection, which is "
+            "k → ∞, or shorten the period (more substeps do not help)"
         )
 
 
-def _of_arm(loop: SampledLoop, arm: RobotModel, q: Array, qd: Array) -> Iterator[str]:
+def _worst(found: Iterable[list[_TooLong]]) -> Iterator[str]:
+    """Of what is said of several arms the worst of each kind."""
+    every = [one for each in found for one in each]
+    for kind in dict.fromkeys(one.kind for one in every):
+        yield max((one for one in every if one.kind == kind), key=lambda one: one.rate).sentence
+
+
+class _TooLong(NamedTuple):
+    """What is too fast for a step [1/s], of what kind it is, and what is said of it."""
+
+    kind: str
+    rate: float
+    sentence: str
+
+
+def _of_arm(loop: SampledLoop, arm: RobotModel, q: Array, qd: Array) -> Iterator[_TooLong]:
     """The step is too long for the arm itself."""
     rate = rate_of_arm(arm, q, qd)
     yield from _too_long(loop, rate, _OSCILLATION, "the arm under gravity at the speed of the task")
@@ -139,7 +174,7 @@ def _of_arm(loop: SampledLoop, arm: RobotModel, q: Array, qd: Array) -> Iterator
 
 def _of_disturbance(
     disturbance: Disturbance, loop: SampledLoop, arm: RobotModel, q: Array, qd: Array, duration: float
-) -> Iterator[str]:
+) -> Iterator[_TooLong]:
     """The step is too long for a disturbance that depends on the state, and is held over it."""
     name = f"the disturbance {type(disturbance).__name__}".replace(" _Sum", "")
     damping, oscillation = rates_of_disturbance(disturbance, arm, q, qd, duration)
@@ -148,14 +183,16 @@ def _of_disturbance(
         yield from _too_long(loop, oscillation, _SPRING, f"{name}, a spring that is held over a step")
 
 
-def _too_long(loop: SampledLoop, rate: float, bound: float, what: str) -> Iterator[str]:
+def _too_long(loop: SampledLoop, rate: float, bound: float, what: str) -> Iterator[_TooLong]:
     """The sentence that a step is too long for a ``rate`` [1/s], with how many would do."""
     step = loop.period / loop.substeps
     if rate * step <= bound:
         return
     substeps = ceil(loop.period * rate / bound)
     remedy = f"take substeps={substeps}" if substeps <= MOST_SUBSTEPS else "make it less stiff, or shorten the period"
-    yield (
+    yield _TooLong(
+        what,
+        rate,
         f"steps of {1e3 * step:.3g} ms are too long for {what}: its fastest mode has {rate:.3g} 1/s; {remedy} "
-        f"(SampledLoop has {loop.substeps} in a period of {loop.period:g} s)"
+        f"(SampledLoop has {loop.substeps} in a period of {loop.period:g} s)",
     )

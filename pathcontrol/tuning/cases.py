@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
+from pathcontrol.simulation.too_long import StepWarning
 from pathcontrol.sweeps.compute import Build, Measure, compute
 from pathcontrol.sweeps.keep import Keep
 from pathcontrol.sweeps.store import Store
@@ -58,7 +60,9 @@ class Cases:
         if known is not None:
             return known
         parameters = {name: each[rows] for name, each in values.items()}
-        found = compute(self.build, parameters, samples[rows], self.measure, Keep(), _NONE)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StepWarning)  # gains that the period does not bear are tried and found bad
+            found = compute(self.build, parameters, samples[rows], self.measure, Keep(), _NONE)
         if self.store is not None:
             self.store.write(found, Keep(), _NONE)
         return found.columns

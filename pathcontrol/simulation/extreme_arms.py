@@ -1,0 +1,45 @@
+"""Of a batch with an arm for each rollout those that feel a step of the plant most."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.robot.batch import RobotBatch
+from pathcontrol.robot.friction import levels_vary, of_rollout
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.fast_modes import steepest_fall
+from pathcontrol.simulation.modes import Arm
+
+
+def arm_of(robot: Arm, rollout: int) -> RobotModel:
+    """Return the arm of a rollout, with the friction of that rollout."""
+    if not isinstance(robot, RobotBatch):
+        return robot
+    return robot.robots[rollout].with_friction(of_rollout(robot.friction, rollout))
+
+
+def most_mobile(robot: Arm, q: Array) -> list[int]:
+    """Return the rollouts whose arms have a joint that moves most easily at q (1, n), or is damped least or most.
+
+    Also those in which dry friction that falls with speed accelerates a joint most; of one arm for all rollout 0.
+    """
+    if not isinstance(robot, RobotBatch):
+        return [0]
+    mobility = _mobility(robot, q)
+    viscous = np.broadcast_to(np.atleast_2d(robot.friction.viscous), mobility.shape)
+    felt = [mobility, viscous * mobility, -viscous]
+    if levels_vary(robot.friction):
+        felt.append(steepest_fall(robot.friction) * mobility)
+    return np.unique([np.argmax(values, axis=0) for values in felt]).tolist()
+
+
+def _mobility(robot: RobotBatch, q: Array) -> Array:
+    """The diagonals of M⁻¹ of all arms at q, (N, n)."""
+    of_body: dict[int, Array] = {}
+    rows = []
+    for arm in robot.robots:
+        if id(arm) not in of_body:
+            of_body[id(arm)] = np.diagonal(np.linalg.inv(arm.mass_matrix(q)[0]))
+        rows.append(of_body[id(arm)])
+    return np.array(rows)
