@@ -67,7 +67,7 @@ def contour_numbers(
     """
     q = run.array("q")[:, :stop]
     tool = Tool(robot, str(task.frame), task.tool_pose)
-    x = where_known(lambda q: tool.kinematics(q).position, q)[0]
+    x = where_known(lambda q: tool.kinematics(q).position, q, shape=(3,))[0]
     speed = tool_speed(run, robot, task)[0, :stop]
     which, finish = run["path_index"].to_numpy()[:stop], run.data["path_finish_time"].to_numpy()
     found = []

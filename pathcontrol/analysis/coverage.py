@@ -8,8 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pathcontrol._arrays import Array
+from pathcontrol.errors import TaskError
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.closest_point.everywhere import FARTHEST
+from pathcontrol.tasks.closest_point.cells import FARTHEST
 
 _POINTS = 1000  # of a path, at least
 _MOST = 200_000  # points that a trace is refined to
@@ -53,7 +54,13 @@ def traverse(task: PathTask) -> Array:
 
 
 def even_points(at: Array) -> Points:
-    """The points (k, m) of a curve in their order, each with half of the chords to its neighbours."""
+    """The points (k, m) of a curve in their order, each with half of the chords to its neighbours.
+
+    Raises:
+        TaskError: one of them is not finite, or too far away for its square to be.
+    """
+    if not (known := (np.abs(at) < FARTHEST).all(-1)).all():
+        raise TaskError(f"the curve passes {at[np.argmin(known)].tolist()}, expected numbers below {FARTHEST:g}")
     chord = np.linalg.norm(np.diff(at, axis=0), axis=-1)
     return Points(at, 0.5 * (np.append(chord, 0.0) + np.append(0.0, chord)))
 

@@ -36,7 +36,7 @@ def tool_positions(run: Run, robot: RobotModel | None = None, frame: str | None 
     arm = run.robot if robot is None else robot
     expect("robot", arm, RobotModel)
     name, tip = _tool(known_task(run, None)) if frame is None else (frame, np.eye(4)[3])
-    return where_known(lambda q: (arm.frame_pose(q, name) @ tip)[..., :3], run.array("q"))
+    return where_known(lambda q: (arm.frame_pose(q, name) @ tip)[..., :3], run.array("q"), shape=(3,))
 
 
 def tool_deviation(

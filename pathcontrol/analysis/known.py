@@ -11,10 +11,11 @@ from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
+from pathcontrol.simulation.origin import check_sequence
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import TaskBatch
-from pathcontrol.tasks.closest_point.everywhere import FARTHEST
+from pathcontrol.tasks.closest_point.cells import FARTHEST
 
 
 def known_task(run: Run, task: PathTask | None) -> PathTask:
@@ -30,6 +31,7 @@ def known_task(run: Run, task: PathTask | None) -> PathTask:
     expect("task", task, PathTask)
     if task.n != run.data.sizes["joint"]:
         raise InputError(f"the task has {task.n} joints, the run {run.data.sizes['joint']}; expected as many")
+    check_sequence(run.data, task)
     return task
 
 
@@ -76,8 +78,8 @@ def by_task(run: Run, task: PathTask) -> Iterator[tuple[Run, PathTask, NDArray[n
         yield run.with_data(run.data.isel(rollout=rows)), own, rows
 
 
-def where_known(function: Callable[..., Array], *arrays: Array) -> Array:
-    """``function`` (k,) or (k, n) of arrays (rollout, time, …), one moment a row, where all are numbers; else NaN.
+def where_known(function: Callable[..., Array], *arrays: Array, shape: tuple[int, ...] = ()) -> Array:
+    """``function`` (k, *shape) of arrays (rollout, time, …), one moment a row, where all are numbers; else NaN.
 
     So no path is asked where it is at a NaN, which a rollout that diverged leaves behind. Numbers with squares that are
     not finite count as none.
@@ -86,7 +88,7 @@ def where_known(function: Callable[..., Array], *arrays: Array) -> Array:
     known = np.all([(np.abs(a) < FARTHEST).reshape(*moments, -1).all(-1) for a in arrays], axis=0)
     if known.all():
         return function(*arrays)
-    found = function(*(a[known] for a in arrays)) if known.any() else np.empty(0)
-    values = np.full(moments + found.shape[1:], np.nan)
-    values[known] = found
+    values = np.full(moments + shape, np.nan)
+    if known.any():
+        values[known] = function(*(a[known] for a in arrays))
     return values

@@ -50,9 +50,9 @@ class LedCurve:
     def __init__(self, task: PathTask, tool: Tool) -> None:
         s = traverse(task)
         there = tool.kinematics(task.q_d(s))
+        self.points: Points = even_points(there.position)
         slope, beyond = _velocity(there, task.dq_d(s)), "periodic" if task.closed else None
         curve = CubicHermiteSpline(s, there.position, slope, extrapolate=beyond)
-        self.points: Points = even_points(there.position)
         self._curve = curve
         self._closest = ClosestPoint(Curve(curve, curve.derivative(), curve.derivative(2)), s[0], s[-1], task.closed)
 

@@ -12,6 +12,7 @@ from pathcontrol.tasks.batch import TaskBatch, of_each
 from pathcontrol.tasks.profile import END_TIME
 
 _SAMPLES = 257  # of the path, for its average speed
+_SHORTEST = 1e-150  # braking, whose inverse and the shares of it are numbers
 _REMAINING = 1e-4  # rad (or m) of joint path that a plan at the end may have left
 
 
@@ -44,8 +45,9 @@ class Ending(NamedTuple):
             return None
         s = np.linspace(task.s0, task.s_end, _SAMPLES)
         theta, length = task.theta(s) + np.zeros_like(s), np.linalg.norm(task.dq_d(s), axis=-1)
-        speed = np.trapezoid(length, s) / np.trapezoid(1 / theta, s)
-        braking = END_TIME * float(theta[-1])
+        with np.errstate(over="ignore"):  # a plan may take for ever
+            speed = np.trapezoid(length, s) / np.trapezoid(1 / theta, s)
+        braking = max(END_TIME * float(theta[-1]), _SHORTEST)
         return cls(task.s_end, braking, task.s_end - max(braking, END_TIME * float(speed / length[-1])))
 
     def braked(self, point: PathPoint, s: Array) -> PathPoint:

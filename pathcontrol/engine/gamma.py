@@ -12,17 +12,24 @@ from pathcontrol._identity import KnownOf
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.structs import Gamma, Memory
 from pathcontrol.engine.table import PathTable, bezier_points, task_table
+from pathcontrol.errors import EngineError
 from pathcontrol.tasks.base import PathTask
 
 _TURN = 1 / 8  # rad over a piece of a cell, which is taken to hold one minimum at most
 _MOST_PIECES = 256
 _SAMPLES = 9  # of a cell, to see how far Γ turns in it
+_LOOKS, _MOST_WORK = 16, 1 << 14  # states that are looked at before, and pieces that each may have to be compared with
 
 
 class _Ready(NamedTuple):
+    """A table with the balls around Γ in its cells, and how many pieces each is cut into."""
+
     table: PathTable
     gamma: Gamma
     memory: Memory
+    centre: Array
+    radius: Array
+    pieces: Array
 
 
 _READY: KnownOf[PathTask, dict[tuple[float, bool], _Ready]] = KnownOf()
@@ -41,7 +48,8 @@ def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braki
         braking: take ϑ with the ending of the controllers' plan.
 
     Raises:
-        EngineError: there is no compiled library, or the task has no table.
+        EngineError: there is no compiled library, the task has no table, or its Γ is so wild that searching the table
+            cell by cell takes too long.
     """
     library = load_library()
     table, path, kept = task_table(task)
@@ -52,14 +60,31 @@ def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braki
         gamma = Gamma(addressof(memory.keep(path)), weight, braking)
         centre, radius = _balls(table, weight, braking)
         gamma.centre, gamma.radius = memory.address(centre), memory.address(radius)
-        gamma.pieces = memory.address(_pieces(table, weight), np.int32)
+        pieces = _pieces(table, weight)
+        gamma.pieces = memory.address(pieces, np.int32)
         memory.keep(kept)
-        known = ready[weight, braking] = _Ready(table, gamma, memory)
+        known = ready[weight, braking] = _Ready(table, gamma, memory, centre, radius, pieces)
     states = np.concatenate([q, weight * qd], axis=-1)
+    _check_work(known, states)
     distance, s = np.empty((2, len(states)))
     arrays = (states, distance, s)
     library.pathcontrol_gamma(addressof(known.gamma), 1, len(states), *(a.ctypes.data for a in arrays))
     return distance, s
+
+
+def _check_work(ready: _Ready, states: Array) -> None:
+    """Check that few of the pieces of Γ may be nearest to a state, as far as the balls around its cells tell.
+
+    Raises:
+        EngineError: there are too many.
+    """
+    looked = states[:: len(states) // _LOOKS + 1]
+    work = [0]
+    for x in looked[np.isfinite(looked).all(-1)]:
+        away = np.linalg.norm(ready.centre - x, axis=-1)
+        work.append(int(ready.pieces[away - ready.radius <= (away + ready.radius).min()].sum()))
+    if max(work) > _MOST_WORK:
+        raise EngineError(f"{max(work)} pieces of Γ may be nearest to a state, expected at most {_MOST_WORK}")
 
 
 def _velocity(table: PathTable) -> Array:

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
@@ -26,6 +27,23 @@ class Stored(NamedTuple):
 
     text: str
     numbers: Array
+
+
+def check_sequence(data: xr.Dataset, task: PathTask | None) -> None:
+    """Check that data which say on which path of a sequence the arm was, and a ``task`` that is one, fit together.
+
+    Raises:
+        InputError: the data are of paths that the task does not have, or are no numbers of paths.
+    """
+    if not isinstance(task, PathSequence) or "path_index" not in data.coords:
+        return
+    which = data["path_index"]
+    if which.dims != ("time",) or which.dtype.kind not in "iu":
+        raise InputError(f"path_index is {which.dtype} over {which.dims}, expected whole numbers over ('time',)")
+    if (which.size and not 0 <= int(which.min()) <= int(which.max()) < len(task)) or (
+        data.sizes.get("path", len(task)) != len(task)
+    ):
+        raise InputError(f"the data are of other paths than the {len(task)} of the task; expected data and task of one")
 
 
 class Origin:

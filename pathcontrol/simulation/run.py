@@ -15,7 +15,7 @@ from pathcontrol._suffixes import check_suffix
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.origin import Origin, Stored
+from pathcontrol.simulation.origin import Origin, Stored, check_sequence
 from pathcontrol.simulation.record import laws, table
 from pathcontrol.simulation.saved.netcdf import read_run, write_run
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
@@ -142,8 +142,13 @@ class Run:
         """The path and its velocity profile, or ``None`` where the run does not know them.
 
         Of several rollouts with a task each, a :class:`TaskBatch`; of one of them, as in ``run.rollout(i)``, its own.
+
+        Raises:
+            InputError: what the file says of them is no path, or not that of the data.
         """
-        return self._origin.task_of(self.data["rollout"].to_numpy())
+        task = self._origin.task_of(self.data["rollout"].to_numpy())
+        check_sequence(self.data, task)
+        return task
 
     @property
     def time(self) -> Array:

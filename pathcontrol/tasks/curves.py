@@ -71,7 +71,7 @@ class Ellipse(JointCurve, single=True):
         if axes.shape != (2,) or (axes <= 0).any():
             raise InputError(f"semi_axes = {semi_axes!r}, expected two lengths greater than 0")
         self.semi_axes = readonly(axes)
-        self.center = readonly(finite("center", np.atleast_1d(as_array("center", center))))
+        self.center = _posture("center", center)
         self.joints = _two_joints(joints, len(self.center))
         self.clockwise = bool(clockwise)
         self._a, self._b = axes[0], -axes[1] if clockwise else axes[1]
@@ -165,7 +165,7 @@ class Lissajous(JointCurve, single=True):
     ) -> None:
         super().__init__(speed)
         given = {"amplitudes": amplitudes, "frequencies": frequencies, "phases": phases, "center": center}
-        arrays = [finite(name, np.atleast_1d(as_array(name, value))) for name, value in given.items()]
+        arrays = [_posture(name, value) for name, value in given.items()]
         try:
             arrays = [readonly(a) for a in np.broadcast_arrays(*arrays)]
         except ValueError as error:
@@ -214,9 +214,8 @@ class Line(JointCurve, single=True):
 
     def __init__(self, start: ArrayLike, end: ArrayLike, speed: float) -> None:
         super().__init__(speed)
-        self.start = readonly(finite("start", np.atleast_1d(as_array("start", start))))
-        self.end = readonly(finite("end", np.atleast_1d(as_array("end", end))))
-        if self.start.shape != self.end.shape or self.start.ndim != 1:
+        self.start, self.end = _posture("start", start), _posture("end", end)
+        if self.start.shape != self.end.shape:
             raise InputError(f"start has shape {self.start.shape} and end {self.end.shape}, expected the same (n,)")
         self.s_end = float(np.linalg.norm(self.end - self.start))
         if self.s_end == 0:
@@ -234,6 +233,14 @@ class Line(JointCurve, single=True):
 
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
         return np.clip(inner(as_array("q", q) - self.start, self._direction), 0.0, self.s_end)
+
+
+def _posture(name: str, given: ArrayLike) -> Array:
+    """Check that there is one finite value for each joint, (n,)."""
+    posture = finite(name, np.atleast_1d(as_array(name, given)))
+    if posture.ndim != 1:
+        raise InputError(f"{name} has shape {posture.shape}, expected (n,): one value for each joint")
+    return readonly(posture)
 
 
 def _two_joints(joints: Sequence[int], n: int) -> tuple[int, int]:

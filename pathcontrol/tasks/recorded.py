@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.closest_point import ClosestPoint, Curve
@@ -34,7 +34,7 @@ class RecordedProfile(VelocityProfile):
 
     def __init__(self, s: ArrayLike, jets: ArrayLike, period: float | None = None) -> None:
         self.s, self.jets = _checked(s, jets, 2)
-        self.period = period
+        self.period = _checked_period(self.s, period)
         self._rate = piecewise(self.s, self.jets[..., None])
 
     def theta(self, path: Path, s: Array) -> Array:
@@ -115,11 +115,12 @@ class RecordedPath(PathTask):
     ) -> None:
         self.samples, self.jets = _checked(samples, jets, 3)
         self.profile, self.endless, self.projects, self.original = profile, endless, projects, original
-        self.s0, self._last, self.period = float(self.samples[0]), float(self.samples[-1]), period
+        self.s0, self._last = float(self.samples[0]), float(self.samples[-1])
+        self.period = _checked_period(self.samples, period)
         self.s_end = np.inf if endless or period is not None else self._last
         self.frame, self.tool_pose = _checked_tool(frame, tool_pose)
         self.rotations = _checked_rotations(rotations)
-        self._knots = None if knots is None else readonly(finite("knots", as_array("knots", knots)))
+        self._knots = None if knots is None else _checked_knots(knots)
 
     @classmethod
     def of(cls, task: PathTask, profile: VelocityProfile | None = None, upto: float | None = None) -> RecordedPath:
@@ -224,6 +225,23 @@ def _within(s: Array, knots: Array, period: float | None) -> Array:
     if period is None:
         return np.clip(s, knots[0], knots[-1])
     return knots[0] + np.mod(s - knots[0], period)
+
+
+def _checked_period(s: Array, period: float | None) -> float | None:
+    """Check that the samples of a closed path reach from s0 to s0 + period."""
+    if period is None:
+        return None
+    if not np.isclose(s[-1] - s[0], scalar("period", period, positive=True), rtol=1e-6, atol=0):
+        raise InputError(f"period = {period:g}, but the samples span {s[-1] - s[0]:g}, expected them over one period")
+    return float(period)
+
+
+def _checked_knots(given: ArrayLike) -> Array:
+    """Check that there are finite knots in a row."""
+    knots = finite("knots", as_array("knots", given))
+    if knots.ndim != 1:
+        raise InputError(f"knots have shape {knots.shape}, expected (K,)")
+    return readonly(knots)
 
 
 def _checked_rotations(rotations: int) -> int:

@@ -160,7 +160,7 @@ def _generation(search: Search, space: Space, cases: Cases, terms: Terms, first:
     parameters = space.at(search.ask())
     rows = cases.rows(parameters, first)
     inputs = {"sample", *OUTCOME, *parameters, *cases.scenarios}
-    numbers = {name: v.reshape(-1, cases.count) for name, v in rows.items() if name not in inputs}
+    numbers = {name: _of_cases(name, v, cases.count) for name, v in rows.items() if name not in inputs}
     status = rows["status"].reshape(-1, cases.count)
     every = np.where((status == "finished").all(1), "finished", "running")
     every = np.where((status == "unfinished").any(1), "unfinished", every)
@@ -173,6 +173,17 @@ def _generation(search: Search, space: Space, cases: Cases, terms: Terms, first:
     table = dataset(columns, parameters)
     search.tell(terms.told(table))
     return table
+
+
+def _of_cases(name: str, values: Array, count: int) -> Array:
+    """Return a metric (N · m,) of N candidates in m scenarios, (N, m).
+
+    Raises:
+        InputError: it is no metric, as in a folder that something else has written to.
+    """
+    if values.ndim != 1 or values.dtype.kind not in "biuf":
+        raise InputError(f"{name} of the candidates is {values.dtype} of shape {values.shape}, expected a number each")
+    return values.reshape(-1, count)
 
 
 def _space(given: Space | Mapping[str, Any], method: str) -> Space:

@@ -15,7 +15,7 @@ from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 _DEEPEST = 50
 _DENSEST = 1100  # numbers that deflate makes of one byte are fewer than 1032
 _UNWRITTEN = 1 << 20  # bytes that a small variable may have without any of them in the file
-_WORDS = ("status", "reason", "path_status")
+_WORDS, _COUNTS = ("status", "reason", "path_status"), ("laps", "path_index")
 
 
 def check_sizes(file: h5py.File, size: int) -> None:
@@ -74,6 +74,8 @@ def check_form(data: xr.Dataset, config: Any) -> None:
         variable = data[name]
         if variable.dims != dims or (variable.dtype.kind in "bfiu") == (name in _WORDS):
             raise InputError(f"{name} is {variable.dtype} over {variable.dims}, expected other values over {dims}")
+        if name in _COUNTS and variable.dtype.kind not in "iu":
+            raise InputError(f"{name} is {variable.dtype}, expected whole numbers")
         if name in VARIABLES and not isinstance(variable.attrs.get("units"), str):
             raise InputError(f"{name} has no unit")
     _check_labels(data)
@@ -81,6 +83,9 @@ def check_form(data: xr.Dataset, config: Any) -> None:
 
 def _check_labels(data: xr.Dataset) -> None:
     """Check the values along which the arrays are laid out: times, names of joints, numbers of rollouts, words."""
+    for name in ("rollout", "joint"):
+        if name in data.coords and data[name].dims != (name,):
+            raise InputError(f"{name} is over {data[name].dims}, expected ({name!r},)")
     time, joints = data["time"].to_numpy(), data["joint"].to_numpy() if "joint" in data.coords else None
     if not np.isfinite(time).all():
         raise InputError("its times are not finite")

@@ -70,6 +70,8 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], Stored | None]:
         config = json.loads(text)
         check_form(data, config)
         _check_digest(digest, lambda: _digest_of_run(data, text))
+        if "rollout" not in data.coords:  # numbered, so that parts of the run are known by their numbers
+            data = data.assign_coords(rollout=data["rollout"])
         stored = _read_origin(path)
     except Exception as error:  # a broken file makes those who read it stumble anywhere
         reason = str(error) if "file signature not found" not in str(error) else f"it is no HDF5 file{_remedy(path)}"

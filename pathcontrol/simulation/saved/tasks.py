@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from pathcontrol._arrays import as_array, finite
 from pathcontrol.cartesian.recorded_toolpath import RecordedToolpath
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
@@ -177,4 +178,13 @@ def _made(recipe: Any, shelf: Shelf, parts: Sequence[Any] = ()) -> Any:
         return RecordedToolpath(placed=contours, **arguments)
     if recipe["class"] not in _CLASSES:
         raise InputError(f"class {recipe['class']!r} of a task, expected one of {', '.join(_CLASSES)}")
-    return _CLASSES[recipe["class"]](**{name: _made(value, shelf, parts) for name, value in values.items()})
+    return _tried(_CLASSES[recipe["class"]](**{name: _made(value, shelf, parts) for name, value in values.items()}))
+
+
+def _tried(made: Any) -> Any:
+    """Return what was made; a path has to answer at three places, as many a wrong one cannot."""
+    if isinstance(made, PathTask):
+        s = np.linspace(*made.sampled_interval, 3)
+        for asked, shape in ((made.q_d, (3, made.n)), (made.dq_d, (3, made.n)), (made.theta, (3,))):
+            finite(f"{type(made).__name__}.{asked.__name__}", np.broadcast_to(as_array("values", asked(s)), shape))
+    return made

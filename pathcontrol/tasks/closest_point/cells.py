@@ -19,6 +19,8 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.closest_point.curve import Curve, Interval
 
+#: numbers whose squares, and sums of many of these, are finite
+FARTHEST = 1e150
 _MAX_TURN = 0.5  # rad over a cell
 _FIRST_CELLS, _MAX_CELLS = 512, 1 << 19
 _NEIGHBOURS = 4  # cut with a cell on either side
@@ -52,7 +54,7 @@ class Cells(NamedTuple):
         """The cells of ``curve``, whose pieces meet at ``knots`` and whose tangent jumps at ``kinks``, if it has any.
 
         Raises:
-            TaskError: the curve is not finite somewhere.
+            TaskError: the curve is not finite somewhere, or too far away for its square to be.
         """
         ends = _first_ends(interval, knots)
         if kinks is not None:
@@ -128,14 +130,20 @@ def _worst(chosen: Array, turn: Array, room: int) -> Array:
 
 def _points(curve: Curve, s: Array) -> Array:
     p = _by_blocks(curve.p, s)
-    if not np.isfinite(p).all():
-        i = int(np.argmax(~np.isfinite(p).all(-1)))
-        raise TaskError(f"the path is {p[i].tolist()} at s = {s[i]:g}, expected finite numbers on the whole domain")
+    if not (known := (np.abs(p) < FARTHEST).all(-1)).all():
+        i = int(np.argmin(known))
+        raise TaskError(
+            f"the path is {p[i].tolist()} at s = {s[i]:g}, expected numbers below {FARTHEST:g} on the whole domain"
+        )
     return p
 
 
 def _tangents(curve: Curve, s: Array) -> Array:
     dp = _by_blocks(curve.dp, s)
+    huge = ~(np.abs(dp) < FARTHEST).all(-1)
+    if huge.any():  # their squares are not finite
+        dp = np.nan_to_num(dp)
+        dp[huge] /= np.maximum(np.abs(dp[huge]).max(-1, keepdims=True), 1.0)
     return dp / np.maximum(np.linalg.norm(dp, axis=-1, keepdims=True), np.finfo(float).tiny)
 
 

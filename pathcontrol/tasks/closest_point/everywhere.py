@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.tasks.closest_point.cells import Cells
+from pathcontrol.tasks.closest_point.cells import FARTHEST, Cells
 from pathcontrol.tasks.closest_point.curve import Curve
 
 if TYPE_CHECKING:
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 _TURN = 1 / 8  # rad over a piece of a cell, which is taken to hold one minimum at most
 _SIZES, _RATIO = 6, 4.0  # how many groups of cells by size, and their sizes
 _BLOCK = 1 << 18  # pairs of a point and a cell held at once
-#: numbers whose squares, and sums of many of these, are finite
-FARTHEST = 1e150
 _TIE = 1e-12  # by how much a sample must be nearer than a root: not by rounding alone
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
+from pathcontrol.tasks.batch import TaskBatch
 from pathcontrol.view.bodies.shapes import Color
 from pathcontrol.view.bodies.visuals import LinkVisual
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from pathcontrol.tasks.base import PathTask
 
 _ABSURD = 1e6  # rad, or m: beyond any arm
+_PROBES = 1001  # of a path
 _AT_ONCE = 20_000  # samples, so that memory for long runs is not needed twice
 
 
@@ -115,6 +117,8 @@ def check_filmed(run: Run, robot: RobotModel, task: PathTask | None) -> None:
         raise InputError(f"the run is of the joints {joints}, {robot.name} has {robot.joint_names}")
     if task is not None and task.n != robot.n:
         raise InputError(f"the task is for {task.n} joints, {robot.name} has {robot.n}")
+    if task is not None and not isinstance(task, TaskBatch):
+        _check_path(run, task)
     if not len(run.time):
         raise InputError("the run has no samples")
     if not (np.isfinite(run.time).all() and (np.diff(run.time) > 0).all()):
@@ -124,4 +128,17 @@ def check_filmed(run: Run, robot: RobotModel, task: PathTask | None) -> None:
         raise InputError(
             f"the run has joint positions that are not finite, or beyond {_ABSURD:g} rad, at {first:.4g} s; to show "
             "what was before, cut the data: run.with_data(run.data.sel(time=slice(0, …)))"
+        )
+
+
+def _check_path(run: Run, task: PathTask) -> None:
+    """Check that the path is where an arm could be, at the parameters of the run and from its begin to its end."""
+    s = run.array("s").ravel() if "s" in run.data else np.empty(0)
+    s = np.concatenate([s, np.linspace(*task.sampled_interval, _PROBES)])
+    s = s if task.closed else np.clip(s, task.s0, task.s_end)
+    near = (np.abs(task.q_d(s)) <= _ABSURD).all(-1)  # a parameter that is no number has no place either
+    if not near.all():
+        raise InputError(
+            f"the path of the run has joint positions that are not finite, or beyond {_ABSURD:g} rad, at "
+            f"s = {s[np.argmin(near)]:.4g}; it cannot be shown"
         )
