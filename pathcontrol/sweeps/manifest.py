@@ -83,13 +83,14 @@ class Manifest:
         _write(self.folder, self.samples, self.definition, self.versions, self.files)
         (self.folder / LOG).unlink(missing_ok=True)
 
-    def resume(self, definition: Mapping[str, Any]) -> None:
-        """Check that the sweep has this definition, and note with which versions it goes on.
+    def resume(self, samples: int, definition: Mapping[str, Any]) -> None:
+        """Check that the sweep has so many samples and this definition, and note with which versions it goes on.
 
         Raises:
             InputError: it has another definition; the message names what differs.
         """
-        if differing := list(_differences(self.definition, definition)):
+        then, now = {"samples": self.samples} | self.definition, {"samples": samples, **definition}
+        if differing := list(_differences(then, now)):
             raise InputError(
                 f"the sweep in {str(self.folder)!r} has another definition: {'; '.join(differing[:5])}; "
                 "give what it was begun with, or name another folder"
@@ -170,8 +171,8 @@ def _wrong(content: Mapping[str, Any]) -> Iterator[str]:
         yield "its definition has no parameters, or what it keeps is no table"
     if not isinstance(which, list) or not which or not all(isinstance(one, dict) for one in which):
         yield "it has no versions"
-    if "files" in content:
-        yield from _wrong_files(content["files"])
+    if "files" in content or "sha256" in content:  # an earlier version wrote neither
+        yield from _wrong_files(content.get("files"))
         if content.get("sha256") != _digest(content):
             yield "its checksum is another one"
 

@@ -89,6 +89,8 @@ class SweepResult:
             raise InputError(f"the sweep in {str(self.folder)!r} keeps no histories; give it keep=Keep(worst=3)")
         rows = np.searchsorted(columns["sample"], kept)
         badness = columns.get(self.kept_by, np.zeros(len(columns["sample"])))[rows]
+        if badness.ndim != 1 or badness.dtype.kind not in "biuf":
+            raise InputError(f"{self.kept_by}, by which histories are kept, is {badness.dtype}, expected numbers")
         order = np.argsort(np.where(columns["status"][rows] == "diverged", -np.inf, -badness), kind="stable")
         return self._readable([kept[i] for i in order], worst)
 

@@ -128,7 +128,9 @@ def opened(folder: Path, samples: int, definition: Mapping[str, Any], resume: bo
         if not ours:
             raise InputError(f"another process is writing to {str(folder)!r}; wait for it, or name another folder")
         begun = (folder / MANIFEST).exists()
-        store = Store.resume(folder, definition) if resume and begun else Store.begin(folder, samples, definition)
+        store = (
+            Store.resume(folder, samples, definition) if resume and begun else Store.begin(folder, samples, definition)
+        )
         try:
             yield store
         finally:

@@ -92,14 +92,14 @@ class Store:
         return cls(folder)
 
     @classmethod
-    def resume(cls, folder: str | Path, definition: Mapping[str, Any]) -> Store:
+    def resume(cls, folder: str | Path, samples: int, definition: Mapping[str, Any]) -> Store:
         """Open the sweep on disk to go on with it; what is damaged or missing is told, and forgotten to be made again.
 
         Raises:
             InputError: it has another definition; the message names what differs.
         """
         store = cls(folder, mending=True)
-        store.manifest.resume(definition)
+        store.manifest.resume(samples, definition)
         store._forget_damaged()
         store.manifest.settle()
         return store
@@ -241,6 +241,8 @@ class Store:
         count = len(found["sample"])
         diverged = found["status"] == "diverged" if count else np.zeros(0, dtype=bool)
         by = found.get(keep.by, np.full(count, np.nan))
+        if by.ndim != 1 or by.dtype.kind not in "biuf":
+            raise InputError(f"{keep.by}, by which histories are kept, is {by.dtype}, expected numbers")
         return set(at_random.tolist()) | keep.chosen(found["sample"], by, diverged)
 
     def _remembered(self, place: str, names: list[str]) -> dict[str, Array]:

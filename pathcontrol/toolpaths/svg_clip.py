@@ -156,7 +156,7 @@ def _convex(pieces: Sequence[Piece], matrix: Array) -> Iterator[Array]:
     whole = np.arctan2(turns, (edges * np.roll(edges, -1, axis=0)).sum(1)).sum()
     if whole < 0:
         plane, turns, whole = plane[::-1], -turns, -whole
-    if turns.min() >= -1e-9 * float(np.ptp(plane, axis=0).max()) ** 2 and abs(whole - 2 * np.pi) < 1e-3:
+    if turns.min() >= -1e-9 * np.square(np.ptp(plane, axis=0).max()) and abs(whole - 2 * np.pi) < 1e-3:
         yield plane
 
 

@@ -13,6 +13,7 @@ from pathcontrol.toolpaths.svg_shapes import Attributes
 from pathcontrol.toolpaths.svg_style import StyleSheet
 from pathcontrol.toolpaths.text import read_text
 
+_LONGEST = 300  # characters of what the parser says
 _NAMESPACES = ("", "http://www.w3.org/2000/svg")
 _MOST_ELEMENTS = 1_000_000
 _SERVER = re.compile(
@@ -114,6 +115,8 @@ def _refusal(message: str) -> str:
         return "has elements nested more than 256 deep; ungroup them"
     if "XML_PARSE_HUGE" in message:
         return "has an attribute of more than 10 MB; split the path"
+    if len(message) > _LONGEST:  # it repeats names and values of the file, and ends with the line
+        message = f"{message[: _LONGEST // 2]} … {message[-_LONGEST // 4 :]}"
     return f"is no well-formed SVG drawing: {message}"
 
 

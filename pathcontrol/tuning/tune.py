@@ -152,7 +152,10 @@ def _noted(store: Store | None) -> Mapping[str, Array]:
     if store is None:
         return {}
     store.tidy(Keep(), np.zeros(0, dtype=np.intp))
-    return store.columns()
+    known = store.columns()
+    if len(known["sample"]) and "status" not in known:
+        raise InputError(f"the tuning in {str(store.folder)!r} has no status of its candidates; begin it anew")
+    return known
 
 
 def _generation(search: Search, space: Space, cases: Cases, terms: Terms, first: int) -> xr.Dataset:

@@ -14,6 +14,7 @@ from pathcontrol.robot.urdf.mending import mended, parser
 from pathcontrol.robot.urdf.prolog import COMMENT, INSTRUCTION, end_of_prolog
 
 MAX_BYTES = 64 * 2**20
+_LONGEST = 200  # characters of what the parser says
 
 _NO_DOCTYPE = "a DOCTYPE may define entities and is refused; expected none, remove it"
 _RUN_XACRO = "run xacro first and load what it prints"
@@ -86,7 +87,7 @@ def _parsed(text: str, data: bytes) -> tuple[etree._Element, list[Finding]]:
 
 
 def _not_xml(error: etree.XMLSyntaxError) -> UrdfError:
-    reason = str(error.msg).splitlines()[0]
+    reason = str(error.msg).splitlines()[0][:_LONGEST]  # it repeats names and values of the file
     advice = _RUN_XACRO if "xacro" in reason else "correct that line"
     return UrdfError(f"line {error.lineno}: not XML: {reason}; {advice}")
 
