@@ -112,6 +112,7 @@ from .view.figures.errors import error_figure as error_figure
 from .view.figures.pareto import pareto_figure as pareto_figure
 from .view.figures.path import path_figure as path_figure
 from .view.figures.path import phase_figure as phase_figure
+from .view.figures.shares import limits_figure as limits_figure
 from .view.figures.speed import speed_figure as speed_figure
 from .view.figures.style import save_figure as save_figure
 from .view.figures.sweep import basin_figure as basin_figure

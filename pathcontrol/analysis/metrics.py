@@ -13,6 +13,7 @@ from pathcontrol._expect import expect
 from pathcontrol.analysis.coverage import passed, path_points
 from pathcontrol.analysis.gamma import distance_to_gamma, planned_rate
 from pathcontrol.analysis.known import by_task, known_task, of_rollouts, where_known
+from pathcontrol.analysis.laps import lap_time
 from pathcontrol.analysis.limit_shares import limit_ratios
 from pathcontrol.analysis.names import LABELS, UNITS
 from pathcontrol.analysis.progress import progress
@@ -156,8 +157,9 @@ def metrics(
     of its z axis only where it may turn about that, and left out where its orientation is free.
 
     Contour error, coverage and distance to Γ are left out for paths that neither end nor repeat. Open paths have the
-    time [s] after which they were finished, and the :func:`end_error` [rad], each NaN where they were not. All numbers
-    of a rollout that diverged are NaN. Of these, those that ``only`` names; the distance to Γ takes the most time.
+    time [s] after which they were finished, and the :func:`end_error` [rad], each NaN where they were not; closed ones
+    ``lap_time`` [s], the mean of their whole laps, see :func:`~pathcontrol.analysis.laps.lap_times`. All numbers of a
+    rollout that diverged are NaN. Of these, those that ``only`` names; the distance to Γ takes the most time.
 
     Rollouts with a task each have the numbers of their own.
 
@@ -199,6 +201,8 @@ def _metrics(run: Run, task: PathTask, counted: Samples, band: float, only: Coll
         values |= _of_coverage(run, task, own, band)
     if np.isfinite(task.s_end):
         values |= {"path_time": run.finish_time, "end_error": _end_error(run, task)}
+    if task.closed and "lap_time" in only:
+        values["lap_time"] = lap_time(run, task)
     sound = run.status != "diverged"
     return {name: np.where(sound, value, np.nan) for name, value in values.items() if name in only}
 

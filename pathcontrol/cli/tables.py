@@ -64,10 +64,11 @@ def red(text: str) -> str:
 
 
 def contour_lines(run: Run) -> list[Table]:
-    """What became of each contour of a toolpath; nothing of another run."""
+    """What became of each contour of a toolpath, or of each lap; nothing of another run."""
     from pathcontrol.analysis.contours import contour_table
+    from pathcontrol.analysis.laps import lap_table
 
-    heads, *rows = contour_table(run) or [[]]
+    heads, *rows = contour_table(run) or lap_table(run) or [[]]
     if not rows:
         return []
     table = Table()

@@ -11,8 +11,7 @@ from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.known import where_known
-from pathcontrol.analysis.tool import feed_along, tool_speed
-from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.analysis.tool import feed_along, tool_of, tool_speed
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.view.figures.inset import magnified
 from pathcontrol.view.figures.limits import extent, over_time, span
@@ -30,7 +29,7 @@ FEED_LABEL = "speed of the tool [mm/s]"
 def speed_figure(run: Runs, task: PathTask | None = None, rollout: int = 0) -> Figure:
     """The rate σ̇ of the path parameter beside the velocity profile ϑ(σ) [1/s], over time.
 
-    Of a toolpath, or several, the speed of the tool beside the feed that the plan asks for [mm/s].
+    Of paths that were made for a tool, as toolpaths are, the speed of the tool beside the feed of the plan [mm/s].
 
     Args:
         run: a run, or several by their names.
@@ -70,14 +69,14 @@ def draw_speed(axes: Axes, one: Shown) -> Array:
 
 
 def _has_tool(one: Shown) -> bool:
-    """Whether a run is along a toolpath with an arm whose tool has a speed."""
-    along = isinstance(one.task, ToolpathTask) and "path_index" in one.run.data.coords
-    return along and "qd" in one.run.data and own_robot(one.run) is not None
+    """Whether a run is along a path that was made for a tool of its arm, whose speed is known."""
+    arm = own_robot(one.run)
+    return arm is not None and one.task is not None and "qd" in one.run.data and tool_of(arm, one.task) is not None
 
 
 def _draw_feed(axes: Axes, one: Shown) -> Array:
     """The speed of the tool and the feed, of the first rollout; what is drawn, (2, time)."""
-    assert isinstance(one.task, ToolpathTask)
+    assert one.task is not None
     task, robot = one.task, one.run.robot
     wanted = where_known(lambda s: feed_along(task, robot, s), one.run.array("s"))
     drawn = [drawable(1e3 * tool_speed(one.run, robot, task)[0]), drawable(1e3 * wanted[0])]

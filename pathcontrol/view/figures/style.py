@@ -35,6 +35,7 @@ DASHED = (0, (4, 2))
 Look = dict[str, Any]
 DESIRED_LOOK: Look = {"color": GREY, "linewidth": 2.4, "zorder": 1.9}
 START_LOOK: Look = {"marker": "o", "markerfacecolor": "white", "markersize": 4.5, "zorder": 3}
+BEYOND = "#C0392B"  # a limit that must not be passed
 LIMIT_LOOK: Look = {"color": INK, "linewidth": 0.9}
 PROFILE_LOOK: Look = {"color": INK, "linewidth": 0.8, "linestyle": DASHED}
 PEAK_LOOK: Look = {"linewidth": 0.8, "linestyle": DASHED}

@@ -8,9 +8,11 @@ from typing import TypeAlias
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.analysis.limit_shares import RATIOS, limit_shares
 from pathcontrol.analysis.readable import in_degrees
-from pathcontrol.analysis.tool import feed_along, tool_speed
+from pathcontrol.analysis.tool import feed_along, tool_of, tool_speed
 from pathcontrol.analysis.torque_limits import torque_limits
+from pathcontrol.tasks.base import PathTask
 from pathcontrol.view.film.charts import Chart, Curve
 from pathcontrol.view.film.error import MILLIMETRE
 from pathcontrol.view.film.shot import Shot
@@ -24,7 +26,7 @@ def charts(shots: Sequence[Shot]) -> list[Chart]:
     """The charts of some runs; lines of the same quantity in the same unit share one."""
     found: dict[tuple[str, str], list[Curve]] = {}
     several = len(shots) > 1
-    makers: tuple[Callable[[Shot, int, bool], list[_Entry]], ...] = (_norms, _error, _rates, _torques)
+    makers: tuple[Callable[[Shot, int, bool], list[_Entry]], ...] = (_norms, _error, _rates, _torques, _shares)
     for maker in makers:
         for i, shot in enumerate(shots):
             for title, unit, curves in maker(shot, i, several):
@@ -55,8 +57,8 @@ def _rates(shot: Shot, index: int, several: bool) -> list[_Entry]:
     take = shot.take
     if "sdot" not in take.run.data:
         return []
-    if take.toolpath is not None and "qd" in take.run.data:
-        return _feeds(take, index, several)
+    if take.task is not None and "qd" in take.run.data and tool_of(take.robot, take.task) is not None:
+        return _feeds(take, take.task, index, several)
     curves = [Curve(take.name if several else "σ̇", take.time, take.run.array("sdot")[0], index)]
     if take.task is not None:
         theta = np.broadcast_to(take.task.theta(take.s), take.s.shape)
@@ -64,11 +66,10 @@ def _rates(shot: Shot, index: int, several: bool) -> list[_Entry]:
     return [("rate along the path σ̇", "1/s", curves)]
 
 
-def _feeds(take: Take, index: int, several: bool) -> list[_Entry]:
-    """The speed of the tool on a toolpath, beside the one that the plan asks for there."""
-    assert take.toolpath is not None
-    speed = tool_speed(take.run, take.robot, take.toolpath)[0]
-    wanted = feed_along(take.toolpath, take.robot, take.s)
+def _feeds(take: Take, task: PathTask, index: int, several: bool) -> list[_Entry]:
+    """The speed of the tool on a path that was made for it, beside the one that the plan asks for there."""
+    speed = tool_speed(take.run, take.robot, task)[0]
+    wanted = feed_along(task, take.robot, take.s)
     curves = [
         Curve(take.name if several else "tool", take.time, MILLIMETRE * speed, index),
         Curve("feed", take.time, MILLIMETRE * wanted, index, "reference"),
@@ -93,6 +94,24 @@ def _torques(shot: Shot, index: int, several: bool) -> list[_Entry]:
     ends, signs = take.time[[0, -1]], (1.0,) if several else (1.0, -1.0)
     curves += [Curve("limit", ends, np.full(2, 100.0 * sign), index, "limit") for sign in signs]
     return [("largest torque / limit" if several else "torque / limit", "%", curves)]
+
+
+def _shares(shot: Shot, index: int, several: bool) -> list[_Entry]:
+    """The largest shares [%] of limits of position and velocity; those of torques have a chart of their own."""
+    take = shot.take
+    curves: list[Curve] = []
+    if "qd" not in take.run.data:
+        return []
+    for name, shares in limit_shares(take.run.with_robot(take.robot)).items():
+        limited = np.isfinite(shares[0]).any(0)
+        if RATIOS[name] != "torque" and limited.any():
+            share, label = 100 * shares[0][:, limited].max(-1), RATIOS[name]
+            label = f"{take.name}, {label}" if several else label
+            curves.append(Curve(label, take.time, share, index, shade=len(curves)))
+    if not curves:
+        return []
+    limit = Curve("limit", take.time[[0, -1]], np.full(2, 100.0), index, "limit")
+    return [("position and velocity / limit, largest", "%", [*curves, limit])]
 
 
 def _curves(take: Take, index: int, several: bool, values: Array, joints: Sequence[str]) -> list[Curve]:

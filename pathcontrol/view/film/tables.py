@@ -9,6 +9,7 @@ import numpy as np
 
 from pathcontrol.analysis.contours import contour_table
 from pathcontrol.analysis.deviation import toolpath_metrics
+from pathcontrol.analysis.laps import lap_table
 from pathcontrol.analysis.limit_shares import RATIOS, is_passed
 from pathcontrol.analysis.metrics import LABELS, metrics
 from pathcontrol.analysis.readable import readable_number, unit_of
@@ -28,6 +29,7 @@ def tables(takes: Sequence[Take]) -> list[dict[str, Any]]:
     found = [
         {"title": "Metrics", "columns": [_meant(takes), *names], "rows": rows},
         *_contours(takes),
+        *_laps(takes),
         {"title": "Settings", "columns": ["", *names], "rows": _rows([settings(take) for take in takes])},
     ]
     found[0]["marked"] = [i for i, row in enumerate(rows) if row[0] in beyond]
@@ -56,6 +58,14 @@ def _contours(takes: Sequence[Take]) -> list[dict[str, Any]]:
         return []
     heads, *rows = contour_table(takes[0].run, takes[0].robot) or [[]]
     return [{"title": "Contours", "columns": heads, "rows": rows}]
+
+
+def _laps(takes: Sequence[Take]) -> list[dict[str, Any]]:
+    """How long each lap of a closed path took, of a single take."""
+    if len(takes) > 1 or takes[0].task is None or takes[0].task is not takes[0].run.task:
+        return []
+    heads, *rows = lap_table(takes[0].run) or [[]]
+    return [{"title": "Laps", "columns": heads, "rows": rows}]
 
 
 def _meant(takes: Sequence[Take]) -> str:

@@ -47,6 +47,7 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
     from pathcontrol.view.figures.deviation import deviation_figure
     from pathcontrol.view.figures.errors import error_bands_figure, error_figure
     from pathcontrol.view.figures.path import path_figure, phase_figure
+    from pathcontrol.view.figures.shares import largest_shares, limits_figure
     from pathcontrol.view.figures.speed import speed_figure
     from pathcontrol.view.figures.tool import tool_figure
     from pathcontrol.view.figures.torque import torque_figure
@@ -67,6 +68,8 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
         yield "Speed along the path", speed_figure(shown)
     if "tau" in recorded:
         yield "Torques", torque_figure(shown)
+    if any(largest_shares(run) for run in runs.values()):
+        yield "Shares of limits", limits_figure(shown)
     if "qd" in recorded:
         yield "Velocities over positions", phase_figure(shown)
     for name, run in runs.items():

@@ -12,6 +12,7 @@ import jinja2
 from markupsafe import Markup, escape
 
 from pathcontrol.analysis.contours import contour_table
+from pathcontrol.analysis.laps import lap_table
 from pathcontrol.analysis.metrics import UNITS
 from pathcontrol.analysis.remarks import remarks
 from pathcontrol.analysis.window import told
@@ -46,6 +47,7 @@ def sections(runs: Mapping[str, Run], made_by: str, sweep: SweepResult | None = 
             rows=rows(runs, numbers),
             remarks=[(name, sentence) for name, run in runs.items() for sentence in remarks(run)],
             contours=[(name, table) for name, run in runs.items() if (table := contour_table(run))],
+            laps=[(name, table) for name, run in runs.items() if (table := lap_table(run))],
             window=told(),
             files=[_metrics_file(numbers), json_file("configuration.json", configuration), *_signals(runs)],
         ),

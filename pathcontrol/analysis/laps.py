@@ -1,0 +1,95 @@
+"""A run round a closed path lap by lap: how long each took, how fast the arm and its tool were."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.analysis.known import of_rollouts
+from pathcontrol.analysis.tool import tool_of, tool_speed
+from pathcontrol.analysis.window import own_samples
+from pathcontrol.errors import InputError
+from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.base import PathTask
+
+_ROUNDING = 1e-9  # of a lap
+_MOST = 1000  # laps of a table
+
+
+def lap_times(run: Run, task: PathTask | None = None, rollout: int = 0) -> Array:
+    """Return how long [s] each whole lap of a rollout took, (laps,), counted from where its plan began.
+
+    A lap ends when s, linear between samples, has grown by a period.
+
+    Raises:
+        InputError: the path is not closed, or not known.
+    """
+    part = run.rollout(rollout)
+    path = part.task if task is None else task
+    if path is None or not path.closed:
+        raise InputError("laps are of closed paths; the path of this run has no period, or is not known")
+    return np.diff(_ends(part, path))
+
+
+def lap_time(run: Run, task: PathTask) -> Array:
+    """Return the mean time [s] of the whole laps of each rollout, (rollout,); NaN without one."""
+    found = (lap_times(run, task, i) for i in range(run.rollouts))
+    return np.array([times.mean() if len(times) else np.nan for times in found])
+
+
+def _ends(run: Run, task: PathTask) -> Array:
+    """The times [s] at which laps of a single rollout begin and end, (laps + 1,)."""
+    stop = own_samples(run)[0]
+    s, time = run.array("s")[0, :stop], run.time[:stop]
+    known = np.isfinite(s)
+    if not known.any() or task.period is None:
+        return run.time[:1]
+    s, time = np.maximum.accumulate(s[known]), time[known]
+    laps = (s - s[0]) / task.period
+    whole = np.arange(int(min(laps[-1] + _ROUNDING, _MOST)) + 1)
+    after = np.minimum(np.searchsorted(laps, whole - _ROUNDING), len(laps) - 1)
+    before = np.maximum(after - 1, 0)
+    step = laps[after] - laps[before]
+    share = np.divide(whole - laps[before], step, out=np.ones(len(whole)), where=step > 0)
+    return time[before] + np.minimum(share, 1.0) * (time[after] - time[before])
+
+
+def lap_table(run: Run) -> list[list[str]]:
+    """The numbers of each whole lap of a run of one rollout round a closed path, as texts for a reader.
+
+    Heads come first; it is empty for a run of another kind, and where no lap is whole.
+    """
+    task = run.task
+    if task is None or not task.closed or run.rollouts != 1 or not {"q", "s"} <= set(run.data.data_vars):
+        return []
+    ends = _ends(run, task)
+    if len(ends) < 2:
+        return []
+    columns = [("lap", [str(i + 1) for i in range(len(ends) - 1)]), ("time [s]", [f"{t:.4g}" for t in np.diff(ends)])]
+    columns += [(head, [f"{v:.4g}" for v in _by_lap(run, ends, values)]) for head, values in _signals(run, task)]
+    return [[head for head, _ in columns], *map(list, zip(*(texts for _, texts in columns), strict=True))]
+
+
+def _signals(run: Run, task: PathTask) -> list[tuple[str, Array]]:
+    """What is averaged over each lap, (time,) each, with what it is called."""
+    found = []
+    try:
+        arm = run.robot
+    except InputError:
+        arm = None
+    if arm is not None and "qd" in run.data and tool_of(arm, task) is not None:
+        found.append(("mean speed [mm/s]", 1e3 * of_rollouts(lambda r, t: tool_speed(r, arm, t), run, task)[0]))
+    if "sdot" in run.data:
+        theta = np.broadcast_to(task.theta(run.array("s")[0]), len(run.time))
+        found.append(("mean σ̇ over mean ϑ", run.array("sdot")[0] / np.where(theta > 0, theta, np.nan)))
+    return found
+
+
+def _by_lap(run: Run, ends: Array, values: Array) -> list[float]:
+    """The means of values (time,) over each lap, (laps,)."""
+    lap = np.searchsorted(ends, run.time, side="right") - 1
+    means = []
+    for i in range(len(ends) - 1):
+        mine = values[(lap == i) & np.isfinite(values)]
+        means.append(float(mine.mean()) if mine.size else np.nan)
+    return means
