@@ -37,6 +37,7 @@ _ENDLESS = {
     "settling_time": "never",
     "path_time": "not finished",
     "cut_time": "not finished",
+    "lap_time": "never",
     "end_error": "not finished",
 }
 
