@@ -73,7 +73,7 @@ try:
 except KeyboardInterrupt:
     assert temporary.exists()
 """
-    subprocess.run([sys.executable, "-c", program, str(tmp_path / "run.nc")], check=True, timeout=60)
+    subprocess.run([sys.executable, "-c", program, str(tmp_path / "run.nc")], check=True, timeout=600)
     assert not list(tmp_path.iterdir())
 
 

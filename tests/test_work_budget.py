@@ -55,5 +55,5 @@ def test_ctrl_c_interrupts_the_integrator():
     assert process.stdout.readline() == "integrating\n"
     time.sleep(0.2)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=600)
     assert (out, err, process.returncode) == ("interrupted\n", "", 0)
