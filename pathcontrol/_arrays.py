@@ -96,3 +96,15 @@ def in_common(values: Sequence[Array]) -> Array:
 def as_slice(rows: NDArray[np.intp]) -> NDArray[np.intp] | slice:
     """Increasing rows as a slice where they follow one another, which copies nothing."""
     return slice(int(rows[0]), int(rows[-1]) + 1) if rows[-1] - rows[0] == len(rows) - 1 else rows
+
+
+def rigid(name: str, pose: ArrayLike, tolerance: float = 1e-9) -> Array:
+    """``pose`` as a homogeneous transform (4, 4) whose rotation is one up to ``tolerance``; errors name it."""
+    transform = finite(name, as_array(name, pose))
+    if transform.shape != (4, 4):
+        raise InputError(f"{name} has shape {transform.shape}, expected (4, 4), a homogeneous transform")
+    turn = transform[:3, :3]
+    proper = np.allclose(turn @ turn.T, np.eye(3), atol=tolerance) and np.linalg.det(turn) > 0
+    if not proper or not np.allclose(transform[3], [0, 0, 0, 1]):
+        raise InputError(f"{name} is no rigid motion: its rotation is not orthonormal, or its last row not 0 0 0 1")
+    return readonly(transform)

@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, rigid
 from pathcontrol.cartesian.links import from_end_to_end
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.sequence import PathSequence
-from pathcontrol.toolpaths.contour import Contour, Toolpath, rigid
+from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.smoothing import Corners, Smoothed
 
 

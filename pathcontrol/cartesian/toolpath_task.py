@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, rigid, scalar
 from pathcontrol._expect import expect
 from pathcontrol.cartesian.contour_paths import ContourPaths, Held, rotations_of
 from pathcontrol.cartesian.links import linked
@@ -16,7 +16,7 @@ from pathcontrol.errors import InputError
 from pathcontrol.robot.extent import question_length
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.sequence import PathSequence
-from pathcontrol.toolpaths.contour import Contour, Toolpath, rigid
+from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.curve import ToolCurve
 from pathcontrol.toolpaths.segments import Polyline
 from pathcontrol.toolpaths.smoothing import Corners, smooth

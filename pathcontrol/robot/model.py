@@ -15,11 +15,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, joint_array, scalar
+from pathcontrol._arrays import Array, as_array, finite, joint_array, rigid, scalar
 from pathcontrol.errors import InputError, UnknownNameError, UrdfError
 from pathcontrol.robot.actuation import Actuation, Limits
+from pathcontrol.robot.bodies import payload_of, scale_bodies
 from pathcontrol.robot.friction import FrictionLaw, check_consistent, no_friction
-from pathcontrol.robot.lump import rod
 from pathcontrol.robot.rigid_body import RigidBody, together
 from pathcontrol.robot.urdf.locking import locked_angles
 from pathcontrol.robot.urdf.parse import parse_urdf
@@ -279,18 +279,15 @@ class RobotModel:
             frame: the frame that carries it.
             com: centre of mass in that frame [m], shape (3,).
             inertia: inertia about the centre of mass, axes of that frame [kg m²], shape (3, 3); default a point mass.
+                Of one that is symmetric up to rounding the symmetric part is taken.
         """
         self._check_mass()
-        mass, lever = scalar("mass", mass, least=0.0), finite("com", as_array("com", com))
-        tensor = np.zeros((3, 3)) if inertia is None else finite("inertia", as_array("inertia", inertia))
-        if lever.shape != (3,) or tensor.shape != (3, 3):
-            raise InputError(f"com has shape {lever.shape} and inertia {tensor.shape}, expected (3,) and (3, 3)")
-        if not np.allclose(tensor, tensor.T) or np.linalg.eigvalsh(tensor).min() < -1e-12:
-            raise InputError("the payload's inertia is not symmetric positive semi-definite")
+        body = payload_of(mass, com, inertia)
         model = pin.Model(self.pinocchio_model)
         support = model.frames[self._frame_id(frame)]
-        model.appendBodyToJoint(support.parentJoint, pin.Inertia(mass, lever, tensor), support.placement)
-        given = {"mass": mass, "frame": frame, "com": lever.tolist(), "inertia": tensor.tolist()}
+        model.appendBodyToJoint(support.parentJoint, body, support.placement)
+        tensor = np.array(body.inertia)
+        given = {"mass": body.mass, "frame": frame, "com": body.lever.tolist(), "inertia": tensor.tolist()}
         return self._changed(model, "with_payload", given)
 
     def with_frame(self, name: str, parent: str, pose: ArrayLike) -> RobotModel:
@@ -306,7 +303,7 @@ class RobotModel:
         model, given = pin.Model(self.pinocchio_model), finite("pose", as_array("pose", pose))
         if given.shape not in ((3,), (4, 4)):
             raise InputError(f"pose has shape {given.shape}, expected (4, 4), or (3,) for a position")
-        placement = pin.SE3(np.eye(3), given) if given.shape == (3,) else pin.SE3(given)
+        placement = pin.SE3(np.eye(3), given) if given.shape == (3,) else pin.SE3(rigid("pose", given, 1e-6))
         support = model.frames[self._frame_id(parent)]
         frame = pin.Frame(name, support.parentJoint, support.placement * placement, pin.FrameType.OP_FRAME)
         model.addFrame(frame, False)
@@ -335,20 +332,14 @@ class RobotModel:
                 from its joint to what is farthest on it.
 
         Raises:
-            InputError: a factor of a body that has no mass, or a number that is not above 0.
+            InputError: a factor of a body that has no mass, a number that is not above 0, or a factor and a mass of one
+                joint.
         """
         model = pin.Model(self.pinocchio_model)
         factors, masses = self._positive("scale", scale), self._positive("kg", kg)
-        for joint, value in (*factors.items(), *masses.items()):
-            i = self.joint_index(joint) + 1
-            body = model.inertias[i]
-            if body.mass > 0:
-                factor = value if joint in factors else value / body.mass
-                model.inertias[i] = pin.Inertia(factor * body.mass, body.lever, factor * body.inertia)
-            elif joint in masses:
-                model.inertias[i] = pin.Inertia(*rod(value, self._farthest(i)))
-            else:
-                raise InputError(f"scale of {joint} = {value:g}, but it moves no mass; say how many with kg={{...}}")
+        for joint in (*factors, *masses):
+            self.joint_index(joint)
+        scale_bodies(model, self.joint_names, factors, masses)
         return self._changed(model, "with_masses", {"scale": factors, "kg": masses})
 
     def _positive(self, name: str, given: Mapping[str, float] | Sequence[float] | None) -> dict[str, float]:
@@ -450,13 +441,6 @@ class RobotModel:
         if i == 0:
             raise InputError(f"no joint of {self.name} moves the frame {frame!r}; give one farther out as tip")
         return i
-
-    def _farthest(self, i: int) -> Array:
-        """Of the joints and frames on what joint ``i`` of Pinocchio moves, the place of the farthest [m], (3,)."""
-        model = self.pinocchio_model
-        joints = [model.jointPlacements[k].translation for k in range(len(model.parents)) if model.parents[k] == i]
-        frames = [frame.placement.translation for frame in model.frames if frame.parentJoint == i]
-        return max((np.array(place) for place in (*joints, *frames)), key=lambda x: float(x @ x), default=np.zeros(3))
 
     def _frame_id(self, frame: str) -> int:
         # getFrameId answers nframes for a frame that does not exist, so ask first

@@ -53,7 +53,7 @@ def robot_of(recipe: Mapping[str, Any]) -> RobotModel:
     """
     try:
         return _made(recipe)
-    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError) as error:
         if isinstance(error, PathControlError):
             raise
         raise InputError(f"this is no recipe of a robot ({type(error).__name__}: {error})") from error

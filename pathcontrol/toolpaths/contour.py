@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol._arrays import Array, as_array, rigid
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.columns import measure_bounds, measure_lengths
 from pathcontrol.toolpaths.segments import Polyline, Segment
@@ -167,18 +167,6 @@ class Toolpath:
         """Distance from points x (*batch, 3) to the nearest of the contours, by default of the cuts [m], (*batch,)."""
         chosen = self.cuts if contours is None else contours
         return np.min([contour.distance(x) for contour in chosen], axis=0)
-
-
-def rigid(name: str, pose: ArrayLike) -> Array:
-    """``pose`` as a homogeneous transform (4, 4) whose rotation is one; errors name it."""
-    transform = finite(name, as_array(name, pose))
-    if transform.shape != (4, 4):
-        raise InputError(f"{name} has shape {transform.shape}, expected (4, 4), a homogeneous transform")
-    turn = transform[:3, :3]
-    proper = np.allclose(turn @ turn.T, np.eye(3), atol=1e-9) and np.linalg.det(turn) > 0
-    if not proper or not np.allclose(transform[3], [0, 0, 0, 1]):
-        raise InputError(f"{name} is no rigid motion: its rotation is not orthonormal, or its last row not 0 0 0 1")
-    return readonly(transform)
 
 
 def _counted(name: str, contours: Sequence[Contour]) -> str:
