@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, as_array, rigid
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.columns import measure_bounds, measure_lengths
+from pathcontrol.toolpaths.nearest import Cubics, is_cubic
 from pathcontrol.toolpaths.segments import Polyline, Segment
 
 _MEET = 1e-9  # m, how near the ends of neighbouring segments are
@@ -87,13 +88,17 @@ class Contour:
         """Distance from points x (*batch, 3) to the contour [m], (*batch,)."""
         x = as_array("x", x)
         flat = x.reshape(-1, 3)
-        best = np.full(len(flat), np.inf)
-        measure_bounds(self.segments)
-        boxes = np.stack([_to_box(flat, *segment.bounds) for segment in self.segments])
-        for rank in np.argsort(boxes.min(1)):
-            near = boxes[rank] < best
-            if near.any():
-                best[near] = np.minimum(best[near], self.segments[rank].distance(flat[near]))
+        best = np.where(np.isfinite(flat).all(-1), np.inf, np.nan)
+        cubics, others = self._by_kind
+        if cubics is not None:
+            best = np.minimum(best, cubics.distance(flat))
+        if others and flat.size:
+            measure_bounds(others)
+            boxes = np.stack([_to_box(flat, *segment.bounds) for segment in others])
+            for rank in np.argsort(boxes.min(1)):
+                near = boxes[rank] < best
+                if near.any():
+                    best[near] = np.minimum(best[near], others[rank].distance(flat[near]))
         return best.reshape(x.shape[:-1])
 
     def placed(self, pose: ArrayLike) -> Contour:
@@ -106,6 +111,13 @@ class Contour:
         """The contour from its end to its start."""
         normals = None if self.normals is None else self.normals[::-1]
         return replace(self, segments=tuple(s.reversed() for s in self.segments[::-1]), normals=normals)
+
+    @cached_property
+    def _by_kind(self) -> tuple[Cubics | None, tuple[Segment, ...]]:
+        """What is searched for the nearest point together, and what piece by piece."""
+        cubics = [segment for segment in self.segments if is_cubic(segment)]
+        others = tuple(segment for segment in self.segments if not is_cubic(segment))
+        return Cubics(cubics) if cubics else None, others
 
     @cached_property
     def _ends(self) -> tuple[Array, Array]:
