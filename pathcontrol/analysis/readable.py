@@ -12,6 +12,7 @@ from pathcontrol.analysis.metrics import UNITS
 from pathcontrol.simulation.run import Run
 
 _NOTHING = 1e-7  # of the largest of several numbers
+_ROUNDING = 1e-9  # rad, m, N m, …: what an arm of these sizes has by the digits of floats alone
 _VARIABLES = {"rad": "q", "rad/s": "qd", "N m": "tau_demand"}
 
 
@@ -24,6 +25,11 @@ def reading(unit: str, values: Array) -> tuple[float, str]:
     if unit == "m":
         return (1e3, "mm") if np.abs(values[np.isfinite(values)]).max(initial=0.0) >= 1e-3 else (1e6, "µm")
     return 1.0, unit
+
+
+def without_rounding(values: Array) -> Array:
+    """Return values in SI units with 0 where they are smaller than a billionth, which is rounding on an arm."""
+    return np.where(np.abs(values) < _ROUNDING, 0.0, values)
 
 
 def in_degrees(values: Array, unit: str) -> tuple[Array, str]:
@@ -39,6 +45,7 @@ def readable_number(value: float, unit: str) -> str:
         return "–"
     if np.isinf(value):
         return "never" if unit == "s" else "∞"
+    value = float(without_rounding(np.array(value)))
     factor, name = reading(unit, np.array([value]))
     return f"{factor * value:.4g} {name}".strip()
 

@@ -14,7 +14,7 @@ from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.limit_shares import RATIOS, is_passed, limit_ratios
 from pathcontrol.analysis.metrics import LABELS, metrics
 from pathcontrol.analysis.progress import got_there
-from pathcontrol.analysis.readable import counted, reading, unit_of
+from pathcontrol.analysis.readable import counted, reading, unit_of, without_rounding
 from pathcontrol.analysis.torque import torque_metrics
 from pathcontrol.analysis.window import samples_of
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
@@ -127,7 +127,10 @@ def _outcome(run: Run) -> str:
 
 
 def rows(runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]]]) -> list[Row]:
-    """A row for each metric that one of the runs has, the best of each marked where there are several."""
+    """A row for each metric that one of the runs has, the best of each marked where there are several.
+
+    What is 0 but for rounding is shown as 0; where that would be the best, none is marked.
+    """
     wanted = [(key, unit) for key in LABELS for unit in _units(key, runs, numbers)]
     return [_row(key, unit, runs, numbers) for key, unit in wanted]
 
@@ -138,12 +141,15 @@ def _units(key: str, runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str,
 
 
 def _row(key: str, unit: str, runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]]]) -> Row:
-    values = {n: np.asarray(numbers[n][key]) for n, r in runs.items() if key in numbers[n] and unit_of(key, r) == unit}
+    given = {n: np.asarray(numbers[n][key]) for n, r in runs.items() if key in numbers[n] and unit_of(key, r) == unit}
+    values = {name: without_rounding(value) for name, value in given.items()}
+    rounded = {name for name in given if given[name].any() and not values[name].any()}
     scale, shown = reading(unit, np.concatenate(list(values.values())))
     texts = {name: _text(scale * value, _ENDLESS.get(key, "–")) for name, value in values.items()}
     arrived = {name: float(np.median(value)) for name, value in values.items() if _arrived(numbers[name])}
     beyond = {name for name, value in values.items() if key in RATIOS and is_passed(value).any()}
-    best = _best(_BADNESS.get(key, abs), arrived, texts) - beyond
+    best = _best(_BADNESS.get(key, abs), arrived, texts)
+    best = set() if best & rounded else best - beyond
     return Row(LABELS[key], shown, tuple(Cell(texts.get(name, "–"), name in best, name in beyond) for name in runs))
 
 
@@ -159,6 +165,8 @@ def _text(values: Array, endless: str) -> str:
 
 
 def _number(value: float, endless: str) -> str:
+    if value == 0:
+        return "0"
     return f"{value:#.4g}".rstrip(".") if math.isfinite(value) else endless
 
 
