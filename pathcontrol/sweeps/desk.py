@@ -68,6 +68,7 @@ class Desk:
         self._client, self._parcel = client, Parcel.of(job, expected_versions())
         self._direct = _reachable(client)
         self._there: Future | None = None  # the parcel, on the workers
+        self._known: dict[str, None] = {}  # workers by their address, those that have been there longest first
         self._out: dict[Any, tuple[Future, Piece]] = {}  # by key
         self._kills: Counter[int] = Counter()  # by the first sample of a piece
         self._ready = as_completed(loop=client.loop)
@@ -141,17 +142,22 @@ class Desk:
         self._ready.add(future)
 
     def _sent(self) -> Future | None:
-        """The parcel, once it is on all workers that there are; others will get it from these. None to try again."""
+        """The parcel, once it is on all workers that there are; others will get it from these. None to try again.
+
+        Then it goes to one worker, which has been there longest: others may come and go faster than they can take it.
+        """
         try:
             self._client.wait_for_workers(1, timeout=_RESTART)
         except TimeoutError as error:
             raise ClusterError(f"no worker is left, and none has come for {_RESTART:g} s; {_KEPT}") from error
+        there = self._client.nthreads()
+        steady = next((address for address in self._known if address in there), None)
+        self._known |= dict.fromkeys(there)
+        where = {"broadcast": True} if steady is None else {"workers": [steady]}
         try:
             return within(
                 _RESTART,
-                lambda: self._client.scatter(
-                    self._parcel, broadcast=True, direct=self._direct, hash=False, timeout=_RESTART
-                ),
+                lambda: self._client.scatter(self._parcel, direct=self._direct, hash=False, timeout=_RESTART, **where),
             )
         except (OSError, TimeoutError, KeyError):  # a worker died, or froze, or is gone from the scheduler, meanwhile
             self._check_scheduler()
