@@ -10,6 +10,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.toolpaths.corners import angles, end_tangent, start_tangent
 from pathcontrol.toolpaths.segments import Polyline, Segment
 
+_BETWEEN = 64  # places of each piece, at which a polyline is compared with what it stands for
 _FIRST_PIECES = 32
 _TURN = 0.2  # rad over a piece
 _NARROWEST = 2.0**-40
@@ -34,7 +35,8 @@ def regular(segment: Segment, tolerance: float) -> tuple[Segment, float]:
         pieces = pieces.halved(segment, coarse)
     least = max(_NOTHING, min(0.1 * tolerance, 0.01 * segment.length))
     polyline = Polyline(_apart(segment.point(pieces.u), least))
-    between = segment.point(pieces.u[:-1] + np.diff(pieces.u) * np.linspace(0.0, 1.0, 16, endpoint=False)[:, None])
+    shares = np.linspace(0.0, 1.0, _BETWEEN, endpoint=False)[:, None]
+    between = segment.point(pieces.u[:-1] + np.diff(pieces.u) * shares)
     return polyline, float(polyline.distance(between).max())
 
 
