@@ -85,3 +85,18 @@ def test_a_path_made_for_a_tool_is_charted_by_its_speed():
     assert not any("σ̇" in title for title in titles)
     label = pc.speed_figure(run).axes[0].get_ylabel()
     assert "speed of the tool" in label
+
+
+def test_very_many_laps_all_have_their_times_and_a_table_has_the_first():
+    time = np.linspace(0.0, 1500.5, 15006)
+    run = run_with(2 * np.pi * time, time, pc.Circle(1.0, 2.0))
+    assert len(lap_times(run)) == 1500
+    assert np.allclose(lap_times(run), 1.0)
+    assert len(lap_table(run)) == 1 + 1000
+
+
+def test_each_rollout_of_a_batch_has_its_own_lap_time():
+    circle = pc.Circle(1.0, 2.0)
+    law = pc.ComputedTorque(ROBOT, pc.TaskBatch([circle, circle.with_profile(pc.ConstantRate(4.0))]), 400.0, 40.0)
+    run = pc.simulate(law, circle.q_d(np.array(0.0)), duration=7.0, progress=False)
+    assert np.allclose(pc.metrics(run, only=["lap_time"])["lap_time"], [np.pi, np.pi / 2], rtol=1e-9)

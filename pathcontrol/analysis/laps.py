@@ -28,25 +28,30 @@ def lap_times(run: Run, task: PathTask | None = None, rollout: int = 0) -> Array
     path = part.task if task is None else task
     if path is None or not path.closed:
         raise InputError("laps are of closed paths; the path of this run has no period, or is not known")
-    return np.diff(_ends(part, path))
+    return np.diff(_ends(part, path)[0])
 
 
 def lap_time(run: Run, task: PathTask) -> Array:
     """Return the mean time [s] of the whole laps of each rollout, (rollout,); NaN without one."""
-    found = (lap_times(run, task, i) for i in range(run.rollouts))
+    found = map(np.diff, _ends(run, task))
     return np.array([times.mean() if len(times) else np.nan for times in found])
 
 
-def _ends(run: Run, task: PathTask) -> Array:
-    """The times [s] at which laps of a single rollout begin and end, (laps + 1,)."""
-    stop = own_samples(run)[0]
-    s, time = run.array("s")[0, :stop], run.time[:stop]
+def _ends(run: Run, task: PathTask) -> list[Array]:
+    """The times [s] at which laps of each rollout begin and end, (laps + 1,) each."""
+    s, time = run.array("s"), run.time
+    return [_ends_of_one(s[i, :stop], time[:stop], task) for i, stop in enumerate(own_samples(run))]
+
+
+def _ends_of_one(s: Array, time: Array, task: PathTask) -> Array:
+    """The times [s] at which laps of one rollout, s at times (k,) each, begin and end, (laps + 1,)."""
     known = np.isfinite(s)
     if not known.any() or task.period is None:
-        return run.time[:1]
+        return time[:1]
     s, time = np.maximum.accumulate(s[known]), time[known]
     laps = (s - s[0]) / task.period
-    whole = np.arange(int(min(laps[-1] + _ROUNDING, _MOST)) + 1)
+    # of more laps than samples nobody could say how long they took
+    whole = np.arange(int(min(laps[-1] + _ROUNDING, len(s))) + 1)
     after = np.minimum(np.searchsorted(laps, whole - _ROUNDING), len(laps) - 1)
     before = np.maximum(after - 1, 0)
     step = laps[after] - laps[before]
@@ -57,12 +62,13 @@ def _ends(run: Run, task: PathTask) -> Array:
 def lap_table(run: Run) -> list[list[str]]:
     """The numbers of each whole lap of a run of one rollout round a closed path, as texts for a reader.
 
-    Heads come first; it is empty for a run of another kind, and where no lap is whole.
+    Heads come first, and of very many laps the first 1000; it is empty for a run of another kind, and where no lap is
+    whole.
     """
     task = run.task
     if task is None or not task.closed or run.rollouts != 1 or not {"q", "s"} <= set(run.data.data_vars):
         return []
-    ends = _ends(run, task)
+    ends = _ends(run, task)[0][: _MOST + 1]
     if len(ends) < 2:
         return []
     columns = [("lap", [str(i + 1) for i in range(len(ends) - 1)]), ("time [s]", [f"{t:.4g}" for t in np.diff(ends)])]

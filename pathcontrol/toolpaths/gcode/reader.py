@@ -16,7 +16,7 @@ from pathcontrol.toolpaths.gcode.modes import Modes
 from pathcontrol.toolpaths.gcode.program import Program
 from pathcontrol.toolpaths.gcode.remarks import without_remarks
 from pathcontrol.toolpaths.gcode.units import UNITS
-from pathcontrol.toolpaths.gcode.words import PERCENT, PROGRAM_NAME, parse, without_comments
+from pathcontrol.toolpaths.gcode.words import PERCENT, PLAIN, PROGRAM_NAME, parse, without_comments
 from pathcontrol.toolpaths.passed import Passed
 from pathcontrol.toolpaths.text import MAX_COORDINATE, read_lines
 
@@ -110,6 +110,7 @@ def _run(program: Program, texts: Sequence[str], passed: Passed) -> None:
                 began = True
                 if not program.carry_out(parse(text), number):
                     return
-                number += program.follow(texts, number)
+                if PLAIN.fullmatch(text):  # what follows other lines is rarely plain, and looking for it takes time
+                    number += program.follow(texts, number)
         except ToolpathError as error:
             raise ToolpathError(f"line {number}: {error}") from None
