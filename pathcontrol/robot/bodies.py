@@ -69,6 +69,17 @@ def scale_bodies(model: Any, names: tuple[str, ...], factors: Mapping[str, float
             raise InputError(f"scale of {joint} = {value:g}, but it moves no mass; say how many with kg={{...}}")
 
 
+def idle_joints(model: Any) -> list[str]:
+    """Return the names of the joints that have neither a rotor nor, from there to the tips, anything to move."""
+    bodies, rotors = list(model.inertias), np.asarray(model.armature)
+    heavy = [bool(body.mass or body.inertia.any()) for body in bodies]
+    return [
+        model.names[i]
+        for i in range(1, len(bodies))
+        if rotors[i - 1] == 0 and not any(heavy[k] for k in model.subtrees[i])
+    ]
+
+
 def _farthest(model: Any, i: int) -> Array:
     """Of the joints and frames on what joint ``i`` moves, return the place of the farthest [m], (3,)."""
     joints = [model.jointPlacements[k].translation for k in range(len(model.parents)) if model.parents[k] == i]

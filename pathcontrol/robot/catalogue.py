@@ -61,6 +61,8 @@ def _named(name: str, package_dirs: tuple[Path, ...]) -> UrdfSource:
     except MissingExtraError as missing:
         raise UnknownNameError(f"unknown robot {name!r}; known here: {_names()}. {missing}") from missing
     loader = catalogue.get(name)
+    if loader is None and Path(name).is_dir():
+        raise UrdfError(f"{name!r} is a folder, expected a URDF file; give the one that is in it")
     if loader is None or not loader.urdf_filename or loader.free_flyer:
         reason = "has a floating base" if loader is not None and loader.free_flyer else "is unknown"
         raise UnknownNameError(f"robot {name!r} {reason}; known arms: {_names()}")

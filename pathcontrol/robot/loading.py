@@ -15,7 +15,7 @@ from pathcontrol.errors import PathControlWarning, UrdfError
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Viscous
-from pathcontrol.robot.model import RobotModel, UrdfSource, build_model
+from pathcontrol.robot.model import RobotModel, UrdfSource, build_model, with_locked
 from pathcontrol.robot.urdf import UrdfReport, check_urdf, parse_urdf
 from pathcontrol.robot.urdf.extension import extension_values
 from pathcontrol.robot.urdf.locking import locked_angles, locked_beyond_limits
@@ -67,10 +67,10 @@ def load_robot(
     report = _checked(urdf, label, tuple(locked))
     for finding in (*mended, *(finding for finding in report.warnings if finding.code in TOLD)):
         warnings.warn(f"{label}: {finding.where}: {finding.message}", PathControlWarning, stacklevel=2)
-    for told in locked_beyond_limits(root, lock or {}):
+    for told in locked_beyond_limits(root, locked):
         warnings.warn(f"{label}: {told}", PathControlWarning, stacklevel=2)
     robot = _build(urdf, threads)
-    return robot.reduced(locked) if locked else robot
+    return with_locked(robot, locked) if locked else robot
 
 
 def _parsed(urdf: UrdfSource, label: str) -> Parsed:

@@ -5,6 +5,7 @@ Arrays have leading batch axes: q, q̇, τ are ``(*batch, n)`` in the order of `
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -16,12 +17,12 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, joint_array, rigid, scalar
-from pathcontrol.errors import InputError, UnknownNameError, UrdfError
+from pathcontrol.errors import InputError, PathControlWarning, UnknownNameError, UrdfError
 from pathcontrol.robot.actuation import Actuation, Limits
-from pathcontrol.robot.bodies import payload_of, scale_bodies
+from pathcontrol.robot.bodies import idle_joints, payload_of, scale_bodies
 from pathcontrol.robot.friction import FrictionLaw, check_consistent, no_friction
 from pathcontrol.robot.rigid_body import RigidBody, together
-from pathcontrol.robot.urdf.locking import locked_angles
+from pathcontrol.robot.urdf.locking import check_tip, locked_angles, locked_beyond_limits, names_to_keep
 from pathcontrol.robot.urdf.parse import parse_urdf
 
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED  # the frame's origin, axes parallel to the base's
@@ -369,20 +370,15 @@ class RobotModel:
                 limit nearest to 0.
             tip: a frame: as ``keep`` with all joints that move it.
         """
-        named = [*(lock or {}), *([keep] if isinstance(keep, str) else keep)]
-        for joint in named:
+        check_tip(tip)
+        for joint in (*(lock or {}), *names_to_keep(keep)):
             self.joint_index(joint)
         moving = None if tip is None else self.pinocchio_model.names[self._support(tip)]
-        found = locked_angles(parse_urdf(self.source.text), lock, keep, moving)
-        angles = {joint: angle for joint, angle in found.items() if joint in self.joint_names}
-        indices = {self.joint_index(joint): angle for joint, angle in angles.items()}
-        if len(indices) == self.n:
-            raise InputError(f"locking all {self.n} joints of {self.name} leaves nothing to control; leave one free")
-        q = np.zeros(self.n)
-        q[list(indices)] = list(indices.values())
-        model = pin.buildReducedModel(self.pinocchio_model, [i + 1 for i in indices], q)
-        free = [i for i in range(self.n) if i not in indices]
-        return self._changed(model, "reduced", {"lock": angles}, actuation=self.actuation.select(free))
+        root = parse_urdf(self.source.text)
+        angles = {j: at for j, at in locked_angles(root, lock, keep, moving).items() if j in self.joint_names}
+        for told in locked_beyond_limits(root, angles):
+            warnings.warn(told, PathControlWarning, stacklevel=2)
+        return with_locked(self, angles)
 
     # --- inside ---------------------------------------------------------------------------------------------
 
@@ -409,9 +405,9 @@ class RobotModel:
         model = pin.Model(self.pinocchio_model)
         return model, model.createData()
 
-    def _changed(self, model: Any, method: str, arguments: dict[str, Any], **others: Any) -> RobotModel:
+    def _changed(self, model: Any, method: str, arguments: dict[str, Any]) -> RobotModel:
         """The arm that a method makes of this one."""
-        return replace(self, pinocchio_model=model, steps=(*self.steps, (method, arguments)), **others)
+        return replace(self, pinocchio_model=model, steps=(*self.steps, (method, arguments)))
 
     def _centripetal(self, q: ArrayLike, x: ArrayLike) -> Array:
         """c(q,x) = C(q,x)x [N m], (*batch, n)."""
@@ -434,6 +430,11 @@ class RobotModel:
                 f"{self.name}: no link has a mass, so there are kinematics and no dynamics; give some with "
                 f"with_masses(kg={{{self.joint_names[0]!r}: 2.0, ...}}) or load_robot(..., estimated_inertia=True)"
             )
+        if idle := idle_joints(self.pinocchio_model):
+            raise UrdfError(
+                f"{self.name}: {', '.join(idle)} would move no mass, so there are no dynamics; give some with "
+                f"with_masses(kg={{{idle[-1]!r}: 2.0, ...}})"
+            )
 
     def _support(self, frame: str) -> int:
         """The index of the joint of Pinocchio that moves a frame, which is not 0."""
@@ -450,6 +451,24 @@ class RobotModel:
         if model.existFrame(frame, pin.FrameType.BODY):  # a link and a joint may share a name
             return model.getFrameId(frame, pin.FrameType.BODY)
         return model.getFrameId(frame)
+
+
+def with_locked(robot: RobotModel, angles: Mapping[str, float]) -> RobotModel:
+    """Return the arm with joints locked at ``angles`` [rad], by name, and only those: none that mimic them.
+
+    Raises:
+        InputError: an angle is not finite, or no joint is left.
+        UnknownNameError: there is no such joint.
+    """
+    indices = {robot.joint_index(joint): scalar(f"angle of {joint}", angle) for joint, angle in angles.items()}
+    if len(indices) == robot.n:
+        raise InputError(f"locking all {robot.n} joints of {robot.name} leaves nothing to control; leave one free")
+    q = np.zeros(robot.n)
+    q[list(indices)] = list(indices.values())
+    model = pin.buildReducedModel(robot.pinocchio_model, [i + 1 for i in indices], q)
+    free = [i for i in range(robot.n) if i not in indices]
+    steps = (*robot.steps, ("reduced", {"lock": dict(angles)}))
+    return replace(robot, pinocchio_model=model, actuation=robot.actuation.select(free), steps=steps)
 
 
 def build_model(text: str) -> Any:

@@ -16,7 +16,7 @@ from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.friction import FrictionLaw, friction_of, no_friction
 from pathcontrol.robot.loading import checked_model
-from pathcontrol.robot.model import RobotModel, UrdfSource
+from pathcontrol.robot.model import RobotModel, UrdfSource, with_locked
 
 _METHODS = ("reduced", "with_payload", "with_frame", "with_armature", "with_masses")
 _LIMITS = {"lower": -np.inf, "upper": np.inf, "velocity": np.inf, "effort": np.inf}  # null stands for these
@@ -66,7 +66,7 @@ def _made(recipe: Mapping[str, Any]) -> RobotModel:
     for method, arguments in steps:
         if method not in _METHODS:
             raise InputError(f"step {method!r} of the robot, expected one of {', '.join(_METHODS)}")
-        robot = getattr(robot, method)(**arguments)
+        robot = with_locked(robot, arguments["lock"]) if method == "reduced" else getattr(robot, method)(**arguments)
     limits = Limits(*(_array(recipe["limits"][name], robot.n, missing) for name, missing in _LIMITS.items()))
     counts = recipe["encoder_counts"]
     encoders = None if counts is None else _array(counts, robot.n, np.nan)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 from lxml import etree
 
@@ -31,12 +31,14 @@ def locked_angles(
         tip: a link or joint; the joints that move it stay free.
 
     Raises:
-        InputError: a joint is to be kept and locked, or to be kept though it mimics another.
+        InputError: a joint is to be kept and locked, or to be kept though it mimics another; ``keep`` is no names, or
+            ``tip`` no name.
         UnknownNameError: a joint, or the tip, does not exist.
     """
     joints = {joint.get("name", ""): joint for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES}
-    given = _positions(lock, joints)
-    kept = {*_kept(keep, joints), *(() if tip is None else _carrying(root, tip, joints))}
+    given, keep = _positions(lock, joints), names_to_keep(keep)
+    check_tip(tip)
+    kept = {*(_known("keep", name, joints) for name in keep), *(() if tip is None else _carrying(root, tip, joints))}
     if both := sorted(kept & given.keys()):
         raise InputError(f"{', '.join(both)}: to be locked and kept; take it out of lock, keep or tip")
     if following := sorted(name for name in kept if _leaders(name, joints)):
@@ -71,8 +73,26 @@ def _positions(lock: Mapping[str, float] | None, joints: Collection[str]) -> dic
     return {_known("lock", name, joints): scalar(f"angle of {name}", angle) for name, angle in lock.items()}
 
 
-def _kept(keep: Sequence[str], joints: Collection[str]) -> list[str]:
-    return [_known("keep", name, joints) for name in ([keep] if isinstance(keep, str) else keep)]
+def names_to_keep(keep: str | Sequence[str] | None) -> list[str]:
+    """Return the names of joints that are to stay free: several, one, or none.
+
+    Raises:
+        InputError: they are no names.
+    """
+    names = [] if keep is None else [keep] if isinstance(keep, str) else keep
+    if not isinstance(names, Iterable) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"keep = {keep!r}, expected names of joints, as ['joint name', ...]")
+    return list(names)
+
+
+def check_tip(tip: str | None) -> None:
+    """Refuse a tip that is not the name of one frame.
+
+    Raises:
+        InputError: it is not.
+    """
+    if tip is not None and not isinstance(tip, str):
+        raise InputError(f"tip = {tip!r}, expected the name of one frame; keep=[...] takes several joints")
 
 
 def _known(argument: str, name: str, joints: Collection[str]) -> str:

@@ -31,10 +31,11 @@ def check_mimics(arm: Arm) -> Iterator[Finding]:
     """No joint follows another, for Pinocchio would take it as independent."""
     for joint in arm.movable:
         if joint.name in arm.mimics and joint.name not in arm.locked:
-            followed = shown(arm.mimics[joint.name])
-            message = (
-                f"it mimics joint {followed}, which is refused; lock {followed}, which locks it too, "
-                "or keep other joints only, or make it fixed or independent"
+            leader = arm.mimics[joint.name]
+            message = f"it mimics joint {shown(leader)}, which is refused; " + (
+                f"lock {shown(leader)}, which locks it too, or keep other joints only, or make it fixed or independent"
+                if leader != joint.name and leader in {other.name for other in arm.joints}
+                else "no other joint has that name; correct it, lock this one, or make it fixed or independent"
             )
             yield Finding("error", "joint-mimic", place("joint", joint.name), message)
 
