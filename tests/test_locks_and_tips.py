@@ -47,8 +47,19 @@ def test_a_lock_outside_the_limits_is_told(lock, told):
 
 
 def test_a_finger_that_follows_beyond_its_limits_is_told():
-    with pytest.warns(PathControlWarning, match=r"m = -1\.9 rad is outside its limits"):
+    said = r"g = 0\.4 rad puts m, which follows it, at -1\.9 rad, outside its limits of .* rad$"
+    with pytest.warns(PathControlWarning, match=said) as told:
         pc.load_robot(gripper('<mimic joint="g" multiplier="-5" offset="0.1"/>'), lock={"g": 0.4})
+    assert len(told) == 1
+
+
+def test_degrees_are_asked_of_the_leader_alone():
+    with pytest.warns(PathControlWarning) as told:
+        pc.load_robot(gripper(), lock={"g": 20.0})
+    leader, follower = (str(one.message) for one in told)
+    assert leader.endswith("lock: g = 20 rad is outside its limits of 0 to 0.5 rad; did you mean degrees?")
+    assert "g = 20 rad puts m, which follows it, at -39.9 rad" in follower
+    assert "degrees" not in follower
 
 
 def test_an_arm_reduced_outside_its_limits_is_told_once(arm):

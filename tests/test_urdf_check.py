@@ -393,7 +393,7 @@ def test_an_inertial_is_missed_on_shapes_and_bodies_but_not_on_frames():
 @pytest.mark.parametrize("scheme", ["", "package://", "file://"])
 def test_meshes_are_looked_for_in_the_folders_given(tmp_path, scheme):
     (tmp_path / "pack" / "urdf").mkdir(parents=True)
-    (tmp_path / "pack" / "upper.stl").touch()
+    (tmp_path / "pack" / "upper.stl").write_text("solid")
     name = f"file://{tmp_path}/pack/upper.stl" if scheme == "file://" else f"{scheme}pack/upper.stl"
     shape = f'<visual><geometry><mesh filename="{name}"/></geometry></visual>'
     assert check_urdf(hand(INERTIAL + shape), package_dirs=[tmp_path]).findings == ()

@@ -121,8 +121,8 @@ def test_the_colours_inside_a_mesh_win_and_split_it(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("nowhere.stl", "no such file"),
-        ("package://nowhere/it.stl", "no such file"),
+        ("nowhere.stl", "it is not found"),
+        ("package://nowhere/it.stl", "it is not found"),
         ("https://example.org/it.stl", "not fetched"),
         ("text.stl", "no triangles"),
         ("text.dae", "cannot be read"),

@@ -45,7 +45,13 @@ def find_urdf(source: str | Path, package_dirs: tuple[Path, ...] = ()) -> UrdfSo
         raise UrdfError(
             f"cannot read the URDF file {str(path)!r} ({error}); give a file, a URDF string or one of: {_names()}"
         ) from error
-    return UrdfSource(text, path.resolve().parent, package_dirs)
+    return UrdfSource(text, path.resolve().parent, (*package_dirs, *_folders_of_link(path)))
+
+
+def _folders_of_link(path: Path) -> list[Path]:
+    """Where a symbolic link to a URDF is, and above: its meshes may be there and not beside the file itself."""
+    beside = path.absolute().parent
+    return [] if beside.resolve() == path.resolve().parent else [beside, beside.parent]
 
 
 def _read(path: Path) -> str:

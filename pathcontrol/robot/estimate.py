@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -17,8 +16,9 @@ from pathcontrol.robot.lump import Lump, ball, combined
 from pathcontrol.robot.meshes import load_parts
 from pathcontrol.robot.model import UrdfSource
 from pathcontrol.robot.urdf.arm import moving_bodies, read_arm
+from pathcontrol.robot.urdf.finding import shown
 from pathcontrol.robot.urdf.form import check_form
-from pathcontrol.robot.urdf.mesh_files import find_mesh_file
+from pathcontrol.robot.urdf.mesh_files import find_mesh
 from pathcontrol.robot.urdf.numbers import read_numbers
 from pathcontrol.robot.urdf.parse import parse_urdf
 
@@ -42,20 +42,34 @@ def with_estimated_inertia(urdf: UrdfSource, density: float = DENSITY) -> UrdfSo
         return urdf  # which the checks refuse
     arm, links = read_arm(root), {link.get("name", ""): link for link in root.iterfind("link")}
     empty = {name for name in links if not has_mass(arm.links[name].inertial)}
-    lumps = {name: _solid(links[name], urdf, density) for name in links if name in empty}
+    unread: dict[str, str] = {}
+    lumps = {name: _solid(links[name], urdf, density, unread) for name in links if name in empty}
     balls = []
     for body in moving_bodies(arm):
         if empty.issuperset(body.poses) and not any(lumps[name] for name in body.poses):
             lumps[body.joint.child] = ball(density * 4 / 3 * np.pi * _BALL**3, _BALL)
             balls.append(body.joint.child)
+            reasons = [unread.pop(name) for name in body.poses if name in unread]
+            unread |= {body.joint.child: reasons[0]} if reasons else {}
     for name, lump in lumps.items():
         if lump is not None:
             _write(links[name], lump)
-    if balls:
-        what = f"no shape of {', '.join(balls)} can be read"
-        message = f"{what}: each is taken as a ball of {_BALL:g} m radius; give package_dirs, or <inertial>"
-        warnings.warn(message, PathControlWarning, stacklevel=3)
+    _tell(balls, unread)
     return replace(urdf, text=etree.tostring(root, encoding="unicode"))
+
+
+def _tell(balls: list[str], unread: dict[str, str]) -> None:
+    """Warn of links that became balls, and of shapes that are missing from what a link weighs."""
+    light = [name for name in unread if name not in balls]
+    if balls:
+        because = next((f": {unread[name]}" for name in balls if name in unread), "; give them shapes, or <inertial>")
+        _warn(f"no shape of {', '.join(balls)} can be read, each is taken as a ball of {_BALL:g} m radius{because}")
+    if light:
+        _warn(f"the mass of {', '.join(light)} lacks shapes that cannot be read: {unread[light[0]]}")
+
+
+def _warn(told: str) -> None:
+    warnings.warn(f"estimated_inertia: {told}", PathControlWarning, stacklevel=5)
 
 
 def has_mass(inertial: object) -> bool:
@@ -63,27 +77,37 @@ def has_mass(inertial: object) -> bool:
     return inertial is not None and bool(inertial.mass or np.any(inertial.inertia))  # type: ignore[attr-defined]
 
 
-def _solid(link: etree._Element, urdf: UrdfSource, density: float) -> Lump | None:
-    """What the shapes of a link weigh, ``None`` if none can be read."""
+def _solid(link: etree._Element, urdf: UrdfSource, density: float, unread: dict[str, str]) -> Lump | None:
+    """What the shapes of a link weigh, ``None`` if none can be read; why one cannot is added to ``unread``."""
+    missing: list[str] = []
     for tag in ("collision", "visual"):
-        lumps = [lump for holder in link.iterchildren(tag) for lump in _shape(holder, urdf, density)]
+        lumps: list[Lump] = []
+        reasons: list[str] = []
+        for holder in link.iterchildren(tag):
+            try:
+                lumps.append(_shape(holder, urdf, density))
+            except UrdfError as error:
+                reasons.append(str(error))
+        missing = reasons if lumps else missing or reasons
         if lumps:
-            return combined(lumps)
-    return None
+            break
+    if missing:
+        unread[link.get("name", "")] = missing[0]
+    return combined(lumps) if lumps else None
 
 
-def _shape(holder: etree._Element, urdf: UrdfSource, density: float) -> Iterator[Lump]:
-    """The shape of one ``<visual>`` or ``<collision>`` in the frame of its link, if it can be read."""
+def _shape(holder: etree._Element, urdf: UrdfSource, density: float) -> Lump:
+    """The shape of one ``<visual>`` or ``<collision>`` in the frame of its link."""
     shape = next(holder.iterfind("geometry/*"), None)
-    solid = None if shape is None else _mesh(shape, urdf) if shape.tag == "mesh" else _primitive(shape)
-    if solid is None:
-        return
+    if shape is None:
+        raise UrdfError(f"a <{holder.tag}> holds no shape")
+    solid = _mesh(shape, urdf) if shape.tag == "mesh" else _primitive(shape)
     solid.apply_transform(_pose(holder.find("origin")))
     solid.density = density
-    yield Lump(float(solid.mass), np.array(solid.center_mass), np.array(solid.moment_inertia))
+    return Lump(float(solid.mass), np.array(solid.center_mass), np.array(solid.moment_inertia))
 
 
-def _primitive(shape: etree._Element) -> trimesh.Trimesh | None:
+def _primitive(shape: etree._Element) -> trimesh.Trimesh:
     """A box, cylinder or ball: polyhedra of the same volume to 1 % or better."""
     size, radius, length = (
         read_numbers(shape.get(name, ""), count) for name, count in (("size", 3), ("radius", 1), ("length", 1))
@@ -94,25 +118,24 @@ def _primitive(shape: etree._Element) -> trimesh.Trimesh | None:
         return trimesh.creation.cylinder(radius[0], length[0], sections=64)
     if shape.tag == "sphere" and radius and radius[0] > 0:
         return trimesh.creation.icosphere(subdivisions=4, radius=radius[0])
-    return None
+    raise UrdfError(f"a <{shape.tag}> has no size that can be read")
 
 
-def _mesh(shape: etree._Element, urdf: UrdfSource) -> trimesh.Trimesh | None:
+def _mesh(shape: etree._Element, urdf: UrdfSource) -> trimesh.Trimesh:
     """What a mesh encloses, or its convex hull, or where it is flat a box around it."""
-    path = find_mesh_file(shape.get("filename", ""), urdf.base_dir, urdf.package_dirs)
-    scale = read_numbers(shape.get("scale", "1 1 1"), 3)
-    if path is None or scale is None:
-        return None
+    name, scale = shape.get("filename", ""), read_numbers(shape.get("scale", "1 1 1"), 3)
     try:
-        parts = load_parts(path)
-    except UrdfError:
-        return None
+        parts = load_parts(find_mesh(name, urdf.base_dir, urdf.package_dirs))
+    except UrdfError as error:
+        raise UrdfError(f"mesh {shown(name)}: {error}") from error
+    if scale is None:
+        raise UrdfError(f"mesh {shown(name)}: its scale is {shown(shape.get('scale'))}, expected 3 numbers")
     whole: Any = trimesh.util.concatenate([trimesh.Trimesh(part.vertices, part.faces) for part in parts])
     whole.apply_scale(scale)
     return whole if whole.is_volume else _hull(whole)
 
 
-def _hull(mesh: trimesh.Trimesh) -> trimesh.Trimesh | None:
+def _hull(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     try:
         hull = mesh.convex_hull
         if hull.volume > 0:

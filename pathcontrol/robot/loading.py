@@ -67,7 +67,7 @@ def load_robot(
     report = _checked(urdf, label, tuple(locked))
     for finding in (*mended, *(finding for finding in report.warnings if finding.code in TOLD)):
         warnings.warn(f"{label}: {finding.where}: {finding.message}", PathControlWarning, stacklevel=2)
-    for told in locked_beyond_limits(root, locked):
+    for told in locked_beyond_limits(root, locked, lock or ()):
         warnings.warn(f"{label}: {told}", PathControlWarning, stacklevel=2)
     robot = _build(urdf, threads)
     return with_locked(robot, locked) if locked else robot

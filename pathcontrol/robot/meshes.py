@@ -13,10 +13,8 @@ import trimesh
 from pathcontrol._arrays import Array
 from pathcontrol._files import read_bounded
 from pathcontrol.errors import UrdfError
-from pathcontrol.robot.urdf.mesh_files import A_POINTER, is_pointer
+from pathcontrol.robot.urdf.mesh_files import check_content, check_format
 
-#: the kinds of mesh files that are read
-FORMATS = (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf")
 MAX_BYTES = 128 << 20
 #: most triangles of a mesh, counted as often as they are placed
 MAX_TRIANGLES = 5_000_000
@@ -44,11 +42,9 @@ def load_parts(path: Path) -> list[Part]:
     Raises:
         UrdfError: the file is of another kind, too large, cannot be read, or holds no triangles.
     """
-    if path.suffix.lower() not in FORMATS:
-        raise UrdfError(f"it ends in {path.suffix or 'nothing'!r}, expected one of {', '.join(FORMATS)}")
+    check_format(path)
     data = read_bounded(path, MAX_BYTES, "a mesh", UrdfError)
-    if is_pointer(path):
-        raise UrdfError(f"it is {A_POINTER}")
+    check_content(data)
     try:
         parts = _parts(data, path)
     except UrdfError:

@@ -376,7 +376,7 @@ class RobotModel:
         moving = None if tip is None else self.pinocchio_model.names[self._support(tip)]
         root = parse_urdf(self.source.text)
         angles = {j: at for j, at in locked_angles(root, lock, keep, moving).items() if j in self.joint_names}
-        for told in locked_beyond_limits(root, angles):
+        for told in locked_beyond_limits(root, angles, lock or ()):
             warnings.warn(told, PathControlWarning, stacklevel=2)
         return with_locked(self, angles)
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array, readonly
-from pathcontrol.errors import InputError, MissingExtraError, PathControlError, UnknownNameError
+from pathcontrol.errors import InputError, MissingExtraError, PathControlError, PathControlWarning, UnknownNameError
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.friction import FrictionLaw, friction_of, no_friction
@@ -91,7 +91,7 @@ def _friction(description: Mapping[str, Any], n: int) -> FrictionLaw:
     try:
         law = friction_of(description)
     except UnknownNameError as error:
-        warnings.warn(f"the robot is rebuilt without its friction: {error}", stacklevel=2)
+        warnings.warn(f"the robot is rebuilt without its friction: {error}", PathControlWarning, stacklevel=2)
         return no_friction(n)
     if law.n != n:
         raise InputError(f"the recorded friction law is for {law.n} joints, the robot has {n}")

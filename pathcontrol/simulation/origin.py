@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import InputError
+from pathcontrol.errors import InputError, PathControlWarning
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.saved.shelf import Shelf
@@ -162,7 +162,7 @@ def _recipe(task: PathTask | None, shelf: Shelf, upto: float) -> dict[str, Any] 
     try:
         return task_recipe(task, shelf, upto)
     except Exception as error:  # whatever the user's own code raises
-        warnings.warn(f"the {type(task).__name__} is not kept with its run: {error}", stacklevel=3)
+        warnings.warn(f"the {type(task).__name__} is not kept with its run: {error}", PathControlWarning, stacklevel=3)
         return None
 
 

@@ -158,6 +158,7 @@ def _check_workers(client: Client) -> None:
         warnings.warn(
             f"{len(crowded)} workers have several threads, as {crowded[0]}, of which one computes at a time; start "
             "them as processes: --nworkers=-1 --nthreads 1",
+            PathControlWarning,
             stacklevel=5,
         )
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import ClusterError
+from pathcontrol.errors import ClusterError, PathControlWarning
 from pathcontrol.sweeps.cluster import (
     GoneError,
     NoAnswerError,
@@ -278,6 +278,7 @@ def _reachable(client: Client) -> bool:
         warnings.warn(
             f"this machine cannot reach all workers ({error!r}), so that all results go through the scheduler; start "
             "the sweep on a machine in their network if that is too slow",
+            PathControlWarning,
             stacklevel=5,
         )
         return False

@@ -8,15 +8,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from pathcontrol.errors import UrdfError
+from pathcontrol._files import read_bounded
+from pathcontrol.errors import InputError, UrdfError
 from pathcontrol.robot.urdf.arm import read_arm
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES, names_of
+from pathcontrol.robot.urdf.encoding import decoded
 from pathcontrol.robot.urdf.extension import check_extension
-from pathcontrol.robot.urdf.finding import Finding, Level, UrdfReport
+from pathcontrol.robot.urdf.finding import Finding, Level, UrdfReport, shown
 from pathcontrol.robot.urdf.form import check_form
 from pathcontrol.robot.urdf.inertia import check_inertials, check_inertias, check_mass_matrix, check_masses
 from pathcontrol.robot.urdf.locking import locked_angles
-from pathcontrol.robot.urdf.parse import parse_and_mend
+from pathcontrol.robot.urdf.parse import MAX_BYTES, parse_and_mend
 from pathcontrol.robot.urdf.shapes import check_meshes, check_shapes
 from pathcontrol.robot.urdf.values import (
     check_axes,
@@ -44,7 +46,7 @@ VALUE_CHECKS = (
 
 
 def check_urdf(
-    text: str,
+    text: str | Path,
     *,
     base_dir: Path | None = None,
     package_dirs: Sequence[Path] = (),
@@ -56,17 +58,25 @@ def check_urdf(
     Values are looked at once the form is sound, so a second run may find more than the first.
 
     Args:
-        text: The XML of the robot.
-        base_dir: Folder of the URDF file. Relative meshes are looked for there, and packages there and above.
+        text: The XML of the robot, or the path of a file as a :class:`~pathlib.Path`.
+        base_dir: Folder of the URDF file, known where its path is given. Relative meshes are looked for there, and
+            packages there and above.
         package_dirs: Folders that hold packages, for ``package://`` meshes.
         allow_mimic: Joints that the caller is going to lock: taken as fixed here, with those that mimic them, and
             free to mimic another.
 
     Returns:
         The names in the robot and the findings.
+
+    Raises:
+        InputError: ``text`` is neither.
     """
+    if not isinstance(text, str | Path):
+        raise InputError(f"text = {shown(repr(text))}, expected the XML of a robot as a string, or the Path of a file")
+    if isinstance(text, Path) and base_dir is None:
+        base_dir = text.resolve().parent
     try:
-        root, mended = parse_and_mend(text)
+        root, mended = parse_and_mend(_text_of(text))
     except UrdfError as error:
         return UrdfReport("", (), (), (Finding("error", "unreadable", "file", str(error)),))
     findings = [*mended, *check_form(root)]
@@ -80,3 +90,12 @@ def check_urdf(
     links = names_of(root.iterfind("link"))
     joints = names_of(joint for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES)
     return UrdfReport(root.get("name", ""), links, joints, tuple(findings))
+
+
+def _text_of(source: str | Path) -> str:
+    """The XML itself; a string that begins like a name is asked whether it is one."""
+    if isinstance(source, Path):
+        return decoded(read_bounded(source, MAX_BYTES, "a URDF", UrdfError), source.name)
+    if "<" not in source and source.strip().lower().endswith((".urdf", ".xml")):
+        raise UrdfError(f"{shown(source)} is a name and not XML; give Path({shown(source)}) to have the file read")
+    return source

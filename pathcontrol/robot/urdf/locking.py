@@ -49,20 +49,54 @@ def locked_angles(
     return {name: _position(name, joints, given, frozenset()) for name in wanted}
 
 
-def locked_beyond_limits(root: etree._Element, lock: Mapping[str, float]) -> Iterator[str]:
-    """A sentence for each joint that is to be locked outside its limits: likely degrees, or millimetres."""
-    for joint in root.iterfind("joint"):
-        name, limit = joint.get("name", ""), joint.find("limit")
-        if name not in lock or limit is None or joint.get("type") == "continuous":
+def locked_beyond_limits(
+    root: etree._Element, angles: Mapping[str, float], given: Collection[str] = ()
+) -> Iterator[str]:
+    """Say of each joint that is to be locked outside its limits where it would be, and why.
+
+    Args:
+        root: the ``<robot>``.
+        angles: where joints are to be locked [rad or m].
+        given: those whose position was given: likely in degrees, or millimetres. The others follow one.
+    """
+    joints = {joint.get("name", ""): joint for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES}
+    for name, joint in joints.items():
+        if name not in angles or (limits := _range(joint)) is None:
             continue
-        lower, upper, at = _number(limit, "lower", 0.0), _number(limit, "upper", 0.0), float(lock[name])
+        (lower, upper), at = limits, float(angles[name])
         slack = 1e-6 * max(1.0, abs(lower), abs(upper))
-        if lower < upper and not lower - slack <= at <= upper + slack:
-            slides = joint.get("type") == "prismatic"
-            unit, smaller = ("m", "millimetres") if slides else ("rad", "degrees")
-            scaled = at / 1000 if slides else at * math.pi / 180
-            meant = f"; did you mean {smaller}?" if lower <= scaled <= upper and abs(at) >= 1 else ""
-            yield f"lock: {name} = {at:g} {unit} is outside its limits of {lower:g} to {upper:g} {unit}{meant}"
+        if lower - slack <= at <= upper + slack:
+            continue
+        beyond = f"outside its limits of {lower:g} to {upper:g} {_unit(joint)}"
+        leaders = [] if name in given else [leader for leader in _leaders(name, joints) if leader in angles]
+        if leaders:
+            leader = next((leader for leader in leaders if leader in given), leaders[-1])
+            by = f"{leader} = {float(angles[leader]):g} {_unit(joints[leader])}"
+            yield f"lock: {by} puts {name}, which follows it, at {at:g} {_unit(joint)}, {beyond}"
+        else:
+            yield f"lock: {name} = {at:g} {_unit(joint)} is {beyond}{_question(joint, at, lower, upper)}"
+
+
+def _range(joint: etree._Element) -> tuple[float, float] | None:
+    """The limits of a joint, ``None`` where there are none."""
+    limit = joint.find("limit")
+    if limit is None or joint.get("type") == "continuous":
+        return None
+    lower, upper = _number(limit, "lower", 0.0), _number(limit, "upper", 0.0)
+    return (lower, upper) if lower < upper else None
+
+
+def _unit(joint: etree._Element) -> str:
+    return "m" if joint.get("type") == "prismatic" else "rad"
+
+
+def _question(joint: etree._Element, at: float, lower: float, upper: float) -> str:
+    """Ask for degrees or millimetres where the number would be within the limits as such."""
+    slides = _unit(joint) == "m"
+    scaled = at / 1000 if slides else math.radians(at)
+    if abs(at) < 1 or not lower <= scaled <= upper:
+        return ""
+    return f"; did you mean {'millimetres' if slides else 'degrees'}?"
 
 
 def _positions(lock: Mapping[str, float] | None, joints: Collection[str]) -> dict[str, float]:
@@ -130,13 +164,13 @@ def _position(
     return _number(mimic, "multiplier", 1.0) * followed + _number(mimic, "offset", 0.0)
 
 
-def _leaders(name: str, joints: Mapping[str, etree._Element]) -> set[str]:
+def _leaders(name: str, joints: Mapping[str, etree._Element]) -> list[str]:
     """The joint that a joint follows, the one that that one follows, and so on."""
-    found: set[str] = set()
+    found: list[str] = []
     while (mimic := joints[name].find("mimic")) is not None and (name := mimic.get("joint", "")) in joints:
         if name in found:
             break
-        found.add(name)
+        found.append(name)
     return found
 
 

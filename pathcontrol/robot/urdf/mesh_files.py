@@ -1,48 +1,81 @@
-"""Where the mesh files that a URDF names may be."""
+"""Where the mesh files that a URDF names may be, and why one cannot be read."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
-from pathlib import Path
-from urllib.parse import unquote
+from itertools import islice
+from pathlib import Path, PurePosixPath
 
-_PACKAGE, _FILE = ("package", "model"), "file"
+from pathcontrol.errors import UrdfError
+from pathcontrol.robot.urdf.mesh_names import MeshName, at_home, in_package, is_local, readings
+
+#: the kinds of mesh files that are read
+FORMATS = (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf")
+
 _POINTER = b"version https://git-lfs"
-_MOST_PACKAGES = 1000  # folders in one of package_dirs that are looked into
-
-#: what to do about a mesh that is not found, in Python, in experiment files and on the command line
-ADD_FOLDER = "give the folder that holds its package: package_dirs in Python, --package-dir on the command line"
-
-#: what a file is that is no mesh but the address of one
-A_POINTER = "a pointer of Git LFS and not the mesh itself; run `git lfs pull` where it came from"
+_MOST_ENTRIES = 1000  # of a folder that are looked at
+_OPTIONS = "package_dirs in Python, --package-dir on the command line"
+#: what names the folders of packages to ROS and Gazebo: those that hold packages, and those with packages in share/
+_ENVIRONMENT = ("ROS_PACKAGE_PATH", "GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH")
+_PREFIXES = ("AMENT_PREFIX_PATH", "COLCON_PREFIX_PATH")
 
 
-def scheme_of(name: str) -> str:
-    """What stands before the colon of a mesh name: empty for a path, ``"package"`` for ``model://`` too."""
-    scheme, colon, rest = name.partition(":")
-    if not colon or len(scheme) == 1 or not scheme.isalpha():  # C:\arm.stl is a path
-        return ""
-    if scheme in _PACKAGE:
-        return "package"
-    return scheme if scheme == _FILE or rest.startswith("//") else ""
-
-
-def is_local(name: str) -> bool:
-    """Whether a mesh name means a file of this machine; nothing is fetched."""
-    return scheme_of(name) in ("", _FILE, "package")
-
-
-def find_mesh_file(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Path | None:
-    """The file that a mesh name means, ``None`` if there is none.
+def find_mesh(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Path:
+    """Return the file that a mesh name of a URDF means; nothing is fetched.
 
     Args:
         name: a relative or absolute path, ``file:…``, ``package://…`` or ``model://…``. What no file has as it is
-            written is looked for with ``%20`` as a space, backslashes as slashes and ``~`` as the home folder.
+            written is looked for with ``%20`` as a space, backslashes as slashes, ``~`` as the home folder, in upper or
+            lower case, and by the end of its path beside the URDF and in ``package_dirs``.
         base_dir: folder of the URDF. Relative meshes are looked for there, packages there and above.
         package_dirs: folders that hold packages, or are packages. A package whose folder has another name is found
-            by what is in it.
+            by what is in it. The folders that ``ROS_PACKAGE_PATH`` and the like name come after them.
+
+    Raises:
+        UrdfError: there is no such file, or it is no mesh; the message says why and what to try.
     """
-    for path in mesh_candidates(name, base_dir, package_dirs):
+    if not is_local(name):
+        raise UrdfError("it is not fetched; expected package://, file:// or a relative path")
+    path = _first(name, base_dir, package_dirs)
+    if path is None:
+        raise UrdfError(f"it is not found; {_what_to_do(name)}")
+    check_format(path)
+    try:
+        with path.open("rb") as file:
+            check_content(file.read(len(_POINTER)))
+    except OSError as error:
+        raise UrdfError(f"it cannot be read: {error.strerror}") from error
+    return path
+
+
+def check_format(path: Path) -> None:
+    """Refuse a file whose name ends like that of no mesh, with a :class:`UrdfError`."""
+    if path.suffix.lower() not in FORMATS:
+        raise UrdfError(f"it ends in {path.suffix or 'nothing'!r}, expected one of {', '.join(FORMATS)}")
+
+
+def check_content(start: bytes) -> None:
+    """Refuse what is no mesh by its first bytes, with a :class:`UrdfError`."""
+    if start.startswith(_POINTER):
+        raise UrdfError("it is a pointer of Git LFS and not the mesh itself; run `git lfs pull` where it came from")
+    if not start:
+        raise UrdfError("it is an empty file")
+
+
+def may_be_found(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> bool:
+    """Whether there is any folder to look for a mesh in, as there is not for a robot that is given as text."""
+    return next(_candidates(name, base_dir, package_dirs), None) is not None
+
+
+def _what_to_do(name: str) -> str:
+    if in_package(name):
+        return f"give the folder that holds its package: {_OPTIONS}, or ROS_PACKAGE_PATH"
+    return f"put it there, or give the folder that its path begins in: {_OPTIONS}"
+
+
+def _first(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Path | None:
+    for path in _candidates(name, base_dir, package_dirs):
         try:
             if path.is_file():
                 return path
@@ -51,56 +84,69 @@ def find_mesh_file(name: str, base_dir: Path | None, package_dirs: Sequence[Path
     return None
 
 
-def is_pointer(path: Path) -> bool:
-    """Whether a file is but a pointer of Git LFS to the mesh, which was not downloaded."""
-    with path.open("rb") as file:
-        return file.read(len(_POINTER)) == _POINTER
+def _candidates(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Path]:
+    """The files that a mesh name may mean, in the order to try; see :func:`find_mesh`."""
+    names = list(readings(name))
+    for reading in names:
+        inside = _in_packages if reading.scheme == "package" else _paths
+        yield from inside(reading, base_dir, package_dirs)
+    near = (*package_dirs, *(() if base_dir is None else (base_dir.absolute(), base_dir.absolute().parent)))
+    for reading in names:  # a package or a folder that was copied or renamed keeps what is in it
+        yield from (folder / tail for tail in reading.tails for folder in near)
+    for reading in names:
+        whole = PurePosixPath(reading.path.lstrip("/"))
+        yield from (path for end in (whole, *reading.tails) for folder in near for path in _in_any_case(folder, end))
 
 
-def mesh_candidates(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Path]:
-    """The files that a mesh name may mean, in the order to try; see :func:`find_mesh_file`."""
-    for spelling in dict.fromkeys((name, name.replace("\\", "/"), unquote(name.replace("\\", "/")))):
-        scheme = scheme_of(spelling)
-        if scheme == "package":
-            yield from _in_packages(spelling.partition(":")[2].lstrip("/"), base_dir, package_dirs)
-        else:
-            yield from _paths(spelling, scheme, base_dir, package_dirs)
-
-
-def _paths(name: str, scheme: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Path]:
+def _paths(reading: MeshName, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Path]:
     """What a path may mean: as it is, or from the folder of the URDF and those given."""
-    relative = name.removeprefix("file:") if scheme else name
-    if relative.startswith("//"):  # file://HOST/path, where most mean file:///path
+    relative = reading.path
+    if reading.scheme and relative.startswith("//"):  # file://HOST/path, where most mean file:///path
         relative = relative[1:]
         relative = relative.removeprefix("/localhost") if relative.startswith("/localhost/") else relative
         yield Path(relative)
         relative = relative.lstrip("/")
-    path = _at_home(relative)
+    path = at_home(relative)
     for folder in (*package_dirs, *(() if base_dir is None else (base_dir.absolute(),))):
         yield folder / path  # which is the path itself if it is absolute
     if path.is_absolute():
         yield path
 
 
-def _in_packages(relative: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Path]:
+def _in_packages(reading: MeshName, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Path]:
     """What a path that begins with the name of a package may mean."""
+    relative = reading.path.lstrip("/")
+    package, _, inside = relative.partition("/")
     above = () if base_dir is None else (base_dir.absolute(), *base_dir.absolute().parents)
-    folders, inside = (*package_dirs, *above), relative.partition("/")[2]
-    yield from (folder / relative for folder in folders)
+    known = _package_folders()
+    folders = (*package_dirs, *above)
+    yield from (folder / relative for folder in (*folders, *known))
     if inside:
+        yield from (folder / inside for folder in known if folder.name == package)
         yield from (folder / inside for folder in folders)
-        yield from (package / inside for folder in package_dirs for package in _folders_in(folder))
+        yield from (entry / inside for folder in package_dirs for entry in _entries(folder))
 
 
-def _folders_in(folder: Path) -> list[Path]:
+def _package_folders() -> list[Path]:
+    """The folders of packages that the environment names."""
+    folders = [Path(entry) for name in _ENVIRONMENT for entry in os.environ.get(name, "").split(os.pathsep) if entry]
+    prefixes = [Path(entry) for name in _PREFIXES for entry in os.environ.get(name, "").split(os.pathsep) if entry]
+    return [*folders, *(prefix / "share" for prefix in prefixes)]
+
+
+def _in_any_case(folder: Path, relative: PurePosixPath) -> list[Path]:
+    """The files below ``folder`` whose path is ``relative`` but for upper and lower case."""
+    found = [folder]
+    for part in relative.parts:
+        if part in ("..", "."):
+            found = [path / part for path in found]
+        else:
+            found = [entry for path in found for entry in _entries(path) if entry.name.casefold() == part.casefold()]
+    return found
+
+
+def _entries(folder: Path) -> list[Path]:
     try:
-        return sorted(entry for entry, _ in zip(folder.iterdir(), range(_MOST_PACKAGES), strict=False))
+        return sorted(islice(folder.iterdir(), _MOST_ENTRIES))
     except OSError:
         return []
-
-
-def _at_home(name: str) -> Path:
-    try:
-        return Path(name).expanduser()
-    except RuntimeError:  # the home of a user who does not exist
-        return Path(name)

@@ -8,16 +8,11 @@ from pathlib import Path
 
 from lxml import etree
 
+from pathcontrol.errors import UrdfError
 from pathcontrol.robot.urdf.elements import place_of
 from pathcontrol.robot.urdf.finding import Finding, shown
-from pathcontrol.robot.urdf.mesh_files import (
-    A_POINTER,
-    ADD_FOLDER,
-    find_mesh_file,
-    is_local,
-    is_pointer,
-    mesh_candidates,
-)
+from pathcontrol.robot.urdf.mesh_files import find_mesh, may_be_found
+from pathcontrol.robot.urdf.mesh_names import is_local
 from pathcontrol.robot.urdf.numbers import POSE, read_numbers
 
 _SHAPES: dict[str, dict[str, int]] = {
@@ -52,24 +47,20 @@ def check_meshes(root: etree._Element, base_dir: Path | None, package_dirs: Sequ
 def _check_drawn(root: etree._Element, problem: Callable[[str], str | None]) -> Iterator[Finding]:
     for link in root.iterfind("link"):
         for name in dict.fromkeys(mesh.get("filename", "") for mesh in link.iterfind("visual/geometry/mesh")):
-            if not is_local(name):
-                message = f"mesh {shown(name)} is not fetched; expected package://, file:// or a relative path"
-                yield Finding("warning", "mesh-remote", place_of(link), message)
-            elif name and (reason := problem(name)):
-                yield Finding("warning", "mesh-missing", place_of(link), f"mesh {shown(name)} {reason}")
+            if name and (reason := problem(name)):
+                code = "mesh-missing" if is_local(name) else "mesh-remote"
+                yield Finding("warning", code, place_of(link), f"mesh {shown(name)}: {reason}")
 
 
 def _mesh_problem(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> str | None:
-    """Why a mesh cannot be read, ``None`` if it can."""
-    if next(mesh_candidates(name, base_dir, package_dirs), None) is None:
-        return None  # a robot given as text, without any folder to look in
-    path = find_mesh_file(name, base_dir, package_dirs)
+    """Why a mesh cannot be read, ``None`` if it can, or if there is no folder to look in."""
+    if is_local(name) and not may_be_found(name, base_dir, package_dirs):
+        return None
     try:
-        if path is None:
-            return f"is not found; {ADD_FOLDER}"
-        return f"is {A_POINTER}" if is_pointer(path) else None
-    except OSError as error:
-        return f"cannot be read: {error.strerror}"
+        find_mesh(name, base_dir, package_dirs)
+    except UrdfError as error:
+        return str(error)
+    return None
 
 
 def _shape_problems(holder: etree._Element) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Mesh files of a robot: where they are, and what is in them."""
+"""What is in the mesh files of a robot, as it is drawn."""
 
 from __future__ import annotations
 
@@ -11,32 +11,12 @@ from numpy.typing import ArrayLike
 
 from pathcontrol.errors import UrdfError
 from pathcontrol.robot.meshes import Part, load_parts
-from pathcontrol.robot.urdf.mesh_files import ADD_FOLDER, find_mesh_file, is_local
 from pathcontrol.view.bodies.shapes import Color, Mesh
 from pathcontrol.view.bodies.thinning import clustered, rounded, thinned
 
 MOST_TRIANGLES = 100_000  # of one colour: a picture shows no more
 _FARTHEST = 1e6  # m
 SHARP = np.deg2rad(40.0)  # faces that meet at more than this show an edge
-
-
-def find_mesh(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Path:
-    """The file behind a mesh name of a URDF; nothing is fetched.
-
-    Args:
-        name: a relative or absolute path, ``file://…``, or ``package://…``.
-        base_dir: folder of the URDF; see :func:`find_mesh_file`.
-        package_dirs: folders that hold packages.
-
-    Raises:
-        UrdfError: there is no such file.
-    """
-    if not is_local(name):
-        raise UrdfError("it is not fetched; give a relative path, package:// or file://")
-    path = find_mesh_file(name, base_dir, package_dirs)
-    if path is None:
-        raise UrdfError(f"there is no such file; {ADD_FOLDER}")
-    return path
 
 
 def read_mesh(path: Path, scale: ArrayLike = 1.0, detail: float = 0.0) -> list[tuple[Mesh, Color | None]]:

@@ -15,10 +15,11 @@ import yourdfpy
 from lxml import etree
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import UrdfError
+from pathcontrol.errors import PathControlWarning, UrdfError
 from pathcontrol.robot.urdf import parse_urdf
+from pathcontrol.robot.urdf.mesh_files import find_mesh
 from pathcontrol.view.bodies.links import reach
-from pathcontrol.view.bodies.meshes import find_mesh, read_mesh
+from pathcontrol.view.bodies.meshes import read_mesh
 from pathcontrol.view.bodies.shapes import Box, Color, Cylinder, Shape, Sphere
 
 if TYPE_CHECKING:
@@ -85,7 +86,8 @@ def _visuals(
     except (UrdfError, LookupError, TypeError, ValueError) as error:
         mesh = element.find("geometry/mesh")
         what = "a visual" if mesh is None else f"mesh {mesh.get('filename')!r}"
-        warnings.warn(f"{what} of link {link!r} is left out of the picture: {error}", stacklevel=5)
+        told = f"{what} of link {link!r} is left out of the picture: {error}"
+        warnings.warn(told, PathControlWarning, stacklevel=5)
         return
     color = _color(visual.material, palette)
     for shape, own_color in shapes:
