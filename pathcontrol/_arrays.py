@@ -68,16 +68,6 @@ def scalar(name: str, value: Any, *, positive: bool = False, least: float | None
     return number
 
 
-def factor(x: Array) -> Array:
-    """``x`` (*batch,) as a factor of arrays (*batch, n); a single number as it is, which NumPy multiplies faster."""
-    return x[..., None] if x.ndim else x
-
-
-def inner(x: Array, y: Array) -> Array:
-    """xᵀy, (*batch,), of arrays (*batch, n); of two single vectors faster, and to the last bit as in a batch."""
-    return x.dot(y) if x.ndim == y.ndim == 1 else np.vecdot(x, y)
-
-
 def readonly(array: Array) -> Array:
     """A copy that cannot be written to, so that values stay values."""
     copy = np.array(array)
@@ -91,12 +81,6 @@ def in_common(values: Sequence[Array]) -> Array:
         return values[0]
     rows = np.stack(values)
     return readonly(rows[0] if (rows == rows[0]).all() else rows)
-
-
-def as_slice(rows: NDArray[np.intp]) -> NDArray[np.intp] | slice:
-    """Increasing rows as a slice where they follow one another, which copies nothing."""
-    return slice(int(rows[0]), int(rows[-1]) + 1) if rows[-1] - rows[0] == len(rows) - 1 else rows
-
 
 def rigid(name: str, pose: ArrayLike, tolerance: float = 1e-9) -> Array:
     """``pose`` as a homogeneous transform (4, 4) whose rotation is one up to ``tolerance``; errors name it."""

@@ -6,6 +6,7 @@ Every message names the value, what was expected and what to try.
 from __future__ import annotations
 
 import copyreg
+import warnings
 from typing import Any
 
 
@@ -71,3 +72,9 @@ class SimulationError(PathControlError, RuntimeError):
     def __init__(self, message: str, run: Any = None) -> None:
         super().__init__(message)
         self.run = run
+
+
+def warn_of_single(name: str) -> None:
+    """Warn, from ``__init_subclass__``, that the class ``name`` was made with ``single``, which has no effect."""
+    message = f"class {name} is made with single=…, which is not needed any more and has no effect; leave it out"
+    warnings.warn(message, PathControlWarning, stacklevel=4)  # past __init_subclass__ and ABCMeta

@@ -87,7 +87,6 @@ CALLS = {
     "coriolis_matrix": lambda robot, x: robot.coriolis_matrix(x, x),
     "kinetic_energy": lambda robot, x: robot.kinetic_energy(x, x),
     "potential_energy": lambda robot, x: robot.potential_energy(x),
-    "mass_matrix_row": lambda robot, x: robot.mass_matrix_row(x, x),
     "with_payload": lambda robot, x: robot.with_payload(1.0, "l6"),
     "simulate": lambda robot, x: pc.simulate(
         pc.Projection(robot, pc.Line(0 * x, x + 1, 1.0), 100.0, 20.0), q=x, duration=0.1

@@ -73,35 +73,11 @@ class Figure(PathTask):
         return (1.5 + np.sin(s) / 2) / self.width
 
 
-class Entries(Figure):
-    """It takes entries of an array: with a row for each of two rollouts they are numbers of another one."""
-
-    def __init__(self, width: float, height: float) -> None:
-        self.size = np.array([width, height])
-
-    def q_d(self, s):
-        return np.stack([self.size[0] * np.cos(s), self.size[1] * np.sin(s) * (2 + np.sin(s))], axis=-1)
-
-    def theta(self, s):
-        return (1.5 + np.sin(s) / 2) / self.size[0]
-
-
 class Scalars(Figure):
     """It works with plain numbers only."""
 
     def theta(self, s):
         return (1.5 + np.sin(s) / 2) / (math.sqrt(self.width) if self.width > 1 else self.width)
-
-
-class Tabled(Figure):
-    """It keeps its numbers in a table, which nobody looks into."""
-
-    def __init__(self, width: float, height: float) -> None:
-        super().__init__(width, height)
-        self.rate = {"mean": 1.5 * width}
-
-    def theta(self, s):
-        return self.rate["mean"] + np.sin(s) / 2
 
 
 @dataclass
@@ -126,8 +102,8 @@ SIZES = RNG.uniform(0.4, 1.4, (5, 2))
 POINTS = [np.cumsum(RNG.uniform(0.2, 0.5, (4, 2)), axis=0) for _ in range(3)]
 WAY = WaypointPath(POINTS[0], 1.0)
 SHARED = Circle(0.8, 1.0)
-#: tasks that are stacked
-STACKED: dict[str, list[PathTask]] = {
+#: tasks of one class that differ in numbers
+ALIKE: dict[str, list[PathTask]] = {
     "circles": [Circle(a, 2 * b, center=[a, b]) for a, b in SIZES],
     "ellipses": [Ellipse(size, size[0]) for size in SIZES],
     "eights": [Lissajous(size, [1, 2], size[0], phases=[0.0, size[1] / 4]) for size in SIZES],
@@ -139,7 +115,7 @@ STACKED: dict[str, list[PathTask]] = {
     "figures": [Figure(a, b / 4) for a, b in SIZES],
     "hills": [Hill(a / 4, b) for a, b in SIZES],
 }
-#: tasks that are evaluated one by one, or in groups
+#: other tasks
 OTHERS: dict[str, list[PathTask]] = {
     "ways": [WaypointPath(points, 1.0) for points in POINTS],
     "mixed": [
@@ -150,11 +126,9 @@ OTHERS: dict[str, list[PathTask]] = {
         Figure(0.8, 0.3),
         Circle(0.7, 1, clockwise=True),
     ],
-    "entries": [Entries(1.3, 0.2), Entries(0.6, 0.5)],
     "scalars": [Scalars(a, b / 4) for a, b in SIZES],
-    "tabled": [Tabled(a, b / 4) for a, b in SIZES],
 }
-FAMILIES = STACKED | OTHERS
+FAMILIES = ALIKE | OTHERS
 
 
 def begin(tasks: list[PathTask]) -> np.ndarray:
@@ -177,19 +151,21 @@ def assert_row_is(together: Run, i: int, alone: Run) -> None:
 # --- one by one -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
 @pytest.mark.parametrize("law", ["plan", "follow"])
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_rollout_is_its_task_alone(family, law):
+def test_a_rollout_is_its_task_alone(family, law, engine):
     tasks = FAMILIES[family]
     q = begin(tasks)
-    together = ran(LAWS[law](TaskBatch(tasks)), q)
+    together = ran(LAWS[law](TaskBatch(tasks)), q, engine=engine)
+    assert together.config["engine"] == engine
     for i, task in enumerate(tasks):
-        assert_row_is(together, i, ran(LAWS[law](task), q[i]))
+        assert_row_is(together, i, ran(LAWS[law](task), q[i], engine=engine))
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_with_any_law(law):
-    for tasks in (OTHERS["mixed"], STACKED["lines"]):
+    for tasks in (OTHERS["mixed"], ALIKE["lines"]):
         q = begin(tasks)
         together = ran(LAWS[law](TaskBatch(tasks)), q)
         for i, task in enumerate(tasks):
@@ -197,7 +173,7 @@ def test_with_any_law(law):
 
 
 def test_an_arm_that_was_pushed_away_is_captured_by_a_branch_of_its_own_path():
-    tasks = [*STACKED["eights"], *STACKED["eights"][:1]]
+    tasks = [*ALIKE["eights"], *ALIKE["eights"][:1]]
     q = np.stack([task.q_d(np.array(2.5)) for task in tasks])
     q[-1] = tasks[-1].q_d(np.array(0.0))
     law = lambda task: Projection(ARM, task, 800.0, [45.0, 100.0], start="s0")  # noqa: E731
@@ -208,7 +184,7 @@ def test_an_arm_that_was_pushed_away_is_captured_by_a_branch_of_its_own_path():
 
 
 def test_rollouts_may_be_cut_and_ordered_at_will():
-    tasks = [*STACKED["circles"], *OTHERS["mixed"], *STACKED["eights"]]
+    tasks = [*ALIKE["circles"], *OTHERS["mixed"], *ALIKE["eights"]]
     q = begin(tasks)
     whole = ran(LAWS["follow"](TaskBatch(tasks)), q)
     order = np.random.default_rng(3).permutation(len(tasks))
@@ -245,7 +221,7 @@ def test_laps_are_counted_in_periods_of_their_own():
 
 
 def test_a_rollout_that_diverges_changes_no_other():
-    tasks = STACKED["circles"]
+    tasks = ALIKE["circles"]
     q, K_p = begin(tasks), np.full((len(tasks), 1), 800.0)
     K_p[2] = 1e7
     law = lambda task, rows: ExtendedMotionPlan(ARM, task, K_p[rows], [45.0, 100.0], 20.0)  # noqa: E731
@@ -258,7 +234,7 @@ def test_a_rollout_that_diverges_changes_no_other():
 
 
 def test_arms_and_tasks_may_both_differ():
-    tasks, q = STACKED["ellipses"], begin(STACKED["ellipses"])
+    tasks, q = ALIKE["ellipses"], begin(ALIKE["ellipses"])
     plants = [ARM.with_payload(mass, "tool") for mass in np.linspace(0.0, 2.0, len(tasks))]
     together = ran(LAWS["plan"](TaskBatch(tasks)), q, plant=plants)
     for i, (task, plant) in enumerate(zip(tasks, plants, strict=True)):
@@ -268,7 +244,7 @@ def test_arms_and_tasks_may_both_differ():
 
 
 def test_continuous_time_agrees_within_its_tolerance():
-    tasks, q = STACKED["circles"][:3], begin(STACKED["circles"][:3])
+    tasks, q = ALIKE["circles"][:3], begin(ALIKE["circles"][:3])
     loop = ContinuousTime(output_period=0.05)
     together = simulate(LAWS["plan"](TaskBatch(tasks)), q, duration=0.3, loop=loop, progress=False)
     for i, task in enumerate(tasks):
@@ -277,7 +253,7 @@ def test_continuous_time_agrees_within_its_tolerance():
 
 
 def test_one_initial_state_does_for_all():
-    tasks = STACKED["circles"]
+    tasks = ALIKE["circles"]
     assert_array_equal(
         ran(LAWS["plan"](TaskBatch(tasks)), [0.5, 0.2]).array("q"),
         ran(LAWS["plan"](TaskBatch(tasks)), [[0.5, 0.2]] * len(tasks)).array("q"),
@@ -287,23 +263,20 @@ def test_one_initial_state_does_for_all():
 # --- evaluation -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("family", STACKED)
-def test_tasks_that_differ_in_numbers_are_evaluated_together(family):
-    parts = TaskBatch(STACKED[family])._parts
-    assert len(parts) == 1
-    assert parts[0]._projects
+def test_each_different_task_is_asked_once_for_all_rollouts_that_have_it():
+    asked = []
 
+    class Counted(Figure):
+        def theta(self, s):
+            asked.append(s.shape)
+            return super().theta(s)
 
-def test_tasks_that_only_seem_to_differ_in_numbers_are_not():
-    for family in ("entries", "scalars", "tabled"):
-        assert len(TaskBatch(OTHERS[family])._parts) == len(OTHERS[family])
-    # of the mixed ones the circles that turn the same way
-    assert sorted(len(np.arange(6)[part.rows]) for part in TaskBatch(OTHERS["mixed"])._parts) == [1, 1, 1, 3]
-    wrong = Entries.__new__(Entries)  # the trap: with two rollouts of two joints it broadcasts
-    wrong.size = np.stack([task.size for task in OTHERS["entries"]])
-    alone = np.concatenate([task.q_d(np.array([0.3])) for task in OTHERS["entries"]])
-    assert wrong.q_d(np.full(2, 0.3)).shape == alone.shape
-    assert not np.array_equal(wrong.q_d(np.full(2, 0.3)), alone)
+    one, other = Counted(1.0, 0.3), Counted(0.7, 0.3)
+    batch = TaskBatch([one, other, one, one])
+    asked.clear()
+    batch.theta(np.zeros((2, 4)))
+    assert asked == [(2, 3), (2, 1)]
+    assert [(task, rows.tolist()) for task, rows in batch.groups()] == [(one, [0, 2, 3]), (other, [1])]
 
 
 @settings(max_examples=10)
@@ -324,7 +297,7 @@ def test_a_batch_has_the_values_of_its_tasks(tasks, seed):
 
 
 def test_what_is_made_of_a_batch_is_made_of_each():
-    circles = TaskBatch(STACKED["circles"])
+    circles = TaskBatch(ALIKE["circles"])
     s = np.linspace(0.1, 0.9, len(circles))
     for made in (
         lambda task: task.shifted([0.1, 0.2]),
@@ -363,7 +336,7 @@ def test_a_rollout_has_the_numbers_of_its_own_task(family):
 
 
 def test_a_part_of_a_run_knows_the_tasks_of_its_rollouts():
-    tasks = STACKED["circles"]
+    tasks = ALIKE["circles"]
     run = ran(LAWS["plan"](TaskBatch(tasks)), begin(tasks), first_rollout=7)
     part = run.with_data(run.data.isel(rollout=[3, 1]))
     assert part.task.tasks == (tasks[3], tasks[1])
@@ -422,7 +395,7 @@ def test_figures_films_and_reports_show_the_path_of_their_rollout():
     from pathcontrol.view.report.reproduction import script
     from pathcontrol.view.report.summary import facts, measured
 
-    tasks = STACKED["circles"]
+    tasks = ALIKE["circles"]
     run = ran(LAWS["plan"](TaskBatch(tasks)), begin(tasks))
     assert shown(run, rollout=2)[0].task is tasks[2]
     assert shown(run, task=TaskBatch(tasks), rollout=3)[0].task is tasks[3]
@@ -462,8 +435,8 @@ def test_what_is_no_batch_is_named(tasks, message):
 
 
 def test_numbers_of_rollouts_that_do_not_fit_are_named():
-    batch = TaskBatch(STACKED["circles"])
-    law, q = LAWS["plan"](batch), begin(STACKED["circles"])
+    batch = TaskBatch(ALIKE["circles"])
+    law, q = LAWS["plan"](batch), begin(ALIKE["circles"])
     with pytest.raises(InputError, match="TaskBatch has 5 tasks, q and qd are 3 initial states"):
         ran(law, q[:3])
     with pytest.raises(InputError, match="plant has 2 arms, the controller's TaskBatch has 5 tasks"):
@@ -485,7 +458,7 @@ def test_every_task_is_checked_by_its_number():
 
 
 def test_paths_made_of_paths_and_sequences_take_one():
-    lines = TaskBatch(STACKED["lines"])
+    lines = TaskBatch(ALIKE["lines"])
     with pytest.raises(InputError, match="path 0 of the sequence is a TaskBatch of 5 tasks"):
         PathSequence([lines])
     with pytest.raises(InputError, match=r"the task of controllers\[0\] is a TaskBatch of 5 tasks"):

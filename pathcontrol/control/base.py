@@ -12,16 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly, unlabelled
 from pathcontrol._expect import expect
 from pathcontrol.control.ending import Ending
-from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.errors import InputError, UnknownNameError, warn_of_single
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.check import check_task
 
 FrictionCompensation = Literal["none", "viscous", "full"]
 Start = Literal["s0", "nearest"]
-
-
-_ONE = np.array(1.0)
 
 
 class ControlOutput(NamedTuple):
@@ -56,11 +53,6 @@ class Controller(ABC):
     :meth:`start` gives the state z, (*batch, m); :meth:`law` maps (t, q, q̇, z) to torques and ż and keeps nothing;
     :meth:`advance` takes z over one control period. The state of the controllers here is the path parameter, m = 1.
 
-    A subclass made with ``single=True``, as ``class Mine(Controller, single=True)``, says that its law
-    takes a single state, q (n,) and z (m,), as well, and answers to the last bit what it would in a batch of one; a
-    simulation of one rollout is then faster. (NumPy raises a number to a power with another last bit than an array.)
-    It is not inherited, since the law of a subclass may be another.
-
     Args:
         robot: the model the law uses, which need not be the simulated arm.
         task: path and velocity profile, for as many joints; one of each rollout is a :class:`TaskBatch`.
@@ -84,11 +76,10 @@ class Controller(ABC):
         self.ending = Ending.of(task)
         self._viscous = robot.friction.viscous
 
-    single = False
-
-    def __init_subclass__(cls, single: bool = False, **options: Any) -> None:
+    def __init_subclass__(cls, single: bool | None = None, **options: Any) -> None:
         super().__init_subclass__(**options)
-        cls.single = single
+        if single is not None:
+            warn_of_single(cls.__name__)
 
     @abstractmethod
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
@@ -110,7 +101,7 @@ class Controller(ABC):
         k → ∞ it is a step of Newton's method for (29) from the present arm, plus hσ̄̇ for its motion.
         (Hochbruck and Ostermann, Acta Numerica 19, 2010.)
         """
-        x = np.minimum(period * out.slope, _ONE)
+        x = np.minimum(period * out.slope, 1.0)
         phi_1, phi_2 = _phi(x)
         s = out.s + period * (phi_1 * out.sdot + period * phi_2 * out.drift)
         return (s if self.task.closed else np.minimum(np.maximum(s, self.task.s0), self.task.s_end))[..., None]
@@ -135,7 +126,7 @@ class Controller(ABC):
 
         Outside [s0, s_end] the point is the end that was passed.
         """
-        if not s.ndim and not self.task.single:
+        if not s.ndim:  # tasks take arrays
             return PathPoint(*(value[0] for value in self.point(s[None])))
         if self.ending is None:
             return self.task.at(s if self.task.closed else np.maximum(s, self.task.s0))
@@ -174,10 +165,7 @@ class Controller(ABC):
 
 def _phi(x: Array) -> tuple[Array, Array]:
     """φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x, by their series where x is small."""
-    small = abs(x) < 1e-3
-    if not (small.any() if x.ndim else small):
-        phi_1 = np.expm1(x) / x
-        return phi_1, (phi_1 - 1) / x
+    small = np.abs(x) < 1e-3
     safe = np.where(small, 1.0, x)
     phi_1 = np.where(small, 1 + x / 2 * (1 + x / 3 * (1 + x / 4)), np.expm1(safe) / safe)
     phi_2 = np.where(small, 0.5 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5))), (phi_1 - 1) / safe)

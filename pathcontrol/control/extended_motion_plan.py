@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, factor, finite, inner, readonly
+from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathTask
 
 
-class ExtendedMotionPlan(Controller, single=True):
+class ExtendedMotionPlan(Controller):
     """Path control with the extended motion plan, eqs. (22) and (25), for any path.
 
         σ̇ = ϑ(σ) − k e_pᵀq_d'(σ)
@@ -57,17 +57,16 @@ class ExtendedMotionPlan(Controller, single=True):
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         s = z[..., 0]
         point = self.point(s)
-        velocity, k = point.velocity, np.asarray(self.plan_gain(s))[()]  # of (), the number
+        velocity, k = point.velocity, self.plan_gain(s)
         e_p, e_v = point.q_d - q, velocity - qd
-        free = point.theta - k * inner(e_p, point.dq_d)
+        free = point.theta - k * np.vecdot(e_p, point.dq_d)
         sdot = self.inside(s, free)
-        curvature = inner(point.dq_d, point.dq_d) + inner(e_p, point.ddq_d)
-        qdd = point.velocity_slope * factor(sdot) + self.K_v * e_v + self.K_p * e_p
+        curvature = np.vecdot(point.dq_d, point.dq_d) + np.vecdot(e_p, point.ddq_d)
+        qdd = point.velocity_slope * sdot[..., None] + self.K_v * e_v + self.K_p * e_p
         tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd, velocity)
-        slope, drift = point.dtheta - k * curvature, k * inner(qd, point.dq_d)
-        if sdot is not free:  # it may be held at an end of an open path
-            held = sdot != free
-            slope, drift = np.where(held, 0.0, slope), np.where(held, 0.0, drift)
+        held = sdot != free  # at an end of an open path
+        slope = np.where(held, 0.0, point.dtheta - k * curvature)
+        drift = np.where(held, 0.0, k * np.vecdot(qd, point.dq_d))
         regular = np.isfinite(s)
         return ControlOutput(tau, sdot[..., None], s, sdot, slope, drift, e_p, e_v, regular)
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, factor
+from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathTask
@@ -35,7 +35,7 @@ class MotionController(Controller):
         point = self.point(s)
         velocity = point.velocity
         e_p, e_v = point.q_d - q, velocity - qd
-        tracking = Tracking(point.velocity_slope * factor(point.theta), velocity, e_p, e_v)
+        tracking = Tracking(point.velocity_slope * point.theta[..., None], velocity, e_p, e_v)
         tau = self.torque(q, qd, tracking) + self.friction_torque(qd, velocity)
         drift, regular = np.zeros_like(s), np.ones(s.shape, dtype=bool)
         return ControlOutput(tau, point.theta[..., None], s, point.theta, point.dtheta, drift, e_p, e_v, regular)
@@ -66,7 +66,7 @@ class ProportionalDerivative(MotionController):
         return self.K_v * ref.velocity_error + self.K_p * ref.position_error
 
 
-class ComputedTorque(ProportionalDerivative, single=True):
+class ComputedTorque(ProportionalDerivative):
     """Computed torque, eq. (16): τ = M(q)[q̈_r + K_v dq̃/dt + K_p q̃] + C(q,q̇)q̇ + g(q) + f̂(q̇).
 
     Without unmodelled friction the error obeys (17), d²q̃/dt² + K_v dq̃/dt + K_p q̃ = 0. K_p in 1/s², K_v in 1/s;
@@ -77,7 +77,7 @@ class ComputedTorque(ProportionalDerivative, single=True):
         return self.robot.inverse_dynamics(q, qd, ref.acceleration + self.correction(ref))
 
 
-class PDPlus(ProportionalDerivative, single=True):
+class PDPlus(ProportionalDerivative):
     """PD+ (Paden and Panja, Int. J. Control 47, 1988): τ = M(q)q̈_r + C(q,q̇)q̇_r + g(q) + K_v dq̃/dt + K_p q̃ + f̂(q̇).
 
     K_p in N m/rad, K_v in N m s/rad; arguments as for :class:`ProportionalDerivative`.
@@ -87,7 +87,7 @@ class PDPlus(ProportionalDerivative, single=True):
         return self.robot.inverse_dynamics(q, qd, ref.acceleration, velocity=ref.velocity) + self.correction(ref)
 
 
-class SlotineLi(MotionController, single=True):
+class SlotineLi(MotionController):
     """Slotine and Li's law with known parameters (Int. J. Robotics Research 6, 1987).
 
     τ = M(q)q̈_s + C(q,q̇)q̇_s + g(q) + K_d (q̇_s − q̇) + f̂(q̇),  q̇_s = q̇_r + Λq̃,  q̈_s = q̈_r + Λ dq̃/dt.

@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pathcontrol._arrays import Array, as_slice, in_common
+from pathcontrol._arrays import Array, in_common
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.friction import FrictionLaw, friction_of_each
 from pathcontrol.robot.model import RobotModel
 
-_FEW = 4  # rows of one rigid body, below which Pinocchio's batched call does not pay
-
 
 class RobotBatch:
     """One arm for each of N rollouts, all with the same joints: masses, payloads, friction and limits may differ.
 
-    Friction costs nothing more than for one arm, whatever differs. Rows with the same rigid body and the same rotor
-    inertia go through one batched call together; for others the articulated-body algorithm is called row by row.
-    Either way a row has the same result to the last bit as if it were alone.
+    Each rigid body that differs is asked once, for all rows that have it. A row has the same result to the last bit as
+    if it were alone.
 
     Attributes:
         robots: the arms.
@@ -54,8 +51,9 @@ class RobotBatch:
         self.position_units = first.position_units
         law = friction_of_each([robot.friction for robot in self.robots]) if friction is None else friction
         self.actuation = Actuation(_limits(self.robots), law, _encoder_counts(self.robots))
-        self.bodies, self.body = _grouped(self.robots, _same_body)
-        self._parts = self._divided(np.zeros(self.n))
+        self.bodies, self.body = _different(self.robots)
+        # the rows of each body
+        self._rows = np.split(np.argsort(self.body, kind="stable"), np.cumsum(np.bincount(self.body))[:-1])
 
     def __len__(self) -> int:
         return len(self.robots)
@@ -72,82 +70,43 @@ class RobotBatch:
 
     def with_armature(self, armature: Array) -> RobotBatch:
         """The same arms with rotor inertia [kg m²], (n,) or (N, n), added to the diagonals of their M."""
-        batch = object.__new__(RobotBatch)
-        batch.__dict__ |= self.__dict__
-        batch._parts = self._divided(armature)
-        return batch
+        made: dict[tuple[int, bytes], RobotModel] = {}
+        arms = []
+        for body, added in zip(self.body.tolist(), np.broadcast_to(armature, (len(self), self.n)), strict=True):
+            key = body, added.tobytes()
+            if key not in made:
+                made[key] = self.bodies[body].with_armature(added)
+            arms.append(made[key])
+        return RobotBatch(arms, self.friction)
 
     def forward_dynamics(self, q: Array, qd: Array, tau: Array) -> Array:
         """q̈ [rad/s²], (N, n), of the arms at (q, q̇) under τ, each (N, n); :meth:`RobotModel.forward_dynamics`."""
         qdd = np.empty_like(tau)
-        for robot, rows in self._parts.together:
-            qdd[rows] = robot.forward_dynamics(q[rows], qd[rows], tau[rows])
-        for robot, i, armature in self._parts.alone:
-            qdd[i] = robot.forward_dynamics_row(q[i], qd[i], tau[i], armature)
+        for body, rows in zip(self.bodies, self._rows, strict=True):
+            qdd[rows] = body.forward_dynamics(q[rows], qd[rows], tau[rows])
         return qdd
 
-    def mass_matrix(self, q: Array, rows: Array) -> Array:
+    def mass_matrix(self, q: Array, rows: NDArray[np.intp]) -> Array:
         """M(q) [kg m²], (k, n, n), of the arms of some ``rows`` (k,), at q (k, n)."""
-        M, parts = np.empty((len(q), self.n, self.n)), self._parts
-        which = parts.part[rows]
-        for part in np.unique(which):
-            if part >= 0:
-                found = which == part
-                M[found] = parts.together[part][0].mass_matrix(q[found])
-        for k in np.flatnonzero(which < 0):
-            row = rows[k]
-            M[k] = self.bodies[self.body[row]].mass_matrix_row(q[k], parts.armature[row])
-        return M
-
-    def _divided(self, added: Array) -> _Parts:
-        """The rows by the calls that are made for them, with rotor inertia ``added`` to their own."""
-        armature = np.stack([body.armature for body in self.bodies])[self.body] + added
-        parts, order = _Parts(armature), np.argsort(self.body, kind="stable")
-        for rows in np.split(order, np.flatnonzero(np.diff(self.body[order])) + 1):
-            body = self.bodies[self.body[rows[0]]]
-            if len(rows) >= _FEW and (armature[rows] == armature[rows[0]]).all():
-                extra = np.broadcast_to(added, armature.shape)[rows[0]]
-                parts.part[rows] = len(parts.together)
-                parts.together.append((body.with_armature(extra) if extra.any() else body, as_slice(rows)))
-            else:
-                parts.alone.extend((body, int(i), armature[i]) for i in rows)
-        return parts
+        each = [self.bodies[body].mass_matrix(one) for body, one in zip(self.body[rows].tolist(), q, strict=True)]
+        return np.reshape(each, (len(rows), self.n, self.n))
 
 
-class _Parts:
-    """Rows with one rigid body and rotor inertia, and rows that have theirs alone."""
-
-    def __init__(self, armature: Array) -> None:
-        self.armature = armature  # (N, n)
-        self.part = np.full(len(armature), -1)  # (N,), −1 for a row alone
-        self.together: list[tuple[RobotModel, NDArray[np.intp] | slice]] = []
-        self.alone: list[tuple[RobotModel, int, Array]] = []
-
-
-def _grouped(
-    robots: Sequence[RobotModel], same: Callable[[RobotModel, RobotModel], bool]
-) -> tuple[list[RobotModel], NDArray[np.intp]]:
-    """The robots that differ, and which of them each one is, (N,)."""
+def _different(robots: Sequence[RobotModel]) -> tuple[list[RobotModel], NDArray[np.intp]]:
+    """The rigid bodies that differ, and which of them each arm has, (N,)."""
     found: list[RobotModel] = []
-    by_identity: dict[int, int] = {}
-    alike: dict[Hashable, list[int]] = defaultdict(list)
-    which = np.empty(len(robots), dtype=np.intp)
-    for i, robot in enumerate(robots):
-        model = id(robot.pinocchio_model)
-        if model not in by_identity:
-            candidates = alike[(robot.source, json.dumps(robot.steps, sort_keys=True))]
-            match = next((k for k in candidates if same(found[k], robot)), None)
-            if match is None:
-                match = len(found)
+    known: dict[int, int] = {}  # by the identity of a model
+    alike: dict[Hashable, list[int]] = defaultdict(list)  # by where it comes from
+    for robot in robots:
+        model = robot.pinocchio_model
+        if id(model) not in known:
+            same = alike[robot.source, json.dumps(robot.steps, sort_keys=True)]
+            which = next((k for k in same if found[k].pinocchio_model == model), len(found))
+            if which == len(found):
                 found.append(robot)
-                candidates.append(match)
-            by_identity[model] = match
-        which[i] = by_identity[model]
-    return found, which
-
-
-def _same_body(a: RobotModel, b: RobotModel) -> bool:
-    return a.pinocchio_model == b.pinocchio_model
+                same.append(which)
+            known[id(model)] = which
+    return found, np.array([known[id(robot.pinocchio_model)] for robot in robots])
 
 
 def _limits(robots: Sequence[RobotModel]) -> Limits:

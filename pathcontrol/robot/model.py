@@ -146,26 +146,6 @@ class RobotModel:
         """q̈ = M(q)⁻¹(τ − C(q,q̇)q̇ − g(q)) [rad/s²], (*batch, n), by the articulated-body algorithm."""
         return self._body.forward_dynamics(q, qd, tau)
 
-    @property
-    def forward_dynamics_of_one(self) -> Callable[[Array, Array, Array], Array]:
-        """:meth:`forward_dynamics` of three arrays of floats (1, n), which are not looked at: for inner loops."""
-        return self._body.forward_dynamics_of_one
-
-    def forward_dynamics_row(self, q: Array, qd: Array, tau: Array, armature: Array) -> Array:
-        """q̈ (n,) of one configuration, each argument (n,), with another rotor inertia ``armature`` [kg m²].
-
-        To the last bit what :meth:`forward_dynamics` of that arm gives, without making it.
-        """
-        model, data = self._scratch
-        model.armature = armature
-        return pin.aba(model, data, q, qd, tau, pin.Convention.WORLD)  # the convention of the batched call
-
-    def mass_matrix_row(self, q: Array, armature: Array) -> Array:
-        """M(q) [kg m²], (n, n), of one configuration (n,), with another rotor inertia, to the last bit."""
-        model, data = self._scratch
-        model.armature = armature
-        return pin.crba(model, data, q)
-
     def nonlinear_effects(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """C(q,q̇)q̇ + g(q) [N m], (*batch, n)."""
         return self.inverse_dynamics(q, qd, np.zeros(self.n))
@@ -397,13 +377,6 @@ class RobotModel:
         model = pin.Model(self.pinocchio_model)
         model.gravity = pin.Motion.Zero()
         return RigidBody(model, self.threads)
-
-    @cached_property
-    def _scratch(self) -> tuple[Any, Any]:
-        """A model that may be changed, and its data."""
-        self._check_mass()
-        model = pin.Model(self.pinocchio_model)
-        return model, model.createData()
 
     def _changed(self, model: Any, method: str, arguments: dict[str, Any]) -> RobotModel:
         """The arm that a method makes of this one."""

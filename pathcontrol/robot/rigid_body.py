@@ -13,8 +13,6 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, joint_array
 from pathcontrol.errors import InputError
 
-_FLOAT = np.dtype(np.float64)
-
 
 class RigidBody:
     """A ``pin.Model`` with its data, and copies of both for each thread.
@@ -34,17 +32,11 @@ class RigidBody:
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """τ [N m] of (q, q̇, q̈), (*batch, n), by the recursive Newton–Euler algorithm."""
-        return self._of(pin.rnea, pin.rneaInParallel, ("q", "qd", "qdd"), q, qd, qdd)
+        return self._of(pin.rnea, pin.rneaInParallel, {"q": q, "qd": qd, "qdd": qdd})
 
     def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
         """q̈ [rad/s²] of (q, q̇, τ), (*batch, n), by the articulated-body algorithm."""
-        return self._of(_aba, pin.abaInParallel, ("q", "qd", "tau"), q, qd, tau)
-
-    @cached_property
-    def forward_dynamics_of_one(self) -> Callable[[Array, Array, Array], Array]:
-        """:meth:`forward_dynamics` of three arrays of floats (1, n), which are not looked at: for inner loops."""
-        model, data, aba, convention = self.model, self.data, pin.aba, pin.Convention.WORLD
-        return lambda q, qd, tau: aba(model, data, q[0], qd[0], tau[0], convention)[None]
+        return self._of(_aba, pin.abaInParallel, {"q": q, "qd": qd, "tau": tau})
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """M(q) [kg m²], (*batch, n, n), by the composite rigid body algorithm."""
@@ -54,25 +46,14 @@ class RigidBody:
             M[k] = pin.crba(self.model, self.data, qi)
         return M.reshape(*array.shape, self.n)
 
-    def _of(
-        self,
-        one: Callable[..., Any],
-        many: Callable[..., Any],
-        names: Sequence[str],
-        x: Any,
-        y: Any,
-        z: Any,
-    ) -> Array:
+    def _of(self, one: Callable[..., Any], many: Callable[..., Any], arguments: Mapping[str, ArrayLike]) -> Array:
         """An algorithm for one configuration, and for many, of three (*batch, n) arguments that broadcast."""
-        if not _alike(x, y, z, self.n):
-            x, y, z = together(self.n, dict(zip(names, (x, y, z), strict=True)), self._joints)
-        if x.size == self.n:  # one configuration is not worth the threads' overhead
-            if x.ndim == 1:
-                return one(self.model, self.data, x, y, z)
-            return one(self.model, self.data, x.reshape(-1), y.reshape(-1), z.reshape(-1)).reshape(x.shape)
-        out: Array = np.empty(x.shape)
-        if out.size:
-            many(self._threads, self._pool, *(a.reshape(-1, self.n).T for a in (x, y, z, out)))
+        arrays = together(self.n, arguments, self._joints)
+        out: Array = np.empty(arrays[0].shape)
+        if out.size == self.n:  # one configuration is not worth the threads' overhead
+            out[...] = one(self.model, self.data, *(a.reshape(-1) for a in arrays))
+        elif out.size:
+            many(self._threads, self._pool, *(a.reshape(-1, self.n).T for a in (*arrays, out)))
         return out
 
     @cached_property
@@ -95,16 +76,6 @@ def together(n: int, arguments: Mapping[str, ArrayLike], joints: Sequence[str] |
         shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(arguments, arrays, strict=True))
         raise InputError(f"the batch axes do not fit together: {shapes}") from error
     return [np.broadcast_to(a, shape) for a in arrays]
-
-
-def _alike(x: Any, y: Any, z: Any, n: int) -> bool:
-    """Whether all are arrays of floats of one shape (*batch, n), which need no more looking at."""
-    return (
-        type(x) is type(y) is type(z) is np.ndarray
-        and x.dtype is y.dtype is z.dtype is _FLOAT
-        and x.shape == y.shape == z.shape
-        and x.shape[-1:] == (n,)
-    )
 
 
 def _aba(*arguments: Any) -> Array:

@@ -36,7 +36,6 @@ class Damping:
         self._pairs = eighth[:, :, None] * eighth[:, None, :]
         self._eighth, self._half = (np.where(self._one, factor * eighth[:, None], 0.0) for factor in (1.0, 4.0))
         self._travel = 0.125 * eighth[:, None]
-        self._three, self._four = np.array(3.0), np.array(4.0)
 
     def condense(self, M: Array, moving: NDArray[np.bool_]) -> tuple[Array, Array]:
         """Condense viscous friction into the inertia matrix.
@@ -52,9 +51,9 @@ class Damping:
             M̃ [kg m²], (N, n, n), and XB/h, (N, n, n).
         """
         alone = M if moving.all() else np.where(moving[:, :, None] & moving[:, None, :] | self._one, M, 0.0)
-        first = np.linalg.inv(self._three * alone + self._eighth)
+        first = np.linalg.inv(3.0 * alone + self._eighth)
         E = alone + self._pairs * first
         second = np.linalg.inv(E)
         third = np.linalg.inv(E + self._pairs * second)
-        X = first + second + self._four * third  # of h/8, not of 1
+        X = first + second + 4.0 * third  # of h/8, not of 1
         return M + self._half + self._pairs * X, self._travel * X

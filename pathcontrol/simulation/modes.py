@@ -80,7 +80,7 @@ class SampledLoop:
 
     def sensors(self, robot: Arm) -> Sensors:
         """The measuring chain for ``robot``."""
-        return Sensors(np.array(self.period), self._resolution(robot), self.velocity == "difference", self.filter_hz)
+        return Sensors(self.period, self._resolution(robot), self.velocity == "difference", self.filter_hz)
 
     def _resolution(self, robot: Arm) -> Array | None:
         counts = _per_joint("encoders", self.encoders, robot.actuation.encoder_counts, robot)

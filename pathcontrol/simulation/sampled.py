@@ -11,7 +11,6 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
-from pathcontrol.errors import InputError
 from pathcontrol.simulation.divergence import Divergence
 from pathcontrol.simulation.finish import Finish
 from pathcontrol.simulation.modes import Arm, Outside, SampledLoop, check_rows, torque_limits
@@ -110,9 +109,8 @@ class SampledArm:
         """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
         ticks = max(1, round(duration / self._period))
         recorder, first = Recorder(len(self.q), controller.robot.n, ticks + 1), controller.start(self.q, self.qd)
-        single = _single(controller, self.q, self.qd, first)
-        first = z = first[0] if single else first
-        lost = self.divergence = Divergence(self.q, self.qd)
+        z, lost = first, Divergence(self.q, self.qd)
+        self.divergence = lost
         # a rollout that diverges may overflow in the step before
         with progress_bar("simulating", ticks, progress) as update, np.errstate(over="ignore", invalid="ignore"):
             for tick in range(ticks + 1):
@@ -122,11 +120,9 @@ class SampledArm:
                     self._hold_lost(lost)
                     z = lost.replaced(z, first)
                 reading = self._reading
-                q, qd = (reading.q[0], reading.qd[0]) if single else reading
-                out = controller.law(t, q, qd, z)
-                demand = out.tau.reshape(self.q.shape)
-                lost.look_at_torque(t, demand)
-                tau = self._actuator.limited(demand)
+                out = controller.law(t, reading.q, reading.qd, z)
+                lost.look_at_torque(t, out.tau)
+                tau = self._actuator.limited(out.tau)
                 if lost.any:
                     tau = lost.replaced(tau, 0.0)
                 torques = self._actuator.torques(tau)
@@ -135,7 +131,7 @@ class SampledArm:
                     update(tick)
                 if tick == ticks or lost.all:
                     break
-                if finish is not None and finish(t, np.atleast_1d(out.s), self.qd, lost.lost):
+                if finish is not None and finish(t, out.s, self.qd, lost.lost):
                     break
                 z = controller.advance(z, out, self._period)
                 self._advance(torques)
@@ -165,25 +161,6 @@ class SampledArm:
     def _seen(self) -> tuple[Array, Array]:
         """Positions and velocities (N, n) as they come to the sensors."""
         return (self.q, self.qd) if self._noise is None else self._noise.disturbed(self.q, self.qd)
-
-
-def _single(controller: Controller, q: Array, qd: Array, z: Array) -> bool:
-    """Whether there is one rollout only, (1, n), and the law can be asked for the torques of its state, (n,).
-
-    Raises:
-        InputError: the law, or its task, says so and cannot.
-    """
-    if len(q) > 1 or not controller.single:
-        return False
-    try:
-        tau = controller.law(0.0, q[0], qd[0], z[0]).tau
-    except (ValueError, IndexError, TypeError, AttributeError) as error:
-        names = f"{type(controller).__name__}.law with a {type(controller.task).__name__}"
-        raise InputError(
-            f"{names} fails for a single state, q of shape {q[0].shape}: {error}; one of them is made with single=True "
-            "and takes batches only, so leave that out"
-        ) from error
-    return tau.ndim == 1  # more where a gain has a row for each rollout
 
 
 def _periods_and_rest(delay: float, period: float) -> tuple[int, float]:

@@ -20,13 +20,13 @@ class Sensors(NamedTuple):
     """The measuring chain of a sampled loop.
 
     Attributes:
-        period: sampling period [s], an array (), which NumPy divides by faster than by a number.
+        period: sampling period [s].
         resolution: angle of one encoder count [rad], (1, n) or (N, n), or None for exact positions.
         differentiate: velocity as the difference of two positions over the period, instead of the true one.
         cutoff: corner frequency of a first-order low-pass filter on the velocity [Hz], or None.
     """
 
-    period: Array | float
+    period: float
     resolution: Array | None
     differentiate: bool
     cutoff: float | None

@@ -7,11 +7,11 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.together import by_identity
 
 
 def listed(tasks: Any) -> tuple[PathTask, ...]:
@@ -28,6 +28,14 @@ def listed(tasks: Any) -> tuple[PathTask, ...]:
     for i, task in enumerate(found):
         expect(f"tasks[{i}]", task, PathTask)
     return found
+
+
+def by_identity(tasks: Sequence[PathTask]) -> list[NDArray[np.intp]]:
+    """Return the rows (k,) of each different task."""
+    rows: dict[int, list[int]] = {}
+    for i, task in enumerate(tasks):
+        rows.setdefault(id(task), []).append(i)
+    return [np.array(some) for some in rows.values()]
 
 
 def check_alike(tasks: Sequence[PathTask]) -> None:

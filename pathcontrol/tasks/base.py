@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, factor
-from pathcontrol.errors import TaskError
+from pathcontrol._arrays import Array
+from pathcontrol.errors import TaskError, warn_of_single
 from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 from pathcontrol.tasks.differentiation import Differentiator, best_width
 from pathcontrol.tasks.profile import VelocityProfile, plain_attributes
@@ -30,12 +30,12 @@ class PathPoint(NamedTuple):
     @property
     def velocity(self) -> Array:
         """Desired joint velocity r = q_d'ϑ, (*batch, n)."""
-        return self.dq_d * factor(self.theta)
+        return self.dq_d * self.theta[..., None]
 
     @property
     def velocity_slope(self) -> Array:
         """Slope r' = dr/ds = q_d''ϑ + q_d'ϑ', (*batch, n); the desired acceleration is r'ṡ."""
-        return self.ddq_d * factor(self.theta) + self.dq_d * factor(self.dtheta)
+        return self.ddq_d * self.theta[..., None] + self.dq_d * self.dtheta[..., None]
 
 
 class PathTask(ABC):
@@ -47,10 +47,6 @@ class PathTask(ABC):
         Γ = { (q, q̇) : q = q_d(s), q̇ = q_d'(s) ϑ(s) }
 
     in state space (Moreno and Kelly, eqs. 2, 3 and 5) is what the task asks for.
-
-    A subclass made with ``single=True``, as ``class Mine(PathTask, single=True)``, says that it gives for a number s to
-    the last bit what it gives for an array of it, and so is faster for one rollout. (What raises s to a power does not:
-    NumPy's powers of numbers and of arrays may differ.) It is not inherited, since a subclass may be another path.
 
     Attributes:
         s0: first path parameter.
@@ -69,11 +65,10 @@ class PathTask(ABC):
     tool_pose: Array | None = None
     rotations: int = 0
 
-    single = False
-
-    def __init_subclass__(cls, single: bool = False, **options: Any) -> None:
+    def __init_subclass__(cls, single: bool | None = None, **options: Any) -> None:
         super().__init_subclass__(**options)
-        cls.single = single
+        if single is not None:
+            warn_of_single(cls.__name__)
 
     @abstractmethod
     def q_d(self, s: Array) -> Array:

@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array, in_common
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.alike import check_alike, in_common_or_range, listed
+from pathcontrol.tasks.alike import by_identity, check_alike, in_common_or_range, listed
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.profile import VelocityProfile
-from pathcontrol.tasks.together import Part, by_identity, one_by_one, together
 
 
 class TaskBatch(PathTask):
@@ -26,8 +25,7 @@ class TaskBatch(PathTask):
     Its s has shape (*batch, N) and its q_d(s) (*batch, N, n), where i of the N belongs to tasks[i]. ``s0``, ``s_end``
     and ``period`` are numbers where all tasks have the same, else (N,).
 
-    Tasks of one class that differ only in numbers are evaluated all at once where that gives the same bits, which is
-    tried out; a task that several rollouts have is evaluated once for them; others are evaluated one by one.
+    Each different task is evaluated once, for all rollouts that have it, one task after the other.
 
     Args:
         tasks: the tasks, one for each rollout, all closed or all open.
@@ -77,25 +75,21 @@ class TaskBatch(PathTask):
 
     def at(self, s: Array) -> PathPoint:
         s = self._of_rows("s", s, 1)
-        parts = self._parts
-        if len(parts) == 1:
-            return parts[0].task.at(s)
         vectors, numbers = np.empty((3, *s.shape, self._n)), np.empty((2, *s.shape))
-        for part in parts:
-            point = part.task.at(s[..., part.rows])
+        for task, rows in self._groups:
+            point = task.at(s[..., rows])
             for into, value in zip(vectors, point[:3], strict=True):
-                into[..., part.rows, :] = value
+                into[..., rows, :] = value
             for into, value in zip(numbers, point[3:], strict=True):
-                into[..., part.rows] = value
+                into[..., rows] = value
         return PathPoint(*vectors, *numbers)
 
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
         q = self._of_rows("q", as_array("q", q), 2)
         start = None if near is None else np.broadcast_to(as_array("near", near), q.shape[:-1])
         s = np.empty(q.shape[:-1])
-        for part in self._parts:
-            there = q[..., part.rows, :]
-            s[..., part.rows] = part.sigma_bar(there, None if start is None else start[..., part.rows])
+        for task, rows in self._groups:
+            s[..., rows] = task.sigma_bar(q[..., rows, :], None if start is None else start[..., rows])
         return s
 
     @property
@@ -107,22 +101,17 @@ class TaskBatch(PathTask):
         return self.one_traverse
 
     def rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> PathTask:
-        """The task of some ``rows``, a mask (N,) or numbers (k,); of one row its own, and of all this batch itself.
-
-        It is for a few calls: equal tasks are evaluated together, others one by one.
-        """
+        """The task of some ``rows``, a mask (N,) or numbers (k,); of one row its own, and of all this batch itself."""
         chosen = np.arange(len(self))[rows]
         if len(chosen) == 1:
             return self.tasks[chosen[0]]
         if np.array_equal(chosen, np.arange(len(self))):
             return self
-        some = TaskBatch([self.tasks[i] for i in chosen])
-        some.__dict__["_parts"] = one_by_one(some.tasks)
-        return some
+        return TaskBatch([self.tasks[i] for i in chosen])
 
     def groups(self) -> list[tuple[PathTask, NDArray[np.intp]]]:
         """Each different task, and the rows (k,) that have it."""
-        return [(self.tasks[rows[0]], rows) for rows in by_identity(self.tasks)]
+        return list(self._groups)
 
     def with_profile(self, profile: VelocityProfile) -> TaskBatch:
         return TaskBatch([task.with_profile(profile) for task in self.tasks])
@@ -158,18 +147,16 @@ class TaskBatch(PathTask):
     # --- inside ---------------------------------------------------------------------------------------------
 
     @cached_property
-    def _parts(self) -> list[Part]:
-        return together(self.tasks)
+    def _groups(self) -> list[tuple[PathTask, NDArray[np.intp]]]:
+        return [(self.tasks[rows[0]], rows) for rows in by_identity(self.tasks)]
 
     def _evaluated(self, method: str, s: Array, shape: tuple[int, ...]) -> Array:
         """A method of all tasks at s (*batch, N), of values (*batch, N, *shape)."""
         s = self._of_rows("s", s, 1)
-        parts = self._parts
-        if len(parts) == 1:
-            return getattr(parts[0].task, method)(s)
-        values, whole = np.empty(s.shape + shape), (slice(None),) * len(shape)
-        for part in parts:
-            values[(..., part.rows, *whole)] = getattr(part.task, method)(s[..., part.rows])
+        values, whole = np.empty(s.shape + shape), [slice(None)] * len(shape)
+        for task, rows in self._groups:
+            where: tuple[Any, ...] = (..., rows, *whole)
+            values[where] = getattr(task, method)(s[..., rows])
         return values
 
     def _of_rows(self, name: str, values: ArrayLike, axes: int) -> Array:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, inner, readonly, scalar
+from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.profile import ConstantSpeed
@@ -43,7 +43,7 @@ class JointCurve(PathTask):
         return PathPoint(self.q_d(s), dq_d, ddq_d, theta, dtheta)
 
 
-class Ellipse(JointCurve, single=True):
+class Ellipse(JointCurve):
     """An ellipse drawn by two joints, the others holding still.
 
     q_d(s) = c + (a cos s) e_i ± (b sin s) e_j,  s ∈ [s0, ∞), period 2π.
@@ -96,7 +96,7 @@ class Ellipse(JointCurve, single=True):
         return vector
 
 
-class Circle(Ellipse, single=True):
+class Circle(Ellipse):
     """The paper's task, eqs. (9) and (10): a circle of radius r₀ [rad] at the path speed v₀ [rad/s].
 
     q_d(s) = c + r₀ (cos s e_i ± sin s e_j),  ϑ = v₀/r₀,  σ̄(q) = atan2(±(q_j − c_j), q_i − c_i).
@@ -142,7 +142,7 @@ class Circle(Ellipse, single=True):
         return angle + self.period * np.round((reference - angle) / self.period)
 
 
-class Lissajous(JointCurve, single=True):
+class Lissajous(JointCurve):
     """Each joint swings at its own frequency: q_{d,i}(s) = c_i + a_i sin(f_i s + φ_i).
 
     With whole frequencies the path closes after 2π; frequencies (1, 2) draw a figure of eight.
@@ -201,7 +201,7 @@ class Lissajous(JointCurve, single=True):
         return self.frequencies * np.asarray(s)[..., None] + self.phases
 
 
-class Line(JointCurve, single=True):
+class Line(JointCurve):
     """The straight line from ``start`` to ``end`` in joint space, its parameter the arc length.
 
     q_d(s) = start + s u,  u = (end − start)/‖end − start‖,  s ∈ [0, ‖end − start‖],  ϑ = ``speed``.
@@ -232,7 +232,7 @@ class Line(JointCurve, single=True):
         return np.zeros_like(self.dq_d(s))
 
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
-        return np.clip(inner(as_array("q", q) - self.start, self._direction), 0.0, self.s_end)
+        return np.clip(np.vecdot(as_array("q", q) - self.start, self._direction), 0.0, self.s_end)
 
 
 def _posture(name: str, given: ArrayLike) -> Array:

@@ -16,9 +16,9 @@ from numpy.polynomial import chebyshev
 from pathcontrol._arrays import Array
 
 _DEGREE = 14
-#: Chebyshev points of [-1, 1] on which a function is sampled
-NODES = chebyshev.chebpts2(_DEGREE + 1)
-_TO_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(NODES, _DEGREE))
+# Chebyshev points of [-1, 1] on which a function is sampled
+_NODES = chebyshev.chebpts2(_DEGREE + 1)
+_TO_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(_NODES, _DEGREE))
 _DERIVATIVES = {order: chebyshev.chebder(np.eye(_DEGREE + 1), order) for order in (1, 2)}
 
 
@@ -42,19 +42,11 @@ class Differentiator:
         """Derivative of ``order`` 1 or 2 at s (*batch,)."""
         s = np.asarray(s, dtype=np.float64)
         centre = np.clip(s, self.lower + self.width, self.upper - self.width)
-        values = np.asarray(self.function(centre[..., None] + self.width * NODES))
-        return interpolated(values, (s - centre) / self.width, self.width**order, order)
-
-
-def interpolated(values: Array, u: Array, scale: float | Array, order: int) -> Array:
-    """The derivative of the polynomial with ``values`` (*batch, nodes, …) at :data:`NODES`, at u (*batch,) in [-1, 1].
-
-    ``scale`` is that of u to the power of ``order``; a number, or (*batch, 1).
-    """
-    weights = _weights(u, order) / scale
-    if values.ndim == weights.ndim:
-        return np.einsum("...k,...k->...", weights, values)
-    return np.einsum("...k,...ki->...i", weights, values)
+        values = np.asarray(self.function(centre[..., None] + self.width * _NODES))
+        weights = _weights((s - centre) / self.width, order) / self.width**order
+        if values.ndim == weights.ndim:
+            return np.einsum("...k,...k->...", weights, values)
+        return np.einsum("...k,...ki->...i", weights, values)
 
 
 def _weights(u: Array, order: int) -> Array:

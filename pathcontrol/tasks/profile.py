@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pathcontrol._arrays import Array, inner, scalar
+from pathcontrol._arrays import Array, scalar
 
 #: time constant [s] T with which every controller brings its plan to rest on the end of an open path, ṡ ∝ (s_end − s)/T
 END_TIME = 0.1
@@ -92,9 +92,9 @@ class ConstantSpeed(VelocityProfile):
         return self.at(path.dq_d(s), path.ddq_d(s), path, s)[1]
 
     def at(self, dq_d: Array, ddq_d: Array, path: Path, s: Array) -> tuple[Array, Array]:
-        square = inner(dq_d, dq_d)
+        square = np.vecdot(dq_d, dq_d)
         length = np.sqrt(square)
-        return self.speed / length, -self.speed * inner(dq_d, ddq_d) / (square * length)
+        return self.speed / length, -self.speed * np.vecdot(dq_d, ddq_d) / (square * length)
 
 
 def plain_attributes(instance: Any) -> dict[str, Any]:
