@@ -40,8 +40,6 @@ LOOP = SampledLoop(encoders=True, velocity="difference", torque_limits=True)
 class Ramp(FrictionLaw):
     """A law that the library does not know: dry friction that grows with the speed."""
 
-    varies = True
-
     @property
     def n(self) -> int:
         return 2

@@ -13,7 +13,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,9 +33,6 @@ def _coefficients(name: str, value: ArrayLike) -> Array:
 @dataclass(frozen=True, eq=False)
 class FrictionLaw(ABC):
     """Friction torque of the joints as a function of their velocities."""
-
-    #: whether the levels change with velocity; where they do although this is False, the plant notices by trying
-    varies: ClassVar[bool] = False
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -149,7 +146,6 @@ class Stribeck(FrictionLaw):
     coulomb: Array
     static: Array
     velocity: Array
-    varies = True
 
     def __post_init__(self) -> None:
         for name in ("coulomb", "static", "velocity"):
@@ -190,10 +186,6 @@ class FrictionSum(FrictionLaw):
         return self.terms[0].n
 
     @property
-    def varies(self) -> bool:  # type: ignore[override]
-        return any(term.varies for term in self.terms)
-
-    @property
     def viscous(self) -> Array:
         return sum((term.viscous for term in self.terms), np.zeros(self.n))
 
@@ -219,10 +211,6 @@ class FrictionOfGroups(FrictionLaw):
     @property
     def n(self) -> int:
         return self.parts[0][0].n
-
-    @property
-    def varies(self) -> bool:  # type: ignore[override]
-        return any(law.varies for law, _ in self.parts)
 
     @property
     def viscous(self) -> Array:
@@ -289,9 +277,7 @@ def of_rollout(law: FrictionLaw, row: int) -> FrictionLaw:
 
 
 def levels_vary(law: FrictionLaw) -> bool:
-    """Whether the levels change with velocity, as the law says or as it turns out at some velocities."""
-    if law.varies:
-        return True
+    """Whether the levels change with velocity, as it turns out at some velocities."""
     rest = law.levels(np.zeros((1, law.n)))
     tried = [law.levels(np.full((1, law.n), qd)) for qd in (-3.0, -0.1, -1e-3, 1e-3, 0.1, 3.0)]
     return any(not np.array_equal(a, b) for pair in tried for a, b in zip(pair, rest, strict=True))
