@@ -79,13 +79,13 @@ class Plant:
         """The velocity a ``duration`` after ``start`` if no joint turns or stops, by the trapezoidal rule, (N, n)."""
         return start + duration * self._inertia.forward_dynamics(q, u, drive - dry[2])
 
-    def _condense(
-        self, rows: _Rows, q: Array, qd: Array, v: Array, dry: _Dry, middle_qd: Array
-    ) -> tuple[Array, Array]:
+    def _condense(self, rows: _Rows, q: Array, qd: Array, v: Array, dry: _Dry, middle_qd: Array) -> tuple[Array, Array]:
         """M̃(q) and XB/h, (k, n, n), of ``rows`` (k,) of strong friction, whose ``v`` becomes what it ought to be."""
         viscous = np.broadcast_to(self._viscous, q.shape)[rows]
         M = _mass_matrix(self.robot, q[rows], rows)
-        inertia, travel = Damping(viscous, self.step).condense(M, ((qd != 0) | (middle_qd != 0) | (dry[0] <= dry[1]))[rows])
+        inertia, travel = Damping(viscous, self.step).condense(
+            M, ((qd != 0) | (middle_qd != 0) | (dry[0] <= dry[1]))[rows]
+        )
         change = (v - qd)[rows]
         momentum = _times(M, change) + 0.5 * self.step * viscous * change
         v[rows] = qd[rows] + np.linalg.solve(inertia, momentum[..., None])[..., 0]
