@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
 
 import numpy as np
@@ -11,7 +13,10 @@ import pinocchio as pin
 from benchmarks.cases import Case
 from benchmarks.contest import Contender
 from benchmarks.plain_loop import PlainLaw, plain_run
-from pathcontrol import simulate
+from pathcontrol import Circle, ControlTick, PathTask, Space, simulate, sweep
+
+#: what is measured of each rollout of a sweep
+METRICS = ("e_p_peak", "e_v_peak", "contour_error_peak", "gamma_distance_rms")
 
 
 def ours(case: Case, rollouts: int, ticks: int, threads: int = 1) -> Contender:
@@ -32,6 +37,42 @@ def plain(case: Case, rollouts: int, ticks: int) -> Contender:
 def plain_alone(case: Case, ticks: int) -> Contender:
     """The plain loop over the experiment itself."""
     return _plainly(case, case.start[None], np.zeros((1, case.robot.n)), 1, ticks)
+
+
+class OwnCircle(PathTask):
+    """The paper's task as a user writes a path: q_d(s) and ϑ(s) only."""
+
+    period = 2 * np.pi
+
+    def __init__(self, task: Circle) -> None:
+        self.radius, self.center, self.rate = task.radius, task.center, task.speed / task.radius
+
+    def q_d(self, s: np.ndarray) -> np.ndarray:
+        return self.center + self.radius * np.stack([np.cos(s), np.sin(s)], axis=-1)
+
+    def theta(self, s: np.ndarray) -> np.ndarray:
+        return np.full_like(s, self.rate)
+
+
+def own_task(case: Case, rollouts: int, ticks: int) -> Contender:
+    """:func:`ours` with the same circle as a subclass of :class:`PathTask`."""
+    return ours(case._replace(task=OwnCircle(case.task)), rollouts, ticks)
+
+
+def swept(case: Case, rollouts: int, ticks: int) -> Contender:
+    """:func:`pathcontrol.sweep` over the states of :func:`ours`, with four metrics, from its checks to its files."""
+    law, duration = case.law(), ticks * case.loop.period
+    q, qd = case.states(rollouts)
+    space = Space.given({"q": q, "qd": qd})
+
+    def build(p: dict[str, np.ndarray], samples: np.ndarray) -> dict[str, object]:
+        return {"controller": law, "q": p["q"], "qd": p["qd"], "duration": duration, "loop": case.loop}
+
+    def run() -> None:
+        with TemporaryDirectory() as folder:
+            sweep(build, space, Path(folder) / "sweep", metrics=METRICS, chunk=rollouts, progress=False)
+
+    return Contender(run, rollouts, ticks)
 
 
 def _simulated(case: Case, q: np.ndarray, qd: np.ndarray, ticks: int, threads: int) -> Contender:
@@ -65,18 +106,17 @@ def pinocchio_alone(case: Case, rollouts: int, ticks: int, threads: int = 1) -> 
 
 
 def control_tick(case: Case, repeats: int = 5000) -> tuple[float, float, float]:
-    """Median time [µs] of one law and step of its state, as on hardware, of the plain one, and of one raw RNEA."""
-    law, period = case.law(), case.loop.period
+    """Median time [µs] of a :class:`ControlTick`, as on hardware, of the plain law, and of one raw RNEA."""
     q, qd = case.start, np.zeros(case.robot.n)
-    z = law.start(q, qd)
+    tick_of = ControlTick(case.law(), case.loop.period)
+    tick_of.start(q, qd)
     model, data, plain_law = case.robot.pinocchio_model, case.robot.pinocchio_model.createData(), PlainLaw(case)
 
     def tick() -> None:
-        nonlocal z
-        z = law.advance(z, law.law(0.0, q, qd, z), period)
+        tick_of(q, qd)
 
     def plain_tick() -> None:
-        plain_law(float(z[0]), q, qd)
+        plain_law(tick_of.s, q, qd)
 
     def rnea() -> None:
         pin.rnea(model, data, q, qd, qd)

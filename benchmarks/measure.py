@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from benchmarks.cases import Case, paper, seven_joints
-from benchmarks.contenders import control_tick, ours, ours_alone, pinocchio_alone, plain, plain_alone
+from benchmarks.contenders import control_tick, ours, ours_alone, own_task, pinocchio_alone, plain, plain_alone, swept
 from benchmarks.contest import contest
 from benchmarks.peers import batched, single
 
 ROLLOUTS, TICKS, SHORT, ROUNDS = 1000, 4000, 200, 5
 SAMPLE = 20  # of the rollouts, for the plain loop
+SWEPT = 250  # rollouts of the sweep, TICKS each
 #: (rollouts, ticks) of the cost in rollouts, and of the cost in time
 CROWDS = ((100, 400), (1_000, 100), (10_000, 20), (100_000, 10))
 LENGTHS = ((100, 250), (100, 1_000), (100, 4_000))
@@ -45,13 +46,9 @@ def measure() -> Results:
     ratios |= _crowd(paper(), "2 joints", rows)
     others, more = _alone(seven_joints(), "7 joints")
     joined = _crowd(seven_joints(), "7 joints", more)
+    ratios |= {f"{name}_seven_joints": value for name, value in (others | joined).items()}
     ratios["seven_joints"] = joined["batch1000_1thread"]
-    ratios |= {
-        f"seven_joints_{name}": value for name, value in (others | joined).items() if name != "batch1000_1thread"
-    }
-    tick, plainly, rnea = control_tick(paper())
-    ratios |= {"control_tick_us": tick, "rnea_us": rnea, "control_tick_over_rnea": tick / rnea}
-    ratios["plain_tick_over_rnea"] = plainly / rnea
+    ratios |= _around(paper()) | _tick(paper())
     return Results(ratios, [*rows, *more], _growth(paper()))
 
 
@@ -60,27 +57,49 @@ def _alone(case: Case, arm: str) -> tuple[dict[str, float], list[Row]]:
     contenders = {"plain loop": plain_alone(case, TICKS), "pathcontrol, 1 rollout": ours_alone(case, TICKS)}
     times = contest(contenders | single(case, TICKS), ROUNDS)
     rows = [Row(arm, name, times.median(name), times.ratio("plain loop", name)) for name in times.rounds]
-    return {"single": times.ratio("plain loop", "pathcontrol, 1 rollout")}, rows
+    names = {"single": "plain loop", "mujoco_single": "MuJoCo"}
+    there = {key: name for key, name in names.items() if name in times.rounds}
+    return {key: times.ratio(name, "pathcontrol, 1 rollout") for key, name in there.items()}, rows
 
 
 def _crowd(case: Case, arm: str, rows: list[Row]) -> dict[str, float]:
-    """Many rollouts in lockstep, on one thread and on two."""
+    """Many rollouts, on one thread and on two."""
     contenders = {"plain loop, of these rollouts": plain(case, SAMPLE, SHORT)}
     for threads in (1, 2):
-        some = (ours(case, ROLLOUTS, SHORT, threads), pinocchio_alone(case, ROLLOUTS, SHORT, threads))
-        names = (
-            f"{name}, {ROLLOUTS} rollouts, threads: {threads}" for name in ("pathcontrol", "Pinocchio's calls alone")
-        )
-        contenders |= dict(zip(names, some, strict=True))
-        for name, peer in batched(case, ROLLOUTS, SHORT, threads).items():
-            contenders[f"{name} with our law, {ROLLOUTS} rollouts, threads: {threads}"] = peer
+        named = {
+            "pathcontrol": ours(case, ROLLOUTS, SHORT, threads),
+            "Pinocchio's calls alone": pinocchio_alone(case, ROLLOUTS, SHORT, threads),
+            **{f"{name} with our law": peer for name, peer in batched(case, ROLLOUTS, SHORT, threads).items()},
+        }
+        contenders |= {f"{name}, {ROLLOUTS} rollouts, threads: {threads}": who for name, who in named.items()}
     times, base = contest(contenders, ROUNDS), next(iter(contenders))
     rows += [Row(arm, name, times.median(name), times.ratio(base, name)) for name in times.rounds]
     one, two = (f"{ROLLOUTS} rollouts, threads: {threads}" for threads in (1, 2))
-    return {
+    ratios = {
         "batch1000_1thread": times.ratio(base, f"pathcontrol, {one}"),
         "batch1000_2threads": times.ratio(base, f"pathcontrol, {two}"),
         "over_pinocchio": times.ratio(f"pathcontrol, {one}", f"Pinocchio's calls alone, {one}"),
+    }
+    if (mjbatch := f"mjbatch with our law, {one}") in times.rounds:
+        ratios["mjbatch"] = times.ratio(mjbatch, f"pathcontrol, {one}")
+    return ratios
+
+
+def _around(case: Case) -> dict[str, float]:
+    """A path of the user's own beside the circle, and a sweep beside its simulations alone."""
+    own = contest({"circle": ours(case, 1, TICKS), "own": own_task(case, 1, TICKS)}, ROUNDS)
+    sweep = contest({"simulated": ours(case, SWEPT, TICKS), "swept": swept(case, SWEPT, TICKS)}, ROUNDS)
+    return {"own_task": own.ratio("own", "circle"), "sweep_over_simulation": sweep.ratio("swept", "simulated")}
+
+
+def _tick(case: Case) -> dict[str, float]:
+    """One control tick beside the plain law and one call of RNEA."""
+    tick, plainly, rnea = control_tick(case)
+    return {
+        "control_tick_us": tick,
+        "rnea_us": rnea,
+        "control_tick_over_rnea": tick / rnea,
+        "plain_tick_over_rnea": plainly / rnea,
     }
 
 
