@@ -163,7 +163,12 @@ def test_distances_to_gamma_are_the_global_minima_of_a_dense_search(name, brakin
     stated = np.linalg.norm(np.concatenate([there.q_d, there.velocity], axis=-1) - states, axis=-1)
     assert np.abs(stated - distance).max() < 1e-8
     order = rng.permutation(300)
-    assert np.array_equal(distances_to_gamma(task, q[order], qd[order], 1.0, braking)[0], distance[order])
+    shuffled, there = distances_to_gamma(task, q[order], qd[order], 1.0, braking)
+    assert np.abs(shuffled - distance[order]).max() < 1e-12
+    batch = [np.stack([one, one[order]]) for one in (q, qd)]
+    for together, alone in zip(distances_to_gamma(task, *batch, 1.0, braking), (distance, found), strict=True):
+        assert np.array_equal(together[0], alone)  # each series by itself
+    assert np.array_equal(distances_to_gamma(task, *batch, 1.0, braking)[1][1], there)
 
 
 def test_distances_to_gamma_are_those_of_the_search_in_python(monkeypatch):

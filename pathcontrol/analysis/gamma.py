@@ -28,7 +28,7 @@ def distance_to_gamma(
 
     Args:
         task: path and velocity profile; its path ends or repeats.
-        q: joint positions [rad], (*batch, n).
+        q: joint positions [rad], (*batch, n); fastest where states follow one another along the last axis of the batch.
         qd: joint velocities [rad/s], (*batch, n).
         weight: w [s], how much a velocity counts beside a position; 1 as in the paper, 0 for the path alone.
         return_s: also return the path parameter of the nearest point of Γ.
@@ -64,8 +64,7 @@ def _nearest(task: PathTask, q: Array, qd: Array, weight: float, braking: bool) 
         return _nearest_of(task, q, qd, weight, braking)
     try:
         if q.ndim > 1:
-            found = distances_to_gamma(task, q.reshape(-1, task.n), qd.reshape(-1, task.n), weight, braking)
-            return found[0].reshape(q.shape[:-1]), found[1].reshape(q.shape[:-1])
+            return distances_to_gamma(task, q, qd, weight, braking)
     except EngineError:
         pass  # the search below is for any task, and needs no compiled library
     ending = Ending.of(task) if braking else None
@@ -87,7 +86,8 @@ def _nearest_of(sequence: PathSequence, q: Array, qd: Array, weight: float, brak
 
 def planned_rate(task: PathTask, s: Array) -> Array:
     """The rate ϑ(s) [1/s], (*batch,), at which controllers take a path: at the end of an open one, with its braking."""
-    return _planned(task, Ending.of(task))(s).theta
+    ending = Ending.of(task)
+    return task.theta(s) if ending is None else _planned(task, ending)(s).theta
 
 
 def _planned(task: PathTask, ending: Ending | None) -> Callable[[Array], PathPoint]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from ctypes import addressof
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol._identity import KnownOf
@@ -17,8 +19,9 @@ from pathcontrol.tasks.base import PathTask
 
 _TURN = 1 / 8  # rad over a piece of a cell, which is taken to hold one minimum at most
 _MOST_PIECES = 256
-_SAMPLES = 9  # of a cell, to see how far Γ turns in it
+_SAMPLES = 9  # of a cell, to see how Γ runs in it
 _LOOKS, _MOST_WORK = 16, 1 << 14  # states that are looked at before, and pieces that each may have to be compared with
+_CORNER = 1e-6  # of the largest ‖Γ'‖: a jump of Γ' that is a corner
 
 
 class _Ready(NamedTuple):
@@ -29,21 +32,22 @@ class _Ready(NamedTuple):
     memory: Memory
     centre: Array
     radius: Array
-    pieces: Array
+    pieces: NDArray[np.int32]
 
 
 _READY: KnownOf[PathTask, dict[tuple[float, bool], _Ready]] = KnownOf()
 
 
 def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braking: bool) -> tuple[Array, Array]:
-    """Return the distances [rad] of states (m, n) to Γ, and the parameters of the nearest points, (m,) each.
+    """Return the distances [rad] of states to Γ, and the parameters of the nearest points, (*series, m) each.
 
-    It is the global minimum at every state. States that follow one another, as those of a run, are fastest.
+    It is the global minimum at every state, and NaN where a state is not finite. States of a series that follow one
+    another, as those of a rollout, are fastest; a series has the same bits alone and among others.
 
     Args:
         task: path and velocity profile.
-        q: joint positions [rad], (m, n).
-        qd: joint velocities [rad/s], (m, n).
+        q: joint positions [rad], (*series, m, n).
+        qd: joint velocities [rad/s], (*series, m, n).
         weight: w [s], how much a velocity counts beside a position.
         braking: take ϑ with the ending of the controllers' plan.
 
@@ -60,15 +64,18 @@ def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braki
         gamma = Gamma(addressof(memory.keep(path)), weight, braking)
         centre, radius = _balls(table, weight, braking)
         gamma.centre, gamma.radius = memory.address(centre), memory.address(radius)
-        pieces = _pieces(table, weight)
-        gamma.pieces = memory.address(pieces, np.int32)
+        shape = _shape(table, weight, braking)
+        gamma.pieces, gamma.smooth = memory.address(shape.pieces, np.int32), memory.address(shape.smooth, np.int32)
+        gamma.length, gamma.straight = memory.address(shape.length), memory.address(shape.straight)
         memory.keep(kept)
-        known = ready[weight, braking] = _Ready(table, gamma, memory, centre, radius, pieces)
-    states = np.concatenate([q, weight * qd], axis=-1)
-    _check_work(known, states)
-    distance, s = np.empty((2, len(states)))
-    arrays = (states, distance, s)
-    library.pathcontrol_gamma(addressof(known.gamma), 1, len(states), *(a.ctypes.data for a in arrays))
+        known = ready[weight, braking] = _Ready(table, gamma, memory, centre, radius, shape.pieces)
+    *series, rows, joints = q.shape
+    states = np.empty((*series, rows, 2 * joints))
+    states[..., :joints], states[..., joints:] = q, weight * qd
+    _check_work(known, states.reshape(-1, 2 * joints))
+    distance, s = np.empty((2, *series, rows))
+    pointers = (array.ctypes.data for array in (states, distance, s))
+    library.pathcontrol_gamma(addressof(known.gamma), prod(series), rows, *pointers)
     return distance, s
 
 
@@ -112,19 +119,60 @@ def _balls(table: PathTable, weight: float, braking: bool) -> tuple[Array, Array
     return np.concatenate(centres, axis=-1), np.hypot(*radii) * (1 + 1e-12)
 
 
-def _pieces(table: PathTable, weight: float) -> Array:
-    """Into how many pieces each cell is cut so that Γ turns little over each, (K,)."""
+class _Shape(NamedTuple):
+    """How Γ runs in each cell, (K,) each.
+
+    Attributes:
+        pieces: into how many a cell is cut so that Γ turns little over each.
+        length: of Γ.
+        straight: ‖Γ'‖²/‖Γ''‖ at least, the distance from a state up to which its square is a convex function of s.
+        smooth: whether Γ' does not jump where the cell begins.
+    """
+
+    pieces: NDArray[np.int32]
+    length: Array
+    straight: Array
+    smooth: NDArray[np.bool_]
+
+
+def _shape(table: PathTable, weight: float, braking: bool) -> _Shape:
+    """What is seen of Γ at some samples of each cell, with a tenth in hand."""
     width = np.diff(table.knots)
-    x = np.linspace(0.0, 1.0, _SAMPLES)[:, None] * width
-    tangents = []
-    for polynomials, factor in ((table.coefficients[..., :-1], 1.0), (_velocity(table), weight)):
-        degree = polynomials.shape[1] - 1
-        slope = np.zeros((_SAMPLES, len(width), polynomials.shape[-1]))
-        for power in range(degree):
-            slope = slope * x[..., None] + (degree - power) * polynomials[:, power]
-        tangents.append(factor * slope)
-    tangent = np.concatenate(tangents, axis=-1)
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=-1, keepdims=True), np.finfo(float).tiny)
-    chord = np.linalg.norm(np.diff(tangent, axis=0), axis=-1)
+    tangent, bend = _derivatives(table, weight, braking, np.linspace(0.0, 1.0, _SAMPLES)[:, None] * width)
+    speed, curvature = (np.linalg.norm(values, axis=-1) for values in (tangent, bend))
+    tiny = np.finfo(float).tiny
+    direction = tangent / np.maximum(speed, tiny)[..., None]
+    chord = np.linalg.norm(np.diff(direction, axis=0), axis=-1)
     turn = 2 * np.arcsin(np.minimum(chord / 2, 1.0)).sum(0)
-    return np.clip(np.ceil(turn / _TURN), 1, _MOST_PIECES).astype(np.int32)
+    straight = 0.9 * speed.min(0) ** 2 / np.maximum(1.1 * curvature.max(0), tiny)
+    jump = np.linalg.norm(tangent[0] - np.roll(tangent[-1], 1, axis=0), axis=-1)
+    if braking and table.ending is not None:  # there Γ has a corner inside a cell
+        begin = table.ending.s_end - table.ending.braking
+        straight = np.where((table.knots[:-1] <= begin) & (begin <= table.knots[1:]), 0.0, straight)
+    return _Shape(
+        np.clip(np.ceil(turn / _TURN), 1, _MOST_PIECES).astype(np.int32),
+        1.1 * speed.max(0) * width,
+        straight,
+        jump <= _CORNER * speed.max(),
+    )
+
+
+def _derivatives(table: PathTable, weight: float, braking: bool, x: Array) -> tuple[Array, Array]:
+    """Γ' and Γ'' at s − knot = x (m, K), (m, K, 2n) each."""
+    q, r = table.coefficients[..., :-1], _velocity(table)
+    (_, dq, ddq), (velocity, dr, ddr) = (_jet(polynomials, x) for polynomials in (q, r))
+    if braking and table.ending is not None:
+        left = (table.ending.s_end - table.knots[:-1] - x) / table.ending.braking
+        share, slope = np.clip(left, 0.0, 1.0)[..., None], np.where(left < 1, -1 / table.ending.braking, 0.0)[..., None]
+        dr, ddr = dr * share + velocity * slope, ddr * share + 2 * dr * slope
+    return np.concatenate([dq, weight * dr], axis=-1), np.concatenate([ddq, weight * ddr], axis=-1)
+
+
+def _jet(polynomials: Array, x: Array) -> tuple[Array, Array, Array]:
+    """Value, first and second derivative of polynomials (K, d + 1, n), from the highest power down, at x (m, K)."""
+    value, slope, bend = np.zeros((3, *x.shape, polynomials.shape[-1]))
+    for coefficient in np.moveaxis(polynomials, 1, 0):
+        bend = bend * x[..., None] + 2 * slope
+        slope = slope * x[..., None] + value
+        value = value * x[..., None] + coefficient
+    return value, slope, bend

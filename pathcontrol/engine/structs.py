@@ -140,6 +140,9 @@ class Gamma(Structure):
         ("centre", _Doubles),
         ("radius", _Doubles),
         ("pieces", c_void_p),
+        ("length", _Doubles),
+        ("straight", _Doubles),
+        ("smooth", c_void_p),
     ]
 
 

@@ -77,9 +77,10 @@ EXPORT void pathcontrol_nearest(const Path *path, integer rows, const double *q,
 
 // Distances to Γ of several series of states, (series, rows, 2 joints) each.
 EXPORT void pathcontrol_gamma(const Gamma *gamma, integer series, integer rows, const double *states, double *distance, double *parameter) {
-  const integer width = 2 * gamma->path->joints;
+  const int joints = gamma->path->joints;
+  const auto one = joints == 2 ? distances_to_gamma<2> : joints == 6 ? distances_to_gamma<6> : joints == 7 ? distances_to_gamma<7> : distances_to_gamma<0>;
   for (integer k = 0; k < series; k++)
-    distances_to_gamma(*gamma, rows, states + k * rows * width, distance + k * rows, parameter + k * rows);
+    one(*gamma, rows, states + k * rows * 2 * joints, distance + k * rows, parameter + k * rows);
 }
 
 // One tick of the law alone: `io` holds q, q̇ and s, and then gets τ, with s one period on in its place.

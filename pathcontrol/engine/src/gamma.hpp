@@ -1,8 +1,10 @@
 // The distance of states to the curve Γ of a task, [q_d(s); w q_d'(s)ϑ(s)], sample after sample of a run.
 //
-// The nearest point is the best of the cells of the table whose ball, a bound on where Γ is, may hold it. Γ's distance changes
-// by no more than the state moves. So the cells that were too far by a margin stay too far until the state has moved by
-// that margin, and only the others are looked at from sample to sample; then all are again.
+// The nearest point of all is searched for in the cells of the table whose ball, a bound on where Γ is, may hold it. From there
+// it is followed from sample to sample by Newton's method within a *reach* of cells around it: over these the distance to the
+// state is a convex function of s, so that they hold one minimum, and all others are farther than it by a gap. A distance
+// changes by no more than the state moves, so both hold until the state has moved by that gap. Then the reach is laid anew
+// around the point that was followed; only where that cannot be shown to be the nearest of all is it searched for again.
 #pragma once
 #include "path.hpp"
 
@@ -12,6 +14,9 @@ struct Gamma {
   int brakes;                     // take ϑ with the ending of the controllers' plan
   const double *centre, *radius;  // (cells, 2 joints) and (cells,): a ball around Γ in each cell
   const int *pieces;              // (cells,): parts of a cell over which Γ turns little
+  const double *length;           // (cells,): of Γ in a cell
+  const double *straight;         // (cells,): up to this distance from Γ, along a cell, the distance is convex
+  const int *smooth;              // (cells,): whether Γ' does not jump where the cell begins
 };
 
 // Distance² of a state x = [q; w q̇] to Γ at s, and the slope of half of it.
@@ -75,38 +80,143 @@ static inline void search_cell(const Gamma &gamma, int cell, const double *x, Ne
     low = s, before = here;
   }
 }
-// Distances of states, (rows, 2 joints) each [q; w q̇], to Γ, and the parameters there; NaN where a state is not finite.
+// The nearest point of all, among the cells whose balls may hold it.
+static inline Nearest search_all(const Gamma &gamma, const double *x, Buffer<double> &bounds) {
+  const int cells = gamma.path->cells;
+  double farthest = INFINITY;
+  for (int cell = 0; cell < cells; cell++) {
+    bounds[cell] = to_ball(gamma, cell, x);
+    farthest = fmin(farthest, bounds[cell] + 2 * gamma.radius[cell]);
+  }
+  Nearest best = {INFINITY, NAN};
+  for (int cell = 0; cell < cells; cell++)
+    if (bounds[cell] <= fmin(farthest * (1 + 1e-12), sqrt(best.square))) search_cell(gamma, cell, x, best);
+  return best;
+}
+
+// Where the nearest point may be followed: s from `low` to `high`, counted on over laps; Γ elsewhere is as far as `others` at least,
+// which is negative where there is no such stretch.
+struct Reach {
+  double low, high, others;
+  bool holds(const Path &path, double s) const {  // a minimum at an end of the reach is none of Γ, but for an end of Γ
+    return (s > low || (s == low && !path.closed && low == path.s0)) && (s < high || (s == high && !path.closed && high == path.s_end));
+  }
+};
+
+// Half of the squared distance at s: twice its value, its slope and its curvature.
+struct GammaShape { double square, slope, curvature; };
+
+template <int N> static inline GammaShape gamma_shape(const Gamma &gamma, double s, const double *x) {
+  const Path &path = *gamma.path;
+  const int n = size<N>(path.joints), columns = n + 1;
+  const double inside = path.closed ? in_first_lap(path, s) : s < path.s0 ? path.s0 : s > path.s_end ? path.s_end : s;
+  const int cell = cell_of(path, inside);
+  const double y = inside - path.knots[cell], *c = path.coefficients + (integer)cell * 6 * columns;
+  constexpr int wide = room<N>() + 1;
+  double value[wide], first[wide], second[wide], third[wide];
+  for (int k = 0; k < columns; k++) {
+    const double c5 = c[k], c4 = c[columns + k], c3 = c[2 * columns + k], c2 = c[3 * columns + k], c1 = c[4 * columns + k];
+    value[k] = ((((c5 * y + c4) * y + c3) * y + c2) * y + c1) * y + c[5 * columns + k];
+    first[k] = (((5 * c5 * y + 4 * c4) * y + 3 * c3) * y + 2 * c2) * y + c1;
+    second[k] = ((20 * c5 * y + 12 * c4) * y + 6 * c3) * y + 2 * c2;
+    third[k] = (60 * c5 * y + 24 * c4) * y + 6 * c3;
+  }
+  double theta = value[n], dtheta = first[n], ddtheta = second[n];
+  if (gamma.brakes && path.brakes) {
+    const double left = (path.s_end - inside) / path.braking, share = left < 0 ? 0.0 : left > 1 ? 1.0 : left;
+    const double slope = left < 1 ? -1.0 / path.braking : 0.0;
+    ddtheta = ddtheta * share + 2 * dtheta * slope, dtheta = dtheta * share + theta * slope, theta *= share;
+  }
+  GammaShape d = {0, 0, 0};
+  for (int k = 0; k < n; k++) {
+    const double v1 = gamma.weight * (second[k] * theta + first[k] * dtheta);
+    const double v2 = gamma.weight * (third[k] * theta + 2 * second[k] * dtheta + first[k] * ddtheta);
+    const double q = value[k] - x[k], v = gamma.weight * first[k] * theta - x[n + k];
+    d.square += q * q + v * v;
+    d.slope += q * first[k] + v * v1;
+    d.curvature += first[k] * first[k] + v1 * v1 + q * second[k] + v * v2;
+  }
+  return d;
+}
+// Cells around `best` over which the distance is convex, as long as the state has moved by less than all others are farther.
+static inline Reach reach_around(const Gamma &gamma, const double *x, const Nearest &best, Buffer<double> &bounds) {
+  const Path &path = *gamma.path;
+  const int cells = path.cells, here = cell_of(path, path.closed ? in_first_lap(path, best.s) : best.s);
+  const double away = sqrt(best.square);
+  int before = 0, after = 0;  // how many cells on either side
+  double behind = gamma.length[here], ahead = gamma.length[here], straight = gamma.straight[here];
+  // a point of the reach is no farther from a state than that may be when it leaves the reach, plus the way along the reach
+  if (!(away + 3 * gamma.length[here] < straight)) return {0, 0, -1};
+  auto grows = [&](int cell, int knot) {
+    if ((!path.closed && (cell < 0 || cell >= cells)) || before + after + 2 > cells) return false;
+    const int there = (cell + cells) % cells;
+    if (!gamma.smooth[(knot + cells) % cells]) return false;
+    const double least = fmin(straight, gamma.straight[there]);
+    if (!(away + fmin(behind, ahead) + behind + ahead + 2 * gamma.length[there] < least)) return false;
+    straight = least;
+    return true;
+  };
+  bool left = true, right = true;
+  while (left || right) {
+    if (left && (left = grows(here - before - 1, here - before))) before++, behind += gamma.length[(here - before + cells) % cells];
+    if (right && (right = grows(here + after + 1, here + after + 1))) after++, ahead += gamma.length[(here + after) % cells];
+  }
+  double others = INFINITY;
+  for (int k = after + 1; k < cells - before; k++) others = fmin(others, bounds[(here + k + cells) % cells]);
+  const double lap = path.closed ? path.period * floor((best.s - path.s0) / path.period) : 0.0;
+  auto knot = [&](int k) {  // in the lap of the point, or the one beside it
+    const int turns = k < 0 ? -1 : k > cells ? 1 : 0;
+    return path.knots[k - turns * cells] + (turns ? turns * path.period : 0.0) + lap;
+  };
+  return {knot(here - before), knot(here + after + 1), away < others ? others : -1};
+}
+// The minimum in a reach, from a guess by Newton's method; NaN where that does not get there.
+template <int N> static inline Nearest follow(const Gamma &gamma, const double *x, const Reach &reach, double guess) {
+  double s = guess < reach.low ? reach.low : guess > reach.high ? reach.high : guess;
+  for (int step = 0; step < 8; step++) {
+    const GammaShape d = gamma_shape<N>(gamma, s, x);
+    if (!(d.curvature > 0)) return {INFINITY, NAN};
+    double next = s - d.slope / d.curvature;
+    next = next < reach.low ? reach.low : next > reach.high ? reach.high : next;
+    const double change = next - s, scale = 1e-14 * (1 + fabs(s));
+    // what a last step of Newton's method changes is known to its square
+    if (change * change * d.curvature <= 1e-16 * d.square || fabs(change) <= scale)
+      return {fmax(d.square + change * (2 * d.slope + change * d.curvature), 0.0), next};
+    s = next;
+  }
+  return {INFINITY, NAN};
+}
+// Distances of states, (rows, 2 joints) each [q; w q̇], to Γ, and the parameters there; NaN where squares are not finite.
+constexpr double FARTHEST = 1e150;  // as in tasks/closest_point/everywhere.py
+template <int N>
 static void distances_to_gamma(const Gamma &gamma, integer rows, const double *states, double *distance, double *parameter) {
-  const int m = 2 * gamma.path->joints, cells = gamma.path->cells;
+  const Path &path = *gamma.path;
+  const int m = 2 * size<N>(path.joints), cells = path.cells;
   Buffer<double> bounds(cells);
-  Buffer<int> near(cells);
-  int nearest = 0;  // how many cells are near
-  double margin_left = -1.0, step = 0.0;  // how far the state may still move before all cells are looked at again
+  Reach reach = {0, 0, -1};
+  double moved = 0, s = 0, step = 0;  // how far the state has moved in this reach, and s from sample to sample
   for (integer row = 0; row < rows; row++) {
     const double *x = states + row * m;
-    double moved = 0;
     bool finite = true;
-    for (int k = 0; k < m; k++) finite = finite && isfinite(x[k]);
-    if (!finite) { distance[row] = parameter[row] = NAN, margin_left = -1.0; continue; }
-    if (row && margin_left >= 0) {
-      for (int k = 0; k < m; k++) { const double y = x[k] - x[k - m]; moved += y * y; }
-      moved = sqrt(moved), step = moved, margin_left -= 2 * moved;  // both the nearest and the others may change by it
-    }
+    for (int k = 0; k < m; k++) finite = finite && fabs(x[k]) < FARTHEST;
+    if (!finite) { distance[row] = parameter[row] = NAN, reach.others = -1; continue; }
     Nearest best = {INFINITY, NAN};
-    if (margin_left < 0) {
-      double bound = INFINITY;
-      for (int cell = 0; cell < cells; cell++) {
-        bounds[cell] = to_ball(gamma, cell, x);
-        bound = fmin(bound, bounds[cell] + 2 * gamma.radius[cell]);
-      }
-      const double margin = fmax(40 * step, 0.02 * bound);
-      nearest = 0;
-      for (int cell = 0; cell < cells; cell++)
-        if (bounds[cell] <= bound * (1 + 1e-12) + margin) near[nearest++] = cell;
-      margin_left = margin;
+    if (reach.others > 0) {
+      double square = 0;
+      for (int k = 0; k < m; k++) { const double y = x[k] - x[k - m]; square += y * y; }
+      moved += sqrt(square);
+      best = follow<N>(gamma, x, reach, s + step);
     }
-    for (int k = 0; k < nearest; k++)
-      if (to_ball(gamma, near[k], x) <= sqrt(best.square)) search_cell(gamma, near[k], x, best);
-    distance[row] = sqrt(best.square), parameter[row] = best.s;
+    const bool followed = reach.others > 0 && reach.holds(path, best.s);
+    if (!followed || sqrt(best.square) + moved >= reach.others) {
+      moved = 0, reach.others = -1;
+      if (followed) {
+        for (int cell = 0; cell < cells; cell++) bounds[cell] = to_ball(gamma, cell, x);
+        reach = reach_around(gamma, x, best, bounds);
+      }
+      if (reach.others < 0) best = search_all(gamma, x, bounds), reach = reach_around(gamma, x, best, bounds);
+    }
+    step = followed ? best.s - s : 0.0, s = best.s;
+    distance[row] = sqrt(best.square), parameter[row] = path.closed ? in_first_lap(path, s) : s;
   }
 }
