@@ -50,11 +50,21 @@ class Differentiator:
 
 
 def _weights(u: Array, order: int) -> Array:
-    """Weights of the samples for the derivative at u in [-1, 1]."""
+    """Weights of the samples for the derivative at u in [-1, 1], the same for each u in any batch."""
+    inside = (u == 0)[..., None]
+    if inside.all():  # nearly everywhere
+        return np.broadcast_to(_IN_THE_MIDDLE[order], (*np.shape(u), _DEGREE + 1))
+    return np.where(inside, _IN_THE_MIDDLE[order], _weights_at(u, order))
+
+
+def _weights_at(u: Array, order: int) -> Array:
     derivative = _DERIVATIVES[order]
     basis = chebyshev.chebvander(u, len(derivative) - 1).reshape(*np.shape(u), 1, len(derivative))
     # one product for each s, of numbers side by side: else a row would be rounded differently in another batch
     return (np.ascontiguousarray(basis) @ (derivative @ _TO_COEFFICIENTS))[..., 0, :]
+
+
+_IN_THE_MIDDLE = {order: _weights_at(np.array(0.0), order) for order in _DERIVATIVES}
 
 
 def best_width(function: Callable[[Array], Array], lower: float, upper: float, samples: int = 33) -> float:

@@ -6,8 +6,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
+
+_MOST_STEPS = 200
+_LAST_DIGITS = 2 * float(np.finfo(np.float64).eps)
 
 
 class Curve(NamedTuple):
@@ -23,10 +27,42 @@ class Curve(NamedTuple):
 
     def root(self, x: Array, first: Array, second: Array) -> Array:
         """A root of g for each row of x (N, m) between two parameters (N,) where it has different signs."""
-        from scipy.optimize.elementwise import find_root  # loads all of scipy.optimize
+        return _root_between(lambda s, rows: self.slope(s, x[rows]), first, second)
 
-        lower, upper = np.minimum(first, second), np.maximum(first, second)
-        return find_root(lambda s, row: self.slope(s, x[row]), (lower, upper), args=(np.arange(len(x)),)).x
+
+def _root_between(g: Callable[[Array, NDArray[np.intp]], Array], a: Array, b: Array) -> Array:
+    """A root of g(s, row) for each row between a (N,) and b (N,), where g has different signs, to the last digits.
+
+    Inverse quadratic interpolation where that is safe, else halving (T. R. Chandrupatla, Advances in Engineering
+    Software 28, 1997), as SciPy's ``find_root``, which takes five times as long for a few rows.
+    """
+    rows = np.arange(len(a))
+    a, b, t = np.array(a), np.array(b), np.full(len(a), 0.5)
+    g_a, g_b, root = g(a, rows), g(b, rows), np.array(a)
+    for _ in range(_MOST_STEPS):
+        s = a + t * (b - a)
+        value = g(s, rows)
+        same = value * g_a > 0
+        c, g_c = np.where(same, a, b), np.where(same, g_a, g_b)
+        b, g_b = np.where(same, b, a), np.where(same, g_b, g_a)
+        a, g_a = s, value
+        best = np.where(np.abs(g_a) < np.abs(g_b), a, b)
+        root[rows] = best
+        least = _LAST_DIGITS * (np.abs(best) + np.finfo(np.float64).tiny) / np.abs(b - a)
+        going = (least < 0.5) & (g_a != 0) & (g_b != 0)
+        rows, a, b, c, g_a, g_b, g_c, least = (part[going] for part in (rows, a, b, c, g_a, g_b, g_c, least))
+        if not rows.size:
+            break
+        t = np.clip(_interpolated(a, b, c, g_a, g_b, g_c), least, 1 - least)
+    return root
+
+
+def _interpolated(a: Array, b: Array, c: Array, g_a: Array, g_b: Array, g_c: Array) -> Array:
+    """Where from a to b the next point is: by the inverse parabola through three points where that is monotonic."""
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        xi, phi = (a - b) / (c - b), (g_a - g_b) / (g_c - g_b)
+        t = g_a / (g_b - g_a) * g_c / (g_b - g_c) + (c - a) / (b - a) * g_a / (g_c - g_a) * g_b / (g_c - g_b)
+        return np.where((phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi) & np.isfinite(t), t, 0.5)
 
 
 class Interval(NamedTuple):
