@@ -520,7 +520,8 @@ def test_a_machine_without_this_package_can_be_asked():
     done = subprocess.run([sys.executable, "-c", code], input=question, capture_output=True, check=True)
     there = eval(done.stdout)
     assert cluster_module._differences(cluster_module.expected_versions(), there) == (
-        f"pathcontrol missing (here {cluster_module.versions()['pathcontrol']})"
+        f"pathcontrol missing (here {cluster_module.versions()['pathcontrol']}), "
+        "the compiled engine missing (here installed)"
     )
 
 

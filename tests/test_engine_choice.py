@@ -172,8 +172,8 @@ def test_experiment_files_and_the_command_line_choose_the_engine(tmp_path):
 
     file = tmp_path / "one.toml"
     file.write_text(EXPERIMENT.format(engine=""))
-    assert run_experiment(file, tmp_path / "a", progress=False).run.config["engine"] == "pinocchio"
-    assert run_experiment(file, tmp_path / "b", engine="auto").run.config["engine"] == "compiled"
+    assert run_experiment(file, tmp_path / "a", progress=False).run.config["engine"] == "compiled"
+    assert run_experiment(file, tmp_path / "b", engine="pinocchio").run.config["engine"] == "pinocchio"
     file.write_text(EXPERIMENT.format(engine='engine = "compiled"'))
     assert run_experiment(file, tmp_path / "c", progress=False).run.config["engine"] == "compiled"
     file.write_text(EXPERIMENT.format(engine='engine = "fast"'))

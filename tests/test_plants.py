@@ -57,13 +57,13 @@ LAWS = [
     Viscous([3.0, 0.1]) + Coulomb([9.0, 2.0], [8.0, 1.0]),
     Stribeck([4.0, 1.0], [6.0, 1.5], [0.1, 0.2]) + Viscous([2.0, 0.2]),
     Viscous([2.0, 0.2]),
-    Ramp(),
 ]
+OWN = {"pinocchio": [Ramp()], "compiled": []}  # of an engine, the laws that only the reference knows
 
 
 @st.composite
-def arms(draw: st.DrawFn) -> RobotModel:
-    return draw(st.sampled_from(PAYLOADS)).with_friction(draw(st.sampled_from(LAWS)))
+def arms(draw: st.DrawFn, laws: list[FrictionLaw] = LAWS) -> RobotModel:
+    return draw(st.sampled_from(PAYLOADS)).with_friction(draw(st.sampled_from(laws)))
 
 
 def assert_rows_equal(together: Run, alone: Run, i: int) -> None:
@@ -75,19 +75,23 @@ def law(arm, circle, **options):
     return ExtendedMotionPlan(arm, circle, 800.0, [45.0, 100.0], 20.0, **options)
 
 
+@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
 @settings(max_examples=15)
-@given(st.lists(arms(), min_size=2, max_size=9), st.integers(1, 3))
-def test_a_batch_is_the_loop_over_its_plants(plants, copies):
+@given(st.data(), st.integers(1, 3))
+def test_a_batch_is_the_loop_over_its_plants(engine, data, copies):
     from pathcontrol import Circle
 
+    plants = data.draw(st.lists(arms(LAWS + OWN[engine]), min_size=2, max_size=9))
     plants = [*plants, *[plants[0]] * (3 * copies)]  # some share a rigid body, or all that they are
     controller = law(ARM, Circle(1.0, 2.0))
     q = START + 0.3 * np.random.default_rng(2).normal(size=(len(plants), 2))
-    together = simulate(controller, q, duration=0.15, plant=plants, loop=LOOP, progress=False)
+
+    def ran(q, plant):
+        return simulate(controller, q, duration=0.15, plant=plant, loop=LOOP, engine=engine, progress=False)
+
+    together = ran(q, plants)
     for i, plant in enumerate(plants[: -3 * copies]):
-        assert_rows_equal(
-            together, simulate(controller, q[i], duration=0.15, plant=plant, loop=LOOP, progress=False), i
-        )
+        assert_rows_equal(together, ran(q[i], plant), i)
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda"])
@@ -137,7 +141,7 @@ def test_equal_arms_are_one(arm):
 
 
 def test_friction_of_each_is_that_of_each():
-    laws = [*LAWS, *LAWS[::-1]]
+    laws = [*LAWS, Ramp(), Ramp(), *LAWS[::-1]]
     together = friction_of_each(laws)
     qd = np.random.default_rng(6).normal(size=(len(laws), 2))
     qd[3] = 0.0

@@ -45,7 +45,7 @@ def test_coulomb_friction_moves_the_peaks_in_proportion_about_those_of_reproduce
     [(order, arguments)] = Combinations()(columns(rows, experiment), np.arange(3))
     assert_array_equal(order, [0, 1, 2])
     peaks = window_peaks(simulate(**arguments, progress=False))
-    published = paper_experiment(experiment, load_robot("cicese_2dof"), progress=False).peaks
+    published = paper_experiment(experiment, load_robot("cicese_2dof"), progress=False, engine="auto").peaks
     for name, signal in zip(PEAKS, ("e_p", "e_v"), strict=True):
         nominal, less, more = np.rad2deg(peaks[f"{signal} second half"])
         assert nominal == published[name]  # to the last bit: the settings are those of the table

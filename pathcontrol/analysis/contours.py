@@ -115,7 +115,7 @@ def contour_table(run: Run, robot: RobotModel | None = None) -> list[list[str]]:
         InputError: the run does not know its robot.
     """
     task = run.task
-    if not isinstance(task, PathSequence) or "path_finish_time" not in run.data.coords or "qd" not in run.data:
+    if not isinstance(task, PathSequence) or "path_finish_time" not in run or "qd" not in run:
         return []
     arm = run.robot if robot is None else robot
     if tool_of(arm, task) is None:

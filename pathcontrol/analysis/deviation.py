@@ -89,7 +89,7 @@ def geometry_of(task: PathTask, robot: RobotModel) -> Sequence[Geometry]:
 
 def contour_deviation(run: Run, contours: Sequence[Geometry], x: Array) -> Array:
     """Distance [m], (rollout, time), of x (rollout, time, 3) from the contour of the path that the run was on."""
-    if len(contours) == 1 or "path_index" not in run.data.coords:
+    if len(contours) == 1 or "path_index" not in run:
         return np.min([where_known(contour.distance, x) for contour in contours], axis=0)
     which, deviation = run["path_index"].to_numpy(), np.empty(x.shape[:-1])
     for i in np.unique(which):
@@ -139,7 +139,7 @@ def toolpath_metrics(
     }
     values = {f"{name}_peak": counted.reduced(_largest, v * cutting) for name, v in signals.items()}
     values |= {f"{name}_rms": counted.reduced(_rms, v * cutting) for name, v in signals.items()}
-    if "path_finish_time" in run.data.coords:  # not of a part of a run
+    if "path_finish_time" in run:  # not of a part of a run
         values |= _of_drawing(run, task, arm, tolerance)
     values |= _of_tool(run, task, arm, counted, cutting)
     values["smoothing_deviation"] = np.full(run.rollouts, task.deviation)

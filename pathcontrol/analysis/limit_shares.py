@@ -39,15 +39,15 @@ def limit_ratios(run: Run, own: Samples) -> dict[str, Array]:
 
 def limit_shares(run: Run) -> dict[str, Array]:
     """|q − middle| over half of the range, |q̇| and |τ| over their limits, (rollout, time, joint); NaN without one."""
-    robots, n, shares = robots_of(run), run.data.sizes["joint"], {}
+    robots, n, shares = robots_of(run), len(run.array("joint")), {}
     with np.errstate(invalid="ignore"):
-        if "q" in run.data:
+        if "q" in run:
             middle, half = np.array([_range(robot, n) for robot in robots]).swapaxes(0, 1)[:, :, None]
             shares["position_limit_ratio"] = np.abs(run.array("q") - middle) / half
-        if "qd" in run.data:
+        if "qd" in run:
             most = np.array([_velocity(robot, n) for robot in robots])
             shares["velocity_limit_ratio"] = np.abs(run.array("qd")) / most[:, None]
-        if "tau" in run.data:
+        if "tau" in run:
             limits = limits_of_each(run)
             limits = np.where(np.isfinite(limits), limits, np.nan)
             shares["torque_limit_ratio"] = np.abs(run.array("tau")) / limits[:, None]

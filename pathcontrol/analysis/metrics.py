@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -14,17 +14,22 @@ from pathcontrol.analysis.coverage import passed, path_points
 from pathcontrol.analysis.gamma import distance_to_gamma, planned_rate
 from pathcontrol.analysis.known import by_task, known_task, of_rollouts, where_known
 from pathcontrol.analysis.laps import lap_time
-from pathcontrol.analysis.limit_shares import limit_ratios
+from pathcontrol.analysis.limit_shares import RATIOS, limit_ratios
 from pathcontrol.analysis.names import LABELS, UNITS
 from pathcontrol.analysis.progress import progress
+from pathcontrol.analysis.tool_metrics import NAMES as TOOL_METRICS
 from pathcontrol.analysis.tool_metrics import tool_metrics
+from pathcontrol.analysis.torque import NAMES as TORQUE_METRICS
 from pathcontrol.analysis.torque import torque_metrics
 from pathcontrol.analysis.window import Samples, Window, samples_of
 from pathcontrol.errors import TaskError
-from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.run import Run, norms
 from pathcontrol.tasks.base import PathTask
 
 __all__ = ["LABELS", "UNITS"]
+
+_ERRORS = ("e_p", "e_v", "lag_error", "contour_error", "gamma_distance")
+_OF_ERRORS = [f"{name}_{kind}" for name in _ERRORS for kind in ("peak", "rms")]
 
 
 def steady_state(run: Run, fraction: float = 0.5) -> Run:
@@ -190,36 +195,71 @@ def metrics(
 
 def _metrics(run: Run, task: PathTask, counted: Samples, band: float, only: Collection[str]) -> dict[str, Array]:
     """The metrics of rollouts with one task, (rollout,) each."""
-    own = samples_of(run, "all")
-    values = _of_errors(run, task, counted, only)
-    theta = where_known(lambda s: planned_rate(task, s), counted.within(run.array("s")))
-    values["speed_ratio"] = counted.reduced(np.mean, run.array("sdot")) / counted.reduced(np.mean, theta)
-    values["settling_time"] = own.reduced(lambda e, t: settling_time(e[None], t, band)[0], *_over_time(run))
-    values |= torque_metrics(run, own, counted) | limit_ratios(run, own) | tool_metrics(run, task, counted, only)
-    values["progress"] = progress(run, task)
-    if not {"coverage", "path_deviation_peak"}.isdisjoint(only):
-        values |= _of_coverage(run, task, own, band)
-    if np.isfinite(task.s_end):
-        values |= {"path_time": run.finish_time, "end_error": _end_error(run, task)}
-    if task.closed and "lap_time" in only:
-        values["lap_time"] = lap_time(run, task)
+    own, wanted = samples_of(run, "all"), set(only)
+    values: dict[str, Array] = {}
+    makers: list[tuple[Collection[str], Callable[[], Mapping[str, Array]]]] = [
+        (_OF_ERRORS, lambda: _of_errors(run, task, counted, wanted)),
+        (("speed_ratio",), lambda: {"speed_ratio": _speed_ratio(run, task, counted)}),
+        (("settling_time",), lambda: {"settling_time": _settling_times(run, own, band)}),
+        (TORQUE_METRICS, lambda: torque_metrics(run, own, counted)),
+        (RATIOS, lambda: limit_ratios(run, own)),
+        (TOOL_METRICS, lambda: tool_metrics(run, task, counted, only)),
+        (("progress",), lambda: {"progress": progress(run, task)}),
+        (("coverage", "path_deviation_peak"), lambda: _of_coverage(run, task, own, band)),
+        (("path_time", "end_error"), lambda: _of_end(run, task)),
+        (("lap_time",), lambda: {"lap_time": lap_time(run, task)} if task.closed else {}),
+    ]
+    for names, make in makers:
+        if not wanted.isdisjoint(names):
+            values |= make()
     sound = run.status != "diverged"
-    return {name: np.where(sound, value, np.nan) for name, value in values.items() if name in only}
+    return {name: np.where(sound, value, np.nan) for name, value in values.items() if name in wanted}
 
 
-def _of_errors(run: Run, task: PathTask, counted: Samples, only: Collection[str]) -> dict[str, Array]:
+def _of_errors(run: Run, task: PathTask, counted: Samples, wanted: Collection[str]) -> dict[str, Array]:
     """Peaks and RMS of errors over the samples that count, (rollout,) each."""
-    q, qd, s = (counted.within(run.array(name)) for name in ("q", "qd", "s"))
-    signals = {"e_p": run.norm("e_p"), "e_v": run.norm("e_v"), "lag_error": np.abs(_lag(task, s, q))}
-    with suppress(TaskError):  # no nearest point on an endless path
-        if not {"contour_error_peak", "contour_error_rms"}.isdisjoint(only):
-            signals["contour_error"] = _distance(task, q)
-        if not {"gamma_distance_peak", "gamma_distance_rms"}.isdisjoint(only):
-            signals["gamma_distance"] = where_known(
-                lambda q, qd: np.asarray(distance_to_gamma(task, q, qd, braking=True)), q, qd
-            )
-    values = {f"{name}_peak": counted.reduced(np.max, v) for name, v in signals.items()}
-    return values | {f"{name}_rms": counted.reduced(_rms, v) for name, v in signals.items()}
+    late, values = counted.of_span(), dict[str, Array]()
+
+    def of(*names: str) -> list[Array]:
+        return [late.within(run.array(name)[:, counted.span]) for name in names]
+
+    signals: dict[str, Callable[[], Array]] = {
+        "e_p": lambda: norms(*of("e_p")),
+        "e_v": lambda: norms(*of("e_v")),
+        "lag_error": lambda: np.abs(_lag(task, *of("s", "q"))),
+        "contour_error": lambda: _distance(task, *of("q")),
+        "gamma_distance": lambda: _gamma_distance(task, *of("q", "qd")),
+    }
+    for name, signal in signals.items():
+        of_it: dict[str, Callable[..., float | Array]] = {f"{name}_peak": np.max, f"{name}_rms": _rms}
+        if not set(wanted).isdisjoint(of_it):
+            with suppress(TaskError):  # no nearest point on an endless path
+                found = signal()
+                values |= {key: late.reduced(reduce, found) for key, reduce in of_it.items() if key in wanted}
+    return values
+
+
+def _gamma_distance(task: PathTask, q: Array, qd: Array) -> Array:
+    """Distance to Γ with the braking that controllers plan, (rollout, time)."""
+    return np.asarray(distance_to_gamma(task, q, qd, braking=True))
+
+
+def _speed_ratio(run: Run, task: PathTask, counted: Samples) -> Array:
+    """The mean rate of s over the mean of what the plan asks for, (rollout,)."""
+    theta = where_known(lambda s: planned_rate(task, s), counted.within(run.array("s")))
+    return counted.reduced(np.mean, run.array("sdot")) / counted.reduced(np.mean, theta)
+
+
+def _settling_times(run: Run, own: Samples, band: float) -> Array:
+    """When ‖e_p‖ of each rollout settled [s], (rollout,)."""
+    e_p = run.norm("e_p")
+    time = np.broadcast_to(run.time, e_p.shape)
+    return own.reduced(lambda e, t: settling_time(e[None], t, band)[0], e_p, time)
+
+
+def _of_end(run: Run, task: PathTask) -> dict[str, Array]:
+    """When an open path was finished and how far from its end, (rollout,) each."""
+    return {"path_time": run.finish_time, "end_error": _end_error(run, task)} if np.isfinite(task.s_end) else {}
 
 
 def _of_coverage(run: Run, task: PathTask, own: Samples, band: float) -> dict[str, Array]:
@@ -230,12 +270,6 @@ def _of_coverage(run: Run, task: PathTask, own: Samples, band: float) -> dict[st
         return {}
     share, farthest = own.reduced(lambda q: np.array(passed(points, q, band)), run.array("q")).T
     return {"coverage": share, "path_deviation_peak": farthest}
-
-
-def _over_time(run: Run) -> tuple[Array, Array]:
-    """‖e_p‖ and the time, (rollout, time) each."""
-    e_p = run.norm("e_p")
-    return e_p, np.broadcast_to(run.time, e_p.shape)
 
 
 def _rms(values: Array) -> float:

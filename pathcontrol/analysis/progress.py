@@ -30,7 +30,7 @@ def progress(run: Run, task: PathTask) -> Array:
 
 def unfinished(run: Run) -> NDArray[np.bool_]:
     """Which rollouts were still running when the time was up and did not get there, (rollout,); none without a task."""
-    if run.task is None or "s" not in run.data:
+    if run.task is None or "s" not in run:
         return np.zeros(run.rollouts, dtype=bool)
     short = np.zeros(run.rollouts, dtype=bool)
     for part, own, rows in by_task(run, run.task):
@@ -61,14 +61,16 @@ def _of_end(run: Run, task: PathTask) -> Array:
 
 
 def _of_going_on(run: Run, task: PathTask) -> Array:
-    late, time = samples_of(run), run.time
-    s = run.array("s")
-    theta = where_known(lambda s: planned_rate(task, s), late.within(s))
+    late, time, s = samples_of(run), run.time, run.array("s")
     rows, last = np.arange(run.rollouts), late.stop - 1
+    passed, once = s[rows, last] - s[rows, late.first], np.inf if task.period is None else task.period
+    if (passed >= once).all():
+        return np.ones(run.rollouts)
+    theta = where_known(lambda s: planned_rate(task, s), late.within(s))
     asked = late.reduced(np.mean, theta) * (time[last] - time[late.first])
-    wanted = np.minimum(np.inf if task.period is None else task.period, _HALF_SPEED * asked)
+    wanted = np.minimum(once, _HALF_SPEED * asked)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(wanted > 0, (s[rows, last] - s[rows, late.first]) / wanted, 1.0)
+        return np.where(wanted > 0, passed / wanted, 1.0)
 
 
 def _largest(s: Array) -> Array:

@@ -62,7 +62,7 @@ def _of_one(run: Run) -> dict[str, str]:
 def _progress(run: Run) -> float:
     """That of the first rollout; 1 where it is not known."""
     task = run.task
-    if task is None or isinstance(task, TaskBatch) or "s" not in run.data:
+    if task is None or isinstance(task, TaskBatch) or "s" not in run:
         return 1.0
     done = float(progress(run, task)[0])
     return 1.0 if np.isnan(done) else done

@@ -12,6 +12,8 @@ from pathcontrol.simulation.record import laws
 from pathcontrol.simulation.run import Run
 
 _DEMAND = "tau_demand"
+#: what :func:`torque_metrics` says
+NAMES = ("tau_demand_peak", "tau_peak", "tau_demand_ratio", "tau_noise", "noise_amplification")
 
 
 def torque_metrics(run: Run, own: Samples, counted: Samples) -> dict[str, Array]:
@@ -19,15 +21,13 @@ def torque_metrics(run: Run, own: Samples, counted: Samples) -> dict[str, Array]
 
     Of several joints each number is that of the one where it is largest.
     """
-    values = {
-        f"{name}_peak": own.reduced(_peak, run.array(name)).max(-1) for name in (_DEMAND, "tau") if name in run.data
-    }
+    values = {f"{name}_peak": own.reduced(_peak, run.array(name)).max(-1) for name in (_DEMAND, "tau") if name in run}
     limits = limits_of_each(run)
     if np.isfinite(limits).any():
         values["tau_demand_ratio"] = (own.reduced(_peak, run.array(_DEMAND)) / limits).max(-1)
     noise = _of_joints(counted.reduced(_noise, run.array(_DEMAND), _unsteady(run)), run)
     values["tau_noise"] = noise.max(-1)
-    if "q_measured" in run.data:
+    if "q_measured" in run:
         heard = _of_joints(counted.reduced(_rms, run.array("q_measured") - run.array("q")), run)
         if (heard > 0).any():
             gains = np.divide(noise, heard, out=np.zeros_like(noise), where=heard > 0)
@@ -72,7 +72,7 @@ def _unsteady(run: Run) -> Array:
 
     Where it changes, the torque jumps by design and not by noise: see :meth:`Controller.friction_torque`.
     """
-    known = {"qd_measured", "e_v"} <= set(run.data.data_vars)
+    known = all(name in run for name in ("qd_measured", "e_v"))
     if not known or not any(law.get("friction") == "full" for law in laws(run.config)):
         return np.zeros_like(run.array(_DEMAND))
     measured = run.array("qd_measured")
@@ -91,4 +91,4 @@ def _rms(values: Array) -> Array:
 
 def _of_joints(values: Array, run: Run) -> Array:
     """(rollout, joint), where none has a sample too."""
-    return np.broadcast_to(values.reshape(len(values), -1), (len(values), run.data.sizes["joint"]))
+    return np.broadcast_to(values.reshape(len(values), -1), (len(values), len(run.array("joint"))))

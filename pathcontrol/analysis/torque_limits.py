@@ -18,7 +18,7 @@ _NO_LIMIT = 1e6  # N m: files that know no limit say some huge number, or zero
 
 def torque_limits(run: Run, robot: RobotModel | None) -> Array:
     """Limits of the torques [N m], (n,): those that were clamped to, else the robot's; inf without one."""
-    n = run.data.sizes["joint"]
+    n = len(run.array("joint"))
     own = np.full(n, np.inf) if robot is None or robot.n != n else robot.limits.effort
     limits = _clamped(run, n)
     limits = np.abs(own if limits is None else limits)

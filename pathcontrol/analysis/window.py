@@ -26,9 +26,20 @@ class Samples(NamedTuple):
     first: NDArray[np.intp]
     stop: NDArray[np.intp]
 
+    @property
+    def span(self) -> slice:
+        """From the first sample that counts in any rollout to the last."""
+        return slice(int(self.first.min()), int(self.stop.max()))
+
+    def of_span(self) -> Samples:
+        """The same samples, counted from the beginning of :attr:`span`."""
+        return Samples(self.first - self.span.start, self.stop - self.span.start)
+
     def within(self, values: Array) -> Array:
         """``values`` (rollout, time, …) with NaN outside, so that nothing is computed of what does not count."""
         number = np.arange(values.shape[1])
+        if not self.first.any() and (self.stop == len(number)).all():
+            return values
         inside = (number >= self.first[:, None]) & (number < self.stop[:, None])
         return np.where(inside.reshape(*inside.shape, *[1] * (values.ndim - 2)), values, np.nan)
 
@@ -53,7 +64,7 @@ def own_samples(run: Run) -> NDArray[np.intp]:
     It is where the run would have ended had the rollout been alone. One that is finished is held at the end of its path
     while others go on, which says nothing of it.
     """
-    closed = "laps" in run.data.coords
+    closed = "laps" in run
     ended = np.where(run.status == "finished", seen_finished(run.finish_time, not closed), np.inf)
     ended = np.where(run.status == "diverged", run.diverged_time, ended)
     return np.minimum(np.searchsorted(run.time, ended - _slack(run)) + 1, len(run.time))

@@ -130,7 +130,7 @@ def import_all() -> None:
 engine_option = click.option(
     "--engine",
     type=click.Choice(["auto", "compiled", "pinocchio"]),
-    help="Which engine runs the simulations; default what the file says, else pinocchio.",
+    help="Which engine runs the simulations; default what the file says, else auto.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, nothing else.")
 open_option = click.option("--open", "opened", is_flag=True, help="Show the page in the default browser at the end.")

@@ -178,7 +178,8 @@ def _halved(knots: Array) -> Array:
 def _refined(task: PathTask, knots: Array) -> Array:
     """``knots`` with cells halved until quintics follow ϑ in them, within shares of the largest ϑ and |ϑ'|."""
     theta, slope = _theta(task, 0.5 * (knots[1:] + knots[:-1]))
-    scale = np.abs(theta).max(), np.abs(slope).max()
+    largest = np.abs(theta).max()
+    scale = largest, max(np.abs(slope).max(), largest / (knots[-1] - knots[0]))
     coarse, most = _coarse(task, knots, np.arange(len(knots) - 1), *scale), len(knots) + _MOST_CELLS
     for _ in range(_HALVINGS):
         if not coarse.size or len(knots) + len(coarse) > most:
@@ -215,6 +216,7 @@ def _is_like(table: PathTable, task: PathTask) -> bool:
     extent, steepest = np.ptp(expected[0], axis=0), np.abs(expected[1]).max(0)
     extent[:-1], steepest[:-1] = extent[:-1].max(), steepest[:-1].max()
     extent[-1] = expected[0][:, -1].max()
+    steepest[-1] = max(steepest[-1], extent[-1] / (domain[1] - domain[0]))  # what ϑ' is less than that does not count
     rounding = _ROUNDING * np.abs(expected[0]).max()
     close = np.abs(found[0] - expected[0]) <= 2 * _VALUE * extent + rounding
     along = np.abs(found[1] - expected[1]) <= 4 * _SLOPE * steepest + rounding / np.median(np.diff(table.knots)) + 1e-12

@@ -86,7 +86,7 @@ class Experiment(Section):
     angle_unit: Literal["rad", "deg"] = "rad"
     duration: Positive | None = None
     laps: Whole | None = None
-    engine: Literal["auto", "compiled", "pinocchio"] = "pinocchio"
+    engine: Literal["auto", "compiled", "pinocchio"] = "auto"
     robot: Robot
     task: Task
     controller: Law

@@ -107,11 +107,16 @@ class CompiledArm:
         self._state["queue"] = np.zeros((actuator.waiting, *q.shape))
         self.divergence = Divergence(q, qd)
 
-    def run(self, controller: Controller, duration: float, finish: Finish | None, progress: bool) -> dict[str, Array]:
-        """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
+    def run(
+        self, controller: Controller, duration: float, finish: Finish | None, progress: bool, z: Array | None = None
+    ) -> dict[str, Array]:
+        """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most.
+
+        ``z`` is the state that the law starts with, where that is known already.
+        """
         setup, period = self._laws[controller], self._loop.period
         _add_finish(setup, finish)
-        self._take_over(controller)
+        self._take_over(controller, z)
         ticks, rollouts = max(1, round(duration / period)), self._shape[0]
         recorder = Recorder(rollouts, self._shape[1], ticks + 1)
         block = max(1, _BLOCK // rollouts)
@@ -132,11 +137,11 @@ class CompiledArm:
         add_law(setup, controller, self._memory)
         return setup
 
-    def _take_over(self, controller: Controller) -> None:
+    def _take_over(self, controller: Controller, z: Array | None) -> None:
         """Begin with the state of the law, and with no rollout finished or lost."""
         rollouts, state = self._shape[0], self._state
         state["home_q"], state["home_qd"] = state["q"].copy(), state["qd"].copy()
-        s = controller.start(state["q"], state["qd"])[..., 0]
+        s = (controller.start(state["q"], state["qd"]) if z is None else z)[..., 0]
         state["s"], state["first_s"] = np.array(s, dtype=np.float64), np.array(s, dtype=np.float64)
         state["rest_since"], state["reason"] = np.full(rollouts, np.inf), np.zeros(rollouts)
         for name in ("lap_start", "finish_time", "diverged_time"):

@@ -77,14 +77,20 @@ class ContinuousArm:
         self._disturbance, self._began = outside.disturbance, 0.0
         self.divergence = Divergence(q, qd)
 
-    def run(self, controller: Controller, duration: float, finish: Finish | None, progress: bool) -> dict[str, Array]:
-        """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
+    def run(
+        self, controller: Controller, duration: float, finish: Finish | None, progress: bool, z: Array | None = None
+    ) -> dict[str, Array]:
+        """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most.
+
+        ``z`` is the state that the law starts with, where that is known already.
+        """
         push = None if self._disturbance is None else _Push(self._disturbance, self._began)
         time = self._period * np.arange(max(1, round(duration / self._period)) + 1)
         loop = ClosedLoop(controller, self._robot, self._mode, push)
         recorder = Recorder(len(self.q), self._robot.n, len(time))
         lost = self.divergence = Divergence(self.q, self.qd)
-        start = np.concatenate([self.q, self.qd, controller.start(self.q, self.qd)], axis=-1)
+        z = controller.start(self.q, self.qd) if z is None else z
+        start = np.concatenate([self.q, self.qd, z], axis=-1)
         with progress_bar("integrating", duration, progress) as update:
             for t, y in zip(time, _Solution(loop, start, lost, push).at(time, update), strict=False):
                 self.q, self.qd, _ = loop.split(y)

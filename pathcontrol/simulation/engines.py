@@ -41,6 +41,22 @@ def check_engine(engine: str) -> None:
         raise UnknownNameError(f"engine = {engine!r}, expected one of {', '.join(map(repr, get_args(Engine)))}")
 
 
+def settle_engine(engine: Engine) -> Engine:
+    """Return which engine a study of many simulations asks for: not ``"auto"`` where there is no compiled one.
+
+    What is resumed elsewhere is then seen to be on another engine.
+    """
+    check_engine(engine)
+    if engine != "auto":
+        return engine
+    try:
+        load_library()
+    except EngineError as error:
+        _warn_once(str(error))
+        return "pinocchio"
+    return "auto"
+
+
 def choose_engine(
     engine: str,
     controllers: Sequence[Controller],

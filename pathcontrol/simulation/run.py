@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
@@ -17,24 +16,29 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.origin import Origin, Stored, check_sequence
 from pathcontrol.simulation.record import laws, table
-from pathcontrol.simulation.saved.netcdf import read_run, write_run
+from pathcontrol.simulation.samples import Samples, complete_outcome, label_outcome
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 from pathcontrol.tasks.base import PathTask
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class Run:
     """What happened in a simulation, one or many rollouts.
 
     Attributes:
-        data: an ``xarray.Dataset`` with the dimensions rollout, time and joint; see :data:`VARIABLES` and
-            :data:`OUTCOMES`.
         config: everything the run was made with: robot, task, controller, plant, loop, versions.
     """
 
-    def __init__(self, data: xr.Dataset, config: Mapping[str, Any], origin: Origin | None = None) -> None:
-        if missing := [name for name in ("rollout", "time", "joint") if not data.sizes.get(name)]:
-            raise InputError(f"the data of the run have no {' and no '.join(missing)}; expected at least one of each")
-        self.data, self.config = data, dict(config)
+    def __init__(self, data: xr.Dataset | Samples, config: Mapping[str, Any], origin: Origin | None = None) -> None:
+        self._samples = data if isinstance(data, Samples) else None
+        if not isinstance(data, Samples):
+            if missing := [name for name in ("rollout", "time", "joint") if not data.sizes.get(name)]:
+                lacks = " and no ".join(missing)
+                raise InputError(f"the data of the run have no {lacks}; expected at least one of each")
+            self._data = data
+        self.config = dict(config)
         self._origin = Origin.of(None, None) if origin is None else origin
 
     @classmethod
@@ -58,20 +62,19 @@ class Run:
         about, where they are known, and ``model`` the arm that the law computes with, where it is another one. Rollouts
         are numbered from ``first_rollout``.
         """
-        kinds = sorted(set(joints.values()), reverse=True)
-        variables = {}
-        for name, array in arrays.items():
-            dims, unit, meaning = VARIABLES[name]
-            units = {unit if kind == "rad" else unit.replace("rad", "m").replace("N m", "N"): None for kind in kinds}
-            variables[name] = (dims, array, {"units": " or ".join(units), "long_name": meaning})
-        rollouts = len(arrays["q"])
-        coords = {
-            "rollout": first_rollout + np.arange(rollouts),
-            "time": ("time", time, {"units": "s"}),
-            "joint": list(joints),
-        }
-        data = xr.Dataset(variables, coords).assign_coords(_outcome(rollouts, outcome or {}))
-        return cls(data, config, Origin.of(robot, task, first_rollout, model))
+        rollout = first_rollout + np.arange(len(arrays["q"]))
+        samples = Samples(time, joints, arrays, complete_outcome(len(rollout), outcome or {}), rollout)
+        return cls(samples, config, Origin.of(robot, task, first_rollout, model))
+
+    @property
+    def data(self) -> xr.Dataset:
+        """An ``xarray.Dataset`` with the dimensions rollout, time and joint, labelled when it is first asked for.
+
+        Its variables are :data:`VARIABLES`, its coordinates :data:`OUTCOMES`.
+        """
+        if self._samples is not None:
+            self._data, self._samples = self._samples.dataset(), None
+        return self._data
 
     def __getitem__(self, name: str) -> xr.DataArray:
         """One variable by its name.
@@ -89,6 +92,10 @@ class Run:
         if found.dims != dims:
             raise InputError(f"{name} of the run is over {found.dims}, expected {dims}")
         return found
+
+    def __contains__(self, name: str) -> bool:
+        """Whether the run has a variable or a coordinate of this name."""
+        return name in self.data.variables if self._samples is None else self._samples.plain(name) is not None
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{name}: {size}" for name, size in self.data.sizes.items())
@@ -134,7 +141,7 @@ class Run:
         Raises:
             InputError: the run does not know its robot.
         """
-        numbers = self.data["rollout"].to_numpy().tolist()
+        numbers = self.array("rollout").tolist()
         return [self._origin.rollout(number).robot or self.robot for number in numbers]
 
     @property
@@ -146,8 +153,9 @@ class Run:
         Raises:
             InputError: what the file says of them is no path, or not that of the data.
         """
-        task = self._origin.task_of(self.data["rollout"].to_numpy())
-        check_sequence(self.data, task)
+        task = self._origin.task_of(self.array("rollout"))
+        if self._samples is None:  # data that may have come from elsewhere
+            check_sequence(self.data, task)
         return task
 
     @property
@@ -158,7 +166,7 @@ class Run:
     @property
     def rollouts(self) -> int:
         """Number of rollouts."""
-        return self.data.sizes["rollout"]
+        return len(self.array("rollout"))
 
     @property
     def status(self) -> NDArray[np.str_]:
@@ -173,13 +181,13 @@ class Run:
     @property
     def diverged_time(self) -> Array:
         """When each rollout diverged [s], NaN where it did not, (rollout,); from then on it is NaN in all variables."""
-        known = "diverged_time" in self.data.coords  # not in a file from elsewhere
-        return self.data["diverged_time"].to_numpy() if known else np.full(self.rollouts, np.nan)
+        known = "diverged_time" in self  # not in a file from elsewhere
+        return self.array("diverged_time") if known else np.full(self.rollouts, np.nan)
 
     @property
     def reason(self) -> NDArray[np.str_]:
         """Why each rollout diverged and what to try, empty where it did not, (rollout,)."""
-        return self.data["reason"].to_numpy() if "reason" in self.data.coords else np.full(self.rollouts, "")
+        return self.array("reason") if "reason" in self else np.full(self.rollouts, "")
 
     @property
     def laps(self) -> NDArray[np.int64]:
@@ -190,9 +198,9 @@ class Run:
         Raises:
             InputError: the path is not closed.
         """
-        if "laps" not in self.data.coords:
+        if "laps" not in self:
             raise InputError("the run counts no laps: its path is not closed, or it is a sequence of paths")
-        return self.data["laps"].to_numpy()
+        return self.array("laps")
 
     def array(self, name: str) -> Array:
         """One variable as a plain array, (rollout, time, …).
@@ -200,7 +208,8 @@ class Run:
         Raises:
             UnknownNameError: the run has no such variable.
         """
-        return self[name].to_numpy()
+        plain = None if self._samples is None else self._samples.plain(name)
+        return self[name].to_numpy() if plain is None else plain
 
     def norm(self, name: str) -> Array:
         """Euclidean norm over the joints, (rollout, time), as ‖e_p‖ of ``run.norm("e_p")``; inf beyond 1e154.
@@ -208,8 +217,7 @@ class Run:
         Raises:
             UnknownNameError: the run has no such variable.
         """
-        with np.errstate(over="ignore"):
-            return np.linalg.norm(self.array(name), axis=-1)
+        return norms(self.array(name))
 
     def rollout(self, index: int) -> Run:
         """One of the rollouts as a run of its own."""
@@ -220,7 +228,7 @@ class Run:
 
     def path(self, index: int) -> Run:
         """One path of a sequence as a run of its own, that begins at 0 s and where the path before was finished."""
-        if "path_status" not in self.data.coords:
+        if "path_status" not in self:
             raise InputError("the run is no sequence of paths; make one with simulate_sequence")
         status, among, ends = (self.array(f"path_{name}") for name in ("status", "index", "finish_time"))
         if not 0 <= index < len(status) or status[index] == "waiting" or not (among == index).any():
@@ -236,8 +244,19 @@ class Run:
         outcome = {"finish_time": ends[[index]] - begin}
         if status[index] == "diverged":
             outcome |= {"diverged_time": self.diverged_time - begin, "reason": self.reason}
-        data = data.assign_coords(_outcome(1, outcome))
+        data = data.assign_coords(label_outcome(complete_outcome(1, outcome)))
         return Run(data, config, self._origin.path(index))
+
+    def excerpt(self, rows: NDArray[np.intp], stop: int) -> Run:
+        """Return the first samples, up to ``stop``, of the rollouts in some ``rows`` (k,) as a run of their own.
+
+        Their arrays are laid out as if these rollouts had been alone, so that sums over time have the same bits.
+        """
+        if self._samples is not None:
+            return Run(self._samples.excerpt(rows, stop), self.config, self._origin)
+        data = self.data.isel(rollout=rows, time=slice(0, stop))
+        flat = {name: (v.dims, np.ascontiguousarray(v.to_numpy()), v.attrs) for name, v in data.data_vars.items()}
+        return self.with_data(data.assign(flat))
 
     def with_data(self, data: xr.Dataset) -> Run:
         """Other ``data`` of the same robot, task and configuration, such as a part of the time."""
@@ -258,6 +277,8 @@ class Run:
             InputError: the name does not end with ``.nc``; the message names what writes other formats.
             OSError: the file cannot be written, as on a full disk; what was there before stays.
         """
+        from pathcontrol.simulation.saved.netcdf import write_run  # loads xarray and HDF5
+
         path = check_suffix(path, "a run", ".nc")
         write_run(path, self.data, self.config, self._stored())
         return path
@@ -269,6 +290,8 @@ class Run:
         Raises:
             InputError: there is no such file, it is damaged, or it is not a saved run.
         """
+        from pathcontrol.simulation.saved.netcdf import read_run  # loads xarray and HDF5
+
         data, config, stored = read_run(Path(path))
         return cls(data, config, None if stored is None else Origin.load(stored))
 
@@ -280,18 +303,11 @@ class Run:
         return _unpickled, (self.data, self.config, self._stored())
 
 
+def norms(vectors: Array) -> Array:
+    """Return Euclidean norms over the last axis; inf beyond 1e154."""
+    with np.errstate(over="ignore"):
+        return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+
+
 def _unpickled(data: xr.Dataset, config: Mapping[str, Any], stored: Stored) -> Run:
     return Run(data, config, Origin.load(stored))
-
-
-def _outcome(rollouts: int, outcome: Mapping[str, Array]) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:
-    """Coordinates that say how each rollout went."""
-    never = np.full(rollouts, np.nan)
-    values = {"finish_time": never, "diverged_time": never, "reason": np.full(rollouts, "")} | dict(outcome)
-    status = np.where(np.isnan(values["finish_time"]), "running", "finished")
-    values = {"status": np.where(np.isnan(values["diverged_time"]), status, "diverged")} | values
-    labels = {}
-    for name, value in values.items():
-        dims, unit, meaning = OUTCOMES[name]
-        labels[name] = (dims, value, {"long_name": meaning} | ({"units": unit} if unit else {}))
-    return labels

@@ -105,11 +105,16 @@ class SampledArm:
         self._disturbance, self._ticks = outside.disturbance, 0
         self.divergence = Divergence(q, qd)
 
-    def run(self, controller: Controller, duration: float, finish: Finish | None, progress: bool) -> dict[str, Array]:
-        """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most."""
+    def run(
+        self, controller: Controller, duration: float, finish: Finish | None, progress: bool, z: Array | None = None
+    ) -> dict[str, Array]:
+        """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most.
+
+        ``z`` is the state that the law starts with, where that is known already.
+        """
         ticks = max(1, round(duration / self._period))
-        recorder, first = Recorder(len(self.q), controller.robot.n, ticks + 1), controller.start(self.q, self.qd)
-        z, lost = first, Divergence(self.q, self.qd)
+        recorder, lost = Recorder(len(self.q), controller.robot.n, ticks + 1), Divergence(self.q, self.qd)
+        first = z = controller.start(self.q, self.qd) if z is None else z
         self.divergence = lost
         # a rollout that diverges may overflow in the step before
         with progress_bar("simulating", ticks, progress) as update, np.errstate(over="ignore", invalid="ignore"):

@@ -59,7 +59,7 @@ def simulate_sequence(
     plant: RobotModel | None = None,
     loop: SampledLoop | ContinuousTime | None = None,
     disturbance: Disturbance | None = None,
-    engine: Engine = "pinocchio",
+    engine: Engine = "auto",
     progress: bool = True,
 ) -> Run:
     """Simulate several paths of one arm, each from where the arm is when the one before is finished.
@@ -107,7 +107,7 @@ def simulate_sequence(
     whole = _whole(laws, laps, gaps) if task is None else _checked_whole(task, laws, laps)
     for law in laws:
         check_joints(law, robot)
-        check_law(law, q0, qd0)
+        check_law(law, q0, qd0, law.start(q0, qd0))
     slip = warn_of_slips(robot, whole, q0)
     check_disturbance(disturbance, q0, qd0)
     (arm, said), legs = choose_engine(engine, laws, loop, robot, q0, qd0, Outside(disturbance)), []

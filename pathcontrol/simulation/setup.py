@@ -137,15 +137,24 @@ def _check_equal(counts: Mapping[str, int]) -> None:
         raise InputError(", ".join(said.format(count) for said, count in counts.items()) + "; expected as many")
 
 
-def for_all_rows(q: Array, qd: Array, controller: Controller, disturbance: Disturbance | None) -> tuple[Array, Array]:
-    """One state (1, n), q and q̇, for each of the rollouts of which gains, or a disturbance, have a row."""
-    if len(q) > 1:
-        return q, qd
-    asked = [lambda: controller.law(0.0, q, qd, controller.start(q, qd)).tau]
-    if isinstance(disturbance, Disturbance):
-        asked.append(lambda: disturbance.torque(0.0, q, qd))
-    rows = max(map(_rows, asked))
-    return q.repeat(rows, axis=0), qd.repeat(rows, axis=0)
+def start_of_each(
+    controller: Controller, q: Array, qd: Array, disturbance: Disturbance | None
+) -> tuple[Array, Array, Array]:
+    """q, q̇ and the law's state z at the start, (N, …) each; of one state one for each row of gains or disturbance.
+
+    Raises:
+        InputError: the law fails there, or does not give what :class:`ControlOutput` says.
+    """
+    z = _asked(controller, q, controller.start, q, qd)
+    if len(q) == 1:
+        asked = [lambda: controller.law(0.0, q, qd, z).tau]
+        if isinstance(disturbance, Disturbance):
+            asked.append(lambda: disturbance.torque(0.0, q, qd))
+        rows = max(map(_rows, asked))
+        q, qd = q.repeat(rows, axis=0), qd.repeat(rows, axis=0)
+        z = z if len(z) == rows else np.repeat(z, rows, axis=0)
+    check_law(controller, q, qd, z)
+    return q, qd, z
 
 
 def _rows(torque: Callable[[], Any]) -> int:
@@ -164,16 +173,9 @@ def rollout_number(first: Any) -> int:
     return int(first)
 
 
-def check_law(controller: Controller, q: Array, qd: Array) -> None:
+def check_law(controller: Controller, q: Array, qd: Array, z: Array) -> None:
     """The law, asked once, gives what :class:`ControlOutput` says: shapes that fit the initial states, and numbers."""
-    name = type(controller).__name__
-    try:
-        z = controller.start(q, qd)
-        out = controller.law(0.0, q, qd, z)
-    except (ValueError, IndexError, TypeError) as error:
-        if isinstance(error, PathControlError):
-            raise
-        raise InputError(f"{name}.law fails at the initial states, of shape {q.shape}: {error}") from error
+    name, out = type(controller).__name__, _asked(controller, q, controller.law, 0.0, q, qd, z)
     if not isinstance(out, ControlOutput):
         raise InputError(f"{name}.law returns {type(out).__name__}, expected a ControlOutput")
     wanted = {"tau": q.shape, "e_p": q.shape, "e_v": q.shape, "zdot": np.shape(z)}
@@ -187,6 +189,17 @@ def check_law(controller: Controller, q: Array, qd: Array) -> None:
         sound = np.isfinite(np.reshape(value, (len(q), -1))).all(-1)
         if not sound.any():  # where some are no numbers, those rollouts diverge
             raise InputError(f"{name}.law gives {field} = {np.asarray(value).tolist()} at the start, expected numbers")
+
+
+def _asked(controller: Controller, q: Array, function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a method of the law gives at the initial states."""
+    try:
+        return function(*arguments)
+    except (ValueError, IndexError, TypeError) as error:
+        if isinstance(error, PathControlError):
+            raise
+        name = f"{type(controller).__name__}.law"
+        raise InputError(f"{name} fails at the initial states, of shape {q.shape}: {error}") from error
 
 
 def record_of(

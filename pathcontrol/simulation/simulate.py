@@ -18,15 +18,14 @@ from pathcontrol.simulation.modes import ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.setup import (
     check_joints,
-    check_law,
     check_length,
     checked_loop,
-    for_all_rows,
     joints_of,
     period_of,
     plant_of,
     record_of,
     rollout_number,
+    start_of_each,
     states_of_each,
 )
 from pathcontrol.simulation.slips import warn_if_still, warn_of_slips
@@ -45,7 +44,7 @@ def simulate(
     loop: SampledLoop | ContinuousTime | None = None,
     disturbance: Disturbance | None = None,
     first_rollout: int = 0,
-    engine: Engine = "pinocchio",
+    engine: Engine = "auto",
     progress: bool = True,
 ) -> Run:
     """Simulate a control law on an arm.
@@ -93,17 +92,16 @@ def simulate(
     robot, first = plant_of(plant, controller), rollout_number(first_rollout)
     check_joints(controller, robot)
     loop = checked_loop(loop)
-    q0, qd0 = for_all_rows(*states_of_each(q, qd, robot, controller.task), controller, disturbance)
+    q0, qd0, z0 = start_of_each(controller, *states_of_each(q, qd, robot, controller.task), disturbance)
     period, finish = period_of(loop, duration), finish_of(controller.task, laps, until, len(q0))
     check_length(duration, loop, len(q0), robot.n, finish is not None and finish.ends_run)
-    check_law(controller, q0, qd0)
     slip = warn_of_slips(robot, controller.task, q0, first)
     check_disturbance(disturbance, q0, qd0)
     arm, said = choose_engine(engine, [controller], loop, robot, q0, qd0, Outside(disturbance, first))
     slow = "" if first else warn_of_steps([controller], loop, robot, q0, qd0, disturbance, duration)
     settings = {"duration": duration, "laps": laps, "until": until, "first_rollout": first} | said
     config = record_of(controller.describe(), robot, loop, disturbance, **settings)
-    arrays = arm.run(controller, duration, finish, progress)
+    arrays = arm.run(controller, duration, finish, progress, z0)
     arm.divergence.explain(slip or slow)
     outcome = arm.divergence.outcome() | ({} if finish is None else {"finish_time": finish.time})
     if controller.task.closed:

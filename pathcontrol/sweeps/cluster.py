@@ -246,9 +246,13 @@ def all_idle(client: Client) -> bool:
         return False
 
 
+_ENGINE = "the compiled engine"
+
+
 def expected_versions() -> dict[str, str]:
-    """What every process of the cluster has to have: the packages of this one, and its Python up to the bugfix."""
-    return versions() | {"python": _asker()()["python"]}
+    """What every process of the cluster has to have: this one's packages, its Python up to the bugfix, its engine."""
+    here = _asker()()
+    return versions() | {name: here[name] for name in ("python", _ENGINE) if here[name]}
 
 
 def other_versions(expected: Mapping[str, str]) -> str:
@@ -258,7 +262,7 @@ def other_versions(expected: Mapping[str, str]) -> str:
 
 def _asker() -> Callable[[], dict[str, str]]:
     """A function that tells what is installed; as it is local, it is pickled whole, and needs no package there."""
-    packages = PACKAGES
+    packages, engine = PACKAGES, _ENGINE
 
     def installed() -> dict[str, str]:
         import sys
@@ -270,6 +274,13 @@ def _asker() -> Callable[[], dict[str, str]]:
                 found[name] = version(name)
             except PackageNotFoundError:
                 found[name] = ""
+        try:
+            from pathcontrol.engine.library import load_library
+
+            load_library()
+            found[engine] = "installed"
+        except Exception:  # neither the package nor its library need be there
+            found[engine] = ""
         return found
 
     return installed

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,34 +47,29 @@ class Chunk(NamedTuple):
 
 
 class Job(NamedTuple):
-    """How any chunk is computed: the arguments of :func:`compute` that all chunks share."""
+    """How any chunk is computed.
+
+    Attributes:
+        build: from parameters and samples to the arguments of simulations.
+        measure: from a run to numbers, one for each rollout.
+        keep: which histories are kept.
+        at_random: the samples whose histories are kept by chance.
+        engine: which engine the simulations run on where ``build`` says none.
+    """
 
     build: Build
     measure: Measure
-    keep: Keep
-    at_random: NDArray[np.intp]
+    keep: Keep = Keep()
+    at_random: NDArray[np.intp] = np.empty(0, dtype=np.intp)
+    engine: Engine = "auto"
 
     def __call__(self, parameters: Mapping[str, Array], samples: NDArray[np.int64]) -> Chunk:
-        return compute(self.build, parameters, samples, self.measure, self.keep, self.at_random)
+        """Simulate and measure ``samples`` (k,), with the values of their ``parameters``, (k,) or (k, d) each.
 
-
-def on_engine(build: Build, engine: Engine) -> Build:
-    """Return what builds a chunk, for simulations that run on ``engine`` where it says none itself."""
-    return build if engine == "pinocchio" else OnEngine(build, engine)
-
-
-@dataclass(frozen=True)
-class OnEngine:
-    """What builds a chunk, with the engine that its simulations run on where it says none itself."""
-
-    build: Build
-    engine: Engine
-
-    def __call__(self, parameters: Mapping[str, Array], samples: NDArray[np.int64]) -> Arguments | Parts:
-        built = self.build(parameters, samples)
-        if isinstance(built, Mapping):
-            return {"engine": self.engine, **built}
-        return [(rows, {"engine": self.engine, **arguments}) for rows, arguments in built]
+        Raises:
+            InputError: the parameters, or what was built of them, are refused; the message says of which samples.
+        """
+        return _computed(self, parameters, samples)
 
 
 def measure_of(wanted: Sequence[str] | Measure | None) -> Measure:
@@ -101,31 +95,20 @@ def _some(values: Mapping[str, ArrayLike], wanted: Sequence[str]) -> dict[str, A
     return {name: values[name] for name in wanted}
 
 
-def compute(
-    build: Build,
-    parameters: Mapping[str, Array],
-    samples: NDArray[np.int64],
-    measure: Measure,
-    keep: Keep,
-    at_random: NDArray[np.intp],
-) -> Chunk:
-    """Simulate and measure ``samples`` (k,), with the values of their ``parameters``, (k,) or (k, d) each.
-
-    Raises:
-        InputError: the parameters, or what was built of them, are refused; the message says of which samples.
-    """
+def _computed(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int64]) -> Chunk:
+    """What :class:`Job` gives."""
     measured: dict[str, Array] = {}
     runs: dict[int, Run] = {}
     try:
-        built = build(parameters, samples)
+        built = job.build(parameters, samples)
         parts = [(np.arange(len(samples)), built)] if isinstance(built, Mapping) else built
         for rows, arguments in parts:
-            run = _simulated(samples[rows], arguments)
-            values = _measured(run, measure)
+            run = _simulated(job.engine, samples[rows], arguments)
+            values = _measured(run, job.measure)
             _put(measured, values, rows, len(samples))
-            for row in _candidates(values, samples[rows], keep, at_random):
+            for row in _candidates(values, samples[rows], job.keep, job.at_random):
                 at = rows[row]
-                alone = run if run.rollouts == 1 else _alone(build, parameters, samples, at)
+                alone = run if run.rollouts == 1 else _alone(job, parameters, samples, at)
                 runs[int(samples[at])] = _history(
                     alone, {name: value[at].tolist() for name, value in parameters.items()}
                 )
@@ -137,7 +120,7 @@ def compute(
     return Chunk({"sample": samples, **parameters, **measured}, runs)
 
 
-def _simulated(samples: NDArray[np.int64], arguments: Arguments) -> Run:
+def _simulated(engine: Engine, samples: NDArray[np.int64], arguments: Arguments) -> Run:
     taken = [name for name in _NOT_YOURS if name in arguments]
     if taken:
         raise InputError(f"build gives {', '.join(taken)}, which the sweep sets itself; leave it out")
@@ -146,7 +129,7 @@ def _simulated(samples: NDArray[np.int64], arguments: Arguments) -> Run:
     if noisy and (np.diff(samples) != 1).any():
         raise InputError("the rows of a part with sensor noise have to follow one another, as noise goes by sample")
     try:
-        run = simulate(**arguments, first_rollout=int(samples[0]), progress=False)
+        run = simulate(**({"engine": engine} | dict(arguments)), first_rollout=int(samples[0]), progress=False)
     except SimulationError as error:
         if error.run is None:
             raise
@@ -158,7 +141,7 @@ def _simulated(samples: NDArray[np.int64], arguments: Arguments) -> Run:
 
 def _measured(run: Run, measure: Measure) -> dict[str, Array]:
     """The outcome and the metrics of each rollout, as if it had been alone, (k,) each."""
-    values: dict[str, Array] = {name: np.array(run.data[name].to_numpy()) for name in OUTCOME}
+    values: dict[str, Array] = {name: np.array(run.array(name)) for name in OUTCOME}
     values["status"] = np.where(unfinished(run), "unfinished", values["status"])
     sound = values["status"] != "diverged"
     some = np.flatnonzero(sound) if sound.any() else np.array([0])  # one at least, for the names
@@ -178,20 +161,13 @@ def _blocks(run: Run, some: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp]
         rows = some[ends[some] == end]
         for first in range(0, len(rows), _BLOCK):
             block = rows[first : first + _BLOCK]
-            yield block, _part(run, block, int(end))
+            yield block, run.excerpt(block, int(end))
 
 
 def samples_alone(run: Run) -> NDArray[np.intp]:
     """How many samples of each rollout say something: until it is finished or has diverged, (k,)."""
     ends = (run.status == "diverged") | ((run.status == "finished") & (run.config.get("until") == "end"))
     return np.where(ends, own_samples(run), len(run.time))
-
-
-def _part(run: Run, rows: NDArray[np.intp], end: int) -> Run:
-    data = run.data.isel(rollout=rows, time=slice(0, end))
-    # sums over time have the same last bit only where numbers lie in memory in the same way
-    flat = {name: (v.dims, np.ascontiguousarray(v.to_numpy()), v.attrs) for name, v in data.data_vars.items()}
-    return run.with_data(data.assign(flat))
 
 
 def _put(into: dict[str, Array], values: Mapping[str, Array], rows: NDArray[np.intp], count: int) -> None:
@@ -216,11 +192,11 @@ def _candidates(
     return [row for row, sample in enumerate(samples.tolist()) if sample in chosen]
 
 
-def _alone(build: Build, parameters: Mapping[str, Array], samples: NDArray[np.int64], at: int) -> Run:
+def _alone(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int64], at: int) -> Run:
     """One sample simulated alone, which says of itself nothing of the chunk that it is in: its own gains, arm, path."""
-    built = build({name: value[[at]] for name, value in parameters.items()}, samples[[at]])
+    built = job.build({name: value[[at]] for name, value in parameters.items()}, samples[[at]])
     [(_, arguments)] = [(0, built)] if isinstance(built, Mapping) else built
-    return _simulated(samples[[at]], arguments)
+    return _simulated(job.engine, samples[[at]], arguments)
 
 
 def _history(alone: Run, parameters: Mapping[str, Any]) -> Run:

@@ -17,9 +17,9 @@ from pathcontrol._files import locked
 from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.errors import InputError
-from pathcontrol.simulation.engines import Engine, check_engine
+from pathcontrol.simulation.engines import Engine, settle_engine
 from pathcontrol.sweeps.cluster import connected
-from pathcontrol.sweeps.compute import Build, Chunk, Job, Measure, Piece, measure_of, on_engine
+from pathcontrol.sweeps.compute import Build, Chunk, Job, Measure, Piece, measure_of
 from pathcontrol.sweeps.desk import Desk
 from pathcontrol.sweeps.keep import Keep
 from pathcontrol.sweeps.manifest import MANIFEST
@@ -44,7 +44,7 @@ def sweep(
     progress: bool = True,
     cluster: str | Path | Client | None = None,
     security: Security | None = None,
-    engine: Engine = "pinocchio",
+    engine: Engine = "auto",
 ) -> SweepResult:
     """Simulate every sample of a space, a chunk at a time, and keep its numbers on disk.
 
@@ -85,16 +85,16 @@ def sweep(
     expect("space", space, Space)
     if isinstance(chunk, bool) or not isinstance(chunk, int) or chunk < 1:
         raise InputError(f"chunk = {chunk!r}, expected a whole number from 1")
-    check_engine(engine)
+    engine = settle_engine(engine)
     keep, measure, seed = Keep() if keep is None else keep, measure_of(metrics), check_seed(seed)
     if not isinstance(keep, Keep):
         raise InputError(f"keep = {keep!r}, expected a Keep, such as Keep(worst=5), or None")
     with connected(cluster, security) as client:
         design = space.design(seed)
-        job = Job(on_engine(build, engine), measure, keep, keep.at_random(space.samples, seed))
+        job = Job(build, measure, keep, keep.at_random(space.samples, seed), engine)
         computed = partial(_computed_here, job) if client is None else Desk(client, job).chunks
         definition = _definition(build, space, design, metrics, keep, seed)
-        definition |= {} if engine == "pinocchio" else {"engine": engine}
+        definition |= {"engine": engine}
         with opened(Path(out), space.samples, definition, resume) as store:
             store.tidy(keep, job.at_random)
             missing, done = store.missing(chunk), 0

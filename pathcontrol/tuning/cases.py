@@ -11,11 +11,8 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.simulation.too_long import StepWarning
-from pathcontrol.sweeps.compute import Build, Measure, compute
-from pathcontrol.sweeps.keep import Keep
+from pathcontrol.sweeps.compute import Job
 from pathcontrol.sweeps.store import Store
-
-_NONE = np.zeros(0, dtype=np.intp)
 
 
 @dataclass(frozen=True)
@@ -23,19 +20,17 @@ class Cases:
     """Simulates candidates in scenarios.
 
     Attributes:
-        build: as of a sweep, of the parameters of both.
+        job: how they are computed, as of a sweep, from the parameters of both.
         scenarios: values by name, (m,) or (m, d) each.
         count: how many scenarios there are, m; without any it is 1.
-        measure: numbers of a run.
         chunk: how many rollouts are simulated together at most.
         store: where every rollout is noted, or None.
         known: what was noted before, by column.
     """
 
-    build: Build
+    job: Job
     scenarios: Mapping[str, Array]
     count: int
-    measure: Measure
     chunk: int
     store: Store | None
     known: Mapping[str, Array]
@@ -62,9 +57,9 @@ class Cases:
         parameters = {name: each[rows] for name, each in values.items()}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)  # gains that the period does not bear are tried and found bad
-            found = compute(self.build, parameters, samples[rows], self.measure, Keep(), _NONE)
+            found = self.job(parameters, samples[rows])
         if self.store is not None:
-            self.store.write(found, Keep(), _NONE)
+            self.store.write(found, self.job.keep, self.job.at_random)
         return found.columns
 
     def _known(self, samples: NDArray[np.int64]) -> dict[str, Array] | None:

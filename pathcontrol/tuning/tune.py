@@ -15,8 +15,8 @@ from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol._progress import progress_bar
 from pathcontrol.errors import InputError, UnknownNameError
-from pathcontrol.simulation.engines import Engine, check_engine
-from pathcontrol.sweeps.compute import OUTCOME, Build, Measure, measure_of, on_engine
+from pathcontrol.simulation.engines import Engine, settle_engine
+from pathcontrol.sweeps.compute import OUTCOME, Build, Job, Measure, measure_of
 from pathcontrol.sweeps.goals import Limits, Objectives, check_limits, check_objectives
 from pathcontrol.sweeps.keep import Keep
 from pathcontrol.sweeps.result import dataset
@@ -45,7 +45,7 @@ def tune(
     out: str | Path | None = None,
     resume: bool = False,
     progress: bool = True,
-    engine: Engine = "pinocchio",
+    engine: Engine = "auto",
 ) -> Tuning:
     """Search gains, or other parameters, for objectives within limits; all of a generation is one batch of simulations.
 
@@ -94,23 +94,20 @@ def tune(
     _check_size(space.width, population, generations, count)
     search = Search(space.width, (len(terms.goals), 1 + len(terms.bounds)), population, check_seed(seed))
     design = {} if several is None else several.design(seed)
-    check_engine(engine)
+    engine = settle_engine(engine)
     if both := set(design) & set(space.names):
         raise InputError(f"{', '.join(sorted(both))}: both searched and in the scenarios; call one of them otherwise")
-    definition = (
-        _definition(terms, build, (space, several), digest(list(design.values())), wanted)
-        | {
-            "population": population,
-            "generations": generations,
-            "seed": seed,
-        }
-        | ({} if engine == "pinocchio" else {"engine": engine})
-    )
+    definition = _definition(terms, build, (space, several), digest(list(design.values())), wanted) | {
+        "population": population,
+        "generations": generations,
+        "seed": seed,
+        "engine": engine,
+    }
     total, measure = population * generations * count, measure_of(wanted)
     folder = nullcontext() if out is None else opened(Path(out), total, json.loads(json.dumps(definition)), resume)
     tables: list[xr.Dataset] = []
     with folder as store, progress_bar("tune", generations, progress) as update:
-        cases = Cases(on_engine(build, engine), design, count, measure, chunk, store, _noted(store))
+        cases = Cases(Job(build, measure, engine=engine), design, count, chunk, store, _noted(store))
         try:
             for _ in range(generations):
                 tables.append(_generation(search, space, cases, terms, sum(table.sizes["sample"] for table in tables)))

@@ -1,0 +1,112 @@
+"""What a simulation hands over: arrays and how each rollout went, labelled when somebody asks for the labels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pathcontrol._arrays import Array
+from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Labelled = tuple[tuple[str, ...], Array, dict[str, str]]
+
+
+class Samples(NamedTuple):
+    """Arrays of a run before they are labelled, which takes longer than a compiled simulation does.
+
+    Attributes:
+        time: [s], (time,).
+        joints: the unit of each joint's position by its name.
+        arrays: laid out as :data:`VARIABLES` says.
+        outcome: laid out as :data:`OUTCOMES` says, as :func:`complete_outcome` gives it.
+        rollout: the numbers of the rollouts, (rollout,).
+    """
+
+    time: Array
+    joints: Mapping[str, str]
+    arrays: Mapping[str, Array]
+    outcome: Mapping[str, Array]
+    rollout: NDArray[np.intp]
+
+    def plain(self, name: str) -> Array | None:
+        """Return one of the arrays by its name, ``None`` for what is none of them."""
+        if name == "joint":
+            return np.array(list(self.joints))
+        if name in ("time", "rollout"):
+            return self.time if name == "time" else self.rollout
+        return self.arrays[name] if name in self.arrays else self.outcome.get(name)
+
+    def excerpt(self, rows: NDArray[np.intp], stop: int) -> Samples:
+        """Return the first samples, up to ``stop``, of some ``rows``, laid out in memory as if these had been alone."""
+        some = _as_slice(rows)
+        cut = {"rollout": some, "time": slice(stop), "joint": slice(None), "path": slice(None)}
+        outcome = {name: value[tuple(cut[dim] for dim in OUTCOMES[name][0])] for name, value in self.outcome.items()}
+        return Samples(self.time[:stop], self.joints, _Cut(self.arrays, some, stop), outcome, self.rollout[some])
+
+    def dataset(self) -> xr.Dataset:
+        """Return all of it with names and units, as the ``data`` of a run."""
+        import xarray as xr  # it takes a third of a second to load
+
+        kinds = sorted(set(self.joints.values()), reverse=True)
+        variables = {}
+        for name, array in self.arrays.items():
+            dims, unit, meaning = VARIABLES[name]
+            units = {unit if kind == "rad" else unit.replace("rad", "m").replace("N m", "N"): None for kind in kinds}
+            variables[name] = (dims, array, {"units": " or ".join(units), "long_name": meaning})
+        coords = {
+            "rollout": self.rollout,
+            "time": ("time", self.time, {"units": "s"}),
+            "joint": list(self.joints),
+        }
+        return xr.Dataset(variables, coords).assign_coords(label_outcome(self.outcome))
+
+
+class _Cut(Mapping[str, Array]):
+    """Parts of arrays, each copied when it is first asked for: metrics need few of them."""
+
+    def __init__(self, whole: Mapping[str, Array], rows: slice | NDArray[np.intp], stop: int) -> None:
+        self._whole, self._rows, self._stop = whole, rows, stop
+        self._copied: dict[str, Array] = {}
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self._copied:
+            self._copied[name] = np.ascontiguousarray(self._whole[name][self._rows, : self._stop])
+        return self._copied[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._whole
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._whole)
+
+    def __len__(self) -> int:
+        return len(self._whole)
+
+
+def _as_slice(rows: NDArray[np.intp]) -> slice | NDArray[np.intp]:
+    """``rows`` that follow one another as a slice, which copies nothing."""
+    first, last = int(rows[0]), int(rows[-1])
+    return slice(first, last + 1) if last - first + 1 == len(rows) and (np.diff(rows) == 1).all() else rows
+
+
+def complete_outcome(rollouts: int, outcome: Mapping[str, Array]) -> dict[str, Array]:
+    """Return what is said of each rollout with its status: one with a ``diverged_time`` has diverged, and so on."""
+    never = np.full(rollouts, np.nan)
+    values = {"finish_time": never, "diverged_time": never, "reason": np.full(rollouts, "")} | dict(outcome)
+    status = np.where(np.isnan(values["finish_time"]), "running", "finished")
+    return {"status": np.where(np.isnan(values["diverged_time"]), status, "diverged")} | values
+
+
+def label_outcome(outcome: Mapping[str, Array]) -> dict[str, Labelled]:
+    """Return coordinates that say how each rollout went."""
+    labels = {}
+    for name, value in outcome.items():
+        dims, unit, meaning = OUTCOMES[name]
+        labels[name] = (dims, value, {"long_name": meaning} | ({"units": unit} if unit else {}))
+    return labels
