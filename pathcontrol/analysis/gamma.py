@@ -87,7 +87,9 @@ def _nearest_of(sequence: PathSequence, q: Array, qd: Array, weight: float, brak
 def planned_rate(task: PathTask, s: Array) -> Array:
     """The rate ϑ(s) [1/s], (*batch,), at which controllers take a path: at the end of an open one, with its braking."""
     ending = Ending.of(task)
-    return task.theta(s) if ending is None else _planned(task, ending)(s).theta
+    if ending is None:
+        return np.broadcast_to(task.theta(s), np.shape(s))  # it may be a plain number
+    return _planned(task, ending)(s).theta
 
 
 def _planned(task: PathTask, ending: Ending | None) -> Callable[[Array], PathPoint]:
