@@ -82,6 +82,7 @@ def in_common(values: Sequence[Array]) -> Array:
     rows = np.stack(values)
     return readonly(rows[0] if (rows == rows[0]).all() else rows)
 
+
 def rigid(name: str, pose: ArrayLike, tolerance: float = 1e-9) -> Array:
     """``pose`` as a homogeneous transform (4, 4) whose rotation is one up to ``tolerance``; errors name it."""
     transform = finite(name, as_array(name, pose))

@@ -66,7 +66,7 @@ def lap_table(run: Run) -> list[list[str]]:
     whole.
     """
     task = run.task
-    if task is None or not task.closed or run.rollouts != 1 or not {"q", "s"} <= set(run.data.data_vars):
+    if task is None or not task.closed or run.rollouts != 1 or "q" not in run or "s" not in run:
         return []
     ends = _ends(run, task)[0][: _MOST + 1]
     if len(ends) < 2:
@@ -83,9 +83,9 @@ def _signals(run: Run, task: PathTask) -> list[tuple[str, Array]]:
         arm = run.robot
     except InputError:
         arm = None
-    if arm is not None and "qd" in run.data and tool_of(arm, task) is not None:
+    if arm is not None and "qd" in run and tool_of(arm, task) is not None:
         found.append(("mean speed [mm/s]", 1e3 * of_rollouts(lambda r, t: tool_speed(r, arm, t), run, task)[0]))
-    if "sdot" in run.data:
+    if "sdot" in run:
         theta = np.broadcast_to(task.theta(run.array("s")[0]), len(run.time))
         found.append(("mean σ̇ over mean ϑ", run.array("sdot")[0] / np.where(theta > 0, theta, np.nan)))
     return found
