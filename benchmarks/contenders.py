@@ -28,7 +28,7 @@ def ours(case: Case, rollouts: int, ticks: int, threads: int = 1) -> Contender:
 def ours_alone(case: Case, ticks: int) -> Contender:
     """:func:`pathcontrol.simulate` of the experiment itself, one rollout that begins at rest.
 
-    It is run again and again, so that a round takes about as long as one of the plain loop and finds the caches as full.
+    It runs again and again, so that a round takes about as long as one of the plain loop and finds caches as full.
     """
     one = _simulated(case, case.start[None], np.zeros((1, case.robot.n)), ticks, 1)
 
