@@ -6,10 +6,9 @@ import json
 import warnings
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError, PathControlWarning
@@ -20,6 +19,9 @@ from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import TaskBatch
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.sequence import PathSequence
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class Stored(NamedTuple):
