@@ -20,19 +20,17 @@ from pathcontrol.tasks.base import PathTask
 _TURN = 1 / 8  # rad over a piece of a cell, which is taken to hold one minimum at most
 _MOST_PIECES = 256
 _SAMPLES = 9  # of a cell, to see how Γ runs in it
-_LOOKS, _MOST_WORK = 16, 1 << 14  # states that are looked at before, and pieces that each may have to be compared with
+_LOOKS, _MOST_WORK = 16, 1 << 14  # points of Γ to look at, pieces that each may be compared with
 _CORNER = 1e-6  # of the largest ‖Γ'‖: a jump of Γ' that is a corner
 
 
 class _Ready(NamedTuple):
-    """A table with the balls around Γ in its cells, and how many pieces each is cut into."""
+    """A table with what the engine knows of its Γ, and the most pieces that a state on Γ has to be compared with."""
 
     table: PathTable
     gamma: Gamma
     memory: Memory
-    centre: Array
-    radius: Array
-    pieces: NDArray[np.int32]
+    work: int
 
 
 _READY: KnownOf[PathTask, dict[tuple[float, bool], _Ready]] = KnownOf()
@@ -68,30 +66,22 @@ def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braki
         gamma.pieces, gamma.smooth = memory.address(shape.pieces, np.int32), memory.address(shape.smooth, np.int32)
         gamma.length, gamma.straight = memory.address(shape.length), memory.address(shape.straight)
         memory.keep(kept)
-        known = ready[weight, braking] = _Ready(table, gamma, memory, centre, radius, shape.pieces)
+        known = ready[weight, braking] = _Ready(table, gamma, memory, _work(centre, radius, shape.pieces))
+    if known.work > _MOST_WORK:
+        raise EngineError(f"{known.work} pieces of Γ may be nearest to a state on it, expected at most {_MOST_WORK}")
     *series, rows, joints = q.shape
     states = np.empty((*series, rows, 2 * joints))
     states[..., :joints], states[..., joints:] = q, weight * qd
-    _check_work(known, states.reshape(-1, 2 * joints))
     distance, s = np.empty((2, *series, rows))
     pointers = (array.ctypes.data for array in (states, distance, s))
     library.pathcontrol_gamma(addressof(known.gamma), prod(series), rows, *pointers)
     return distance, s
 
 
-def _check_work(ready: _Ready, states: Array) -> None:
-    """Check that few of the pieces of Γ may be nearest to a state, as far as the balls around its cells tell.
-
-    Raises:
-        EngineError: there are too many.
-    """
-    looked = states[:: len(states) // _LOOKS + 1]
-    work = [0]
-    for x in looked[np.isfinite(looked).all(-1)]:
-        away = np.linalg.norm(ready.centre - x, axis=-1)
-        work.append(int(ready.pieces[away - ready.radius <= (away + ready.radius).min()].sum()))
-    if max(work) > _MOST_WORK:
-        raise EngineError(f"{max(work)} pieces of Γ may be nearest to a state, expected at most {_MOST_WORK}")
+def _work(centre: Array, radius: Array, pieces: NDArray[np.int32]) -> int:
+    """The most pieces of Γ that may be nearest to one of some points of it, as far as the balls around cells tell."""
+    away = (np.linalg.norm(centre - point, axis=-1) for point in centre[:: len(centre) // _LOOKS + 1])
+    return max(int(pieces[d - radius <= (d + radius).min()].sum()) for d in away)
 
 
 def _velocity(table: PathTable) -> Array:

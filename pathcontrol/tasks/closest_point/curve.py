@@ -42,7 +42,7 @@ def _root_between(g: Callable[[Array, NDArray[np.intp]], Array], a: Array, b: Ar
     for _ in range(_MOST_STEPS):
         s = a + t * (b - a)
         value = g(s, rows)
-        same = value * g_a > 0
+        same = np.sign(value) == np.sign(g_a)
         c, g_c = np.where(same, a, b), np.where(same, g_a, g_b)
         b, g_b = np.where(same, b, a), np.where(same, g_b, g_a)
         a, g_a = s, value
