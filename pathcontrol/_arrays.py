@@ -14,6 +14,10 @@ from pathcontrol.errors import InputError
 #: an array of floats; shapes are said in docstrings
 Array = NDArray[Any]
 
+#: in SI units: sums and products of what is larger are beyond the range of floats, and Pinocchio adds up no bodies that
+#: are lighter than 2e-16 kg
+LARGEST, SMALLEST = 1e30, 1e-12
+
 
 def as_array(name: str, value: ArrayLike) -> Array:
     """``value`` as a float array, or an error that names it; labels, which would be lost, are refused."""
@@ -55,6 +59,17 @@ def finite(name: str, array: Array) -> Array:
     return array
 
 
+def physical(name: str, array: Array) -> Array:
+    """``array`` itself if all of it is finite and below 1e30 in size, so that dynamics can compute with it."""
+    finite(name, array)
+    if (np.abs(array) >= LARGEST).any():
+        where = tuple(int(i) for i in np.argwhere(np.abs(array) >= LARGEST)[0])
+        raise InputError(
+            f"{name}{list(where) if where else ''} = {array[where]:g}, expected SI units, below {LARGEST:g}"
+        )
+    return array
+
+
 def scalar(name: str, value: Any, *, positive: bool = False, least: float | None = None) -> float:
     """``value`` as a finite float, optionally positive or not below ``least``."""
     array = as_array(name, value)
@@ -65,6 +80,14 @@ def scalar(name: str, value: Any, *, positive: bool = False, least: float | None
         raise InputError(f"{name} = {number:g}, expected a number greater than 0")
     if least is not None and number < least:
         raise InputError(f"{name} = {number:g}, expected a number not below {least:g}")
+    return number
+
+
+def quantity(name: str, value: Any) -> float:
+    """``value`` as a float from 1e-12 to 1e30, such as a mass, so that dynamics can compute with it."""
+    number = scalar(name, value, positive=True)
+    if not SMALLEST <= number < LARGEST:
+        raise InputError(f"{name} = {number:g}, expected SI units, from {SMALLEST:g} to {LARGEST:g}")
     return number
 
 

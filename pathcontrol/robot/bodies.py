@@ -9,10 +9,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, scalar
+from pathcontrol._arrays import Array, as_array, physical, quantity, scalar
 from pathcontrol.errors import InputError
 from pathcontrol.robot.lump import rod
 
+_SPREAD = 1e12  # between what joints feel of the bodies of one arm
 _ROUNDING = 1e-12  # of the largest moment, how far below zero a principal moment may be
 
 
@@ -22,11 +23,13 @@ def body_of(mass: float, com: Array, inertia: Array) -> Any:
     Of the inertia the symmetric part is taken. Its constructor refuses moments below zero, which URDFs may have.
 
     Raises:
-        InputError: they are too large to be floats.
+        InputError: they are too large or too small for dynamics in floats.
     """
     inertia = 0.5 * inertia + 0.5 * inertia.T
-    if not (np.isfinite(mass) and np.isfinite(inertia).all()):
-        raise InputError("the mass or the inertia of a body is not finite; give masses in kg")
+    physical("com", com)
+    if mass:
+        quantity("mass", mass)
+    physical("inertia", inertia)
     body = pin.Inertia.Zero()
     body.mass, body.lever, body.inertia = mass, com, inertia
     return body
@@ -39,8 +42,8 @@ def payload_of(mass: float, com: ArrayLike, inertia: ArrayLike | None) -> Any:
         InputError: a shape is wrong, a number not finite, or the inertia not symmetric positive semi-definite but for
             rounding.
     """
-    mass, lever = scalar("mass", mass, least=0.0), finite("com", as_array("com", com))
-    tensor = np.zeros((3, 3)) if inertia is None else finite("inertia", as_array("inertia", inertia))
+    mass, lever = scalar("mass", mass, least=0.0), physical("com", as_array("com", com))
+    tensor = np.zeros((3, 3)) if inertia is None else physical("inertia", as_array("inertia", inertia))
     if lever.shape != (3,) or tensor.shape != (3, 3):
         raise InputError(f"com has shape {lever.shape} and inertia {tensor.shape}, expected (3,) and (3, 3)")
     least = -_ROUNDING * max(1.0, float(np.abs(tensor).max()))
@@ -58,15 +61,49 @@ def scale_bodies(model: Any, names: tuple[str, ...], factors: Mapping[str, float
     if both := sorted(factors.keys() & masses.keys()):
         raise InputError(f"{', '.join(both)} has a scale and a mass in kg; give one of them")
     for joint, value in (*factors.items(), *masses.items()):
-        i = names.index(joint) + 1
-        body = model.inertias[i]
-        if body.mass > 0:
-            factor = value if joint in factors else value / body.mass
-            model.inertias[i] = body_of(factor * body.mass, body.lever, factor * body.inertia)
-        elif joint in masses:
-            model.inertias[i] = body_of(*rod(value, _farthest(model, i)))
-        else:
-            raise InputError(f"scale of {joint} = {value:g}, but it moves no mass; say how many with kg={{...}}")
+        i, argument = names.index(joint) + 1, "scale" if joint in factors else "kg"
+        try:
+            model.inertias[i] = _scaled(model, i, value, argument)
+        except InputError as error:
+            raise InputError(f"{argument} of {joint} = {value:g}: {error}") from error
+    given = [*(f"scale of {joint} = {value:g}" for joint, value in factors.items())]
+    given += [f"kg of {joint} = {value:g}" for joint, value in masses.items()]
+    check_spread(model, ", ".join(given))
+
+
+def _scaled(model: Any, i: int, value: float, argument: str) -> Any:
+    """The body ``i`` of a ``pin.Model`` times a factor, ``scale``, or of a mass, ``kg``."""
+    body = model.inertias[i]
+    if body.mass > 0:
+        factor = value if argument == "scale" else value / body.mass
+        return body_of(factor * body.mass, body.lever, factor * body.inertia)
+    if argument == "scale":
+        raise InputError("it moves no mass; say how many with kg={...}")
+    return body_of(*rod(value, _farthest(model, i)))
+
+
+def check_spread(model: Any, given: str) -> None:
+    """Check that the bodies of a ``pin.Model`` do not differ so much that M(q) is singular but for rounding.
+
+    What was ``given`` to make them so begins the message.
+
+    Raises:
+        InputError: one counts for more than 1e12 times what another does.
+    """
+    names = list(model.names)
+    felt = {names[i]: _felt(body) for i, body in enumerate(model.inertias) if i and body.mass > 0}
+    most, least = (choose(felt, key=felt.__getitem__, default="") for choose in (max, min))
+    if felt and felt[most] > _SPREAD * felt[least]:
+        raise InputError(
+            f"{given}: what {most} moves has {felt[most] / felt[least]:.3g} times the inertia of what {least} moves, "
+            f"which is lost in rounding; expected {_SPREAD:g} times at most"
+        )
+
+
+def _felt(body: Any) -> float:
+    """How much joints a metre away feel of a body: m (1 + c²) + tr I."""
+    lever = np.asarray(body.lever)
+    return float(body.mass * (1.0 + lever @ lever) + np.trace(body.inertia))
 
 
 def idle_joints(model: Any) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 from lxml import etree
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import LARGEST, SMALLEST, Array
 from pathcontrol.errors import PathControlWarning, UrdfError
 from pathcontrol.robot.lump import Lump, ball, combined
 from pathcontrol.robot.meshes import load_parts
@@ -104,7 +104,10 @@ def _shape(holder: etree._Element, urdf: UrdfSource, density: float) -> Lump:
     solid = _mesh(shape, urdf) if shape.tag == "mesh" else _primitive(shape)
     solid.apply_transform(_pose(holder.find("origin")))
     solid.density = density
-    return Lump(float(solid.mass), np.array(solid.center_mass), np.array(solid.moment_inertia))
+    lump = Lump(float(solid.mass), np.array(solid.center_mass), np.array(solid.moment_inertia))
+    if not (SMALLEST <= lump.mass < LARGEST and np.isfinite(lump.com).all() and np.isfinite(lump.inertia).all()):
+        raise UrdfError(f"a <{shape.tag}> of {lump.mass:g} kg at {density:g} kg/m³ is too small or too large")
+    return lump
 
 
 def _primitive(shape: etree._Element) -> trimesh.Trimesh:

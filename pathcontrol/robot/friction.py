@@ -18,13 +18,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol._arrays import SMALLEST, Array, as_array, physical, readonly
 from pathcontrol.errors import InputError, UnknownNameError
 
 
 def _coefficients(name: str, value: ArrayLike) -> Array:
     """Non-negative coefficients, one for each joint."""
-    array = finite(name, np.atleast_1d(as_array(name, value)))
+    array = physical(name, np.atleast_1d(as_array(name, value)))
     if (array < 0).any():
         raise InputError(f"{name} = {array.tolist()}, expected no negative value: friction takes energy out")
     return readonly(array)
@@ -155,10 +155,10 @@ class Stribeck(FrictionLaw):
             raise InputError(
                 f"Stribeck coefficients for different numbers of joints, {sizes}; expected one each per joint"
             )
-        if (self.static < self.coulomb).any() or (self.velocity == 0).any():
+        if (self.static < self.coulomb).any() or (self.velocity < SMALLEST).any():
             raise InputError(
                 f"Stribeck friction with static {self.static.tolist()}, Coulomb {self.coulomb.tolist()} and velocity "
-                f"{self.velocity.tolist()}; expected static ≥ Coulomb and velocity > 0 at each joint"
+                f"{self.velocity.tolist()}; expected static ≥ Coulomb and velocity ≥ {SMALLEST:g} at each joint"
             )
 
     @property

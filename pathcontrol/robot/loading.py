@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from pathcontrol._arrays import Array, readonly, scalar
+from pathcontrol._arrays import LARGEST, Array, quantity, readonly
 from pathcontrol.errors import PathControlWarning, UrdfError
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.catalogue import find_urdf
@@ -22,7 +22,7 @@ from pathcontrol.robot.urdf.locking import locked_angles, locked_beyond_limits
 from pathcontrol.robot.urdf.parse import Parsed, parse_and_mend
 
 TOLD = ("inertia-negative",)  # warnings of the check that are worth hearing of each time, beside those of its XML
-_UNLIMITED = 1e30  # some URDFs write 1.8e308 for "no limit"
+_UNLIMITED = LARGEST  # some URDFs write 1.8e308 for "no limit"
 
 
 def load_robot(
@@ -63,7 +63,7 @@ def load_robot(
         from pathcontrol.robot.estimate import DENSITY, with_estimated_inertia  # reading meshes takes half a second
 
         density = DENSITY if estimated_inertia is True else estimated_inertia
-        urdf = with_estimated_inertia(urdf, scalar("estimated_inertia", density, positive=True))
+        urdf = with_estimated_inertia(urdf, quantity("estimated_inertia", density))
     report = _checked(urdf, label, tuple(locked))
     for finding in (*mended, *(finding for finding in report.warnings if finding.code in TOLD)):
         warnings.warn(f"{label}: {finding.where}: {finding.message}", PathControlWarning, stacklevel=2)

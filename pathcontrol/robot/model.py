@@ -16,10 +16,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, joint_array, rigid, scalar
+from pathcontrol._arrays import Array, as_array, joint_array, physical, quantity, rigid, scalar
 from pathcontrol.errors import InputError, PathControlWarning, UnknownNameError, UrdfError
 from pathcontrol.robot.actuation import Actuation, Limits
-from pathcontrol.robot.bodies import idle_joints, payload_of, scale_bodies
+from pathcontrol.robot.bodies import check_spread, idle_joints, payload_of, scale_bodies
 from pathcontrol.robot.friction import FrictionLaw, check_consistent, no_friction
 from pathcontrol.robot.rigid_body import RigidBody, together
 from pathcontrol.robot.urdf.locking import check_tip, locked_angles, locked_beyond_limits, names_to_keep
@@ -267,6 +267,7 @@ class RobotModel:
         model = pin.Model(self.pinocchio_model)
         support = model.frames[self._frame_id(frame)]
         model.appendBodyToJoint(support.parentJoint, body, support.placement)
+        check_spread(model, f"mass = {body.mass:g}, com = {body.lever.tolist()}")
         tensor = np.array(body.inertia)
         given = {"mass": body.mass, "frame": frame, "com": body.lever.tolist(), "inertia": tensor.tolist()}
         return self._changed(model, "with_payload", given)
@@ -281,7 +282,7 @@ class RobotModel:
         """
         if name in self.frame_names:
             raise InputError(f"{self.name} has a frame {name!r} already; choose another name")
-        model, given = pin.Model(self.pinocchio_model), finite("pose", as_array("pose", pose))
+        model, given = pin.Model(self.pinocchio_model), physical("pose", as_array("pose", pose))
         if given.shape not in ((3,), (4, 4)):
             raise InputError(f"pose has shape {given.shape}, expected (4, 4), or (3,) for a position")
         placement = pin.SE3(np.eye(3), given) if given.shape == (3,) else pin.SE3(rigid("pose", given, 1e-6))
@@ -292,7 +293,7 @@ class RobotModel:
 
     def with_armature(self, armature: ArrayLike) -> RobotModel:
         """The same arm with rotor inertia [kg m²], shape (n,), added to the diagonal of M."""
-        added = self._array("armature", armature)
+        added = physical("armature", self._array("armature", armature))
         if added.shape != (self.n,) or (added < 0).any():
             raise InputError(f"armature = {added.tolist()}, expected {self.n} values not below 0")
         model = pin.Model(self.pinocchio_model)
@@ -333,7 +334,7 @@ class RobotModel:
                     f"each of the {self.n} joints"
                 )
             given = dict(zip(self.joint_names, values.tolist(), strict=True))
-        return {joint: scalar(f"{name} of {joint}", value, positive=True) for joint, value in (given or {}).items()}
+        return {joint: quantity(f"{name} of {joint}", value) for joint, value in (given or {}).items()}
 
     def with_threads(self, threads: int) -> RobotModel:
         """The same arm whose batched calls use ``threads`` threads."""

@@ -64,7 +64,10 @@ def warn_of_steps(
         return ""
     if not (robot.robots[0] if isinstance(robot, RobotBatch) else robot).has_mass:
         return ""
-    told = list(dict.fromkeys(_all(controllers, loop, robot, q, qd, disturbance, duration)))
+    try:
+        told = list(dict.fromkeys(_all(controllers, loop, robot, q, qd, disturbance, duration)))
+    except np.linalg.LinAlgError:  # M is singular but for rounding, and no estimate can be made
+        return ""
     for sentence in told:
         warnings.warn(sentence, StepWarning, stacklevel=3)
     return "; ".join(told)

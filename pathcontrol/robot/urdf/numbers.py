@@ -8,11 +8,12 @@ from collections.abc import Iterator
 
 from lxml import etree
 
+from pathcontrol._arrays import LARGEST
 from pathcontrol.robot.urdf.elements import MOMENTS, first, links_and_joints, place_of
 from pathcontrol.robot.urdf.finding import Finding, shown
 
 MAX_DIGITS = 400
-ABSURD = 1e30
+ABSURD = LARGEST
 POSE = {"xyz": 3, "rpy": 3}
 
 _LIMITS = ("lower", "upper", "effort", "velocity", "acceleration", "deceleration", "jerk")
