@@ -167,7 +167,7 @@ def test_masses_can_be_given_by_joint():
         heavy.with_masses(dict.fromkeys(kg, 2.0)).mass_matrix(q), twice.mass_matrix(q), rtol=1e-12
     )
     np.testing.assert_array_equal(robot_of(json.loads(json.dumps(recipe_of(twice)))).gravity(q), twice.gravity(q))
-    with pytest.raises(InputError, match=r"scale of j1 = 1.1, but it moves no mass; say how many with kg="):
+    with pytest.raises(InputError, match=r"scale of j1 = 1.1: it moves no mass; say how many with kg="):
         robot.with_masses({"j1": 1.1})
 
 

@@ -158,7 +158,8 @@ class Stribeck(FrictionLaw):
         if (self.static < self.coulomb).any() or (self.velocity < SMALLEST).any():
             raise InputError(
                 f"Stribeck friction with static {self.static.tolist()}, Coulomb {self.coulomb.tolist()} and velocity "
-                f"{self.velocity.tolist()}; expected static ≥ Coulomb and velocity ≥ {SMALLEST:g} at each joint"
+                f"{self.velocity.tolist()}; expected static ≥ Coulomb and velocity > 0 at each joint, of {SMALLEST:g} "
+                "rad/s or more"
             )
 
     @property
