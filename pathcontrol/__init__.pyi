@@ -40,6 +40,8 @@ from .errors import TaskError as TaskError
 from .errors import ToolpathError as ToolpathError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import UrdfError as UrdfError
+from .geometry.arc_length import arc_length as arc_length
+from .geometry.arc_length import curvature as curvature
 from .profiles.limited import limited as limited
 from .profiles.motion import JointMotion as JointMotion
 from .profiles.motion import ToolMotion as ToolMotion
@@ -74,8 +76,6 @@ from .sweeps.keep import Keep as Keep
 from .sweeps.result import SweepResult as SweepResult
 from .sweeps.run import sweep as sweep
 from .sweeps.space import Space as Space
-from .tasks.arc_length import arc_length as arc_length
-from .tasks.arc_length import curvature as curvature
 from .tasks.base import PathPoint as PathPoint
 from .tasks.base import PathTask as PathTask
 from .tasks.batch import TaskBatch as TaskBatch

@@ -26,7 +26,7 @@ from pathcontrol import (
     check_task,
     simulate,
 )
-from pathcontrol.tasks.arc_length import ArcLength
+from pathcontrol.geometry.arc_length import ArcLength
 from pathcontrol.tasks.function import FunctionPath
 
 

@@ -36,9 +36,9 @@ from pathcontrol import (
     limited,
     time_optimal,
 )
+from pathcontrol.geometry.hermite import piecewise, sampled
 from pathcontrol.simulation.saved.shelf import Shelf
 from pathcontrol.simulation.saved.tasks import task_of, task_recipe
-from pathcontrol.tasks.hermite import piecewise, sampled
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.recorded import RecordedPath, RecordedProfile
 

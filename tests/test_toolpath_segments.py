@@ -13,9 +13,9 @@ from scipy.special import ellipe, ellipeinc
 from strategies import floats
 
 from pathcontrol import InputError
+from pathcontrol.geometry.boxes import Boxes
 from pathcontrol.toolpaths.arc import Arc
 from pathcontrol.toolpaths.bezier import Bezier
-from pathcontrol.toolpaths.boxes import Boxes
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.lengths import ArcLength
 from pathcontrol.toolpaths.segments import Polyline, Segment

@@ -13,10 +13,10 @@ from pathcontrol.analysis.coverage import even_points
 from pathcontrol.engine import gamma as engine_gamma
 from pathcontrol.engine.library import load_library
 from pathcontrol.errors import EngineError, InputError, TaskError
+from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.robot.recipe import recipe_of, robot_of
 from pathcontrol.simulation.origin import Stored
 from pathcontrol.simulation.saved.netcdf import read_run, write_run
-from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 from pathcontrol.tasks.recorded import RecordedPath
 
 ROBOT = pc.load_robot("cicese_2dof")

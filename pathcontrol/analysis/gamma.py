@@ -12,9 +12,9 @@ from pathcontrol._expect import expect
 from pathcontrol.control.ending import Ending
 from pathcontrol.engine.gamma import distances_to_gamma
 from pathcontrol.errors import EngineError, InputError, TaskError
+from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.batch import TaskBatch
-from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 from pathcontrol.tasks.sequence import PathSequence
 
 

@@ -14,10 +14,10 @@ from pathcontrol.analysis.coverage import Points, even_points, traverse
 from pathcontrol.analysis.known import where_known
 from pathcontrol.cartesian.tool import Tool, ToolKinematics
 from pathcontrol.errors import InputError
+from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.closest_point import ClosestPoint, Curve
 
 
 class ToolSignals(NamedTuple):

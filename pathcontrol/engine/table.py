@@ -15,9 +15,9 @@ from pathcontrol.control.ending import Ending, arrival_parameter
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.structs import Memory, Path
 from pathcontrol.errors import EngineError
-from pathcontrol.tasks import hermite
+from pathcontrol.geometry import hermite
+from pathcontrol.geometry.hermite import horner
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.hermite import horner
 from pathcontrol.tasks.profile import ConstantRate
 from pathcontrol.tasks.recorded import RecordedPath
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array
 from pathcontrol.errors import TaskError
-from pathcontrol.tasks.arc_length import ArcLength, apart, curvature_vector, last
+from pathcontrol.geometry.arc_length import ArcLength, apart, curvature_vector, last
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.check import check_moves
 from pathcontrol.tasks.derived import DerivedPath

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError, warn_of_single
-from pathcontrol.tasks.closest_point import ClosestPoint, Curve
-from pathcontrol.tasks.differentiation import Differentiator, best_width
+from pathcontrol.geometry.closest_point import ClosestPoint, Curve
+from pathcontrol.geometry.differentiation import Differentiator, best_width
 from pathcontrol.tasks.profile import VelocityProfile, plain_attributes
 
 _MOST_SHOWN = 16  # values of an array in a repr
@@ -194,13 +194,13 @@ class PathTask(ABC):
 
     def arc_length(self, s0: ArrayLike | None = None, s_end: ArrayLike | None = None) -> Array:
         """Length [rad], (*batch,), from ``s0`` to ``s_end``, (*batch,); by default of the whole path, or of one lap."""
-        from pathcontrol.tasks.arc_length import arc_length
+        from pathcontrol.geometry.arc_length import arc_length
 
         return arc_length(self, s0, s_end)
 
     def curvature(self, s: ArrayLike) -> Array:
         """Curvature κ = ‖q_d' ∧ q_d''‖/‖q_d'‖³ [1/rad], (*batch,), at s (*batch,)."""
-        from pathcontrol.tasks.arc_length import curvature
+        from pathcontrol.geometry.arc_length import curvature
 
         return curvature(self, s)
 

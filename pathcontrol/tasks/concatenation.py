@@ -10,7 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.arc_length import ArcLength, apart
+from pathcontrol.geometry.arc_length import ArcLength, apart
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.batch import refuse_batch
 from pathcontrol.tasks.blend import Blend

@@ -11,9 +11,9 @@ import numpy as np
 
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import InputError
+from pathcontrol.geometry.differentiation import Differentiator
 from pathcontrol.tasks.base import PathPoint, PathTask
 from pathcontrol.tasks.batched import batched
-from pathcontrol.tasks.differentiation import Differentiator
 from pathcontrol.tasks.domain import refuse_two_rates, take_domain
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, Path, VelocityProfile
 

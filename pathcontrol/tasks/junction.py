@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pathcontrol.tasks.arc_length import curvature_vector
+from pathcontrol.geometry.arc_length import curvature_vector
 from pathcontrol.tasks.base import PathPoint, PathTask
 
 _SAME = 1e-6  # rad; without unit for directions and speeds, 1/rad for curvatures

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError, TaskError
+from pathcontrol.geometry.closest_point import ClosestPoint, Curve
+from pathcontrol.geometry.hermite import piecewise, sampled
 from pathcontrol.tasks.base import PathPoint, PathTask
-from pathcontrol.tasks.closest_point import ClosestPoint, Curve
-from pathcontrol.tasks.hermite import piecewise, sampled
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, Path, VelocityProfile
 
 if TYPE_CHECKING:

@@ -62,7 +62,7 @@ class SplinePath(JointCurve):
         Raises:
             InputError: wrong shapes, fewer samples than a path needs, parameters that do not increase.
         """
-        from pathcontrol.tasks.samples import fit_samples
+        from pathcontrol.geometry.spline_fit import fit_samples
 
         spline, deviation = fit_samples(q, s, tolerance, closed)
         path = SplinePath(spline, speed, closed)

@@ -11,7 +11,7 @@ from scipy.interpolate import BPoly, PPoly, make_interp_spline
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.closest_point import ClosestPoint, Curve
+from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 
 
 class CurvePoint(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import BPoly, PPoly
 
 from pathcontrol._arrays import Array
-from pathcontrol.tasks.closest_point import ClosestPoint, Curve
+from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.toolpaths.bezier import Bezier
 from pathcontrol.toolpaths.segments import Segment
 

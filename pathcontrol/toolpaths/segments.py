@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.closest_point import ClosestPoint, Curve
-from pathcontrol.toolpaths.boxes import Boxes
+from pathcontrol.geometry.boxes import Boxes
+from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.toolpaths.lengths import ArcLength
 
 _SAMPLES = 1025

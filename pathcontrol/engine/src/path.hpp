@@ -145,7 +145,7 @@ static NOINLINE double downhill_point(const Path &path, const double *q, double 
   return NAN;
 }
 // The local minimum downhill from `near`, the nearest point of a moment ago; the nearest of all only where `near` cannot have
-// been that. As PathTask.sigma_bar(q, near): see tasks/closest_point/downhill.py for the bounds on a step.
+// been that. As PathTask.sigma_bar(q, near): see geometry/closest_point/downhill.py for the bounds on a step.
 static NOINLINE double followed_point(const Path &path, const double *q, double near) {
   constexpr double TURN = 0.5, WINDOW = 0.125, CONVERGED = 1e-9;
   const double length = path.s_end - path.s0;

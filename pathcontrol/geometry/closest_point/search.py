@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array
-from pathcontrol.tasks.closest_point.cells import Cells
-from pathcontrol.tasks.closest_point.curve import Curve, Interval
-from pathcontrol.tasks.closest_point.downhill import WINDOW, newton, steady, stepwise
-from pathcontrol.tasks.closest_point.everywhere import Everywhere
+from pathcontrol.geometry.closest_point.cells import Cells
+from pathcontrol.geometry.closest_point.curve import Curve, Interval
+from pathcontrol.geometry.closest_point.downhill import WINDOW, newton, steady, stepwise
+from pathcontrol.geometry.closest_point.everywhere import Everywhere
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class ClosestPoint:
 
     The curve is cut once into cells over which its tangent turns by half a radian at most; k-d trees of them give those
     near a point, and a bound on the distance of each those that can hold the global minimum. Two minima within an
-    eighth of a radian of turn count as one; see :class:`~pathcontrol.tasks.closest_point.cells.Cells` for what the
+    eighth of a radian of turn count as one; see :class:`~pathcontrol.geometry.closest_point.cells.Cells` for what the
     cells may miss. The local search looks no farther than the distance falls, so it costs the same on a curve of any
     length.
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.tasks.closest_point.cells import FARTHEST, Cells
-from pathcontrol.tasks.closest_point.curve import Curve
+from pathcontrol.geometry.closest_point.cells import FARTHEST, Cells
+from pathcontrol.geometry.closest_point.curve import Curve
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree

@@ -17,7 +17,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
-from pathcontrol.tasks.closest_point.curve import Curve, Interval
+from pathcontrol.geometry.closest_point.curve import Curve, Interval
 
 #: numbers whose squares, and sums of many of these, are finite
 FARTHEST = 1e150

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.tasks.closest_point.cells import Cells
-from pathcontrol.tasks.closest_point.curve import Curve, Interval
+from pathcontrol.geometry.closest_point.cells import Cells
+from pathcontrol.geometry.closest_point.curve import Curve, Interval
 
 WINDOW = 1 / 8  # of the whole curve: what is close by
 _TURN = 0.5  # rad, by which a step turns the tangent at most

@@ -1,0 +1,1 @@
+"""Curves and splines in any space: nearest points, arc length, derivatives, boxes."""
