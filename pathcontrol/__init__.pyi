@@ -96,13 +96,13 @@ from .tasks.symbolic import SymbolicPath as SymbolicPath
 from .tasks.waypoints import WaypointPath as WaypointPath
 from .toolpaths.contour import Contour as Contour
 from .toolpaths.contour import Toolpath as Toolpath
+from .toolpaths.csv.reader import read_csv as read_csv
 from .toolpaths.curve import ToolCurve as ToolCurve
-from .toolpaths.dxf import read_dxf as read_dxf
+from .toolpaths.dxf.reader import read_dxf as read_dxf
 from .toolpaths.gcode import read_gcode as read_gcode
-from .toolpaths.points import read_csv as read_csv
 from .toolpaths.read import read_toolpath as read_toolpath
-from .toolpaths.smoothing import smooth as smooth
-from .toolpaths.svg import read_svg as read_svg
+from .toolpaths.smoothing.smooth import smooth as smooth
+from .toolpaths.svg.reader import read_svg as read_svg
 from .tuning.result import Tuning as Tuning
 from .tuning.tune import tune as tune
 from .view.figures.comparison import comparison_figure as comparison_figure

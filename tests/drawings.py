@@ -9,8 +9,8 @@ import ezdxf
 import numpy as np
 
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.dxf import read_dxf
-from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.dxf.reader import read_dxf
+from pathcontrol.toolpaths.segments.base import Polyline
 
 U = np.linspace(0.0, 1.0, 9)
 MM_PAGE = 'width="100mm" height="50mm" viewBox="0 0 100 50"'

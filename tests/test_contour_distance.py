@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pathcontrol.toolpaths.arc import Arc
-from pathcontrol.toolpaths.bezier import Bezier
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.segments.arc import Arc
+from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.segments.bezier import Bezier
 
 
 def chain(degree: int, count: int, seed: int = 0) -> Contour:

@@ -16,7 +16,7 @@ from pathcontrol import InputError
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths import text
 from pathcontrol.toolpaths.contour import Toolpath
-from pathcontrol.toolpaths.points import read_csv
+from pathcontrol.toolpaths.csv.reader import read_csv
 
 METRES = {"m": 1.0, "mm": 0.001, "in": 0.0254}
 
@@ -193,7 +193,7 @@ def test_files_that_are_none(tmp_path, monkeypatch):
     for name, message in expected.items():
         with pytest.raises(ToolpathError, match=message):
             read_csv(tmp_path / name)
-    monkeypatch.setattr("pathcontrol.toolpaths.points_table.MAX_SEGMENTS", 2)
+    monkeypatch.setattr("pathcontrol.toolpaths.csv.table.MAX_SEGMENTS", 2)
     with pytest.raises(ToolpathError, match="line 3: more than 2 points"):
         read_csv(tmp_path / "points")
     with pytest.raises(InputError, match="path = None, expected the path of a file"):

@@ -7,12 +7,12 @@ import pytest
 from drawings import svg, write
 
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.bezier import Bezier
-from pathcontrol.toolpaths.columns import boxes, end_tangents, measure_bounds, measure_lengths
-from pathcontrol.toolpaths.corners import corners, end_tangent, start_tangent
-from pathcontrol.toolpaths.cusps import is_plain
-from pathcontrol.toolpaths.pieces import NOTHING, Curve, Curves
-from pathcontrol.toolpaths.svg import read_svg
+from pathcontrol.toolpaths.drawing.pieces import NOTHING, Curve, Curves
+from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.bezier_columns import boxes, end_tangents, measure_bounds, measure_lengths
+from pathcontrol.toolpaths.segments.cusps import is_plain
+from pathcontrol.toolpaths.smoothing.corners import corners, end_tangent, start_tangent
+from pathcontrol.toolpaths.svg.reader import read_svg
 
 
 def odd_and_random(degree: int, count: int = 60) -> np.ndarray:

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.arc import Arc
-from pathcontrol.toolpaths.dxf import read_dxf
+from pathcontrol.toolpaths.dxf.reader import read_dxf
+from pathcontrol.toolpaths.segments.arc import Arc
 
 TURN = 2 * np.pi
 

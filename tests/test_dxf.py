@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pathcontrol.errors import InputError, ToolpathError, UnknownNameError
-from pathcontrol.toolpaths.arc import Arc
-from pathcontrol.toolpaths.dxf import UNITS
-from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.dxf.reader import UNITS
+from pathcontrol.toolpaths.segments.arc import Arc
+from pathcontrol.toolpaths.segments.base import Polyline
 
 TURN = 2 * np.pi
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.dxf import read_dxf
+from pathcontrol.toolpaths.dxf.reader import read_dxf
 
 NEAR = 1e-6  # m
 
@@ -184,7 +184,7 @@ BOMB = "".join(_block(f"B{i}", _insert(f"B{i + 1}") * 10) for i in range(12)) + 
     ],
 )
 def test_hostile_files_end_in_an_error(tmp_path, monkeypatch, text, words):
-    monkeypatch.setattr("pathcontrol.toolpaths.dxf_blocks._MOST_ENTITIES", 2000)
+    monkeypatch.setattr("pathcontrol.toolpaths.dxf.blocks._MOST_ENTITIES", 2000)
     path = tmp_path / "drawing.dxf"
     path.write_text(text)
     with pytest.raises(ToolpathError, match=words):
@@ -194,10 +194,10 @@ def test_hostile_files_end_in_an_error(tmp_path, monkeypatch, text, words):
 def test_files_that_are_too_large_are_not_loaded(tmp_path, monkeypatch):
     path = tmp_path / "drawing.dxf"
     path.write_text(_dxf(A_LINE * 20))
-    monkeypatch.setattr("pathcontrol.toolpaths.dxf._MOST_ENTITIES", 15)
+    monkeypatch.setattr("pathcontrol.toolpaths.dxf.reader._MOST_ENTITIES", 15)
     with pytest.raises(ToolpathError, match="entities, expected at most"):
         read_dxf(path)
-    monkeypatch.setattr("pathcontrol.toolpaths.dxf._MOST_ENTITIES", 100)
-    monkeypatch.setattr("pathcontrol.toolpaths.pieces.MAX_SEGMENTS", 39)
+    monkeypatch.setattr("pathcontrol.toolpaths.dxf.reader._MOST_ENTITIES", 100)
+    monkeypatch.setattr("pathcontrol.toolpaths.drawing.pieces.MAX_SEGMENTS", 39)
     with pytest.raises(ToolpathError, match="more than 39 lines"):
         read_dxf(path)

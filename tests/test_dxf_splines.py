@@ -10,7 +10,7 @@ from ezdxf.math import BSpline
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pathcontrol.toolpaths.bezier import Bezier
+from pathcontrol.toolpaths.segments.bezier import Bezier
 
 TURN = 2 * np.pi
 

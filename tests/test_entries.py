@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from pathcontrol import Contour, RobotModel, Toolpath, ToolpathTask, load_robot, read_gcode, smooth
 from pathcontrol.cartesian.links import linked
-from pathcontrol.toolpaths.builder import ContourBuilder
-from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.gcode.builder import ContourBuilder
+from pathcontrol.toolpaths.segments.base import Polyline
 
 UP, TOLERANCE, CLEARANCE = np.array([0.0, 0.0, 1.0]), 1e-4, 0.01
 SURFACE = 0.0  # m, the top of the stock

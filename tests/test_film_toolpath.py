@@ -18,7 +18,7 @@ from pathcontrol import (
     simulate_sequence,
     tool_deviation,
 )
-from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.view.film.error import PathError, in_fitting_units
 from pathcontrol.view.film.recorder import record
 from pathcontrol.view.film.tube import distinct

@@ -15,7 +15,7 @@ import pathcontrol as pc
 from pathcontrol.errors import InputError, ToolpathError, UrdfError
 from pathcontrol.robot.urdf.parse import parse_urdf
 from pathcontrol.sweeps.manifest import _digest
-from pathcontrol.toolpaths.svg import read_svg
+from pathcontrol.toolpaths.svg.reader import read_svg
 
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 from pathcontrol import InputError
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.arc import Arc
 from pathcontrol.toolpaths.contour import Toolpath
 from pathcontrol.toolpaths.gcode import read_gcode
-from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.segments.arc import Arc
+from pathcontrol.toolpaths.segments.base import Polyline
 
 HEAD = "G21 G90\nG0 X0 Y0 Z0\n"
 

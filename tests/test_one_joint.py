@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import pathcontrol as pc
-from pathcontrol.toolpaths.arc import Arc
-from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.segments.arc import Arc
+from pathcontrol.toolpaths.segments.base import Polyline
 
 RADIUS, SWEEP = 0.4, 1.2
 KINDS = ("revolute", "continuous", "prismatic")

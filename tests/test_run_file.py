@@ -44,10 +44,10 @@ from pathcontrol.simulation.saved.contours import contour_of, contour_recipe
 from pathcontrol.simulation.saved.netcdf import read_run, write_run
 from pathcontrol.simulation.saved.shelf import Shelf
 from pathcontrol.tasks.laps import Laps
-from pathcontrol.toolpaths.arc import Arc
-from pathcontrol.toolpaths.bezier import Bezier
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.segments import Polyline, Segment
+from pathcontrol.toolpaths.segments.arc import Arc
+from pathcontrol.toolpaths.segments.base import Polyline, Segment
+from pathcontrol.toolpaths.segments.bezier import Bezier
 
 GAINS = {"K_p": 800.0, "K_v": [45.0, 100.0], "k": 20.0}
 

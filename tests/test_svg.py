@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pathcontrol.errors import InputError, ToolpathError
-from pathcontrol.toolpaths.arc import Arc
-from pathcontrol.toolpaths.bezier import Bezier
-from pathcontrol.toolpaths.segments import Polyline
-from pathcontrol.toolpaths.svg import read_svg
+from pathcontrol.toolpaths.segments.arc import Arc
+from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.svg.reader import read_svg
 
 TURN = 2 * np.pi
 

@@ -7,7 +7,7 @@ import pytest
 from drawings import MM_PAGE, samples, svg, write
 
 from pathcontrol.errors import PathControlError, ToolpathError
-from pathcontrol.toolpaths.svg import read_svg
+from pathcontrol.toolpaths.svg.reader import read_svg
 
 LINE = '<path d="M0 0H1"/>'
 
@@ -242,17 +242,17 @@ def test_hostile_files_end_in_an_error(read, prolog, body, words):
 
 
 def test_a_bomb_of_uses_ends_in_an_error(read, monkeypatch):
-    monkeypatch.setattr("pathcontrol.toolpaths.svg_walk._MOST_ELEMENTS", 2000)
+    monkeypatch.setattr("pathcontrol.toolpaths.svg.walk._MOST_ELEMENTS", 2000)
     levels = "".join(f'<g id="g{i}">' + f'<use href="#g{i + 1}"/>' * 10 + "</g>" for i in range(12))
     with pytest.raises(ToolpathError, match="more than 2000 elements"):
         read(f'<defs>{levels}<path id="g12" d="M0 0H1"/></defs><use href="#g0"/>')
 
 
 def test_too_many_segments_end_in_an_error(read, monkeypatch):
-    monkeypatch.setattr("pathcontrol.toolpaths.svg_pen.MAX_SEGMENTS", 1000)
+    monkeypatch.setattr("pathcontrol.toolpaths.svg.pen.MAX_SEGMENTS", 1000)
     with pytest.raises(ToolpathError, match="more than 1000 segments"):
         read(f'<path d="M0 0{"h1" * 1001}"/>')
-    monkeypatch.setattr("pathcontrol.toolpaths.pieces.MAX_SEGMENTS", 1000)
+    monkeypatch.setattr("pathcontrol.toolpaths.drawing.pieces.MAX_SEGMENTS", 1000)
     for body in (f'<path d="M0 0{"h1" * 501}"/>' * 2, f'<path d="M0 0{"q1 1 2 0" * 101}"/>', '<circle r="1"/>' * 101):
         with pytest.raises(ToolpathError, match="more than 1000 lines, or 100 curves"):
             read(body)

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.svg import read_svg
-from pathcontrol.toolpaths.svg_path import parse_path
-from pathcontrol.toolpaths.svg_values import transform
+from pathcontrol.toolpaths.svg.attributes import transform
+from pathcontrol.toolpaths.svg.path_data import parse_path
+from pathcontrol.toolpaths.svg.reader import read_svg
 
 TAKES = {"m": 2, "l": 2, "h": 1, "v": 1, "c": 6, "s": 4, "q": 4, "t": 2, "a": 7}
 BLANK = " \t\n\r\f"

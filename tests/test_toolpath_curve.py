@@ -11,10 +11,10 @@ from scipy.interpolate import CubicSpline
 from strategies import floats
 
 from pathcontrol import InputError, ToolCurve
-from pathcontrol.toolpaths.arc import Arc
-from pathcontrol.toolpaths.bends import regular
-from pathcontrol.toolpaths.hermite import ByLength, curved
-from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.segments.arc import Arc
+from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.smoothing.bends import regular
+from pathcontrol.toolpaths.smoothing.hermite_data import ByLength, curved
 
 X, Y, Z = np.eye(3)
 T = np.linspace(0.0, 1.0, 501)

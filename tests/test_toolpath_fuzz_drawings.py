@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol.errors import PathControlError
-from pathcontrol.toolpaths.dxf import read_dxf
-from pathcontrol.toolpaths.svg import read_svg
+from pathcontrol.toolpaths.dxf.reader import read_dxf
+from pathcontrol.toolpaths.svg.reader import read_svg
 
 WORDS = ["0", "-1", "1e-300", "1e300", "1e999", "nan", "inf", "0.1.2", "--", "e", "#", "", "%", "9" * 400, "Ω", "\x01"]
 NUMBERS = st.one_of(st.floats(-200, 200).map(repr), st.integers(-9, 9).map(str), st.sampled_from(WORDS))

@@ -11,8 +11,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from pathcontrol.errors import ToolpathError
+from pathcontrol.toolpaths.csv.reader import read_csv
 from pathcontrol.toolpaths.gcode import read_gcode
-from pathcontrol.toolpaths.points import read_csv
 
 CSV = (
     "x [mm], y [mm], z [mm], i, j, k\n0, 0, 0, 0, 0, 1\n10, 0.5, -2e1, 0, 1, 1 # edge\n\n"
@@ -160,6 +160,6 @@ def test_many_lines_end_soon(reader):
     }
     assert check(reader, rows[reader])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pathcontrol.toolpaths.points_table.MAX_SEGMENTS", 9)
+        patch.setattr("pathcontrol.toolpaths.csv.table.MAX_SEGMENTS", 9)
         patch.setattr("pathcontrol.toolpaths.gcode.strokes.MAX_SEGMENTS", 9)
         assert not check(reader, rows[reader])

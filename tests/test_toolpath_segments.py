@@ -14,11 +14,11 @@ from strategies import floats
 
 from pathcontrol import InputError
 from pathcontrol.geometry.boxes import Boxes
-from pathcontrol.toolpaths.arc import Arc
-from pathcontrol.toolpaths.bezier import Bezier
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.lengths import ArcLength
-from pathcontrol.toolpaths.segments import Polyline, Segment
+from pathcontrol.toolpaths.segments.arc import Arc
+from pathcontrol.toolpaths.segments.base import Polyline, Segment
+from pathcontrol.toolpaths.segments.bezier import Bezier
 
 U = np.linspace(0.0, 1.0, 33)
 CURVED = tuple(kind for kind in KINDS if kind != "lines")

@@ -19,7 +19,7 @@ from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.segments.base import Polyline
 
 _MOST = 20_000  # points of a segment
 _FINER = 0.5  # of the tolerance, between points of a drawing

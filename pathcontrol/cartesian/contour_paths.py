@@ -21,7 +21,7 @@ from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.curve import ToolCurve
-from pathcontrol.toolpaths.smoothing import Smoothed
+from pathcontrol.toolpaths.smoothing.smooth import Smoothed
 
 _START_TIME = 0.1  # s
 

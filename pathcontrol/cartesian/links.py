@@ -9,8 +9,8 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.segments import Polyline
-from pathcontrol.toolpaths.smoothing import Corners, Smoothed, smooth
+from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.smoothing.smooth import Corners, Smoothed, smooth
 
 _MEET = 1e-7  # m
 

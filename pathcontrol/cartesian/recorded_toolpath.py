@@ -13,7 +13,7 @@ from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour, Toolpath
-from pathcontrol.toolpaths.smoothing import Corners, Smoothed
+from pathcontrol.toolpaths.smoothing.smooth import Corners, Smoothed
 
 
 class RecordedToolpath(ToolpathTask):

@@ -18,8 +18,8 @@ from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.curve import ToolCurve
-from pathcontrol.toolpaths.segments import Polyline
-from pathcontrol.toolpaths.smoothing import Corners, smooth
+from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.smoothing.smooth import Corners, smooth
 
 
 class ToolpathTask(PathSequence):

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, rigid
 from pathcontrol.errors import InputError
-from pathcontrol.toolpaths.columns import measure_bounds, measure_lengths
-from pathcontrol.toolpaths.nearest import Cubics, is_cubic
-from pathcontrol.toolpaths.segments import Polyline, Segment
+from pathcontrol.toolpaths.segments.base import Polyline, Segment
+from pathcontrol.toolpaths.segments.bezier_columns import measure_bounds, measure_lengths
+from pathcontrol.toolpaths.segments.nearest import Cubics, is_cubic
 
 _MEET = 1e-9  # m, how near the ends of neighbouring segments are
 

@@ -162,8 +162,8 @@ class ToolCurve:
             InputError: the edges turn back by more than 150°, where the tool would have to stop.
         """
         from pathcontrol.toolpaths.contour import Contour
-        from pathcontrol.toolpaths.segments import Polyline
-        from pathcontrol.toolpaths.smoothing import smooth
+        from pathcontrol.toolpaths.segments.base import Polyline
+        from pathcontrol.toolpaths.smoothing.smooth import smooth
 
         given = as_array("points", points)
         edges = Polyline(np.concatenate([given, given[:1]]) if closed else given)

@@ -14,7 +14,7 @@ from pathcontrol.toolpaths.contour import Toolpath
 
 #: readers by the end of a file's name: the module of this package, and the function in it
 READERS = {
-    (".csv", ".tsv", ".txt", ".xyz"): ("points", "read_csv"),
+    (".csv", ".tsv", ".txt", ".xyz"): ("csv", "read_csv"),
     (".ngc", ".nc", ".gcode", ".gc", ".tap", ".cnc"): ("gcode", "read_gcode"),
     (".svg",): ("svg", "read_svg"),
     (".dxf",): ("dxf", "read_dxf"),

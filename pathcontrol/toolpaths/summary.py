@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol.toolpaths.contour import Contour, Toolpath
-from pathcontrol.toolpaths.corners import corners
+from pathcontrol.toolpaths.smoothing.corners import corners
 
 
 def summary(toolpath: Toolpath) -> dict[str, Any]:

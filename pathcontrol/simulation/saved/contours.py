@@ -9,10 +9,10 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.saved.shelf import Shelf
-from pathcontrol.toolpaths.arc import Arc
-from pathcontrol.toolpaths.bezier import Bezier
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.segments import Polyline, Segment
+from pathcontrol.toolpaths.segments.arc import Arc
+from pathcontrol.toolpaths.segments.base import Polyline, Segment
+from pathcontrol.toolpaths.segments.bezier import Bezier
 
 _NEAR = 1e-7  # m, from segments of any other kind to the polylines that are kept of them
 _FINEST = 1 << 20

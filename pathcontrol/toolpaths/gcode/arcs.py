@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.arc import Arc
 from pathcontrol.toolpaths.gcode.modes import Modes
+from pathcontrol.toolpaths.segments.arc import Arc
 from pathcontrol.toolpaths.text import MAX_COORDINATE
 
 #: axes of each plane, first, second and normal: counter-clockwise, seen from the normal's tip, is from first to second

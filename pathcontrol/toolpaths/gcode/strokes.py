@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.arc import Arc
-from pathcontrol.toolpaths.builder import ContourBuilder
 from pathcontrol.toolpaths.contour import Contour
+from pathcontrol.toolpaths.gcode.builder import ContourBuilder
+from pathcontrol.toolpaths.segments.arc import Arc
 from pathcontrol.toolpaths.text import MAX_CONTOURS, MAX_SEGMENTS
 
 

@@ -17,7 +17,7 @@ from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.sequence import PathSequence
-from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.view.figures.limits import aspect, equal_plane, extent
 from pathcontrol.view.figures.lines import curve, drawable
 from pathcontrol.view.figures.shown import Runs, Shown, path_parameters, shown

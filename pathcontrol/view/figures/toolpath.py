@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.toolpaths.contour import Contour, Toolpath
-from pathcontrol.toolpaths.corners import corners
-from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.smoothing.corners import corners
 from pathcontrol.view.figures.style import BLUE, GREY, ORANGE, dressed, new_figure, style
 from pathcontrol.view.figures.words import legend
 

@@ -13,7 +13,7 @@ from pathcontrol.errors import TaskError
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.segments import Polyline
+from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.view.film.take import Take
 from pathcontrol.view.film.tube import distinct
 

@@ -1,0 +1,146 @@
+"""Tool paths from tables of points: CSV, tab-separated, or columns between blanks."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from pathcontrol._arrays import Array, scalar
+from pathcontrol.errors import InputError, ToolpathError
+from pathcontrol.toolpaths.contour import Contour, Toolpath
+from pathcontrol.toolpaths.csv.columns import Columns, checked_choice
+from pathcontrol.toolpaths.csv.names import CONTOUR, UNITS, hint_of_unit
+from pathcontrol.toolpaths.csv.rows import Rows
+from pathcontrol.toolpaths.csv.table import Table, decimal_mark
+from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.text import read_lines
+
+_NOTHING = 1e-9  # m, points nearer than this are the same, as are tool axes
+
+
+def read_csv(
+    path: str | os.PathLike[str],
+    unit: str | None = None,
+    feed: float | None = None,
+    columns: str | Sequence[str] | Mapping[str, int | str] | None = None,
+    decimal: str | None = None,
+    z: float | None = None,
+    unknown: str = "refuse",
+) -> Toolpath:
+    """Contours from a table of points, a point a line: ``x y z``, with the tool's axis or orientation if it has them.
+
+    Semicolons, tabs, commas or blanks separate the values; the first line says which. It may name the columns, in any
+    order and with the unit: ``x [mm]``, ``x / mm`` or ``x_mm``, and so may a comment above, or a line of units below.
+    Three columns need no names, others do. A ``#`` begins a comment. Values may be quoted, lines may end in separators.
+
+    - ``x y z``: the point. ``i j k``, also called ``nx ny nz``: the tool's axis, the direction that stands on the
+      surface; it is normalised.
+    - ``qx qy qz qw``: the orientation of the tool's frame as a unit quaternion in the order of ROS, w last. Of it the
+      axis is kept, against which the tool's z axis points; how the tool is turned about it is not.
+    - ``contour``: the name of the contour, a text; another value begins a new contour, and so does an empty line.
+    - Columns with other names are passed over, and told in :attr:`Toolpath.notes`.
+
+    A contour without a name is called by its first line. A point that repeats the one before it is left out. A contour
+    is closed if its last point, and tool axis, repeat the first.
+
+    Args:
+        path: the file.
+        unit: unit of the coordinates: ``"m"``, ``"cm"``, ``"mm"``, ``"um"`` or ``"in"``. By default the one that the
+            file names, else metres, as everywhere in this package.
+        feed: speed of the tool along the contours [m/s], which a table does not give.
+        columns: what the columns are, whatever the file calls them: names in the order of the file, as ``("x", "y",
+            "z", "nx", "ny", "nz")``, of which any other, such as ``"_"``, passes a column over; or for each name a
+            number from 0 or the name in the file, as ``{"x": 0, "y": "Pos Y", "z": 2}``; or either as a text:
+            ``"x,y,z"`` or ``"x=0,y=Pos Y,z=2"``.
+        decimal: ``"."`` or ``","``, the mark in the numbers. By default it is found out: a comma is one only where
+            nothing else can be meant, and that is told.
+        z: height of all points [m], for tables of x and y alone.
+        unknown: ``"refuse"`` or ``"warn"``, as for the other readers; a table has nothing that makes a difference.
+
+    Raises:
+        InputError: an argument is none of these.
+        ToolpathError: the file cannot be used; the message says in which line and why.
+    """
+    passed, chosen = Passed(unknown), checked_choice(columns)
+    _check_choice("unit", unit, [*UNITS])
+    _check_choice("decimal", decimal, [".", ","])
+    feed = None if feed is None else scalar("feed", feed, positive=True)
+    z = None if z is None else scalar("z", z)
+    lines = read_lines(path, "a table of points")
+    try:
+        rows = Rows.of(lines, decimal)
+        found = Columns.of(rows, chosen, passed, flat=z is not None)
+        unit = found.unit_with(unit) if unit or found.unit else _assumed(rows, passed)
+        table = Table.of(rows, found, UNITS[unit], decimal or _decimal(rows, found, passed), z)
+        contours = [_contour(table, first, end, feed) for first, end in table.parts]
+    except ToolpathError as error:
+        raise ToolpathError(f"{os.fspath(path)}: {error}") from None
+    if "qx" in found.places:
+        passed.tell("of the orientations qx qy qz qw the tool's z axis is kept, not how it is turned about that")
+    return Toolpath(tuple(contours), os.fspath(path), unit, passed.notes)
+
+
+def _check_choice(name: str, value: str | None, choices: list[str]) -> None:
+    if value is not None and value not in choices:
+        raise InputError(f"{name} = {value!r}, expected one of {', '.join(choices)}, or None")
+
+
+def _assumed(rows: Rows, passed: Passed) -> str:
+    """Metres, told where a comment sounds otherwise."""
+    for line, comment in rows.comments:
+        if (word := hint_of_unit(comment)) is not None:
+            passed.tell(
+                f"line {line} speaks of {word!r}, but the coordinates are taken for metres: give unit= if they are not"
+            )
+            break
+    return "m"
+
+
+def _decimal(rows: Rows, columns: Columns, passed: Passed) -> str:
+    """The decimal mark that the numbers have."""
+    mark = decimal_mark(rows, columns)
+    if mark == ",":
+        passed.tell("the numbers have a decimal comma")
+    return mark
+
+
+def _contour(table: Table, first: int, end: int, feed: float | None) -> Contour:
+    """The contour of the rows from ``first`` to before ``end``."""
+    points = table.points[first:end]
+    kept = _distinct(points)
+    if len(kept) < 2:
+        raise ToolpathError(
+            f"line {table.lines[first]}: the contour that begins here is one point, expected at least two that differ; "
+            f"an empty line, or another value in the column {CONTOUR!r}, begins the next contour"
+        )
+    closed = len(kept) > 2 and math.dist(points[0], points[kept[-1]]) <= _NOTHING
+    axes = None
+    if table.axes is not None:
+        axes = table.axes[first:end]
+        _check_axes(axes, kept, table.lines[first:end])
+        axes = axes[kept]
+        closed = closed and bool(np.abs(axes[0] - axes[-1]).max() <= _NOTHING)
+    name = table.labels[first] if table.labels else f"line {table.lines[first]}"
+    return Contour((Polyline(points[kept]),), closed, feed, name=name, normals=axes)
+
+
+def _distinct(points: Array) -> Array:
+    """Indices of the points that do not repeat the last one kept before them."""
+    places, kept = points.tolist(), [0]
+    for index, place in enumerate(places):
+        if math.dist(place, places[kept[-1]]) > _NOTHING:
+            kept.append(index)
+    return np.array(kept)
+
+
+def _check_axes(axes: Array, kept: Array, lines: list[int]) -> None:
+    """Raise if a point that is left out turns the tool."""
+    stays = np.repeat(kept, np.diff([*kept, len(axes)]))
+    turned = np.abs(axes - axes[stays]).max(1) > _NOTHING
+    if turned.any():
+        line = lines[int(np.argmax(turned))]
+        raise ToolpathError(f"line {line}: the tool axis turns on the spot, expected another point, or the same axis")

@@ -1,0 +1,1 @@
+"""What drawings of both kinds are made of: pieces, chained into contours, some left out, some there twice."""

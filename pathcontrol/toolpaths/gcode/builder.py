@@ -1,0 +1,90 @@
+"""Contours put together piece by piece, as the readers of files do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import InputError
+from pathcontrol.toolpaths.contour import Contour
+from pathcontrol.toolpaths.segments.base import Polyline, Segment
+
+_NOTHING = 1e-9  # m, moves shorter than this are none
+
+
+class ContourBuilder:
+    """Collects the pieces of one contour; straight moves that follow each other become one polyline.
+
+    Points are kept as tuples of numbers: programs of a hundred thousand lines are read several times faster so.
+
+    Args:
+        start: where the contour begins [m], (3,).
+
+    Raises:
+        InputError: it, or a point that is added, is not finite.
+    """
+
+    def __init__(self, start: Sequence[float] | Array) -> None:
+        self._segments: list[Segment] = []
+        self._start = _point("start", start)
+        self._corners = [self._start]
+
+    @property
+    def position(self) -> Array:
+        """Where the contour has come to [m], (3,)."""
+        return np.array(self._corners[-1])
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing that has a length was added."""
+        return not self._segments and len(self._corners) == 1
+
+    def line_to(self, point: Sequence[float] | Array) -> None:
+        """A straight move; one of no length is left out."""
+        target = _point("point", point)
+        if math.dist(target, self._corners[-1]) > _NOTHING:
+            self._corners.append(target)
+
+    def lines_to(self, points: Array) -> None:
+        """Straight moves to finite points (k, 3), one after another; those of no length are left out."""
+        steps = np.diff(np.concatenate([self._corners[-1:], points]), axis=0)
+        targets = map(tuple, points.tolist())
+        if (np.abs(steps) > _NOTHING).any(1).all():
+            self._corners.extend(targets)
+            return
+        for target in targets:
+            self.line_to(target)
+
+    def add(self, segment: Segment) -> None:
+        """A curved piece, which begins where the contour has come to; a gap there is closed by a straight move."""
+        self.line_to(segment.first)
+        self._end_polyline()
+        self._segments.append(segment)
+        self._corners = [_point("last", segment.last)]
+
+    def close(self) -> None:
+        """A straight move back to the start."""
+        self.line_to(self._start)
+
+    def contour(self, **attributes: Any) -> Contour:
+        """The contour; ``attributes`` are those of :class:`Contour`, ``closed`` follows from the ends by default."""
+        self._end_polyline()
+        closed = bool(self._segments) and math.dist(self._corners[-1], self._start) <= _NOTHING
+        return Contour(tuple(self._segments), **({"closed": closed} | attributes))
+
+    def _end_polyline(self) -> None:
+        if len(self._corners) > 1:
+            self._segments.append(Polyline(np.array(self._corners)))
+            self._corners = [self._corners[-1]]
+
+
+def _point(name: str, point: Sequence[float] | Array) -> tuple[float, ...]:
+    """The three numbers of a point."""
+    numbers = tuple(map(float, point))
+    if not all(map(math.isfinite, numbers)) or len(numbers) != 3:
+        raise InputError(f"{name} = {numbers}, expected three finite numbers")
+    return numbers

@@ -1,0 +1,1 @@
+"""Segments of contours: polylines, arcs and Bézier curves."""

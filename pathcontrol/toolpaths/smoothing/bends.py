@@ -1,0 +1,76 @@
+"""Curved segments that bend more sharply than a tolerance, as polylines within it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.toolpaths.segments.base import Polyline, Segment
+from pathcontrol.toolpaths.smoothing.corners import angles, end_tangent, start_tangent
+
+_BETWEEN = 64  # places of each piece, at which a polyline is compared with what it stands for
+_FIRST_PIECES = 32
+_TURN = 0.2  # rad over a piece
+_NARROWEST = 2.0**-40
+_NOTHING = 1e-9  # m, points nearer than this are one
+_TINY = np.finfo(float).tiny
+
+
+def regular(segment: Segment, tolerance: float) -> tuple[Segment, float]:
+    """The segment itself, or if it turns by more than 0.2 rad within ``tolerance`` [m] a polyline so near to it.
+
+    Cusps and loops smaller than the tolerance become corners of the polyline. The second value is how far apart they
+    are [m].
+    """
+    if isinstance(segment, Polyline):
+        return segment, 0.0
+    pieces = _Pieces.of(segment, np.linspace(0.0, 1.0, _FIRST_PIECES + 1))
+    while (coarse := (pieces.turn > _TURN) & (pieces.size > tolerance)).any():
+        pieces = pieces.halved(segment, coarse)
+    if (pieces.turn <= _TURN).all():
+        return segment, 0.0
+    while (coarse := (pieces.sagitta > tolerance) & (pieces.size > tolerance)).any():
+        pieces = pieces.halved(segment, coarse)
+    least = max(_NOTHING, min(0.1 * tolerance, 0.01 * segment.length))
+    polyline = Polyline(_apart(segment.point(pieces.u), least))
+    shares = np.linspace(0.0, 1.0, _BETWEEN, endpoint=False)[:, None]
+    between = segment.point(pieces.u[:-1] + np.diff(pieces.u) * shares)
+    return polyline, float(polyline.distance(between).max())
+
+
+class _Pieces(NamedTuple):
+    """Pieces of a segment between parameters u (k + 1,): their size [m], turn [rad] and sagitta [m], each (k,)."""
+
+    u: Array
+    size: Array
+    turn: Array
+    sagitta: Array
+
+    @classmethod
+    def of(cls, segment: Segment, u: Array) -> _Pieces:
+        p, middle = segment.point(u), segment.point(0.5 * (u[:-1] + u[1:]))
+        derivative = segment.derivative(u)
+        t = derivative / np.maximum(np.linalg.norm(derivative, axis=-1, keepdims=True), _TINY)
+        t[0], t[-1] = start_tangent(segment), end_tangent(segment)
+        size = np.linalg.norm(middle - p[:-1], axis=-1) + np.linalg.norm(p[1:] - middle, axis=-1)
+        turn = angles(t[:-1], t[1:])
+        sagitta = np.linalg.norm(middle - 0.5 * (p[:-1] + p[1:]), axis=-1)
+        # what is too narrow to be halved has no size
+        return cls(u, np.where(np.diff(u) > _NARROWEST, size, 0.0), turn, np.maximum(sagitta, size * turn / 8))
+
+    def halved(self, segment: Segment, chosen: Array) -> _Pieces:
+        """With the ``chosen`` pieces halved."""
+        return _Pieces.of(segment, np.sort(np.append(self.u, 0.5 * (self.u[:-1] + self.u[1:])[chosen])))
+
+
+def _apart(points: Array, least: float) -> Array:
+    """The first and last point, and of those between some that are ``least`` [m] apart."""
+    kept = [points[0]]
+    for point in points[1:-1]:
+        if np.linalg.norm(point - kept[-1]) > least:
+            kept.append(point)
+    if len(kept) > 1 and np.linalg.norm(points[-1] - kept[-1]) <= least:
+        kept.pop()
+    return np.array([*kept, points[-1]])

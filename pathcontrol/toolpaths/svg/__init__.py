@@ -1,0 +1,3 @@
+"""SVG drawings."""
+
+from pathcontrol.toolpaths.svg.reader import read_svg as read_svg
