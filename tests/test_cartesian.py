@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pathcontrol import ExtendedMotionPlan, Projection, RobotModel, check_task, load_robot, simulate
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.correction import correct
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.correction import correct
+from pathcontrol.cartesian.ik.redundancy import PostureCost
 from pathcontrol.cartesian.orientation import FixedOrientation, FreeOrientation, NormalOrientation, TangentOrientation
 from pathcontrol.cartesian.path import CartesianPath
-from pathcontrol.cartesian.redundancy import PostureCost
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.toolpaths.curve import ToolCurve
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import pathcontrol as pc
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.continuation import Stop, Trail
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.continuation import Stop, Trail
+from pathcontrol.cartesian.ik.preference import by_preference
 from pathcontrol.cartesian.orientation import FreeOrientation
-from pathcontrol.cartesian.preference import by_preference
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.toolpaths.gcode.builder import ContourBuilder
 

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol import CartesianPath, FixedOrientation, NormalOrientation, TaskError, ToolCurve, load_robot
-from pathcontrol.cartesian.branch import Branch
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.correction import branch_at
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.correction import branch_at
+from pathcontrol.cartesian.ik.singularity_side import Branch
 from pathcontrol.cartesian.orientation import FreeOrientation
 from pathcontrol.cartesian.tool import Tool
 

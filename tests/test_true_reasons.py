@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol import CartesianPath, NormalOrientation, RobotModel, TaskError, ToolCurve, load_robot
-from pathcontrol.cartesian.postures import distance_to_limits
+from pathcontrol.cartesian.ik.joint_range import distance_to_limits
 
 UP = np.array([0.0, 0.0, 1.0])
 SPHERICAL = [("0 0 1", 0.0), ("0 1 0", 0.0), ("0 0 1", 0.0)]  # axes that meet in one point, each with its height

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, readonly, scalar
 from pathcontrol._expect import expect
-from pathcontrol.cartesian.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.solve import posture, solve
 from pathcontrol.cartesian.orientation import FixedOrientation, FreeOrientation, Orientation
-from pathcontrol.cartesian.solve import posture, solve
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.errors import InputError
 from pathcontrol.robot.extent import question_length, question_speed

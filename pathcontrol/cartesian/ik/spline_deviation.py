@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
 
 VELOCITY = 1e-3  # share of p' by which the tool's velocity may be off, in size and direction
 _CHUNK = 1 << 14  # postures looked at together

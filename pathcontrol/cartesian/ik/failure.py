@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.continuation import Stop, Trail
-from pathcontrol.cartesian.correction import KEPT
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.continuation import Stop, Trail
+from pathcontrol.cartesian.ik.correction import KEPT
+from pathcontrol.cartesian.ik.joint_range import distance_to_limits
+from pathcontrol.cartesian.ik.nearest_posture import nearest_postures
 from pathcontrol.cartesian.orientation import FreeOrientation
-from pathcontrol.cartesian.postures import distance_to_limits
-from pathcontrol.cartesian.reach import nearest_postures
 from pathcontrol.errors import TaskError
 
 _SEEDS = 64

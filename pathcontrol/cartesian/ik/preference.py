@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.continuation import Trail
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.continuation import Trail
 
 PLANE = 1e-3  # m below the base plane that is still on it
 _AS_COMFORTABLE = 0.5  # share of the best comfort from which on the higher elbow counts more

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.continuation import Stop, Trail, comforts, verdicts
-from pathcontrol.cartesian.correction import KEPT, Corrected, correct
-from pathcontrol.cartesian.postures import distance_to_limits, unwound
-from pathcontrol.cartesian.preference import above_base
-from pathcontrol.cartesian.reach import reach
-from pathcontrol.cartesian.redundancy import PostureCost
-from pathcontrol.cartesian.refusal import refusal, unreached
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.continuation import Stop, Trail, comforts, verdicts
+from pathcontrol.cartesian.ik.correction import KEPT, Corrected, correct
+from pathcontrol.cartesian.ik.failure import refusal, unreached
+from pathcontrol.cartesian.ik.joint_range import distance_to_limits, unwound
+from pathcontrol.cartesian.ik.nearest_posture import reach
+from pathcontrol.cartesian.ik.preference import above_base
+from pathcontrol.cartesian.ik.redundancy import PostureCost
 from pathcontrol.errors import TaskError
 
 _SEEDS = 256

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.deviation import deviations
-from pathcontrol.cartesian.postures import distance_to_limits
-from pathcontrol.cartesian.preference import PLANE, lowest
-from pathcontrol.cartesian.refinement import Refined
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.joint_range import distance_to_limits
+from pathcontrol.cartesian.ik.preference import PLANE, lowest
+from pathcontrol.cartesian.ik.refinement import Refined
+from pathcontrol.cartesian.ik.spline_deviation import deviations
 
 _VALLEYS = 8  # of a function along the path, looked at more closely
 _HEIGHTS = 256  # postures at which heights are measured

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.deviation import VELOCITY, Deviations, deviations
-from pathcontrol.cartesian.inverse_kinematics import InverseKinematics, Samples
-from pathcontrol.cartesian.mesh import between, first_mesh, graded, subdivided
-from pathcontrol.cartesian.refusal import place
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.failure import place
+from pathcontrol.cartesian.ik.inverse_kinematics import InverseKinematics, Samples
+from pathcontrol.cartesian.ik.knots import between, first_mesh, graded, subdivided
+from pathcontrol.cartesian.ik.spline_deviation import VELOCITY, Deviations, deviations
 from pathcontrol.errors import TaskError
 
 _DEGREE = 5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
 
 _STEPS = 60
 _LEAST_DAMPING, _FIRST_DAMPING, _LARGEST_DAMPING = 1e-10, 1e-2, 1e6

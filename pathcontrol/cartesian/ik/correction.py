@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.branch import Branch
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.redundancy import PostureCost
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.redundancy import PostureCost
+from pathcontrol.cartesian.ik.singularity_side import Branch
 
 KEPT = 0.5  # of the tolerance, by which the tool may be off at the postures themselves
 _STEPS = 12

@@ -10,11 +10,11 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.continuation import Stop, follow, verdicts
-from pathcontrol.cartesian.correction import branch_at, correct
-from pathcontrol.cartesian.redundancy import PostureCost
-from pathcontrol.cartesian.refusal import refusal
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.continuation import Stop, follow, verdicts
+from pathcontrol.cartesian.ik.correction import branch_at, correct
+from pathcontrol.cartesian.ik.failure import refusal
+from pathcontrol.cartesian.ik.redundancy import PostureCost
 
 _NEAR = 0.2  # rad, largest correction of an interpolated posture; more may be another branch
 

@@ -9,10 +9,10 @@ from enum import IntEnum
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.correction import Corrected, branch_at, correct
-from pathcontrol.cartesian.postures import outside, share_to_limits
-from pathcontrol.cartesian.redundancy import PostureCost
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.correction import Corrected, branch_at, correct
+from pathcontrol.cartesian.ik.joint_range import outside, share_to_limits
+from pathcontrol.cartesian.ik.redundancy import PostureCost
 
 _PIECES = 8  # a step is at most this part of the curve, …
 _REACH = 0.1  # … and this part of the lever arm long

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.cartesian.ik.joint_range import spread_postures
 from pathcontrol.cartesian.orientation import Orientation
-from pathcontrol.cartesian.postures import spread_postures
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.curve import ToolCurve

@@ -7,17 +7,17 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
 from pathcontrol._arrays import Array, finite, joint_array
-from pathcontrol.cartesian.closing import closed_lap
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.continuation import SINGULAR, Stop, Trail, follow
-from pathcontrol.cartesian.inverse_kinematics import InverseKinematics, Samples
-from pathcontrol.cartesian.postures import distance_to_limits, outside
-from pathcontrol.cartesian.preference import by_preference
-from pathcontrol.cartesian.redundancy import rest_curve
-from pathcontrol.cartesian.refinement import Refined, refine
-from pathcontrol.cartesian.refusal import not_closing, refusal
-from pathcontrol.cartesian.report import CartesianReport, measured
-from pathcontrol.cartesian.start_posture import moved_start, rewound_starts, search_starts
+from pathcontrol.cartesian.ik.closing import closed_lap
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.continuation import SINGULAR, Stop, Trail, follow
+from pathcontrol.cartesian.ik.failure import not_closing, refusal
+from pathcontrol.cartesian.ik.inverse_kinematics import InverseKinematics, Samples
+from pathcontrol.cartesian.ik.joint_range import distance_to_limits, outside
+from pathcontrol.cartesian.ik.path_report import CartesianReport, measured
+from pathcontrol.cartesian.ik.preference import by_preference
+from pathcontrol.cartesian.ik.redundancy import rest_curve
+from pathcontrol.cartesian.ik.refinement import Refined, refine
+from pathcontrol.cartesian.ik.start_posture import moved_start, rewound_starts, search_starts
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 

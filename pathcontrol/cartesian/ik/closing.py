@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.constraint import ToolConstraint
-from pathcontrol.cartesian.continuation import Stop, verdicts
-from pathcontrol.cartesian.correction import correct
-from pathcontrol.cartesian.redundancy import PostureCost
+from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.continuation import Stop, verdicts
+from pathcontrol.cartesian.ik.correction import correct
+from pathcontrol.cartesian.ik.redundancy import PostureCost
 
 _SAME = 1e-6  # rad, between the first and the last posture of a lap
 _LEFT = 3.0  # rad, what may be taken back; half a turn and more would change the number of turns

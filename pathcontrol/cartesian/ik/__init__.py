@@ -1,0 +1,1 @@
+"""Inverse kinematics along a curve: a start posture, continuation, refinement to a joint spline, verification."""
