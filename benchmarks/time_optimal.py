@@ -16,7 +16,7 @@ import numpy as np
 import toppra
 
 from pathcontrol import Coulomb, PathTask, RobotModel, Viscous, WaypointPath, load_robot
-from pathcontrol.profiles.time_optimal import time_optimal
+from pathcontrol.profiles.topp.time_optimal import time_optimal
 
 POINTS, PATHS, REPEATS = 1000, 9, 15
 

@@ -24,10 +24,10 @@ from pathcontrol import (
     check_task,
     load_robot,
 )
-from pathcontrol.profiles.limited import limited
+from pathcontrol.profiles.limited.limited import limited
+from pathcontrol.profiles.limited.motion_limit import MotionLimit
+from pathcontrol.profiles.limited.two_pass import Lines, largest
 from pathcontrol.profiles.motion import JointMotion, ToolMotion
-from pathcontrol.profiles.motion_limit import MotionLimit
-from pathcontrol.profiles.sweeps import Lines, largest
 from pathcontrol.profiles.tool_speed import ToolSpeed
 
 FRAMES = {"cicese_2dof": "tool", "ur5": "tool0", "panda": "panda_hand_tcp"}

@@ -26,11 +26,11 @@ from pathcontrol import (
     simulate,
 )
 from pathcontrol.profiles.distance import distance
-from pathcontrol.profiles.limited import limited
+from pathcontrol.profiles.jerk.s_curve import Approach, SCurve
+from pathcontrol.profiles.jerk.start_stop import SmoothStartStop
+from pathcontrol.profiles.limited.limited import limited
+from pathcontrol.profiles.limited.motion_limit import MotionLimit
 from pathcontrol.profiles.motion import JointMotion, ToolMotion
-from pathcontrol.profiles.motion_limit import MotionLimit
-from pathcontrol.profiles.s_curve import Approach, SCurve
-from pathcontrol.profiles.start_stop import SmoothStartStop
 from pathcontrol.profiles.tool_speed import ToolSpeed
 from pathcontrol.tasks.profile import END_TIME
 

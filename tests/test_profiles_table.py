@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from pathcontrol import InputError
-from pathcontrol.profiles.table import TabulatedProfile
+from pathcontrol.profiles.tabulated import TabulatedProfile
 
 seeds = st.integers(0, 9999)
 

@@ -22,7 +22,7 @@ from pathcontrol import (
     check_task,
     load_robot,
 )
-from pathcontrol.profiles.time_optimal import time_optimal
+from pathcontrol.profiles.topp.time_optimal import time_optimal
 from pathcontrol.tasks.profile import END_TIME
 
 LOCKED = {"cicese_2dof": {}, "ur5": {}, "panda": {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}}

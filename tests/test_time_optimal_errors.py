@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pathcontrol import Circle, InputError, Line, PathTask, TaskError, WaypointPath, load_robot
-from pathcontrol.profiles.time_optimal import time_optimal
+from pathcontrol.profiles.topp.time_optimal import time_optimal
 
 ARM = load_robot("cicese_2dof")
 LINE = Line([0, 0], [1.0, 0.5], 1.0)

@@ -14,9 +14,9 @@ from pathcontrol.cartesian.orientation import NormalOrientation, Orientation, Ta
 from pathcontrol.cartesian.path import CartesianPath
 from pathcontrol.cartesian.turning import TurningOrientation
 from pathcontrol.errors import InputError, TaskError, UnknownNameError
-from pathcontrol.profiles.limited import limited
+from pathcontrol.profiles.limited.limited import limited
+from pathcontrol.profiles.limited.motion_limit import MotionLimit
 from pathcontrol.profiles.motion import ToolMotion
-from pathcontrol.profiles.motion_limit import MotionLimit
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.toolpaths.contour import Contour

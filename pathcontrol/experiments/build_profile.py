@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 from pathcontrol.experiments.profile_sections import LimitedProfile, Profile, TimeOptimalProfile, ToolSpeedProfile
 from pathcontrol.experiments.profile_sections import RateProfile as RateSection
-from pathcontrol.profiles.limited import limited
+from pathcontrol.profiles.limited.limited import limited
+from pathcontrol.profiles.limited.motion_limit import MotionLimit
 from pathcontrol.profiles.motion import JointMotion, ToolMotion
-from pathcontrol.profiles.motion_limit import MotionLimit
-from pathcontrol.profiles.time_optimal import time_optimal
 from pathcontrol.profiles.tool_speed import ToolSpeed
+from pathcontrol.profiles.topp.time_optimal import time_optimal
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, VelocityProfile

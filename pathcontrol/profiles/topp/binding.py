@@ -8,9 +8,9 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
-from pathcontrol.profiles.topp.along import Samples, Torques
 from pathcontrol.profiles.topp.cells import Cells, static_shares
-from pathcontrol.profiles.topp.limits import JointLimits
+from pathcontrol.profiles.topp.dynamics import Samples, Torques
+from pathcontrol.profiles.topp.joint_limits import JointLimits
 
 
 class Binding(NamedTuple):

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.profiles.topp.along import Samples, Torques
-from pathcontrol.profiles.topp.limits import JointLimits
+from pathcontrol.profiles.topp.dynamics import Samples, Torques
+from pathcontrol.profiles.topp.joint_limits import JointLimits
 
 
 class Cells(NamedTuple):

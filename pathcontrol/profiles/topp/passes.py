@@ -9,7 +9,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.profiles.topp.cells import Cells
-from pathcontrol.profiles.topp.sweep import steps_of, swept
+from pathcontrol.profiles.topp.one_pass import steps_of, swept
 
 _FIRST_INSTANT = 2.5e-3  # s
 _LAPS = 100

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.profiles.topp.along import Samples, Torques
 from pathcontrol.profiles.topp.cells import Cells
+from pathcontrol.profiles.topp.dynamics import Samples, Torques
 from pathcontrol.profiles.topp.fastest_pair import fastest_pair
-from pathcontrol.profiles.topp.limits import JointLimits
+from pathcontrol.profiles.topp.joint_limits import JointLimits
 from pathcontrol.profiles.topp.passes import Allowed
 
 _ACCEPTED = 1 + 7e-4  # at the samples, a little less than is promised between them

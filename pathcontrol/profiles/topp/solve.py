@@ -8,14 +8,14 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
-from pathcontrol.profiles.topp.along import Samples, Torques
 from pathcontrol.profiles.topp.binding import Binding, binding, refuse_rate, refuse_static_overload
 from pathcontrol.profiles.topp.cells import cells_of
+from pathcontrol.profiles.topp.dynamics import Samples, Torques
 from pathcontrol.profiles.topp.fastest_pair import fastest_pair
-from pathcontrol.profiles.topp.limits import JointLimits
+from pathcontrol.profiles.topp.joint_limits import JointLimits
 from pathcontrol.profiles.topp.passes import Allowed, across, around
 from pathcontrol.profiles.topp.recheck import excess, tightened
-from pathcontrol.profiles.topp.speed import end_limit, endless_speed, refuse_endless, speed_limit
+from pathcontrol.profiles.topp.velocity_limits import end_limit, endless_speed, refuse_endless, speed_limit
 
 _ROUNDS = 12
 

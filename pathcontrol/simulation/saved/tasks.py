@@ -15,7 +15,7 @@ from pathcontrol._arrays import as_array, finite
 from pathcontrol.cartesian.recorded_toolpath import RecordedToolpath
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
-from pathcontrol.profiles.table import TabulatedProfile
+from pathcontrol.profiles.tabulated import TabulatedProfile
 from pathcontrol.simulation.saved.contours import contour_of, contour_recipe
 from pathcontrol.simulation.saved.extent import check_extent
 from pathcontrol.simulation.saved.shared import shared

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, joint_array, scalar
 from pathcontrol.errors import InputError
-from pathcontrol.profiles.grid import excess
+from pathcontrol.profiles.limited.grid import excess
+from pathcontrol.profiles.limited.motion_limit import MotionLimit
+from pathcontrol.profiles.limited.tangential import Tangential
 from pathcontrol.profiles.motion import growth
-from pathcontrol.profiles.motion_limit import MotionLimit
-from pathcontrol.profiles.tangential import Tangential
 from pathcontrol.tasks.profile import Path
 
 _START, _END = 2.5e-3, 2.5e-4  # s, how long the acceleration that an open path begins and ends with has been at work

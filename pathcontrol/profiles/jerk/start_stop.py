@@ -10,10 +10,10 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import TaskError
 from pathcontrol.profiles.distance import distance
-from pathcontrol.profiles.grid import edges
+from pathcontrol.profiles.jerk.ramps import Course
+from pathcontrol.profiles.jerk.s_curve import Approach, SCurve
+from pathcontrol.profiles.limited.grid import edges
 from pathcontrol.profiles.motion import JointMotion, Motion, growth
-from pathcontrol.profiles.ramps import Course
-from pathcontrol.profiles.s_curve import Approach, SCurve
 from pathcontrol.tasks.profile import Path, VelocityProfile
 
 _CELLS = 2000

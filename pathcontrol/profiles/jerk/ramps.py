@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from pathcontrol._arrays import Array
-from pathcontrol.profiles.s_curve import Approach, SCurve
+from pathcontrol.profiles.jerk.s_curve import Approach, SCurve
 
 Curve = SCurve | Approach
 

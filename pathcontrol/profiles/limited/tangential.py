@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
+from pathcontrol.profiles.limited.two_pass import Lines
 from pathcontrol.profiles.motion import Motion
-from pathcontrol.profiles.sweeps import Lines
 
 _MAX_GROWTH = 0.1  # relative change of ‖p'‖ over a cell that resolves it
 _UNRESOLVED = 0.3

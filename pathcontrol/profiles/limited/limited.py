@@ -8,12 +8,12 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import scalar
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
-from pathcontrol.profiles.demands import Demands
-from pathcontrol.profiles.grid import below, edges, quarters, refined
-from pathcontrol.profiles.motion_limit import MotionLimit
-from pathcontrol.profiles.sweeps import largest
-from pathcontrol.profiles.table import TabulatedProfile
-from pathcontrol.profiles.tangential import all_steps
+from pathcontrol.profiles.limited.demands import Demands
+from pathcontrol.profiles.limited.grid import below, edges, quarters, refined
+from pathcontrol.profiles.limited.motion_limit import MotionLimit
+from pathcontrol.profiles.limited.tangential import all_steps
+from pathcontrol.profiles.limited.two_pass import largest
+from pathcontrol.profiles.tabulated import TabulatedProfile
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.profile import Path
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
-from pathcontrol.profiles.topp.along import Samples, Torques
-from pathcontrol.profiles.topp.limits import JointLimits
+from pathcontrol.profiles.topp.dynamics import Samples, Torques
+from pathcontrol.profiles.topp.joint_limits import JointLimits
 
 _ENDLESS = 1e6  # times the ṡ² that the arm's strength builds up over the path
 

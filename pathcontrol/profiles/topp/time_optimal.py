@@ -9,9 +9,9 @@ import numpy as np
 from pathcontrol._arrays import Array, readonly, scalar
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError, TaskError
-from pathcontrol.profiles.table import TabulatedProfile
-from pathcontrol.profiles.topp.along import sample, torques
-from pathcontrol.profiles.topp.limits import LimitChoice, joint_limits
+from pathcontrol.profiles.tabulated import TabulatedProfile
+from pathcontrol.profiles.topp.dynamics import sample, torques
+from pathcontrol.profiles.topp.joint_limits import LimitChoice, joint_limits
 from pathcontrol.profiles.topp.solve import Demand, fastest
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathTask

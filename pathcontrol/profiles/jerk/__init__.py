@@ -1,0 +1,1 @@
+"""Jerk-limited ends of velocity profiles."""

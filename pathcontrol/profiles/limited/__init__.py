@@ -1,0 +1,1 @@
+"""Velocity profiles within limits on speed and acceleration of joints and tools."""
