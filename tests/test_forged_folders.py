@@ -13,7 +13,7 @@ from scipy import stats
 
 import pathcontrol as pc
 from pathcontrol.errors import InputError, ToolpathError, UrdfError
-from pathcontrol.robot.urdf.parse import parse_urdf
+from pathcontrol.robot.urdf.xml.parse import parse_urdf
 from pathcontrol.sweeps.manifest import _digest
 from pathcontrol.toolpaths.svg.reader import read_svg
 

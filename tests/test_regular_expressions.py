@@ -11,8 +11,8 @@ import pytest
 
 from pathcontrol.errors import UrdfError
 from pathcontrol.robot.urdf.numbers import read_numbers
-from pathcontrol.robot.urdf.parse import parse_and_mend, parse_urdf
-from pathcontrol.robot.urdf.prolog import COMMENT, INSTRUCTION, end_of_prolog
+from pathcontrol.robot.urdf.xml.parse import parse_and_mend, parse_urdf
+from pathcontrol.robot.urdf.xml.prolog import COMMENT, INSTRUCTION, end_of_prolog
 
 MODULES = sorted((Path(__file__).parent.parent / "pathcontrol").rglob("*.py"))
 ATOMIC = re.compile(r"(?<!\\)(?:[*+?]|[0-9,]\})\+|\(\?>")

@@ -15,7 +15,7 @@ from lxml import etree
 
 from pathcontrol.errors import UrdfError
 from pathcontrol.robot.urdf import Finding, check_urdf, parse_urdf
-from pathcontrol.robot.urdf.arm import axis_inertia, moving_bodies, read_arm
+from pathcontrol.robot.urdf.model_values import axis_inertia, moving_bodies, read_arm
 
 MOMENTS = 'ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"'
 INERTIAL = f'<inertial><origin xyz="0 0 0.1"/><mass value="2"/><inertia {MOMENTS}/></inertial>'
@@ -318,7 +318,7 @@ def test_large_nonsense_is_refused_fast(text):
 
 
 def test_a_text_over_the_size_limit_is_refused(monkeypatch):
-    monkeypatch.setattr("pathcontrol.robot.urdf.parse.MAX_BYTES", len(ARM) - 1)
+    monkeypatch.setattr("pathcontrol.robot.urdf.xml.parse.MAX_BYTES", len(ARM) - 1)
     with pytest.raises(UrdfError, match=f"{len(ARM)} bytes"):
         parse_urdf(ARM)
 

@@ -10,8 +10,8 @@ from typing import Any
 from pathcontrol._files import read_bounded
 from pathcontrol.errors import MissingExtraError, UnknownNameError, UrdfError
 from pathcontrol.robot.model import UrdfSource
-from pathcontrol.robot.urdf.encoding import decoded
-from pathcontrol.robot.urdf.parse import MAX_BYTES
+from pathcontrol.robot.urdf.xml.encoding import decoded
+from pathcontrol.robot.urdf.xml.parse import MAX_BYTES
 
 _OWN_NAME = re.compile(r"<robot\b[^>]*?\sname\s*=\s*[\"']([^\"']*)[\"']")
 

@@ -15,12 +15,12 @@ from pathcontrol.errors import PathControlWarning, UrdfError
 from pathcontrol.robot.lump import Lump, ball, combined
 from pathcontrol.robot.meshes import load_parts
 from pathcontrol.robot.model import UrdfSource
-from pathcontrol.robot.urdf.arm import moving_bodies, read_arm
-from pathcontrol.robot.urdf.finding import shown
-from pathcontrol.robot.urdf.form import check_form
+from pathcontrol.robot.urdf.checks.finding import shown
+from pathcontrol.robot.urdf.checks.form import check_form
 from pathcontrol.robot.urdf.mesh_files import find_mesh
+from pathcontrol.robot.urdf.model_values import moving_bodies, read_arm
 from pathcontrol.robot.urdf.numbers import read_numbers
-from pathcontrol.robot.urdf.parse import parse_urdf
+from pathcontrol.robot.urdf.xml.parse import parse_urdf
 
 #: [kg/m³] of what a link's shape encloses, castings, motors and air: the median of ten arms of example-robot-data,
 #: which are between 375 (TIAGo) and 1890 (Z1)

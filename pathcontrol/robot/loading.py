@@ -17,9 +17,9 @@ from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Viscous
 from pathcontrol.robot.model import RobotModel, UrdfSource, build_model, with_locked
 from pathcontrol.robot.urdf import UrdfReport, check_urdf, parse_urdf
-from pathcontrol.robot.urdf.extension import extension_values
+from pathcontrol.robot.urdf.checks.extension import extension_values
 from pathcontrol.robot.urdf.locking import locked_angles, locked_beyond_limits
-from pathcontrol.robot.urdf.parse import Parsed, parse_and_mend
+from pathcontrol.robot.urdf.xml.parse import Parsed, parse_and_mend
 
 TOLD = ("inertia-negative",)  # warnings of the check that are worth hearing of each time, beside those of its XML
 _UNLIMITED = LARGEST  # some URDFs write 1.8e308 for "no limit"

@@ -23,7 +23,7 @@ from pathcontrol.robot.bodies import check_spread, idle_joints, payload_of, scal
 from pathcontrol.robot.friction import FrictionLaw, check_consistent, no_friction
 from pathcontrol.robot.rigid_body import RigidBody, together
 from pathcontrol.robot.urdf.locking import check_tip, locked_angles, locked_beyond_limits, names_to_keep
-from pathcontrol.robot.urdf.parse import parse_urdf
+from pathcontrol.robot.urdf.xml.parse import parse_urdf
 
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED  # the frame's origin, axes parallel to the base's
 

@@ -5,7 +5,7 @@ The text becomes an element (:mod:`.parse`), whose form is checked (:mod:`.form`
 """
 
 from pathcontrol.robot.urdf.check import check_urdf
-from pathcontrol.robot.urdf.finding import Finding, UrdfReport
-from pathcontrol.robot.urdf.parse import parse_urdf
+from pathcontrol.robot.urdf.checks.finding import Finding, UrdfReport
+from pathcontrol.robot.urdf.xml.parse import parse_urdf
 
 __all__ = ["Finding", "UrdfReport", "check_urdf", "parse_urdf"]

@@ -10,17 +10,11 @@ from pathlib import Path
 
 from pathcontrol._files import read_bounded
 from pathcontrol.errors import InputError, UrdfError
-from pathcontrol.robot.urdf.arm import read_arm
-from pathcontrol.robot.urdf.elements import MOVABLE_TYPES, names_of
-from pathcontrol.robot.urdf.encoding import decoded
-from pathcontrol.robot.urdf.extension import check_extension
-from pathcontrol.robot.urdf.finding import Finding, Level, UrdfReport, shown
-from pathcontrol.robot.urdf.form import check_form
-from pathcontrol.robot.urdf.inertia import check_inertials, check_inertias, check_mass_matrix, check_masses
-from pathcontrol.robot.urdf.locking import locked_angles
-from pathcontrol.robot.urdf.parse import MAX_BYTES, parse_and_mend
-from pathcontrol.robot.urdf.shapes import check_meshes, check_shapes
-from pathcontrol.robot.urdf.values import (
+from pathcontrol.robot.urdf.checks.extension import check_extension
+from pathcontrol.robot.urdf.checks.finding import Finding, Level, UrdfReport, shown
+from pathcontrol.robot.urdf.checks.form import check_form
+from pathcontrol.robot.urdf.checks.inertia import check_inertials, check_inertias, check_mass_matrix, check_masses
+from pathcontrol.robot.urdf.checks.joints import (
     check_axes,
     check_dynamics,
     check_efforts,
@@ -28,6 +22,12 @@ from pathcontrol.robot.urdf.values import (
     check_limits,
     check_mimics,
 )
+from pathcontrol.robot.urdf.checks.visuals import check_meshes, check_shapes
+from pathcontrol.robot.urdf.elements import MOVABLE_TYPES, names_of
+from pathcontrol.robot.urdf.locking import locked_angles
+from pathcontrol.robot.urdf.model_values import read_arm
+from pathcontrol.robot.urdf.xml.encoding import decoded
+from pathcontrol.robot.urdf.xml.parse import MAX_BYTES, parse_and_mend
 
 _ORDER: tuple[Level, ...] = ("error", "warning", "note")
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pathcontrol.robot.urdf.arm import Arm, Body, link_pose, moving_bodies
 from pathcontrol.robot.urdf.links import Inertial
+from pathcontrol.robot.urdf.model_values import Arm, Body, link_pose, moving_bodies
 
 GRAVITY = 9.81  # m/s^2, against the z axis of the root link
 POSTURES = 400

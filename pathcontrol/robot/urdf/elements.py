@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from lxml import etree
 
-from pathcontrol.robot.urdf.finding import place
+from pathcontrol.robot.urdf.checks.finding import place
 
 MOVABLE_TYPES = ("revolute", "continuous", "prismatic")
 JOINT_TYPES = (*MOVABLE_TYPES, "fixed", "floating", "planar")

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from lxml import etree
 
 from pathcontrol._arrays import LARGEST
+from pathcontrol.robot.urdf.checks.finding import Finding, shown
 from pathcontrol.robot.urdf.elements import MOMENTS, first, links_and_joints, place_of
-from pathcontrol.robot.urdf.finding import Finding, shown
 
 MAX_DIGITS = 400
 ABSURD = LARGEST

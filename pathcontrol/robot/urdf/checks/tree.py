@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 from lxml import etree
 
+from pathcontrol.robot.urdf.checks.finding import Finding, place, shown
 from pathcontrol.robot.urdf.elements import place_of
-from pathcontrol.robot.urdf.finding import Finding, place, shown
 
 
 def check_ends(root: etree._Element) -> Iterator[Finding]:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 from lxml import etree
 
+from pathcontrol.robot.urdf.checks.finding import Finding, shown
 from pathcontrol.robot.urdf.elements import MOMENTS, first, links_and_joints, place_of
-from pathcontrol.robot.urdf.finding import Finding, shown
 
 _REQUIRED_ATTRIBUTES: dict[str, dict[str, tuple[str, ...]]] = {
     "link": {"inertial/mass": ("value",), "inertial/inertia": MOMENTS},

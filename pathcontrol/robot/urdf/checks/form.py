@@ -13,11 +13,11 @@ from collections.abc import Iterator
 
 from lxml import etree
 
+from pathcontrol.robot.urdf.checks.finding import Finding, place, shown
+from pathcontrol.robot.urdf.checks.parts import check_quaternions, check_repeated, check_required
+from pathcontrol.robot.urdf.checks.tree import check_ends, check_tree
 from pathcontrol.robot.urdf.elements import JOINT_TYPES, place_of
-from pathcontrol.robot.urdf.finding import Finding, place, shown
 from pathcontrol.robot.urdf.numbers import check_numbers
-from pathcontrol.robot.urdf.parts import check_quaternions, check_repeated, check_required
-from pathcontrol.robot.urdf.tree import check_ends, check_tree
 
 MAX_LINKS = 1000  # the reader recurses: a chain of some thousand links ends the process
 VERSIONS = ("1.0", "1.1", "1.2")

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 from lxml import etree
 
-from pathcontrol.robot.urdf.finding import Finding, shown
-from pathcontrol.robot.urdf.prolog import COMMENT, end_of_prolog
+from pathcontrol.robot.urdf.checks.finding import Finding, shown
+from pathcontrol.robot.urdf.xml.prolog import COMMENT, end_of_prolog
 
 _DECLARATION = re.compile(r"<\?xml\s(?P<inside>.*?)\?>", re.DOTALL)
 _VERSION = re.compile(r"""version\s*=\s*["']([^"']*)["']""")

@@ -9,9 +9,9 @@ from typing import NamedTuple
 from lxml import etree
 
 from pathcontrol.errors import UrdfError
-from pathcontrol.robot.urdf.finding import Finding, shown
-from pathcontrol.robot.urdf.mending import mended, parser
-from pathcontrol.robot.urdf.prolog import COMMENT, INSTRUCTION, end_of_prolog
+from pathcontrol.robot.urdf.checks.finding import Finding, shown
+from pathcontrol.robot.urdf.xml.mending import mended, parser
+from pathcontrol.robot.urdf.xml.prolog import COMMENT, INSTRUCTION, end_of_prolog
 
 MAX_BYTES = 64 * 2**20
 _LONGEST = 200  # characters of what the parser says

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 
 from lxml import etree
 
+from pathcontrol.robot.urdf.checks.finding import Finding, shown
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES
-from pathcontrol.robot.urdf.finding import Finding, shown
 from pathcontrol.robot.urdf.numbers import ABSURD, read_numbers
 
 #: the attributes of each element, all required

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pathcontrol.robot.urdf.arm import Arm, has_direction, moving_bodies
+from pathcontrol.robot.urdf.checks.finding import Finding, place, shown
 from pathcontrol.robot.urdf.dynamics import dynamics, postures
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES
-from pathcontrol.robot.urdf.finding import Finding, place, shown
 from pathcontrol.robot.urdf.links import Joint, Limit
+from pathcontrol.robot.urdf.model_values import Arm, has_direction, moving_bodies
 from pathcontrol.robot.urdf.numbers import ABSURD
 
 UNIT_TOLERANCE = 1e-3

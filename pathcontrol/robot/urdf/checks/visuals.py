@@ -9,8 +9,8 @@ from pathlib import Path
 from lxml import etree
 
 from pathcontrol.errors import UrdfError
+from pathcontrol.robot.urdf.checks.finding import Finding, shown
 from pathcontrol.robot.urdf.elements import place_of
-from pathcontrol.robot.urdf.finding import Finding, shown
 from pathcontrol.robot.urdf.mesh_files import find_mesh, may_be_found
 from pathcontrol.robot.urdf.mesh_names import is_local
 from pathcontrol.robot.urdf.numbers import POSE, read_numbers

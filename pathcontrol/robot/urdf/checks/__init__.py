@@ -1,0 +1,1 @@
+"""Checks of a robot description, each of one kind of fault."""
