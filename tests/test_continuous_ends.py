@@ -11,7 +11,7 @@ from pathcontrol.analysis.lyapunov import lyapunov
 from pathcontrol.control.projection import Projection
 from pathcontrol.errors import SimulationError, TaskError
 from pathcontrol.robot.loading import load_robot
-from pathcontrol.simulation.modes import ContinuousTime
+from pathcontrol.simulation.loops import ContinuousTime
 from pathcontrol.simulation.simulate import simulate
 from pathcontrol.tasks.check import check_task
 from pathcontrol.tasks.curves import Circle, Line

@@ -25,7 +25,7 @@ from pathcontrol._files import locked, scratch_folder, whole_file
 from pathcontrol.cli import main
 from pathcontrol.errors import InputError, PathControlError, PathControlWarning
 from pathcontrol.experiments.sweep_runner import run_sweep
-from pathcontrol.simulation.saved.netcdf import read_run, write_run
+from pathcontrol.simulation.storage.netcdf import read_run, write_run
 
 pytest.importorskip("pyarrow")
 

@@ -12,9 +12,9 @@ from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion import ComputedTorque
 from pathcontrol.robot.friction import Coulomb, Viscous
 from pathcontrol.robot.loading import load_robot
-from pathcontrol.simulation.damping import Damping
-from pathcontrol.simulation.modes import SampledLoop
-from pathcontrol.simulation.plant import Plant
+from pathcontrol.simulation.arm.damping import Damping
+from pathcontrol.simulation.arm.plant import Plant
+from pathcontrol.simulation.loops import SampledLoop
 from pathcontrol.simulation.simulate import simulate
 from pathcontrol.tasks.curves import Lissajous
 

@@ -15,7 +15,7 @@ from pathcontrol.engine.library import load_library
 from pathcontrol.engine.structs import Memory
 from pathcontrol.errors import EngineError
 from pathcontrol.robot.constants import arm_constants, frame_carrier
-from pathcontrol.simulation.dry_friction import stick_slip
+from pathcontrol.simulation.arm.dry_friction import stick_slip
 
 ARMS = [(seed, joints) for seed, joints in enumerate([1, 2, 3, 4, 5, 6, 7, 9, 12, 16, 6, 7])]
 

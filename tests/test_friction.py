@@ -12,8 +12,8 @@ from scipy.optimize import lsq_linear
 
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import Coulomb, FrictionSum, Stribeck, Viscous, no_friction
-from pathcontrol.simulation import dry_friction
-from pathcontrol.simulation.dry_friction import stick_slip
+from pathcontrol.simulation.arm import dry_friction
+from pathcontrol.simulation.arm.dry_friction import stick_slip
 
 EPS = np.finfo(float).eps
 

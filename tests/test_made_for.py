@@ -7,8 +7,8 @@ import pytest
 
 import pathcontrol as pc
 from pathcontrol.analysis.deviation import tool_positions
-from pathcontrol.simulation.saved.shelf import Shelf
-from pathcontrol.simulation.saved.tasks import task_of, task_recipe
+from pathcontrol.simulation.storage.array_store import Shelf
+from pathcontrol.simulation.storage.task_recipes import task_of, task_recipe
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.view.film.casting import cast_takes
 from pathcontrol.view.tool import default_tool, with_tool

@@ -8,8 +8,8 @@ import pytest
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.robot.friction import Viscous
 from pathcontrol.robot.loading import load_robot
-from pathcontrol.simulation.modes import SampledLoop
-from pathcontrol.simulation.plant import Plant
+from pathcontrol.simulation.arm.plant import Plant
+from pathcontrol.simulation.loops import SampledLoop
 from pathcontrol.simulation.simulate import simulate
 from pathcontrol.tasks.curves import Circle
 

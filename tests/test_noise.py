@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from pathcontrol import Circle, ExtendedMotionPlan, InputError, Run, SampledLoop, SensorNoise, load_robot, simulate
-from pathcontrol.simulation.noise import NoiseSource
+from pathcontrol.simulation.arm.noise import NoiseSource
 
 START = np.deg2rad([40.0, 70.0])
 ARM = load_robot("cicese_2dof")

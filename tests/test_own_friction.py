@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import FrictionLaw, Stribeck
 from pathcontrol.robot.loading import load_robot
-from pathcontrol.simulation.plant import Plant
+from pathcontrol.simulation.arm.plant import Plant
 
 
 @dataclass(frozen=True, eq=False)

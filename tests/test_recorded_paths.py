@@ -37,8 +37,8 @@ from pathcontrol import (
     time_optimal,
 )
 from pathcontrol.geometry.hermite import piecewise, sampled
-from pathcontrol.simulation.saved.shelf import Shelf
-from pathcontrol.simulation.saved.tasks import task_of, task_recipe
+from pathcontrol.simulation.storage.array_store import Shelf
+from pathcontrol.simulation.storage.task_recipes import task_of, task_recipe
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.recorded import RecordedPath, RecordedProfile
 

@@ -21,7 +21,7 @@ import pathcontrol as pc
 from pathcontrol import Circle, InputError, RobotModel, Run, metrics
 from pathcontrol.analysis.metrics import LABELS, UNITS
 from pathcontrol.analysis.readable import reading
-from pathcontrol.simulation.origin import Origin
+from pathcontrol.simulation.context import Origin
 from pathcontrol.view.report.pictures import pictures
 from pathcontrol.view.report.report import report
 from pathcontrol.view.report.sections import _section

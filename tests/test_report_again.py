@@ -12,7 +12,7 @@ from lxml import html
 
 import pathcontrol as pc
 from pathcontrol import Circle, RobotModel, Run
-from pathcontrol.simulation.origin import Origin
+from pathcontrol.simulation.context import Origin
 from pathcontrol.view.report.code import call
 from pathcontrol.view.report.report import report
 from pathcontrol.view.report.reproduction import recipe

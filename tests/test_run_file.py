@@ -40,11 +40,11 @@ from pathcontrol.analysis.deviation import tool_positions
 from pathcontrol.experiments.runner import run_experiment
 from pathcontrol.experiments.template import example_text
 from pathcontrol.robot.recipe import recipe_of
-from pathcontrol.simulation.saved.contours import contour_of, contour_recipe
-from pathcontrol.simulation.saved.netcdf import read_run, write_run
-from pathcontrol.simulation.saved.shelf import Shelf
+from pathcontrol.simulation.storage.array_store import Shelf
+from pathcontrol.simulation.storage.netcdf import read_run, write_run
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.toolpaths.contour import Contour
+from pathcontrol.toolpaths.recipes import contour_of, contour_recipe
 from pathcontrol.toolpaths.segments.arc import Arc
 from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier

@@ -27,9 +27,9 @@ from pathcontrol import (
 )
 from pathcontrol.experiments.reproduce import paper_controllers
 from pathcontrol.simulation import recorder
+from pathcontrol.simulation.arm.sensors import Sensors
 from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sampled import _periods_and_rest
-from pathcontrol.simulation.sensors import Sensors
 
 START = np.deg2rad([40.0, 70.0])
 

@@ -13,7 +13,7 @@ from scipy import stats
 import pathcontrol as pc
 from pathcontrol.analysis.remarks import remarks
 from pathcontrol.errors import PathControlWarning
-from pathcontrol.simulation.slips import warn_of_slips
+from pathcontrol.simulation.checks.slips import warn_of_slips
 
 DEGREES = [0.0, -90.0, 90.0, -90.0, -90.0, 0.0]
 

@@ -12,12 +12,12 @@ from pathcontrol.control.projection import Projection
 from pathcontrol.errors import PathControlWarning, SimulationError
 from pathcontrol.robot.friction import Stribeck, Viscous
 from pathcontrol.robot.loading import load_robot
-from pathcontrol.simulation.disturbance import Disturbance, Push
-from pathcontrol.simulation.fast_modes import rate_of_arm, rate_of_friction
-from pathcontrol.simulation.modes import ContinuousTime, SampledLoop
+from pathcontrol.simulation.arm.disturbance import Disturbance, Push
+from pathcontrol.simulation.checks.fast_modes import rate_of_arm, rate_of_friction
+from pathcontrol.simulation.checks.too_long import warn_of_steps
+from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
 from pathcontrol.simulation.sequence import simulate_sequence
 from pathcontrol.simulation.simulate import simulate
-from pathcontrol.simulation.too_long import warn_of_steps
 from pathcontrol.tasks.curves import Circle, Line
 
 ARM = load_robot("cicese_2dof")

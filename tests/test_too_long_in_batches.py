@@ -8,7 +8,7 @@ from scipy import stats
 
 import pathcontrol as pc
 from pathcontrol.robot.friction import of_rollout
-from pathcontrol.simulation.too_long import StepWarning, warn_of_steps
+from pathcontrol.simulation.checks.too_long import StepWarning, warn_of_steps
 
 ARM = pc.load_robot("cicese_2dof").with_friction(None)
 CIRCLE = pc.Circle(1.0, 2.0)

@@ -15,8 +15,8 @@ from pathcontrol.engine.library import load_library
 from pathcontrol.errors import EngineError, InputError, TaskError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.robot.recipe import recipe_of, robot_of
-from pathcontrol.simulation.origin import Stored
-from pathcontrol.simulation.saved.netcdf import read_run, write_run
+from pathcontrol.simulation.context import Stored
+from pathcontrol.simulation.storage.netcdf import read_run, write_run
 from pathcontrol.tasks.recorded import RecordedPath
 
 ROBOT = pc.load_robot("cicese_2dof")

@@ -12,8 +12,8 @@ from pathcontrol.control.projection import Projection
 from pathcontrol.errors import SimulationError
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.simulation import continuous
-from pathcontrol.simulation.disturbance import Harmonic
-from pathcontrol.simulation.modes import ContinuousTime
+from pathcontrol.simulation.arm.disturbance import Harmonic
+from pathcontrol.simulation.loops import ContinuousTime
 from pathcontrol.simulation.simulate import simulate
 from pathcontrol.tasks.curves import Circle
 

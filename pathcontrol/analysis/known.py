@@ -12,7 +12,7 @@ from pathcontrol._expect import expect
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.closest_point.cells import FARTHEST
-from pathcontrol.simulation.origin import check_sequence
+from pathcontrol.simulation.context import check_sequence
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import TaskBatch

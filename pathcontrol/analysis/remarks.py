@@ -9,7 +9,7 @@ from pathcontrol.analysis.progress import ENOUGH, progress
 from pathcontrol.analysis.window import samples_of
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.record import laws
+from pathcontrol.simulation.config import laws
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.batch import TaskBatch
 

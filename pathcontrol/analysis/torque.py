@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.limit_shares import limits_of_each
 from pathcontrol.analysis.window import Samples
-from pathcontrol.simulation.record import laws
+from pathcontrol.simulation.config import laws
 from pathcontrol.simulation.run import Run
 
 _DEMAND = "tau_demand"

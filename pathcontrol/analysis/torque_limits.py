@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.simulation.record import table
+from pathcontrol.simulation.config import table
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel

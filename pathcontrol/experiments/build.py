@@ -23,7 +23,7 @@ from pathcontrol.experiments.keyed import keyed, refuse_unit, users_code
 from pathcontrol.experiments.schema import Experiment, Output
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.engines import Engine
-from pathcontrol.simulation.modes import ContinuousTime, SampledLoop, torque_limits
+from pathcontrol.simulation.loops import ContinuousTime, SampledLoop, torque_limits
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.sequence import PathSequence
 

@@ -22,7 +22,7 @@ from pathcontrol.errors import EngineError
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.engines import Engine
-from pathcontrol.simulation.modes import SampledLoop
+from pathcontrol.simulation.loops import SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
 from pathcontrol.tasks.curves import Circle

@@ -27,7 +27,7 @@ from pathcontrol.experiments.reproduce import (
 from pathcontrol.robot.friction import Coulomb, Viscous
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.modes import SampledLoop
+from pathcontrol.simulation.loops import SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.sweeps.manifest import versions
 from pathcontrol.sweeps.result import SweepResult

@@ -28,13 +28,13 @@ from pathcontrol.engine.structs import (
 from pathcontrol.engine.structs import Disturbance as DisturbanceStruct
 from pathcontrol.errors import EngineError
 from pathcontrol.robot.constants import frame_carrier
-from pathcontrol.simulation.disturbance import Disturbance, FrameForce, Harmonic, Push, terms_of
+from pathcontrol.simulation.arm.disturbance import Disturbance, FrameForce, Harmonic, Push, terms_of
+from pathcontrol.simulation.arm.noise import NoiseSource
+from pathcontrol.simulation.arm.plant import has_strong_friction
 from pathcontrol.simulation.divergence import BEYOND, NO_NUMBERS, Divergence
 from pathcontrol.simulation.finish import AfterLaps, AtEnd, Finish, known_finished
-from pathcontrol.simulation.modes import Arm as SimulatedArm
-from pathcontrol.simulation.modes import Outside, SampledLoop, check_rows
-from pathcontrol.simulation.noise import NoiseSource
-from pathcontrol.simulation.plant import has_strong_friction
+from pathcontrol.simulation.loops import Arm as SimulatedArm
+from pathcontrol.simulation.loops import Outside, SampledLoop, check_rows
 from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sampled import Actuator
 

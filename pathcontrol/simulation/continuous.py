@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller, ControlOutput
-from pathcontrol.simulation.disturbance import Disturbance
+from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.arm.sensors import Reading
 from pathcontrol.simulation.divergence import CRAWLED, NO_NUMBERS, STOPPED, Divergence, sound
 from pathcontrol.simulation.finish import Finish
-from pathcontrol.simulation.modes import Arm, ContinuousTime, Outside, check_rows, torque_limits
+from pathcontrol.simulation.loops import Arm, ContinuousTime, Outside, check_rows, torque_limits
 from pathcontrol.simulation.recorder import Recorder
-from pathcontrol.simulation.sensors import Reading
 
 if TYPE_CHECKING:
     from scipy.integrate import LSODA

@@ -10,7 +10,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import SimulationError
-from pathcontrol.simulation.sensors import Reading
+from pathcontrol.simulation.arm.sensors import Reading
 
 _ABSURD = 1e6  # rad and rad/s, beyond any arm
 BEYOND = (

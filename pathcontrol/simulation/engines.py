@@ -13,7 +13,7 @@ from pathcontrol.engine.library import load_library
 from pathcontrol.errors import EngineError, PathControlWarning, UnknownNameError
 from pathcontrol.simulation.compiled import CompiledArm, CompiledPlant
 from pathcontrol.simulation.continuous import ContinuousArm
-from pathcontrol.simulation.modes import Arm, ContinuousTime, Outside, SampledLoop
+from pathcontrol.simulation.loops import Arm, ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.sampled import SampledArm
 
 Engine = Literal["auto", "compiled", "pinocchio"]

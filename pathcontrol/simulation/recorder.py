@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import ControlOutput
-from pathcontrol.simulation.sensors import Reading
+from pathcontrol.simulation.arm.sensors import Reading
 from pathcontrol.simulation.variables import VARIABLES
 
 _ROOM = 1 << 30  # bytes at first; what is not written to takes no memory

@@ -14,8 +14,8 @@ from pathcontrol._suffixes import check_suffix
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.origin import Origin, Stored, check_sequence
-from pathcontrol.simulation.record import laws, table
+from pathcontrol.simulation.config import laws, table
+from pathcontrol.simulation.context import Origin, Stored, check_sequence
 from pathcontrol.simulation.samples import Samples, complete_outcome, label_outcome
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 from pathcontrol.tasks.base import PathTask
@@ -277,7 +277,7 @@ class Run:
             InputError: the name does not end with ``.nc``; the message names what writes other formats.
             OSError: the file cannot be written, as on a full disk; what was there before stays.
         """
-        from pathcontrol.simulation.saved.netcdf import write_run  # loads xarray and HDF5
+        from pathcontrol.simulation.storage.netcdf import write_run  # loads xarray and HDF5
 
         path = check_suffix(path, "a run", ".nc")
         write_run(path, self.data, self.config, self._stored())
@@ -290,7 +290,7 @@ class Run:
         Raises:
             InputError: there is no such file, it is damaged, or it is not a saved run.
         """
-        from pathcontrol.simulation.saved.netcdf import read_run  # loads xarray and HDF5
+        from pathcontrol.simulation.storage.netcdf import read_run  # loads xarray and HDF5
 
         data, config, stored = read_run(Path(path))
         return cls(data, config, None if stored is None else Origin.load(stored))

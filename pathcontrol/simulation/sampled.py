@@ -11,13 +11,13 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
+from pathcontrol.simulation.arm.noise import NoiseSource
+from pathcontrol.simulation.arm.plant import Plant
+from pathcontrol.simulation.arm.sensors import Reading
 from pathcontrol.simulation.divergence import Divergence
 from pathcontrol.simulation.finish import Finish
-from pathcontrol.simulation.modes import Arm, Outside, SampledLoop, check_rows, torque_limits
-from pathcontrol.simulation.noise import NoiseSource
-from pathcontrol.simulation.plant import Plant
+from pathcontrol.simulation.loops import Arm, Outside, SampledLoop, check_rows, torque_limits
 from pathcontrol.simulation.recorder import Recorder
-from pathcontrol.simulation.sensors import Reading
 
 _UPDATE_EVERY = 64  # ticks between updates of the progress bar
 

@@ -13,13 +13,7 @@ from pathcontrol._expect import described, expect
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.disturbance import Disturbance, check_disturbance
-from pathcontrol.simulation.divergence import Divergence
-from pathcontrol.simulation.engines import Engine, check_engine, choose_engine
-from pathcontrol.simulation.finish import Finish, finish_of
-from pathcontrol.simulation.modes import ContinuousTime, Outside, SampledLoop
-from pathcontrol.simulation.run import Run
-from pathcontrol.simulation.setup import (
+from pathcontrol.simulation.arguments import (
     check_joints,
     check_law,
     check_length,
@@ -30,8 +24,14 @@ from pathcontrol.simulation.setup import (
     plant_of,
     record_of,
 )
-from pathcontrol.simulation.slips import warn_of_slips
-from pathcontrol.simulation.too_long import warn_of_steps
+from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
+from pathcontrol.simulation.checks.slips import warn_of_slips
+from pathcontrol.simulation.checks.too_long import warn_of_steps
+from pathcontrol.simulation.divergence import Divergence
+from pathcontrol.simulation.engines import Engine, check_engine, choose_engine
+from pathcontrol.simulation.finish import Finish, finish_of
+from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
+from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import refuse_batch
 from pathcontrol.tasks.laps import Laps

@@ -11,12 +11,7 @@ from pathcontrol._arrays import scalar
 from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.disturbance import Disturbance, check_disturbance
-from pathcontrol.simulation.engines import Engine, check_engine, choose_engine
-from pathcontrol.simulation.finish import Until, finish_of, first_and_last, whole_laps
-from pathcontrol.simulation.modes import ContinuousTime, Outside, SampledLoop
-from pathcontrol.simulation.run import Run
-from pathcontrol.simulation.setup import (
+from pathcontrol.simulation.arguments import (
     check_joints,
     check_length,
     checked_loop,
@@ -28,8 +23,13 @@ from pathcontrol.simulation.setup import (
     start_of_each,
     states_of_each,
 )
-from pathcontrol.simulation.slips import warn_if_still, warn_of_slips
-from pathcontrol.simulation.too_long import warn_of_steps
+from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
+from pathcontrol.simulation.checks.slips import warn_if_still, warn_of_slips
+from pathcontrol.simulation.checks.too_long import warn_of_steps
+from pathcontrol.simulation.engines import Engine, check_engine, choose_engine
+from pathcontrol.simulation.finish import Until, finish_of, first_and_last, whole_laps
+from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
+from pathcontrol.simulation.run import Run
 
 
 def simulate(

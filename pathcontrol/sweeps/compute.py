@@ -14,7 +14,7 @@ from pathcontrol.analysis.progress import unfinished
 from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError, SimulationError, UnknownNameError
 from pathcontrol.simulation.engines import Engine
-from pathcontrol.simulation.modes import SampledLoop
+from pathcontrol.simulation.loops import SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
 from pathcontrol.sweeps.keep import Keep

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import cloudpickle
 
 from pathcontrol.errors import InputError, PathControlError
-from pathcontrol.simulation.origin import Origin
+from pathcontrol.simulation.context import Origin
 from pathcontrol.simulation.run import Run
 from pathcontrol.sweeps.compute import Chunk, Job, Piece
 from pathcontrol.sweeps.luggage import Luggage

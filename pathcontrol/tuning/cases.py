@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.simulation.too_long import StepWarning
+from pathcontrol.simulation.checks.too_long import StepWarning
 from pathcontrol.sweeps.compute import Job
 from pathcontrol.sweeps.store import Store
 

@@ -10,7 +10,7 @@ import numpy as np
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.record import table
+from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import rows_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pathcontrol.simulation.record import laws, table
+from pathcontrol.simulation.config import laws, table
 from pathcontrol.view.film.take import Take
 
 _NAMES = {

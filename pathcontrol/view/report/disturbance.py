@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pathcontrol.simulation.described import is_whole
 from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.summaries import is_whole
 from pathcontrol.view.report.code import call
 
 #: the arguments of the disturbances of this package, and how many axes each has for a single rollout

@@ -6,9 +6,9 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from pathcontrol.simulation.described import is_whole
-from pathcontrol.simulation.record import laws, table
+from pathcontrol.simulation.config import laws, table
 from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.summaries import is_whole
 from pathcontrol.view.report.code import Name, call
 from pathcontrol.view.report.disturbance import disturbance_code
 from pathcontrol.view.report.downloads import Download, file_name, text_file

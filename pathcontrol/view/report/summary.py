@@ -18,7 +18,7 @@ from pathcontrol.analysis.readable import counted, reading, unit_of, without_rou
 from pathcontrol.analysis.torque import torque_metrics
 from pathcontrol.analysis.window import samples_of
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
-from pathcontrol.simulation.record import table
+from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.batch import TaskBatch
 from pathcontrol.tasks.sequence import PathSequence

@@ -14,7 +14,7 @@ from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.damping import Damping
+from pathcontrol.simulation.arm.damping import Damping
 from pathcontrol.tasks.base import PathTask
 
 _HALVINGS = 30

@@ -14,7 +14,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError, PathControlWarning
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.saved.shelf import Shelf
+from pathcontrol.simulation.storage.array_store import Shelf
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import TaskBatch
 from pathcontrol.tasks.laps import Laps
@@ -157,7 +157,9 @@ class Origin:
 
 def _recipe(task: PathTask | None, shelf: Shelf, upto: float) -> dict[str, Any] | None:
     """That of the task, or a warning: no run is lost because its path is odd."""
-    from pathcontrol.simulation.saved.tasks import task_recipe  # knows every kind of task: only files need that
+    from pathcontrol.simulation.storage.task_recipes import (
+        task_recipe,  # knows every kind of task: only files need that
+    )
 
     if task is None:
         return None
@@ -183,7 +185,7 @@ def _model(stored: Stored) -> RobotModel | None:
 
 
 def _task(stored: Stored) -> PathTask | None:
-    from pathcontrol.simulation.saved.tasks import task_of
+    from pathcontrol.simulation.storage.task_recipes import task_of
 
     recipe = _part_of(stored, "task")
     return None if recipe is None else task_of(recipe, Shelf(stored.numbers))

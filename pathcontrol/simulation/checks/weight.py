@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.modes import Arm
+from pathcontrol.simulation.loops import Arm
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import TaskBatch
 

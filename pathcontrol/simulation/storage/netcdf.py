@@ -17,9 +17,9 @@ from xarray.backends import H5NetCDFStore
 
 from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError, PathControlWarning
-from pathcontrol.simulation.origin import Stored
-from pathcontrol.simulation.saved.form import check_form, check_sizes
-from pathcontrol.simulation.saved.seal import check_seal, digest_of, seal
+from pathcontrol.simulation.context import Stored
+from pathcontrol.simulation.storage.file_form import check_form, check_sizes
+from pathcontrol.simulation.storage.seal import check_seal, digest_of, seal
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 
 _CONFIG = "pathcontrol_config"

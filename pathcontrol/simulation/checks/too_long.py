@@ -16,11 +16,11 @@ from pathcontrol.control.motion import PDPlus, SlotineLi
 from pathcontrol.errors import PathControlWarning
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.disturbance import Disturbance
-from pathcontrol.simulation.extreme_arms import arm_of, most_mobile
-from pathcontrol.simulation.fast_modes import rate_of_arm, rate_of_friction, rates_of_disturbance, with_damping
-from pathcontrol.simulation.held_gains import feedbacks, longest_period, plan_kick
-from pathcontrol.simulation.modes import MOST_SUBSTEPS, Arm, ContinuousTime, SampledLoop
+from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.checks.extreme_arms import arm_of, most_mobile
+from pathcontrol.simulation.checks.fast_modes import rate_of_arm, rate_of_friction, rates_of_disturbance, with_damping
+from pathcontrol.simulation.checks.held_gains import feedbacks, longest_period, plan_kick
+from pathcontrol.simulation.loops import MOST_SUBSTEPS, Arm, ContinuousTime, SampledLoop
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import TaskBatch
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
-from pathcontrol.simulation.saved.shelf import Shelf
+from pathcontrol.simulation.storage.array_store import Shelf
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.arc import Arc
 from pathcontrol.toolpaths.segments.base import Polyline, Segment

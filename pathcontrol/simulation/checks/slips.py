@@ -9,9 +9,9 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import PathControlWarning
 from pathcontrol.robot.batch import RobotBatch
-from pathcontrol.simulation.modes import Arm
+from pathcontrol.simulation.checks.weight import Along, weight_slip
+from pathcontrol.simulation.loops import Arm
 from pathcontrol.simulation.run import Run
-from pathcontrol.simulation.weight import Along, weight_slip
 from pathcontrol.tasks.base import PathTask
 
 _TURNS = 4 * np.pi  # rad, beyond which a joint without limits hardly starts

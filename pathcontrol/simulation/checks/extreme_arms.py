@@ -8,8 +8,8 @@ from pathcontrol._arrays import Array
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import levels_vary, of_rollout
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.fast_modes import steepest_fall
-from pathcontrol.simulation.modes import Arm
+from pathcontrol.simulation.checks.fast_modes import steepest_fall
+from pathcontrol.simulation.loops import Arm
 
 
 def arm_of(robot: Arm, rollout: int) -> RobotModel:

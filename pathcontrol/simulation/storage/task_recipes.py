@@ -16,10 +16,9 @@ from pathcontrol.cartesian.recorded_toolpath import RecordedToolpath
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.tabulated import TabulatedProfile
-from pathcontrol.simulation.saved.contours import contour_of, contour_recipe
-from pathcontrol.simulation.saved.extent import check_extent
-from pathcontrol.simulation.saved.shared import shared
-from pathcontrol.simulation.saved.shelf import Shelf
+from pathcontrol.simulation.storage.array_store import Shelf
+from pathcontrol.simulation.storage.recipe_size import check_extent
+from pathcontrol.simulation.storage.shared_recipes import shared
 from pathcontrol.tasks.base import PathTask, Reprofiled
 from pathcontrol.tasks.batch import TaskBatch
 from pathcontrol.tasks.curves import Circle, Ellipse, Line, Lissajous
@@ -28,6 +27,7 @@ from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, VelocityProfi
 from pathcontrol.tasks.recorded import RecordedPath, RecordedProfile, recorded_profile
 from pathcontrol.tasks.sequence import PathSequence
 from pathcontrol.tasks.transforms import PathSection, ReversedPath, ScaledPath, ShiftedPath
+from pathcontrol.toolpaths.recipes import contour_of, contour_recipe
 
 #: what is made again from its constructor's arguments, which are attributes of the same names
 _MADE: dict[type, tuple[str, ...]] = {

@@ -12,9 +12,9 @@ from pathcontrol._arrays import Array, as_array, finite, scalar
 from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.disturbance import Disturbance
-from pathcontrol.simulation.noise import SensorNoise
-from pathcontrol.simulation.sensors import Sensors
+from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.arm.noise import SensorNoise
+from pathcontrol.simulation.arm.sensors import Sensors
 
 MOST_SUBSTEPS = 10_000
 

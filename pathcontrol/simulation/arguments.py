@@ -17,9 +17,9 @@ from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.errors import InputError, PathControlError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.described import in_short
-from pathcontrol.simulation.disturbance import Disturbance
-from pathcontrol.simulation.modes import Arm, ContinuousTime, SampledLoop
+from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.loops import Arm, ContinuousTime, SampledLoop
+from pathcontrol.simulation.summaries import in_short
 from pathcontrol.simulation.variables import bytes_of_sample
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch import TaskBatch

@@ -13,7 +13,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.robot.friction import FrictionLaw, levels_vary
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.disturbance import Disturbance
+from pathcontrol.simulation.arm.disturbance import Disturbance
 
 _NUDGE = 1e-5  # rad and rad/s
 _TRIED_SPEED, _TRIED_ANGLE = 0.1, 1e-3  # rad/s and rad, by which a disturbance is tried

@@ -9,9 +9,9 @@ from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.damping import Damping
-from pathcontrol.simulation.dry_friction import stick_slip
-from pathcontrol.simulation.mobility import mobility
+from pathcontrol.simulation.arm.damping import Damping
+from pathcontrol.simulation.arm.dry_friction import stick_slip
+from pathcontrol.simulation.checks.mobility import mobility
 
 #: rate of viscous friction [1/s] up to which the trapezoidal rule does: that is off by (h × rate)²/12, 1e-5 in 2.5 ms
 _WEAK = 4.0

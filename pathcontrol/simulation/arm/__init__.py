@@ -1,0 +1,1 @@
+"""The simulated arm: its dynamics with friction, its sensors, and what disturbs it."""

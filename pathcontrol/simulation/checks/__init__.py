@@ -1,0 +1,1 @@
+"""What is told before a simulation begins: likely slips, periods and steps that are too long."""
