@@ -72,10 +72,10 @@ from .simulation.loops import SampledLoop as SampledLoop
 from .simulation.run import Run as Run
 from .simulation.sequence import simulate_sequence as simulate_sequence
 from .simulation.simulate import simulate as simulate
-from .sweeps.keep import Keep as Keep
+from .sweeps.histories import Keep as Keep
 from .sweeps.result import SweepResult as SweepResult
-from .sweeps.run import sweep as sweep
 from .sweeps.space import Space as Space
+from .sweeps.sweep import sweep as sweep
 from .tasks.base import PathPoint as PathPoint
 from .tasks.base import PathTask as PathTask
 from .tasks.batch import TaskBatch as TaskBatch

@@ -30,14 +30,14 @@ from pathcontrol.errors import ClusterError, InputError, MissingExtraError, Path
 from pathcontrol.experiments.load import read_toml
 from pathcontrol.experiments.sweep_runner import run_sweep
 from pathcontrol.experiments.swept import SweptExperiment
-from pathcontrol.sweeps import cluster as cluster_module
-from pathcontrol.sweeps import desk
-from pathcontrol.sweeps.compute import Job
+from pathcontrol.sweeps.chunk import Job
+from pathcontrol.sweeps.cluster.connection import connection as cluster_module
+from pathcontrol.sweeps.cluster.connection import dispatch as desk
 
 distributed = pytest.importorskip("distributed")
 cloudpickle = pytest.importorskip("cloudpickle")
 pytest.importorskip("pyarrow")
-Parcel = pytest.importorskip("pathcontrol.sweeps.parcel").Parcel
+Parcel = pytest.importorskip("pathcontrol.sweeps.cluster.shipping").Parcel
 
 ROBOT = pc.load_robot("cicese_2dof")
 CIRCLE = pc.Circle(1.0, 2.0)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from pathcontrol import InputError, UnknownNameError, non_dominated, pareto_figure, save_figure
-from pathcontrol.sweeps.goals import check_limits, check_objectives, costs, excess, front, within
+from pathcontrol.sweeps.objectives import check_limits, check_objectives, costs, excess, front, within
 
 # few different values, so that there are ties and duplicates; and any numbers at all
 VALUES = st.one_of(

@@ -28,7 +28,7 @@ from pathcontrol.experiments.sensitivity import (
 from pathcontrol.experiments.sensitivity_summary import NEAR, furthest, summarise
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.simulation.simulate import simulate
-from pathcontrol.sweeps import compute
+from pathcontrol.sweeps import chunk as compute
 
 PEAKS = ("e_p_peak_deg", "e_v_peak_deg_s")
 

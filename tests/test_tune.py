@@ -13,8 +13,8 @@ from scipy import stats
 
 import pathcontrol as pc
 from pathcontrol.errors import InputError, MissingExtraError, UnknownNameError
-from pathcontrol.sweeps.goals import excess
-from pathcontrol.tuning.terms import Terms
+from pathcontrol.sweeps.objectives import excess
+from pathcontrol.tuning.problem import Terms
 from pathcontrol.view.figures.style import INK
 
 pytest.importorskip("pymoo")

@@ -54,7 +54,7 @@ def command(
     """
     with uninterrupted():
         from pathcontrol.experiments.sweep_runner import run_sweep
-        from pathcontrol.sweeps.cluster import security_of
+        from pathcontrol.sweeps.cluster.connection import security_of
         from pathcontrol.sweeps.store import parquet
 
         parquet()

@@ -31,8 +31,8 @@ from pathcontrol.simulation.loops import SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.sweeps.manifest import versions
 from pathcontrol.sweeps.result import SweepResult
-from pathcontrol.sweeps.run import sweep
 from pathcontrol.sweeps.space import Space
+from pathcontrol.sweeps.sweep import sweep
 
 SAMPLES = 300
 _CHUNK = 50  # rollouts after which the progress bar moves, and that a killed process loses

@@ -13,11 +13,11 @@ from pathcontrol.experiments.load import invalid, load_experiment, read_toml
 from pathcontrol.experiments.sweep_section import SweepSection
 from pathcontrol.experiments.swept import SweptExperiment
 from pathcontrol.simulation.engines import Engine
-from pathcontrol.sweeps.cluster import connected
-from pathcontrol.sweeps.keep import Keep
+from pathcontrol.sweeps.cluster.connection import connected
+from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.result import SweepResult
-from pathcontrol.sweeps.run import sweep
 from pathcontrol.sweeps.space import Space
+from pathcontrol.sweeps.sweep import sweep
 
 if TYPE_CHECKING:
     from distributed import Client, Security

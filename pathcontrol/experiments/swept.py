@@ -29,7 +29,7 @@ from pathcontrol.experiments.schema import Experiment
 from pathcontrol.experiments.swept_tasks import SweptTask, joined, refuse_sequence, rows_together, swept_tasks
 from pathcontrol.experiments.values import shown
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.sweeps.luggage import Luggage
+from pathcontrol.sweeps.cluster.user_code import Luggage
 
 _GAIN = re.compile(r"controller\.(K_p|K_v|k|k_p|Lambda|K_d)(\[\d+\])?")
 _TOGETHER = re.compile(r"(start|plant|task)\.")  # what may differ from rollout to rollout of a batch, as gains may

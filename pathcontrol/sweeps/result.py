@@ -16,8 +16,8 @@ from pathcontrol.analysis.readable import readable_parameters
 from pathcontrol.errors import InputError, PathControlWarning
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.variables import OUTCOMES
-from pathcontrol.sweeps.goals import Limits, Objectives, front
-from pathcontrol.sweeps.keep import Keep
+from pathcontrol.sweeps.histories import Keep
+from pathcontrol.sweeps.objectives import Limits, Objectives, front
 from pathcontrol.sweeps.store import Store
 
 

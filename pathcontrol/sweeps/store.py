@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol._files import write_whole
 from pathcontrol.errors import InputError, MissingExtraError, PathControlWarning
-from pathcontrol.sweeps.compute import Chunk
-from pathcontrol.sweeps.keep import Keep
+from pathcontrol.sweeps.chunk import Chunk
+from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.manifest import MANIFEST, Manifest
 
 _HEX = "[0-9a-f]" * 8

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.simulation.checks.too_long import StepWarning
-from pathcontrol.sweeps.compute import Job
+from pathcontrol.sweeps.chunk import Job
 from pathcontrol.sweeps.store import Store
 
 

@@ -10,8 +10,8 @@ import xarray as xr
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import UnknownNameError
-from pathcontrol.sweeps.goals import costs, excess, failed, front, metric, within
-from pathcontrol.tuning.terms import Terms
+from pathcontrol.sweeps.objectives import costs, excess, failed, front, metric, within
+from pathcontrol.tuning.problem import Terms
 
 
 class Candidate(NamedTuple):

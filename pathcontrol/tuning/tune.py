@@ -16,17 +16,17 @@ from pathcontrol._expect import expect
 from pathcontrol._progress import progress_bar
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.simulation.engines import Engine, settle_engine
-from pathcontrol.sweeps.compute import OUTCOME, Build, Job, Measure, measure_of
-from pathcontrol.sweeps.goals import Limits, Objectives, check_limits, check_objectives
-from pathcontrol.sweeps.keep import Keep
+from pathcontrol.sweeps.chunk import OUTCOME, Build, Job, Measure, measure_of
+from pathcontrol.sweeps.histories import Keep
+from pathcontrol.sweeps.objectives import Limits, Objectives, check_limits, check_objectives
 from pathcontrol.sweeps.result import dataset
-from pathcontrol.sweeps.run import opened, told
 from pathcontrol.sweeps.space import MOST_NUMBERS, MOST_SAMPLES, Space, check_seed, check_whole, digest
 from pathcontrol.sweeps.store import Store
+from pathcontrol.sweeps.sweep import opened, told
 from pathcontrol.tuning.cases import Cases
+from pathcontrol.tuning.optimizer import Search
+from pathcontrol.tuning.problem import Reduce, Terms
 from pathcontrol.tuning.result import Tuning
-from pathcontrol.tuning.search import Search
-from pathcontrol.tuning.terms import Reduce, Terms
 
 
 def tune(

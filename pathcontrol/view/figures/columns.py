@@ -14,7 +14,7 @@ from pathcontrol._expect import expect
 from pathcontrol.analysis.metrics import LABELS
 from pathcontrol.analysis.readable import reading
 from pathcontrol.errors import InputError, UnknownNameError
-from pathcontrol.sweeps import goals
+from pathcontrol.sweeps import objectives as goals
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.view.figures.ticks import label_plainly
 

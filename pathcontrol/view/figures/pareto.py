@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.readable import readable_parameters
 from pathcontrol.errors import InputError
-from pathcontrol.sweeps.goals import Limits, check_limits, front, within
+from pathcontrol.sweeps.objectives import Limits, check_limits, front, within
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.tuning.result import Tuning
 from pathcontrol.view.figures.columns import (

@@ -17,7 +17,7 @@ from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.loops import SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
-from pathcontrol.sweeps.keep import Keep
+from pathcontrol.sweeps.histories import Keep
 
 Arguments = Mapping[str, Any]
 Parts = Sequence[tuple[NDArray[np.intp], Arguments]]

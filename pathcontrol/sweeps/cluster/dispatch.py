@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ClusterError, PathControlWarning
-from pathcontrol.sweeps.cluster import (
+from pathcontrol.sweeps.chunk import Chunk, Job, Piece
+from pathcontrol.sweeps.cluster.connection import (
     GoneError,
     NoAnswerError,
     all_idle,
@@ -26,12 +27,11 @@ from pathcontrol.sweeps.cluster import (
     other_versions,
     within,
 )
-from pathcontrol.sweeps.compute import Chunk, Job, Piece
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-    from pathcontrol.sweeps.parcel import Parcel
+    from pathcontrol.sweeps.cluster.shipping import Parcel
 
 _AHEAD = 2  # chunks for each worker: the one that it computes, and the next
 _PATIENCE = 10.0  # s, for a worker to answer
@@ -63,7 +63,7 @@ class Desk:
     def __init__(self, client: Client, job: Job) -> None:
         from distributed import as_completed
 
-        from pathcontrol.sweeps.parcel import Parcel
+        from pathcontrol.sweeps.cluster.shipping import Parcel
 
         self._client, self._parcel = client, Parcel.of(job, expected_versions())
         self._direct = _reachable(client)

@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from pathcontrol._arrays import Array
-from pathcontrol.sweeps.goals import costs, excess, failed, metric
-from pathcontrol.tuning.search import Told
+from pathcontrol.sweeps.objectives import costs, excess, failed, metric
+from pathcontrol.tuning.optimizer import Told
 
 #: how a metric over the scenarios becomes one number
 Reduce = Literal["worst", "mean"]

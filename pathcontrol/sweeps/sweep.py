@@ -18,10 +18,10 @@ from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.engines import Engine, settle_engine
-from pathcontrol.sweeps.cluster import connected
-from pathcontrol.sweeps.compute import Build, Chunk, Job, Measure, Piece, measure_of
-from pathcontrol.sweeps.desk import Desk
-from pathcontrol.sweeps.keep import Keep
+from pathcontrol.sweeps.chunk import Build, Chunk, Job, Measure, Piece, measure_of
+from pathcontrol.sweeps.cluster.connection import connected
+from pathcontrol.sweeps.cluster.dispatch import Desk
+from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.manifest import MANIFEST
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.sweeps.space import Space, check_seed, digest

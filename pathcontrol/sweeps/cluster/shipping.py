@@ -19,8 +19,8 @@ import cloudpickle
 from pathcontrol.errors import InputError, PathControlError
 from pathcontrol.simulation.context import Origin
 from pathcontrol.simulation.run import Run
-from pathcontrol.sweeps.compute import Chunk, Job, Piece
-from pathcontrol.sweeps.luggage import Luggage
+from pathcontrol.sweeps.chunk import Chunk, Job, Piece
+from pathcontrol.sweeps.cluster.user_code import Luggage
 from pathcontrol.sweeps.memory import keep_freed_memory
 
 _OURS = __name__.partition(".")[0]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from pathcontrol.sweeps.compute import Build
+from pathcontrol.sweeps.chunk import Build
 
 
 class Luggage(NamedTuple):
