@@ -23,8 +23,8 @@ from pathcontrol import (
     check_task,
     simulate,
 )
-from pathcontrol.tasks.concatenation import concatenated
 from pathcontrol.tasks.function import FunctionPath
+from pathcontrol.tasks.joined.concatenation import concatenated
 
 
 def one_sided(f, s, h):

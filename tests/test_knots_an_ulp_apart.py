@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 
 from pathcontrol.errors import TaskError
 from pathcontrol.profiles.limited.limited import limited
-from pathcontrol.tasks.concatenation import concatenated
 from pathcontrol.tasks.function import FunctionPath
+from pathcontrol.tasks.joined.concatenation import concatenated
 from pathcontrol.tasks.waypoints import WaypointPath
 
 

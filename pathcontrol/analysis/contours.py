@@ -17,7 +17,7 @@ from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.sequence import PathSequence
+from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.base import Polyline
 

@@ -20,7 +20,7 @@ from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.sequence import PathSequence
+from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour
 
 

@@ -14,8 +14,8 @@ from pathcontrol.engine.gamma import distances_to_gamma
 from pathcontrol.errors import EngineError, InputError, TaskError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.tasks.base import PathPoint, PathTask
-from pathcontrol.tasks.batch import TaskBatch
-from pathcontrol.tasks.sequence import PathSequence
+from pathcontrol.tasks.batch.task_batch import TaskBatch
+from pathcontrol.tasks.joined.sequence import PathSequence
 
 
 def distance_to_gamma(

@@ -15,8 +15,8 @@ from pathcontrol.geometry.closest_point.cells import FARTHEST
 from pathcontrol.simulation.context import check_sequence
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch import TaskBatch
-from pathcontrol.tasks.sequence import PathSequence
+from pathcontrol.tasks.batch.task_batch import TaskBatch
+from pathcontrol.tasks.joined.sequence import PathSequence
 
 
 def known_task(run: Run, task: PathTask | None) -> PathTask:

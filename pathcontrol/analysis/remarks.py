@@ -11,7 +11,7 @@ from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.config import laws
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.batch import TaskBatch
+from pathcontrol.tasks.batch.task_batch import TaskBatch
 
 _STILL = 1e-6  # rad or m, by which an arm that stands still may have moved
 _MOST = 3  # rollouts that are named

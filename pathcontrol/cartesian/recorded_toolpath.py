@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array, rigid
 from pathcontrol.cartesian.links import from_end_to_end
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.sequence import PathSequence
+from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.smoothing.smooth import Corners, Smoothed
 

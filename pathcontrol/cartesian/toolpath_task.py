@@ -15,7 +15,7 @@ from pathcontrol.cartesian.orientation import Orientation
 from pathcontrol.errors import InputError
 from pathcontrol.robot.extent import question_length
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.sequence import PathSequence
+from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.curve import ToolCurve
 from pathcontrol.toolpaths.segments.base import Polyline

@@ -10,7 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import UnknownNameError
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch import rows_of
+from pathcontrol.tasks.batch.task_batch import rows_of
 
 Branch = Literal["follow", "nearest", "local"]
 

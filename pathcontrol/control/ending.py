@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.tasks.base import PathPoint, PathTask
-from pathcontrol.tasks.batch import TaskBatch, of_each
+from pathcontrol.tasks.batch.task_batch import TaskBatch, of_each
 from pathcontrol.tasks.profile import END_TIME
 
 _SAMPLES = 257  # of the path, for its average speed

@@ -13,7 +13,7 @@ from pathcontrol.engine.library import load_library
 from pathcontrol.engine.settings import add_law
 from pathcontrol.engine.structs import Memory, Setup
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.batch import TaskBatch
+from pathcontrol.tasks.batch.task_batch import TaskBatch
 
 
 class ControlTick:

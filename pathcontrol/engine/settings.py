@@ -20,7 +20,7 @@ from pathcontrol.errors import EngineError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch import TaskBatch
+from pathcontrol.tasks.batch.task_batch import TaskBatch
 
 #: position and velocity gains of each law, by the names of its attributes, in the order of the engine's numbers
 GAINS: dict[type[Controller], tuple[str, str]] = {

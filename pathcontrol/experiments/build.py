@@ -25,7 +25,7 @@ from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop, torque_limits
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.sequence import PathSequence
+from pathcontrol.tasks.joined.sequence import PathSequence
 
 _LAWS: dict[str, type[Controller]] = {
     "extended_motion_plan": ExtendedMotionPlan,

@@ -22,7 +22,7 @@ from pathcontrol.simulation.loops import Arm, ContinuousTime, SampledLoop
 from pathcontrol.simulation.summaries import in_short
 from pathcontrol.simulation.variables import bytes_of_sample
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch import TaskBatch
+from pathcontrol.tasks.batch.task_batch import TaskBatch
 
 Loop = SampledLoop | ContinuousTime
 

@@ -16,9 +16,9 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.storage.array_store import Shelf
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch import TaskBatch
+from pathcontrol.tasks.batch.task_batch import TaskBatch
+from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.laps import Laps
-from pathcontrol.tasks.sequence import PathSequence
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,7 +12,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.control.ending import arrival_parameter
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch import of_each
+from pathcontrol.tasks.batch.task_batch import of_each
 
 Until = Literal["end", "duration"]
 

@@ -33,9 +33,9 @@ from pathcontrol.simulation.finish import Finish, finish_of
 from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch import refuse_batch
+from pathcontrol.tasks.batch.task_batch import refuse_batch
+from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.laps import Laps
-from pathcontrol.tasks.sequence import PathSequence
 
 
 class _Leg(NamedTuple):

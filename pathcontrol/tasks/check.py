@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array
 from pathcontrol._expect import described, expect
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch import TaskBatch
+from pathcontrol.tasks.batch.task_batch import TaskBatch
 
 _SAMPLES = 129
 _GOLDEN = (5**0.5 - 1) / 2

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch import refuse_batch
+from pathcontrol.tasks.batch.task_batch import refuse_batch
 
 
 class DerivedPath(PathTask):

@@ -20,12 +20,12 @@ from pathcontrol.simulation.storage.array_store import Shelf
 from pathcontrol.simulation.storage.recipe_size import check_extent
 from pathcontrol.simulation.storage.shared_recipes import shared
 from pathcontrol.tasks.base import PathTask, Reprofiled
-from pathcontrol.tasks.batch import TaskBatch
+from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.curves import Circle, Ellipse, Line, Lissajous
+from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, VelocityProfile
 from pathcontrol.tasks.recorded import RecordedPath, RecordedProfile, recorded_profile
-from pathcontrol.tasks.sequence import PathSequence
 from pathcontrol.tasks.transforms import PathSection, ReversedPath, ScaledPath, ShiftedPath
 from pathcontrol.toolpaths.recipes import contour_of, contour_recipe
 

@@ -13,7 +13,7 @@ from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch import rows_of
+from pathcontrol.tasks.batch.task_batch import rows_of
 from pathcontrol.view.bodies.sticks import stick_figure
 from pathcontrol.view.bodies.visuals import LinkVisual, link_visuals
 from pathcontrol.view.film.palette import run_color

@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.sequence import PathSequence
+from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.view.film.take import Take

@@ -11,7 +11,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.batch import TaskBatch
+from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.view.bodies.shapes import Color
 from pathcontrol.view.bodies.visuals import LinkVisual
 

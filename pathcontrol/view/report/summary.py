@@ -20,8 +20,8 @@ from pathcontrol.analysis.window import samples_of
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.batch import TaskBatch
-from pathcontrol.tasks.sequence import PathSequence
+from pathcontrol.tasks.batch.task_batch import TaskBatch
+from pathcontrol.tasks.joined.sequence import PathSequence
 
 #: how far from good a value is, where that is not the value itself; None where none is better than another
 _BADNESS: dict[str, Callable[[float], float] | None] = {

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array, in_common
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.alike import by_identity, check_alike, in_common_or_range, listed
 from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.batch.checks import by_identity, check_alike, in_common_or_range, listed
 from pathcontrol.tasks.profile import VelocityProfile
 
 

@@ -12,9 +12,9 @@ from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.arc_length import ArcLength, apart
 from pathcontrol.tasks.base import PathPoint, PathTask
-from pathcontrol.tasks.batch import refuse_batch
-from pathcontrol.tasks.blend import Blend
-from pathcontrol.tasks.junction import gap, why_apart, why_not_smooth
+from pathcontrol.tasks.batch.task_batch import refuse_batch
+from pathcontrol.tasks.joined.blend import Blend
+from pathcontrol.tasks.joined.junction import gap, why_apart, why_not_smooth
 
 
 def concatenated(paths: Sequence[PathTask], blend: float | None = None) -> ConcatenatedPath:

@@ -1,0 +1,1 @@
+"""Tasks that differ from rollout to rollout."""

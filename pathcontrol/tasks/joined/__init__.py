@@ -1,0 +1,1 @@
+"""Paths that follow one another."""

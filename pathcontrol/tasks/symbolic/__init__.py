@@ -1,0 +1,1 @@
+"""Paths written as formulas."""
