@@ -105,6 +105,7 @@ from .toolpaths.smoothing.smooth import smooth as smooth
 from .toolpaths.svg.reader import read_svg as read_svg
 from .tuning.result import Tuning as Tuning
 from .tuning.tune import tune as tune
+from .view.animation.record import record as record
 from .view.figures.comparison import comparison_figure as comparison_figure
 from .view.figures.deviation import deviation_figure as deviation_figure
 from .view.figures.errors import error_bands_figure as error_bands_figure
@@ -120,6 +121,5 @@ from .view.figures.sweep import robustness_figure as robustness_figure
 from .view.figures.tool import tool_figure as tool_figure
 from .view.figures.toolpath import toolpath_figure as toolpath_figure
 from .view.figures.torque import torque_figure as torque_figure
-from .view.film.recorder import record as record
 from .view.report.report import report as report
 from .view.video import save_video as save_video

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from pathcontrol import RobotModel, Run
-from pathcontrol.view.film.animation import Animation
-from pathcontrol.view.film.film import Film
+from pathcontrol.view.animation.animation import Animation
+from pathcontrol.view.animation.payload import Film
 
 TYPES = {"f4": "<f4", "u4": "<u4", "u1": "u1"}
 

@@ -13,10 +13,10 @@ from test_film import Reel, made_up_run, reel
 from pathcontrol import Circle, ContinuousTime, ExtendedMotionPlan, Projection, RobotModel, Run, load_robot, simulate
 from pathcontrol.analysis.metrics import contour_error, metrics
 from pathcontrol.analysis.readable import readable_number
-from pathcontrol.view.film.charts import MOST_POINTS, Chart, Curve, extremes
-from pathcontrol.view.film.film import Film
-from pathcontrol.view.film.quantities import short_names
-from pathcontrol.view.film.recorder import record
+from pathcontrol.view.animation.charts.chart import MOST_POINTS, Chart, Curve, extremes
+from pathcontrol.view.animation.charts.quantities import short_names
+from pathcontrol.view.animation.payload import Film
+from pathcontrol.view.animation.record import record
 
 seeds = st.integers(0, 2**32 - 1)
 

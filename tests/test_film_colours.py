@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pathcontrol.view.film.palette import PLAIN, RUNS, run_color, scale_colors
+from pathcontrol.view.animation.scene.palette import PLAIN, RUNS, run_color, scale_colors
 
 WHITE, BLACK = np.ones(3), np.array([0.07, 0.08, 0.1])
 # linear RGB as people without one kind of cones see it (Machado, Oliveira and Fernandes, 2009, severity 1)

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from test_film import Reel, made_up_run, played, reel
 
 from pathcontrol import Circle, RobotModel, Run, load_robot
-from pathcontrol.view.film.camera import picture_axes
-from pathcontrol.view.film.layout import shifts
-from pathcontrol.view.film.recorder import MOST_GHOSTS, record
+from pathcontrol.view.animation.record import MOST_GHOSTS, record
+from pathcontrol.view.animation.scene.camera import picture_axes
+from pathcontrol.view.animation.scene.layout import shifts
 
 seeds = st.integers(0, 2**32 - 1)
 

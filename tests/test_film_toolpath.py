@@ -19,9 +19,9 @@ from pathcontrol import (
     tool_deviation,
 )
 from pathcontrol.toolpaths.segments.base import Polyline
-from pathcontrol.view.film.error import PathError, in_fitting_units
-from pathcontrol.view.film.recorder import record
-from pathcontrol.view.film.tube import distinct
+from pathcontrol.view.animation.path_error import PathError, in_fitting_units
+from pathcontrol.view.animation.record import record
+from pathcontrol.view.animation.scene.tube import distinct
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ from test_film import reel
 
 import pathcontrol as pc
 from pathcontrol.analysis.laps import lap_table, lap_times
+from pathcontrol.view.animation.record import record
 from pathcontrol.view.figures.shares import largest_shares
-from pathcontrol.view.film.recorder import record
 
 ROBOT = pc.load_robot("cicese_2dof")
 

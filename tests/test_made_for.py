@@ -10,7 +10,7 @@ from pathcontrol.analysis.deviation import tool_positions
 from pathcontrol.simulation.storage.array_store import Shelf
 from pathcontrol.simulation.storage.task_recipes import task_of, task_recipe
 from pathcontrol.tasks.laps import Laps
-from pathcontrol.view.film.casting import cast_takes
+from pathcontrol.view.animation.recorded_runs import cast_takes
 from pathcontrol.view.tool import default_tool, with_tool
 
 TIP = np.array([0.0, 0.02, -0.1])

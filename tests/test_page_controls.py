@@ -14,7 +14,7 @@ from markupsafe import Markup
 from test_view_browser import DURATION, numbers, saved, short_run
 
 from pathcontrol import Circle, RobotModel, record
-from pathcontrol.view.film.animation import Animation
+from pathcontrol.view.animation.animation import Animation
 from pathcontrol.view.page.html import Section, page
 
 PHONE: dict[str, Any] = {"size": (390, 844), "has_touch": True, "is_mobile": True, "device_scale_factor": 2}

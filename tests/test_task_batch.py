@@ -390,8 +390,8 @@ def test_the_record_of_a_run_stays_short():
 
 def test_figures_films_and_reports_show_the_path_of_their_rollout():
     pytest.importorskip("matplotlib")
+    from pathcontrol.view.animation.recorded_runs import cast_takes
     from pathcontrol.view.figures.shown import shown
-    from pathcontrol.view.film.casting import cast_takes
     from pathcontrol.view.report.reproduction import script
     from pathcontrol.view.report.summary import facts, measured
 

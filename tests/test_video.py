@@ -19,7 +19,7 @@ from patience import PATIENCE, wait_until
 import pathcontrol as pc
 from pathcontrol import Circle, InputError, MissingExtraError, RobotModel, Run
 from pathcontrol.view import video
-from pathcontrol.view.film.animation import Animation
+from pathcontrol.view.animation.animation import Animation
 from pathcontrol.view.video import save_video
 
 SIZE = (320, 200)

@@ -14,8 +14,8 @@ from browser import Opened, opened
 from markupsafe import Markup
 
 from pathcontrol import Circle, ExtendedMotionPlan, RobotModel, Run, load_robot, record, simulate
-from pathcontrol.view.film.animation import Animation
-from pathcontrol.view.film.film import Film
+from pathcontrol.view.animation.animation import Animation
+from pathcontrol.view.animation.payload import Film
 from pathcontrol.view.page.html import Section, page
 
 DURATION = 2.0

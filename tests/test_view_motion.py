@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from test_film import played
 
-from pathcontrol.view.film.camera import HIGHEST, LOWEST, Camera, picture_axes, view_direction
-from pathcontrol.view.film.ground import ground_grid
-from pathcontrol.view.film.keys import line_keys
-from pathcontrol.view.film.motion import Track, continuous_quaternions
-from pathcontrol.view.film.trace import FRAME, MOST_RINGS, trace
-from pathcontrol.view.film.tube import SIDES, dashes, distinct, joined, simplified, tube
+from pathcontrol.view.animation.scene.camera import HIGHEST, LOWEST, Camera, picture_axes, view_direction
+from pathcontrol.view.animation.scene.ground import ground_grid
+from pathcontrol.view.animation.scene.keyframes import line_keys
+from pathcontrol.view.animation.scene.trace import FRAME, MOST_RINGS, trace
+from pathcontrol.view.animation.scene.tracks import Track, continuous_quaternions
+from pathcontrol.view.animation.scene.tube import SIDES, dashes, distinct, joined, simplified, tube
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -29,9 +29,9 @@ from pathcontrol import (
     load_robot,
     simulate,
 )
-from pathcontrol.view.film.animation import Animation
-from pathcontrol.view.film.camera import picture_axes
-from pathcontrol.view.film.recorder import record
+from pathcontrol.view.animation.animation import Animation
+from pathcontrol.view.animation.record import record
+from pathcontrol.view.animation.scene.camera import picture_axes
 from pathcontrol.view.tool import default_tool
 
 HOSTILE = "</script><script>alert(1)</script>"

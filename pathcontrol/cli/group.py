@@ -123,8 +123,7 @@ def import_all() -> None:
     with uninterrupted():
         import pathcontrol.experiments.reproduce
         import pathcontrol.experiments.runner
-        import pathcontrol.view.figures.run
-        import pathcontrol.view.film.recorder  # noqa: F401
+        import pathcontrol.view.animation.record  # noqa: F401
 
 
 engine_option = click.option(

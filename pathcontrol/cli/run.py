@@ -46,7 +46,7 @@ def command(
 
 
 def _animation(done: Outcome, out: Path) -> Path:
-    from pathcontrol.view.film.recorder import record
+    from pathcontrol.view.animation.record import record
 
     return record(done.run).save(out / "run.html")
 

@@ -144,7 +144,7 @@ def _tour(file: Path, package_dirs: Sequence[Path] | None) -> Run:
 
 def _with_robot(run: Run, file: Path, robot: RobotModel | None) -> Run:
     """The run, with ``robot`` if it does not know its own; errors name its file."""
-    from pathcontrol.view.film.take import check_filmed
+    from pathcontrol.view.animation.rollout import check_filmed
 
     try:
         _ = run.robot

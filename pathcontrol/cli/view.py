@@ -65,7 +65,7 @@ def command(
     it.
     """
     import_all()
-    from pathcontrol.view.film.recorder import record
+    from pathcontrol.view.animation.record import record
 
     check_out(out, runs)
     if mp4 is not None:

@@ -85,7 +85,7 @@ def _write_figures(run: Run, setup: Setup, path: Path) -> dict[str, Path]:
 
 
 def _write_html(run: Run, setup: Setup, path: Path) -> Path:
-    from pathcontrol.view.film.recorder import record
+    from pathcontrol.view.animation.record import record
 
     record(run, setup.plant, task=setup.task).save(path)
     return path

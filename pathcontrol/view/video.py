@@ -24,7 +24,7 @@ from pathcontrol._suffixes import check_suffix
 from pathcontrol.errors import InputError, MissingExtraError, PathControlError
 
 if TYPE_CHECKING:
-    from pathcontrol.view.film.animation import Animation
+    from pathcontrol.view.animation.animation import Animation
 
 #: programs that can draw a page, and the variable that names another one
 BROWSERS = (
@@ -78,7 +78,7 @@ def save_video(
         MissingExtraError: a package or a browser is missing.
         PathControlError: the browser cannot draw the page, or FFmpeg cannot write the video.
     """
-    from pathcontrol.view.film.animation import Animation
+    from pathcontrol.view.animation.animation import Animation
 
     expect("animation", animation, Animation)
     path = check_suffix(path, "a video (H.264 in MP4)", ".mp4")

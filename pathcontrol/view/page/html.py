@@ -14,7 +14,7 @@ from typing import NamedTuple
 import jinja2
 from markupsafe import Markup
 
-from pathcontrol.view.film.film import Film
+from pathcontrol.view.animation.payload import Film
 
 #: the page's script in the order in which it is put together; each part says what it is for
 PARTS = (

@@ -15,7 +15,7 @@ from pathcontrol.simulation.run import Run
 
 if TYPE_CHECKING:
     from pathcontrol.sweeps.result import SweepResult
-    from pathcontrol.view.film.layout import Layout
+    from pathcontrol.view.animation.scene.layout import Layout
 
 
 def report(
@@ -44,7 +44,7 @@ def report(
     Raises:
         InputError: there are no runs, one does not know its robot, or ``out`` does not end with ``.html``.
     """
-    from pathcontrol.view.film.recorder import record
+    from pathcontrol.view.animation.record import record
     from pathcontrol.view.page.html import page
     from pathcontrol.view.report.sections import sections
 

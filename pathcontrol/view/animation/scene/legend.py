@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.view.animation.drawn_rollout import Shot
+from pathcontrol.view.animation.path_error import PathError
+from pathcontrol.view.animation.scene.palette import DESIRED, DESIRED_POINT, PLAIN, RAPID, scale_colors
 from pathcontrol.view.bodies.shapes import Color
-from pathcontrol.view.film.error import PathError
-from pathcontrol.view.film.palette import DESIRED, DESIRED_POINT, PLAIN, RAPID, scale_colors
-from pathcontrol.view.film.shot import Shot
 
 _STEPS = 9  # colours of a scale, between which the page blends
 _ABOVE, _APART = 0.06, 0.05  # of the height of what is seen: labels over the arm, and over one another

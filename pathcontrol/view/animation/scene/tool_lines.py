@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.film.drawing import alike
-from pathcontrol.view.film.legend import tops
-from pathcontrol.view.film.palette import DESIRED_POINT, PLAIN, scale_colors
-from pathcontrol.view.film.shot import Shot
-from pathcontrol.view.film.stage import Stage
-from pathcontrol.view.film.trace import trace
+from pathcontrol.view.animation.drawn_rollout import Shot
+from pathcontrol.view.animation.scene.builder import Stage
+from pathcontrol.view.animation.scene.desired_path import alike
+from pathcontrol.view.animation.scene.legend import tops
+from pathcontrol.view.animation.scene.palette import DESIRED_POINT, PLAIN, scale_colors
+from pathcontrol.view.animation.scene.trace import trace
 
 _HALO, _DOT = 6.0, 2.8  # radii of the desired point and of the tool, of that of the tool's line
 

@@ -11,12 +11,12 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
-from pathcontrol.view.film.drawing import Line, alike, desired_joints
-from pathcontrol.view.film.film import Film
-from pathcontrol.view.film.keys import line_keys
-from pathcontrol.view.film.shot import Shot
-from pathcontrol.view.film.take import Take
-from pathcontrol.view.film.tube import simplified
+from pathcontrol.view.animation.drawn_rollout import Shot
+from pathcontrol.view.animation.payload import Film
+from pathcontrol.view.animation.rollout import Take
+from pathcontrol.view.animation.scene.desired_path import Line, alike, desired_joints
+from pathcontrol.view.animation.scene.keyframes import line_keys
+from pathcontrol.view.animation.scene.tube import simplified
 
 _FINE = 1 / 2000  # of the extent: less than a pixel
 _MOST_POINTS = 4000

@@ -13,7 +13,7 @@ from pathcontrol.analysis.metrics import contour_error
 from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import TaskError
-from pathcontrol.view.film.take import Take
+from pathcontrol.view.animation.rollout import Take
 
 MILLIMETRE, MICROMETRE = 1e3, 1e6
 _LITTLE_MORE = 1.25

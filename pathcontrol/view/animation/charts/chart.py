@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.film.film import Film
-from pathcontrol.view.film.keys import Indices
+from pathcontrol.view.animation.payload import Film
+from pathcontrol.view.animation.scene.keyframes import Indices
 
 MOST_POINTS = 4000  # of a chart
 _EACH_BIN = 3  # points of a bin: the least, the greatest, and one where there is none

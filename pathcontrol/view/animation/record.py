@@ -9,18 +9,18 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import UnknownNameError
-from pathcontrol.view.film.animation import Animation
-from pathcontrol.view.film.camera import Camera, view_direction
-from pathcontrol.view.film.casting import cast_takes, film_title
-from pathcontrol.view.film.film import Film
-from pathcontrol.view.film.layout import Layout, shifts
-from pathcontrol.view.film.legend import labels, legend
-from pathcontrol.view.film.lines import add_lines, add_markers
-from pathcontrol.view.film.plane import plane
-from pathcontrol.view.film.quantities import charts
-from pathcontrol.view.film.shot import Shot, shots_of
-from pathcontrol.view.film.stage import Stage
-from pathcontrol.view.film.tables import tables
+from pathcontrol.view.animation.animation import Animation
+from pathcontrol.view.animation.charts.plane import plane
+from pathcontrol.view.animation.charts.quantities import charts
+from pathcontrol.view.animation.drawn_rollout import Shot, shots_of
+from pathcontrol.view.animation.payload import Film
+from pathcontrol.view.animation.recorded_runs import cast_takes, film_title
+from pathcontrol.view.animation.scene.builder import Stage
+from pathcontrol.view.animation.scene.camera import Camera, view_direction
+from pathcontrol.view.animation.scene.layout import Layout, shifts
+from pathcontrol.view.animation.scene.legend import labels, legend
+from pathcontrol.view.animation.scene.tool_lines import add_lines, add_markers
+from pathcontrol.view.animation.tables import tables
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel

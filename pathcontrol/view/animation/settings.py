@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pathcontrol.simulation.config import laws, table
-from pathcontrol.view.film.take import Take
+from pathcontrol.view.animation.rollout import Take
 
 _NAMES = {
     "friction": "friction compensation",

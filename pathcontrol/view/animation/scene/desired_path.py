@@ -14,8 +14,8 @@ from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.base import Polyline
-from pathcontrol.view.film.take import Take
-from pathcontrol.view.film.tube import distinct
+from pathcontrol.view.animation.rollout import Take
+from pathcontrol.view.animation.scene.tube import distinct
 
 _SAMPLES = 2001  # along a path in joint space …
 _SAMPLES_EACH = 201  # … and along each path of a sequence

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.view.animation.payload import Film
+from pathcontrol.view.animation.rollout import Take
+from pathcontrol.view.animation.scene.desired_path import Line
+from pathcontrol.view.animation.scene.ground import ground_grid
+from pathcontrol.view.animation.scene.meshcat_commands import Scene, absolute, path
+from pathcontrol.view.animation.scene.palette import DESIRED, GRID, RAPID
+from pathcontrol.view.animation.scene.trace import Trace
+from pathcontrol.view.animation.scene.tracks import Track
+from pathcontrol.view.animation.scene.tube import SIDES, dashes, joined, simplified, tube
 from pathcontrol.view.bodies.shapes import Color, Mesh, Sphere
-from pathcontrol.view.film.drawing import Line
-from pathcontrol.view.film.film import Film
-from pathcontrol.view.film.ground import ground_grid
-from pathcontrol.view.film.motion import Track
-from pathcontrol.view.film.palette import DESIRED, GRID, RAPID
-from pathcontrol.view.film.scene import Scene, absolute, path
-from pathcontrol.view.film.take import Take
-from pathcontrol.view.film.trace import Trace
-from pathcontrol.view.film.tube import SIDES, dashes, joined, simplified, tube
 
 GHOST = 0.35  # opacity of an arm that stands in another
 _FRAMED_POSES = 50

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.film.keys import Indices, inside, interpolated, key_samples
+from pathcontrol.view.animation.scene.keyframes import Indices, inside, interpolated, key_samples
 
 STILL = 1e-9  # m, and the same of the quaternion: what does not move by more is at rest
 ERROR = 4.9e-5  # m, and the same of the entries of a rotation: single precision stays within 5e-5, too

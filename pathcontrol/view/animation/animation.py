@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pathcontrol._files import whole_file
 from pathcontrol._suffixes import check_suffix
-from pathcontrol.view.film.film import Film
+from pathcontrol.view.animation.payload import Film
 
 _NOTEBOOK_HEIGHT = 640  # px
 
@@ -20,7 +20,7 @@ class Animation:
     """A recorded scene that moves; made by :func:`record`.
 
     Attributes:
-        film: all that the page shows; see :class:`pathcontrol.view.film.film.Film`.
+        film: all that the page shows; see :class:`pathcontrol.view.animation.payload.Film`.
     """
 
     film: Film

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.film.camera import picture_axes
+from pathcontrol.view.animation.scene.camera import picture_axes
 
 Layout: TypeAlias = Literal["beside", "ghosted"]
 

@@ -15,8 +15,8 @@ from pathcontrol.analysis.metrics import LABELS, metrics
 from pathcontrol.analysis.readable import readable_number, unit_of
 from pathcontrol.analysis.remarks import remarks
 from pathcontrol.analysis.window import told
-from pathcontrol.view.film.settings import settings
-from pathcontrol.view.film.take import Take
+from pathcontrol.view.animation.rollout import Take
+from pathcontrol.view.animation.settings import settings
 
 _NEEDED = {"qd", "s", "e_p", "e_v", "sdot", "tau_demand"}
 

@@ -13,10 +13,10 @@ from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.analysis.tool import feed_along, tool_of, tool_speed
 from pathcontrol.analysis.torque_limits import torque_limits
 from pathcontrol.tasks.base import PathTask
-from pathcontrol.view.film.charts import Chart, Curve
-from pathcontrol.view.film.error import MILLIMETRE
-from pathcontrol.view.film.shot import Shot
-from pathcontrol.view.film.take import Take
+from pathcontrol.view.animation.charts.chart import Chart, Curve
+from pathcontrol.view.animation.drawn_rollout import Shot
+from pathcontrol.view.animation.path_error import MILLIMETRE
+from pathcontrol.view.animation.rollout import Take
 
 #: title, unit and lines of one run
 _Entry: TypeAlias = tuple[str, str, list[Curve]]

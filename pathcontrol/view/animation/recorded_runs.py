@@ -14,10 +14,10 @@ from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch.task_batch import rows_of
+from pathcontrol.view.animation.rollout import Take
+from pathcontrol.view.animation.scene.palette import run_color
 from pathcontrol.view.bodies.sticks import stick_figure
 from pathcontrol.view.bodies.visuals import LinkVisual, link_visuals
-from pathcontrol.view.film.palette import run_color
-from pathcontrol.view.film.take import Take
 from pathcontrol.view.tool import with_tool
 
 if TYPE_CHECKING:

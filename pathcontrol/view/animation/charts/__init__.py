@@ -1,0 +1,1 @@
+"""Charts beside an animation."""

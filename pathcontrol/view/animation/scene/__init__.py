@@ -1,0 +1,1 @@
+"""The scene of an animation: arms, lines, markers, camera and how they move."""
