@@ -31,8 +31,8 @@ from pathcontrol.experiments.load import read_toml
 from pathcontrol.experiments.sweep_runner import run_sweep
 from pathcontrol.experiments.swept import SweptExperiment
 from pathcontrol.sweeps.chunk import Job
-from pathcontrol.sweeps.cluster.connection import connection as cluster_module
-from pathcontrol.sweeps.cluster.connection import dispatch as desk
+from pathcontrol.sweeps.cluster import connection as cluster_module
+from pathcontrol.sweeps.cluster import dispatch as desk
 
 distributed = pytest.importorskip("distributed")
 cloudpickle = pytest.importorskip("cloudpickle")

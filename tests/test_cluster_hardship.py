@@ -22,7 +22,7 @@ from scipy import stats
 import pathcontrol as pc
 from pathcontrol.cli import main
 from pathcontrol.errors import InputError
-from pathcontrol.sweeps.cluster.connection import dispatch as desk
+from pathcontrol.sweeps.cluster import dispatch as desk
 
 distributed = pytest.importorskip("distributed")
 pytest.importorskip("pyarrow")
