@@ -108,7 +108,7 @@ def test_every_public_name_is_in_the_api_page():
 
 def test_every_finding_is_in_the_robots_page():
     source = (DOCS / "robots.md").read_text(encoding="utf-8")
-    code = "".join(file.read_text() for file in (DOCS.parent / "pathcontrol" / "robot" / "urdf").glob("*.py"))
+    code = "".join(file.read_text() for file in (DOCS.parent / "pathcontrol" / "robot" / "urdf").rglob("*.py"))
     codes = set(re.findall(r'Finding\([^"]*(?:"(?:error|warning|note)", )?"([a-z-]+)"', code)) - {"error", "warning"}
     assert len(codes) > 30
     assert {name for name in codes if f"`{name}`" not in source} == set()
