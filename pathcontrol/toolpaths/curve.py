@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import BPoly, PPoly, make_interp_spline
+from scipy.interpolate import make_interp_spline
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
-
-
-class CurvePoint(NamedTuple):
-    """A tool curve at s: position [m] and its first two derivatives with respect to s, each (*batch, 3)."""
-
-    p: Array
-    dp: Array
-    ddp: Array
+from pathcontrol.geometry.quintic import CurvePoint, quintic_spline
+from pathcontrol.toolpaths.contour import Contour
+from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.smoothing.corners import TURN_BACK, corners
+from pathcontrol.toolpaths.smoothing.knots import smooth_knots
 
 
 class ToolCurve:
@@ -49,8 +45,7 @@ class ToolCurve:
         if closed and not np.allclose(values[0], values[-1], rtol=1e-6, atol=1e-9):
             raise InputError("the curve is said to be closed, but its last knot is not its first one again")
         self.s0, self.s_end, self.closed = float(self.knots[0]), float(self.knots[-1]), bool(closed)
-        points = quintic_points(np.diff(self.knots), values[:-1], values[1:])
-        curve = PPoly.from_bernstein_basis(BPoly(np.moveaxis(points, -2, 0), self.knots))
+        curve = quintic_spline(self.knots, values)
         self._curves = [curve, curve.derivative(1), curve.derivative(2)]
 
     @property
@@ -161,30 +156,16 @@ class ToolCurve:
         Raises:
             InputError: the edges turn back by more than 150°, where the tool would have to stop.
         """
-        from pathcontrol.toolpaths.contour import Contour
-        from pathcontrol.toolpaths.segments.base import Polyline
-        from pathcontrol.toolpaths.smoothing.smooth import smooth
-
         given = as_array("points", points)
         edges = Polyline(np.concatenate([given, given[:1]]) if closed else given)
-        smoothed = smooth(Contour((edges,), closed=closed), tolerance)
-        if len(smoothed.curves) > 1 or smoothed.curves[0].closed != closed:
-            sharpest = max(smoothed.corners, key=lambda corner: corner.turn)
+        contour = Contour((edges,), closed=closed)
+        sharpest = max(corners(contour), key=lambda corner: corner.turn, default=None)
+        if sharpest is not None and sharpest.turn > TURN_BACK:
             raise InputError(
                 f"the edges turn back by {np.rad2deg(sharpest.turn):.0f}° at {sharpest.point.tolist()}, expected 150° "
                 "at most; end a curve there and begin another"
             )
-        return smoothed.curves[0]
-
-
-def quintic_points(length: Array, start: Array, end: Array) -> Array:
-    """Bézier points (*batch, 6, 3) of quintics of a ``length`` (*batch,) with p, p' and p'' (*batch, 3, 3) given."""
-    h = length[..., None]
-    (p0, v0, a0), (p1, v1, a1) = (np.moveaxis(values, -2, 0) for values in (start, end))
-    # a Bézier curve's end derivatives in terms of its control points, solved for them
-    first = [p0, p0 + h * v0 / 5, p0 + 2 * h * v0 / 5 + h**2 * a0 / 20]
-    last = [p1 - 2 * h * v1 / 5 + h**2 * a1 / 20, p1 - h * v1 / 5, p1]
-    return np.stack(first + last, axis=-2)
+        return cls(*smooth_knots(contour, scalar("tolerance", tolerance, positive=True)).knots, closed=closed)
 
 
 def _vector(name: str, value: ArrayLike) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import comb
 
 from pathcontrol._arrays import Array
-from pathcontrol.toolpaths.curve import CurvePoint, quintic_points
+from pathcontrol.geometry.quintic import CurvePoint, quintic_points
 from pathcontrol.toolpaths.smoothing.corners import angles
 
 #: position, tangent and curvature vector at arc lengths (*batch,) [m] away from a junction

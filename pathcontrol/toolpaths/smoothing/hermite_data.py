@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
-from pathcontrol.toolpaths.curve import CurvePoint, ToolCurve
+from pathcontrol.geometry.quintic import CurvePoint, quintic_spline
 from pathcontrol.toolpaths.segments.base import Segment
 from pathcontrol.toolpaths.smoothing.corners import end_tangent, start_tangent
 
@@ -80,7 +80,7 @@ def curved(segment: Segment, start: float, end: float) -> Stretch:
         between = s[:-1] + 0.4 * np.diff(s)  # beside the middle, where an odd error would not show
         if not between.size:
             break
-        error = np.linalg.norm(ToolCurve(s, *data).position(between) - curve.at(between).p, axis=-1)
+        error = np.linalg.norm(quintic_spline(s, np.stack(data, axis=1))(between) - curve.at(between).p, axis=-1)
         coarse = error > 0.6 * _ACCURACY  # elsewhere in a piece it may be 1.6 times as large
         if not coarse.any():
             break
