@@ -40,8 +40,6 @@ from .errors import TaskError as TaskError
 from .errors import ToolpathError as ToolpathError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import UrdfError as UrdfError
-from .geometry.arc_length import arc_length as arc_length
-from .geometry.arc_length import curvature as curvature
 from .profiles.jerk.start_stop import SmoothStartStop as SmoothStartStop
 from .profiles.limited.limited import limited as limited
 from .profiles.limited.motion_limit import MotionLimit as MotionLimit
@@ -77,7 +75,6 @@ from .sweeps.result import SweepResult as SweepResult
 from .sweeps.space import Space as Space
 from .sweeps.sweep import sweep as sweep
 from .tasks.base import PathPoint as PathPoint
-from .tasks.base import PathTask as PathTask
 from .tasks.batch.task_batch import TaskBatch as TaskBatch
 from .tasks.check import check_task as check_task
 from .tasks.curves import Circle as Circle
@@ -88,11 +85,14 @@ from .tasks.curves import Lissajous as Lissajous
 from .tasks.function import FunctionPath as FunctionPath
 from .tasks.joined.concatenation import concatenated as concatenated
 from .tasks.joined.sequence import PathSequence as PathSequence
+from .tasks.lengths import arc_length as arc_length
+from .tasks.lengths import curvature as curvature
 from .tasks.profile import ConstantRate as ConstantRate
 from .tasks.profile import ConstantSpeed as ConstantSpeed
 from .tasks.profile import VelocityProfile as VelocityProfile
 from .tasks.spline import SplinePath as SplinePath
 from .tasks.symbolic.path import SymbolicPath as SymbolicPath
+from .tasks.task import PathTask as PathTask
 from .tasks.waypoints import WaypointPath as WaypointPath
 from .toolpaths.contour import Contour as Contour
 from .toolpaths.contour import Toolpath as Toolpath

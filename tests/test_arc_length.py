@@ -26,8 +26,8 @@ from pathcontrol import (
     check_task,
     simulate,
 )
-from pathcontrol.geometry.arc_length import ArcLength
 from pathcontrol.tasks.function import FunctionPath
+from pathcontrol.tasks.lengths import length_along
 
 
 class Helix(PathTask):
@@ -207,7 +207,7 @@ FLAT, KNOT = Ellipse((1.0, 1e-3), 1.0), Lissajous([1.0, 0.5], [3, 4], 1.0)
 
 @pytest.mark.parametrize("task", [Circle(0.7, 1.0), FLAT, KNOT, spline(0), Helix(1, 0.1).between(0, 9)])
 def test_the_length_is_inverted_to_rounding(task):
-    length = ArcLength(task, *task.one_traverse)
+    length = length_along(task, *task.one_traverse)
     wanted = length.total * np.random.default_rng(0).uniform(0, 1, 999)
     assert np.abs(length(length.inverse(wanted)) - wanted).max() < 1e-14 * length.total
     s = np.interp(np.random.default_rng(1).uniform(0, 1, 999), [0, 1], task.one_traverse)

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
 from pathcontrol.geometry.closest_point.cells import FARTHEST
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 _POINTS = 1000  # of a path, at least
 _MOST = 200_000  # points that a trace is refined to

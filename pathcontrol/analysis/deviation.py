@@ -19,8 +19,8 @@ from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.task import PathTask
 from pathcontrol.toolpaths.contour import Contour
 
 

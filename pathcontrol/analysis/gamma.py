@@ -13,9 +13,10 @@ from pathcontrol.control.ending import Ending
 from pathcontrol.engine.gamma import distances_to_gamma
 from pathcontrol.errors import EngineError, InputError, TaskError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
-from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.task import PathTask
 
 
 def distance_to_gamma(

@@ -14,9 +14,9 @@ from pathcontrol.errors import InputError
 from pathcontrol.geometry.closest_point.cells import FARTHEST
 from pathcontrol.simulation.context import check_sequence
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.task import PathTask
 
 
 def known_task(run: Run, task: PathTask | None) -> PathTask:

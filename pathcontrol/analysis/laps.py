@@ -10,7 +10,7 @@ from pathcontrol.analysis.tool import tool_of, tool_speed
 from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 _ROUNDING = 1e-9  # of a lap
 _MOST = 1000  # laps of a table

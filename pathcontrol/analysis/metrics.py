@@ -24,7 +24,7 @@ from pathcontrol.analysis.torque import torque_metrics
 from pathcontrol.analysis.window import Samples, Window, samples_of
 from pathcontrol.errors import TaskError
 from pathcontrol.simulation.run import Run, norms
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 __all__ = ["LABELS", "UNITS"]
 

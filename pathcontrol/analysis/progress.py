@@ -10,7 +10,7 @@ from pathcontrol.analysis.gamma import planned_rate
 from pathcontrol.analysis.known import by_task, where_known
 from pathcontrol.analysis.window import samples_of
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 #: a rollout with less progress did not get there
 ENOUGH = 0.999

@@ -17,7 +17,7 @@ from pathcontrol.errors import InputError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 
 class ToolSignals(NamedTuple):

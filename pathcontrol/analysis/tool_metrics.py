@@ -14,7 +14,7 @@ from pathcontrol.analysis.window import Samples
 from pathcontrol.cartesian.path import CartesianPath
 from pathcontrol.errors import TaskError
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 _DEVIATION = ("tool_deviation_peak", "tool_deviation_rms")
 #: the metrics of :func:`tool_metrics`

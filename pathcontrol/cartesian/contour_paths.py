@@ -18,7 +18,7 @@ from pathcontrol.profiles.limited.limited import limited
 from pathcontrol.profiles.limited.motion_limit import MotionLimit
 from pathcontrol.profiles.motion import ToolMotion
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.curve import ToolCurve
 from pathcontrol.toolpaths.smoothing.smooth import Smoothed

@@ -10,8 +10,8 @@ import numpy as np
 from pathcontrol._arrays import Array, rigid
 from pathcontrol.cartesian.links import from_end_to_end
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.task import PathTask
 from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.smoothing.smooth import Corners, Smoothed
 

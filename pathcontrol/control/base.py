@@ -14,8 +14,9 @@ from pathcontrol._expect import expect
 from pathcontrol.control.ending import Ending
 from pathcontrol.errors import InputError, UnknownNameError, warn_of_single
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.check import check_task
+from pathcontrol.tasks.task import PathTask
 
 FrictionCompensation = Literal["none", "viscous", "full"]
 Start = Literal["s0", "nearest"]

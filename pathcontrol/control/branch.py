@@ -9,8 +9,8 @@ import numpy as np
 
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import UnknownNameError
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch.task_batch import rows_of
+from pathcontrol.tasks.task import PathTask
 
 Branch = Literal["follow", "nearest", "local"]
 

@@ -7,9 +7,10 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.batch.task_batch import TaskBatch, of_each
 from pathcontrol.tasks.profile import END_TIME
+from pathcontrol.tasks.task import PathTask
 
 _SAMPLES = 257  # of the path, for its average speed
 _SHORTEST = 1e-150  # braking, whose inverse and the shares of it are numbers

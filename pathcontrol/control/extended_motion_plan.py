@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 
 class ExtendedMotionPlan(Controller):

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 
 class Tracking(NamedTuple):

@@ -11,7 +11,8 @@ from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain, scalar_gain
 from pathcontrol.control.branch import Branch, BranchPolicy
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.base import PathPoint
+from pathcontrol.tasks.task import PathTask
 
 # σ̄ is called irregular where dσ̄/dq exceeds this many times its value on the path
 _STEEPEST = 1e6

@@ -15,7 +15,7 @@ from pathcontrol.engine.library import load_library
 from pathcontrol.engine.structs import Gamma, Memory
 from pathcontrol.engine.table import PathTable, bezier_points, task_table
 from pathcontrol.errors import EngineError
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 _TURN = 1 / 8  # rad over a piece of a cell, which is taken to hold one minimum at most
 _MOST_PIECES = 256

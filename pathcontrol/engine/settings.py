@@ -19,8 +19,8 @@ from pathcontrol.engine.table import path_struct, same_projection
 from pathcontrol.errors import EngineError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch.task_batch import TaskBatch
+from pathcontrol.tasks.task import PathTask
 
 #: position and velocity gains of each law, by the names of its attributes, in the order of the engine's numbers
 GAINS: dict[type[Controller], tuple[str, str]] = {

@@ -17,9 +17,9 @@ from pathcontrol.engine.structs import Memory, Path
 from pathcontrol.errors import EngineError
 from pathcontrol.geometry import hermite
 from pathcontrol.geometry.hermite import horner
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.profile import ConstantRate
 from pathcontrol.tasks.recorded import RecordedPath
+from pathcontrol.tasks.task import PathTask
 
 _NODES = 0.5 - 0.5 * np.cos(np.pi * (2 * np.arange(6) + 1) / 12)  # of a cell, where ϑ is met
 _PROBES = np.array([0.15, 0.5, 0.85])  # of a cell, where table and task are compared

@@ -24,8 +24,8 @@ from pathcontrol.experiments.schema import Experiment, Output
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop, torque_limits
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.task import PathTask
 
 _LAWS: dict[str, type[Controller]] = {
     "extended_motion_plan": ExtendedMotionPlan,

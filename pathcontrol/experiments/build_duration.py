@@ -7,8 +7,8 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.schema import Experiment
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.task import PathTask
 
 _SAMPLES = 4001
 

@@ -12,8 +12,8 @@ from pathcontrol.profiles.motion import JointMotion, ToolMotion
 from pathcontrol.profiles.tool_speed import ToolSpeed
 from pathcontrol.profiles.topp.time_optimal import time_optimal
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, VelocityProfile
+from pathcontrol.tasks.task import PathTask
 
 
 def build_profile(

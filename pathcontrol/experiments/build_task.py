@@ -15,9 +15,9 @@ from pathcontrol.experiments.own_class import own_class
 from pathcontrol.experiments.task_sections import OwnTask
 from pathcontrol.experiments.toolpath_section import ToolpathSection
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.check import check_task
 from pathcontrol.tasks.curves import Circle, Ellipse, Line, Lissajous
+from pathcontrol.tasks.task import PathTask
 
 _CURVES: dict[str, type[PathTask]] = {
     "circle": Circle,

@@ -12,7 +12,7 @@ from types import ModuleType
 
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.keyed import told
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 _KEY = "task.type"
 

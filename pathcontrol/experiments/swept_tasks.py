@@ -14,10 +14,10 @@ from pathcontrol.experiments.build_duration import build_duration
 from pathcontrol.experiments.build_task import build_task
 from pathcontrol.experiments.schema import Experiment
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch.checks import kind_of
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.task import PathTask
 
 
 class SweptTask(NamedTuple):

@@ -1,46 +1,60 @@
-"""Arc length and curvature of paths."""
+"""Arc length and curvature of curves in any space."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.polynomial.legendre import leggauss
-from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite
-from pathcontrol._expect import expect
-from pathcontrol.errors import InputError, TaskError
-from pathcontrol.tasks.base import PathTask
+from pathcontrol._arrays import Array
+from pathcontrol.errors import TaskError
 
 _NODES, _WEIGHTS = (leggauss(10)[0] + 1) / 2, leggauss(10)[1] / 2
 _FIRST_CELLS, _MOST_CELLS = 16, 1 << 17
 _TOLERANCE = 1e-11  # relative, of a cell; its halves are then good to rounding
 _ROUNDING = 2e-16  # relative, of the whole: a cell that is off by less has no share in it
-_NOISE = 1e-8  # disagreements below this that do not fall as cells are halved are rounding of the path itself
+_NOISE = 1e-8  # disagreements below this that do not fall as cells are halved are rounding of the curve itself
 _NEWTON_STEPS = 20
 _COINCIDENT = 1e-13  # relative to the parameter; places nearer to one another are one place
 
 
 class ArcLength:
-    """The arc length L(s) = ∫‖q_d'‖ds of a path, and its inverse.
+    """The arc length L(s) = ∫‖p'‖ds of a curve p(s), and its inverse.
 
-    The interval is cut, first at the knots of the path, until Gauss–Legendre quadrature of 10 points on a cell agrees
-    with that on its halves to 1e-11 of the cell or to rounding of the whole. One lap stands for all of a closed path.
+    The interval is cut, first at the knots of the curve, until Gauss–Legendre quadrature of 10 points on a cell agrees
+    with that on its halves to 1e-11 of the cell or to rounding of the whole. One lap stands for all of a closed curve.
 
     Args:
-        path: the path.
-        lower: where L = 0; of a closed path, where a lap begins.
-        upper: the end of the interval; of a closed path, of the lap.
+        derivative: p'(s), (*batch, n), at s (*batch,).
+        lower: where L = 0; of a closed curve, where a lap begins.
+        upper: the end of the interval; of a closed curve, of the lap.
+        closed: whether the curve repeats with the period ``upper - lower``.
+        knots: where pieces of the curve meet, increasing, (K,); ``None`` for a curve all of one piece.
+        name: what the curve is called in errors.
+
+    Raises:
+        TaskError: the curve stands still over a part of the interval.
     """
 
-    def __init__(self, path: PathTask, lower: float, upper: float) -> None:
-        self.path, self.lower, self.upper = path, lower, upper
+    def __init__(
+        self,
+        derivative: Callable[[Array], Array],
+        lower: float,
+        upper: float,
+        closed: bool = False,
+        knots: Array | None = None,
+        name: str = "the curve",
+    ) -> None:
+        self._derivative, self._closed, self._knots = derivative, closed, knots
+        self.lower, self.upper = lower, upper
         self._ends, steps = self._cells(self._first_ends())
-        self._speeds = np.linalg.norm(path.dq_d(self._ends), axis=-1)
+        self._speeds = np.linalg.norm(derivative(self._ends), axis=-1)
         self._lengths = np.concatenate([[0.0], np.cumsum(steps)])
         if not (steps > 0).all() or not np.isfinite(self.total):
             i = int(np.argmin(np.nan_to_num(steps, nan=-1.0)))
             raise TaskError(
-                f"{type(path).__name__} has length {steps[i]:g} from s = {self._ends[i]:g} to {self._ends[i + 1]:g}, "
+                f"{name} has length {steps[i]:g} from s = {self._ends[i]:g} to {self._ends[i + 1]:g}, "
                 "expected a path that moves with s everywhere: q_d' = 0 is a standstill"
             )
 
@@ -81,7 +95,7 @@ class ArcLength:
 
     def _laps(self, value: Array, one: float) -> tuple[Array, Array]:
         """Whole laps in ``value`` and the rest, for a closed path."""
-        if not self.path.closed:
+        if not self._closed:
             return np.zeros_like(value), value
         laps, rest = np.divmod(value, one)
         return laps, rest
@@ -92,13 +106,13 @@ class ArcLength:
     def _quadrature(self, a: Array, b: Array) -> tuple[Array, Array]:
         """The length from a to b, each (*batch,), and ‖q_d'(b)‖."""
         h = (b - a)[..., None]
-        speed = np.linalg.norm(self.path.dq_d(a[..., None] + h * np.append(_NODES, 1.0)), axis=-1)
+        speed = np.linalg.norm(self._derivative(a[..., None] + h * np.append(_NODES, 1.0)), axis=-1)
         # a product of matrices would round a row differently in another batch
         return h[..., 0] * (speed[..., :-1] * _WEIGHTS).sum(-1), speed[..., -1]
 
     def _first_ends(self) -> Array:
         ends = np.linspace(self.lower, self.upper, _FIRST_CELLS + 1)
-        knots = self.path.knots
+        knots = self._knots
         if knots is None:
             return ends
         return apart(np.union1d(ends, knots[(knots > self.lower) & (knots < self.upper)]))
@@ -136,62 +150,7 @@ def apart(ends: Array) -> Array:
     return np.array([*kept, ends[-1]])
 
 
-def arc_length(task: PathTask, s0: ArrayLike | None = None, s_end: ArrayLike | None = None) -> Array:
-    """Length ∫‖q_d'‖ds [rad], (*batch,), of the path from ``s0`` to ``s_end``, (*batch,) each; negative backwards.
-
-    To about 1e-14 of the length for smooth paths, and for splines.
-
-    Args:
-        task: the path.
-        s0: where to begin; by default where the path begins.
-        s_end: where to end; by default where the path ends, or one lap after where it begins.
-
-    Raises:
-        InputError: an end is outside an open path, or left out where there is none; the shapes do not fit.
-        TaskError: the path stands still somewhere.
-    """
-    expect("task", task, PathTask, error=TaskError)
-    if s_end is None and not np.isfinite(last(task)):
-        raise InputError(f"{type(task).__name__} neither ends nor repeats, so s_end is needed")
-    start = _inside(task, "s0", task.s0 if s0 is None else s0)
-    end = _inside(task, "s_end", last(task) if s_end is None else s_end)
-    try:
-        both = np.stack(np.broadcast_arrays(start, end))
-    except ValueError as error:
-        raise InputError(f"s0 has shape {start.shape} and s_end {end.shape}, expected shapes that broadcast") from error
-    lower, upper = (task.s0, last(task)) if task.closed else (both.min(initial=np.inf), both.max(initial=-np.inf))
-    if not lower < upper:  # nothing is asked for
-        return np.zeros(both.shape[1:])
-    length = ArcLength(task, float(lower), float(upper))(both)
-    return length[1] - length[0]
-
-
-def curvature(task: PathTask, s: ArrayLike) -> Array:
-    """Curvature κ = ‖q_d' ∧ q_d''‖/‖q_d'‖³ [1/rad], (*batch,), at s (*batch,); the same in every parametrisation.
-
-    ‖a ∧ b‖ is the area that a and b span; divided by ‖a‖ it is the part of b normal to a.
-    """
-    expect("task", task, PathTask, error=TaskError)
-    s = as_array("s", s)
-    return np.linalg.norm(curvature_vector(task.dq_d(s), task.ddq_d(s)), axis=-1)
-
-
 def curvature_vector(dq_d: Array, ddq_d: Array) -> Array:
     """Second derivative by the arc length [1/rad], (*batch, n): the part of q_d'' normal to the path, over ‖q_d'‖²."""
     squared = (dq_d * dq_d).sum(-1, keepdims=True)
     return (ddq_d - (dq_d * ddq_d).sum(-1, keepdims=True) / squared * dq_d) / squared
-
-
-def last(task: PathTask) -> float:
-    """Where a path ends, or its first lap; ``inf`` if it neither ends nor repeats."""
-    return task.s_end if task.period is None else task.s0 + task.period
-
-
-def _inside(task: PathTask, name: str, s: ArrayLike) -> Array:
-    """``s`` if the path is there."""
-    s = finite(name, as_array(name, s))
-    slack = 1e-12 * (1 + np.abs(s))
-    outside = (s < task.s0 - slack) | (s > task.s_end + slack)
-    if not task.closed and outside.any():
-        raise InputError(f"{name} = {s[outside].flat[0]:g}, expected a number from {task.s0:g} to {task.s_end:g}")
-    return s

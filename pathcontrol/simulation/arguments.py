@@ -21,8 +21,8 @@ from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.loops import Arm, ContinuousTime, SampledLoop
 from pathcontrol.simulation.summaries import in_short
 from pathcontrol.simulation.variables import bytes_of_sample
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch.task_batch import TaskBatch
+from pathcontrol.tasks.task import PathTask
 
 Loop = SampledLoop | ContinuousTime
 

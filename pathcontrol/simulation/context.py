@@ -15,10 +15,10 @@ from pathcontrol.errors import InputError, PathControlWarning
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.storage.array_store import Shelf
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.laps import Laps
+from pathcontrol.tasks.task import PathTask
 
 if TYPE_CHECKING:
     import xarray as xr

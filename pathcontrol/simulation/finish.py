@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.control.ending import arrival_parameter
 from pathcontrol.errors import InputError, UnknownNameError
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch.task_batch import of_each
+from pathcontrol.tasks.task import PathTask
 
 Until = Literal["end", "duration"]
 

@@ -18,7 +18,7 @@ from pathcontrol.simulation.config import laws, table
 from pathcontrol.simulation.context import Origin, Stored, check_sequence
 from pathcontrol.simulation.samples import Samples, complete_outcome, label_outcome
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 if TYPE_CHECKING:
     import xarray as xr

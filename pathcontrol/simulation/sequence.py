@@ -32,10 +32,10 @@ from pathcontrol.simulation.engines import Engine, check_engine, choose_engine
 from pathcontrol.simulation.finish import Finish, finish_of
 from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch.task_batch import refuse_batch
+from pathcontrol.tasks.base import refuse_batch
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.laps import Laps
+from pathcontrol.tasks.task import PathTask
 
 
 class _Leg(NamedTuple):

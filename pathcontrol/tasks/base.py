@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import TaskError, warn_of_single
+from pathcontrol.errors import InputError, TaskError, warn_of_single
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.geometry.differentiation import Differentiator, best_width
-from pathcontrol.tasks.profile import VelocityProfile, plain_attributes
+from pathcontrol.tasks.profile import plain_attributes
 
 _MOST_SHOWN = 16  # values of an array in a repr
 
@@ -38,15 +38,8 @@ class PathPoint(NamedTuple):
         return self.ddq_d * self.theta[..., None] + self.dq_d * self.dtheta[..., None]
 
 
-class PathTask(ABC):
-    """A robotic task: *where* (a path q_d(s)) and *how fast along it* (a velocity profile ϑ(s)), never *when*.
-
-    Subclasses define :meth:`q_d` and :meth:`theta`, on arrays: s has shape ``(*batch,)``, q_d(s) ``(*batch, n)``.
-    What they leave out is computed: derivatives to about 1e-10, the projection as the global closest point. The curve
-
-        Γ = { (q, q̇) : q = q_d(s), q̇ = q_d'(s) ϑ(s) }
-
-    in state space (Moreno and Kelly, eqs. 2, 3 and 5) is what the task asks for.
+class Task(ABC):
+    """What control laws and simulations ask of a task; :class:`PathTask` is what people subclass.
 
     Attributes:
         s0: first path parameter.
@@ -56,6 +49,7 @@ class PathTask(ABC):
             What is made from the path keeps it, and films, figures and metrics show it.
         tool_pose: pose in that frame of what follows the path, (4, 4); ``None`` for the frame itself.
         rotations: how many rotations of that the path prescribes: 3, 2 where it may turn about its z axis, or 0.
+        rollouts: for how many rollouts it has a task each; ``None`` for one task that is that of any.
     """
 
     s0: float = 0.0
@@ -64,6 +58,7 @@ class PathTask(ABC):
     frame: str | None = None
     tool_pose: Array | None = None
     rotations: int = 0
+    rollouts: int | None = None
 
     def __init_subclass__(cls, single: bool | None = None, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -155,55 +150,6 @@ class PathTask(ABC):
         end = self.s_end if self.period is None else self.s0 + self.period
         return self.s0, end if np.isfinite(end) else self.s0 + 2 * np.pi
 
-    def with_profile(self, profile: VelocityProfile) -> PathTask:
-        """The same path with another velocity profile."""
-        return Reprofiled(self, profile)
-
-    def reversed(self) -> PathTask:
-        """The path taken backwards: ϑ(s) is that of the mirrored parameter. A closed one begins where it did."""
-        from pathcontrol.tasks.transforms import ReversedPath
-
-        return ReversedPath(self)
-
-    def shifted(self, offset: ArrayLike) -> PathTask:
-        """The path moved by an ``offset`` [rad], (n,)."""
-        from pathcontrol.tasks.transforms import ShiftedPath
-
-        return ShiftedPath(self, offset)
-
-    def scaled(self, factor: ArrayLike, about: ArrayLike | None = None) -> PathTask:
-        """The path scaled by a ``factor``, one for all joints or (n,), ``about`` a posture [rad], (n,).
-
-        By default about q_d(s0). The parameter keeps its rate ϑ(s), so that the joints move faster by the factor.
-        """
-        from pathcontrol.tasks.transforms import ScaledPath
-
-        return ScaledPath(self, factor, about)
-
-    def between(self, s0: float, s_end: float) -> PathTask:
-        """The stretch from ``s0`` to ``s_end`` as an open path with the same parameter; of a closed path any laps."""
-        from pathcontrol.tasks.transforms import PathSection
-
-        return PathSection(self, s0, s_end)
-
-    def by_arc_length(self) -> PathTask:
-        """The same path, taken as fast as this one, with its arc length [rad] as parameter: ‖q_d'‖ = 1."""
-        from pathcontrol.tasks.arc_length_path import ArcLengthPath
-
-        return ArcLengthPath(self)
-
-    def arc_length(self, s0: ArrayLike | None = None, s_end: ArrayLike | None = None) -> Array:
-        """Length [rad], (*batch,), from ``s0`` to ``s_end``, (*batch,); by default of the whole path, or of one lap."""
-        from pathcontrol.geometry.arc_length import arc_length
-
-        return arc_length(self, s0, s_end)
-
-    def curvature(self, s: ArrayLike) -> Array:
-        """Curvature κ = ‖q_d' ∧ q_d''‖/‖q_d'‖³ [1/rad], (*batch,), at s (*batch,)."""
-        from pathcontrol.geometry.arc_length import curvature
-
-        return curvature(self, s)
-
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{k}={_short(v)}' for k, v in plain_attributes(self).items())})"
 
@@ -211,7 +157,7 @@ class PathTask(ABC):
         """Name and public parameters, for the record of a run."""
         return {"task": type(self).__name__} | plain_attributes(self)
 
-    def keep_tool(self, *paths: PathTask) -> None:
+    def keep_tool(self, *paths: Task) -> None:
         """Take over the frame that ``paths`` were made for, and what follows them in it, if it is the same for all."""
         frame, pose = paths[0].frame, paths[0].tool_pose
         if isinstance(frame, str) and all(path.frame == frame and _same(path.tool_pose, pose) for path in paths):
@@ -242,47 +188,14 @@ class PathTask(ABC):
         return ClosestPoint(Curve(self.q_d, self.dq_d, self.ddq_d), lower, upper, self.closed, self.knots)
 
 
-class Reprofiled(PathTask):
-    """A path with a velocity profile that is not its own; made by :meth:`PathTask.with_profile`."""
+def refuse_batch(name: str, task: Task) -> None:
+    """Check that something is for one task.
 
-    def __init__(self, path: PathTask, profile: VelocityProfile) -> None:
-        self.path, self.profile = path, profile
-        self.s0, self.s_end, self.period = path.s0, path.s_end, path.period
-        self.keep_tool(path)
-
-    def q_d(self, s: Array) -> Array:
-        return self.path.q_d(s)
-
-    def dq_d(self, s: Array) -> Array:
-        return self.path.dq_d(s)
-
-    def ddq_d(self, s: Array) -> Array:
-        return self.path.ddq_d(s)
-
-    def theta(self, s: Array) -> Array:
-        return self.profile.theta(self.path, s)
-
-    def dtheta(self, s: Array) -> Array:
-        return self.profile.dtheta(self.path, s)
-
-    def at(self, s: Array) -> PathPoint:
-        dq_d, ddq_d, zero = self.path.dq_d(s), self.path.ddq_d(s), np.zeros_like(s, dtype=np.float64)
-        theta, dtheta = self.profile.at(dq_d, ddq_d, self.path, s)
-        return PathPoint(self.path.q_d(s), dq_d, ddq_d, theta + zero, dtheta + zero)
-
-    def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
-        return self.path.sigma_bar(q, near)
-
-    @property
-    def knots(self) -> Array | None:
-        return self.path.knots
-
-    @property
-    def profile_knots(self) -> Array | None:
-        return self.profile.knots(self.path)
-
-    def describe(self) -> dict[str, Any]:
-        return self.path.describe() | self.profile.describe()
+    Raises:
+        InputError: ``task``, which is called so, is a batch.
+    """
+    if task.rollouts is not None:
+        raise InputError(f"{name} is a TaskBatch of {task.rollouts} tasks, expected one task; take them one by one")
 
 
 def _same(a: Array | None, b: Array | None) -> bool:

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.profile import ConstantSpeed
+from pathcontrol.tasks.task import PathTask
 
 _HIGHEST = 1000  # frequency: from there on a path is not resolved by the samples that search and check it
 

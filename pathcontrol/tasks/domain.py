@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import as_array, scalar
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 
 def take_domain(task: PathTask, s0: Any, s_end: Any, period: Any) -> None:

@@ -12,10 +12,11 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.differentiation import Differentiator
-from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.batched import batched
 from pathcontrol.tasks.domain import refuse_two_rates, take_domain
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, Path, VelocityProfile
+from pathcontrol.tasks.task import PathTask
 
 _PROBES = (0.11, 0.27, 0.5, 0.68, 0.93)  # of the domain
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.transforms import PathSection
+from pathcontrol.tasks.task import PathSection, PathTask
 
 MOST_LAPS = 10_000  # each is a piece of the path in which the nearest point is looked for
 

@@ -12,8 +12,9 @@ from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.geometry.hermite import piecewise, sampled
-from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, Path, VelocityProfile
+from pathcontrol.tasks.task import PathTask
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
-from pathcontrol.simulation.storage.array_store import Shelf
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.arc import Arc
 from pathcontrol.toolpaths.segments.base import Polyline, Segment
@@ -17,39 +17,42 @@ from pathcontrol.toolpaths.segments.bezier import Bezier
 _NEAR = 1e-7  # m, from segments of any other kind to the polylines that are kept of them
 _FINEST = 1 << 20
 
+Put = Callable[[Array], dict[str, Any]]  # puts an array away and returns what is written in its place
+Get = Callable[[Mapping[str, Any]], Array]
 
-def contour_recipe(contour: Contour, shelf: Shelf) -> dict[str, Any]:
-    """What :func:`contour_of` makes the contour of."""
-    recipe: dict[str, Any] = {"segments": [_segment_recipe(segment, shelf) for segment in contour.segments]}
+
+def contour_recipe(contour: Contour, put: Put) -> dict[str, Any]:
+    """Return what :func:`contour_of` makes the contour of; arrays are put away by ``put``."""
+    recipe: dict[str, Any] = {"segments": [_segment_recipe(segment, put) for segment in contour.segments]}
     recipe |= {"closed": contour.closed, "feed": contour.feed, "rapid": contour.rapid, "name": contour.name}
-    return recipe if contour.normals is None else recipe | {"normals": shelf.put(contour.normals)}
+    return recipe if contour.normals is None else recipe | {"normals": put(contour.normals)}
 
 
-def contour_of(recipe: dict[str, Any], shelf: Shelf) -> Contour:
-    """The contour of a recipe."""
-    segments = tuple(_segment_of(segment, shelf) for segment in recipe["segments"])
-    normals = shelf.get(recipe["normals"]) if "normals" in recipe else None
+def contour_of(recipe: dict[str, Any], get: Get) -> Contour:
+    """Return the contour of a recipe, whose arrays ``get`` finds again."""
+    segments = tuple(_segment_of(segment, get) for segment in recipe["segments"])
+    normals = get(recipe["normals"]) if "normals" in recipe else None
     return Contour(segments, recipe["closed"], recipe["feed"], recipe["rapid"], recipe["name"], normals)
 
 
-def _segment_recipe(segment: Segment, shelf: Shelf) -> dict[str, Any]:
+def _segment_recipe(segment: Segment, put: Put) -> dict[str, Any]:
     if type(segment) is Arc:
         vectors = [segment.center, segment.x, segment.y, segment.rise]
-        return {"arc": shelf.put(np.concatenate([*vectors, [segment.start, segment.sweep]]))}
+        return {"arc": put(np.concatenate([*vectors, [segment.start, segment.sweep]]))}
     if type(segment) is Bezier:
-        weights = None if segment.weights is None else shelf.put(segment.weights)
-        return {"bezier": shelf.put(segment.points), "weights": weights}
-    return {"line": shelf.put(segment.points if type(segment) is Polyline else _polyline(segment))}
+        weights = None if segment.weights is None else put(segment.weights)
+        return {"bezier": put(segment.points), "weights": weights}
+    return {"line": put(segment.points if type(segment) is Polyline else _polyline(segment))}
 
 
-def _segment_of(recipe: dict[str, Any], shelf: Shelf) -> Segment:
+def _segment_of(recipe: dict[str, Any], get: Get) -> Segment:
     if "line" in recipe:
-        return Polyline(shelf.get(recipe["line"]))
+        return Polyline(get(recipe["line"]))
     if "arc" in recipe:
-        center, x, y, rise, (start, sweep) = np.split(shelf.get(recipe["arc"]), [3, 6, 9, 12])
+        center, x, y, rise, (start, sweep) = np.split(get(recipe["arc"]), [3, 6, 9, 12])
         return Arc(center, x, y, float(start), float(sweep), rise)
     if "bezier" in recipe:
-        return Bezier(shelf.get(recipe["bezier"]), None if recipe["weights"] is None else shelf.get(recipe["weights"]))
+        return Bezier(get(recipe["bezier"]), None if recipe["weights"] is None else get(recipe["weights"]))
     raise InputError(f"a segment is said to be {', '.join(recipe)}, expected a line, an arc or a Bézier curve")
 
 

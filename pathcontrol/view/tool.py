@@ -11,7 +11,7 @@ from pathcontrol.view.bodies.visuals import leaf_links
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel
-    from pathcontrol.tasks.base import PathTask
+    from pathcontrol.tasks.task import PathTask
 
 _MOVES = 1e-9  # m or rad of a frame or a joint; less is rounding
 _SAMPLES = 64  # of the path

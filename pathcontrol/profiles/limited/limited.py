@@ -14,8 +14,8 @@ from pathcontrol.profiles.limited.motion_limit import MotionLimit
 from pathcontrol.profiles.limited.tangential import all_steps
 from pathcontrol.profiles.limited.two_pass import largest
 from pathcontrol.profiles.tabulated import TabulatedProfile
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.profile import Path
+from pathcontrol.tasks.task import PathTask
 
 
 def limited(

@@ -14,8 +14,8 @@ from pathcontrol.profiles.topp.dynamics import sample, torques
 from pathcontrol.profiles.topp.joint_limits import LimitChoice, joint_limits
 from pathcontrol.profiles.topp.solve import Demand, fastest
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.profile import Path
+from pathcontrol.tasks.task import PathTask
 
 _BINDING = 0.999
 

@@ -15,7 +15,7 @@ from pathcontrol.control.motion import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.damping import Damping
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 _HALVINGS = 30
 _SHORTEST = 1e-6  # of the period that is tried

@@ -12,7 +12,7 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.simulation.checks.weight import Along, weight_slip
 from pathcontrol.simulation.loops import Arm
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 _TURNS = 4 * np.pi  # rad, beyond which a joint without limits hardly starts
 _FAR = 10.0  # rad, beyond which an angle outside its limits is rather one in degrees

@@ -21,8 +21,8 @@ from pathcontrol.simulation.checks.extreme_arms import arm_of, most_mobile
 from pathcontrol.simulation.checks.fast_modes import rate_of_arm, rate_of_friction, rates_of_disturbance, with_damping
 from pathcontrol.simulation.checks.held_gains import feedbacks, longest_period, plan_kick
 from pathcontrol.simulation.loops import MOST_SUBSTEPS, Arm, ContinuousTime, SampledLoop
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch.task_batch import TaskBatch
+from pathcontrol.tasks.task import PathTask
 
 _SAMPLES, _FINE = 9, 65  # of a path, where the arm and where the plan is looked at
 _MOST, _FEWEST = 1 << 16, 3  # samples of all tasks of a batch together, and of each at least

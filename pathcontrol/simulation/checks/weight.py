@@ -11,8 +11,8 @@ from pathcontrol._arrays import Array
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.loops import Arm
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch.task_batch import TaskBatch
+from pathcontrol.tasks.task import PathTask
 
 _SAMPLES = 129  # of a path
 _FEWEST = 3

@@ -19,14 +19,13 @@ from pathcontrol.profiles.tabulated import TabulatedProfile
 from pathcontrol.simulation.storage.array_store import Shelf
 from pathcontrol.simulation.storage.recipe_size import check_extent
 from pathcontrol.simulation.storage.shared_recipes import shared
-from pathcontrol.tasks.base import PathTask, Reprofiled
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.curves import Circle, Ellipse, Line, Lissajous
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, VelocityProfile
 from pathcontrol.tasks.recorded import RecordedPath, RecordedProfile, recorded_profile
-from pathcontrol.tasks.transforms import PathSection, ReversedPath, ScaledPath, ShiftedPath
+from pathcontrol.tasks.task import PathSection, PathTask, Reprofiled, ReversedPath, ScaledPath, ShiftedPath
 from pathcontrol.toolpaths.recipes import contour_of, contour_recipe
 
 #: what is made again from its constructor's arguments, which are attributes of the same names
@@ -147,7 +146,7 @@ def _toolpath_recipe(task: ToolpathTask, shelf: Shelf) -> dict[str, Any]:
     return {
         "class": "RecordedToolpath",
         "paths": [task_recipe(path, shelf) for path in task.paths],
-        "placed": [contour_recipe(contour, shelf) for contour in placed],
+        "placed": [contour_recipe(contour, shelf.put) for contour in placed],
         "followed": [rank[contour] for contour in task.contours],
         **{name: _value(getattr(task, name), shelf, None, True) for name in _TOOLPATH},
         "source": task.drawing.source,
@@ -173,7 +172,7 @@ def _made(recipe: Any, shelf: Shelf, parts: Sequence[Any] = ()) -> Any:
         return TaskBatch(_made(recipe["tasks"], shelf, made))
     values = {name: value for name, value in recipe.items() if name != "class"}
     if recipe["class"] == "RecordedToolpath":
-        contours = [contour_of(contour, shelf) for contour in values.pop("placed")]
+        contours = [contour_of(contour, shelf.get) for contour in values.pop("placed")]
         arguments = {name: _made(value, shelf, parts) for name, value in values.items()}
         return RecordedToolpath(placed=contours, **arguments)
     if recipe["class"] not in _CLASSES:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 
 
 def listed(tasks: Any) -> tuple[PathTask, ...]:

@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array, in_common
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.base import PathPoint, refuse_batch
 from pathcontrol.tasks.batch.checks import by_identity, check_alike, in_common_or_range, listed
 from pathcontrol.tasks.profile import VelocityProfile
+from pathcontrol.tasks.task import PathTask
 
 
 class TaskBatch(PathTask):
@@ -45,7 +46,7 @@ class TaskBatch(PathTask):
         self.s0, self.s_end = (_number([getattr(task, name) for task in self.tasks]) for name in ("s0", "s_end"))
         if self.tasks[0].closed:
             self.period = _number([task.period for task in self.tasks])
-        self._n = self.tasks[0].n
+        self._n, self.rollouts = self.tasks[0].n, len(self.tasks)
         self.keep_tool(*self.tasks)
 
     def __len__(self) -> int:
@@ -168,16 +169,6 @@ class TaskBatch(PathTask):
             expected = f"(*batch, {len(self)}{', n' if axes == 2 else ''})"
             raise InputError(f"{name} has shape {array.shape}, expected {expected}: there are {len(self)} tasks")
         return array
-
-
-def refuse_batch(name: str, task: PathTask) -> None:
-    """Something is for one task.
-
-    Raises:
-        InputError: ``task``, which is called so, is a batch.
-    """
-    if isinstance(task, TaskBatch):
-        raise InputError(f"{name} is a TaskBatch of {len(task)} tasks, expected one task; take them one by one")
 
 
 def rows_of(task: PathTask, rows: NDArray[np.bool_] | NDArray[np.intp]) -> PathTask:

@@ -7,7 +7,8 @@ from scipy.interpolate import BPoly
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.base import PathPoint
+from pathcontrol.tasks.task import PathTask
 
 _SLOWEST = 1e-3  # of the speed at its ends
 

@@ -10,11 +10,12 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
-from pathcontrol.geometry.arc_length import ArcLength, apart
-from pathcontrol.tasks.base import PathPoint, PathTask
-from pathcontrol.tasks.batch.task_batch import refuse_batch
+from pathcontrol.geometry.arc_length import apart
+from pathcontrol.tasks.base import PathPoint, refuse_batch
 from pathcontrol.tasks.joined.blend import Blend
 from pathcontrol.tasks.joined.junction import gap, why_apart, why_not_smooth
+from pathcontrol.tasks.lengths import length_along
+from pathcontrol.tasks.task import PathTask
 
 
 def concatenated(paths: Sequence[PathTask], blend: float | None = None) -> ConcatenatedPath:
@@ -158,7 +159,7 @@ class ConcatenatedPath(PathTask):
         path = self.paths[i]
         if not (at_start or at_end):
             return path.s0, path.s_end
-        length = ArcLength(path, path.s0, path.s_end)
+        length = length_along(path, path.s0, path.s_end)
         if length.total <= self.blend * (at_start + at_end):
             raise InputError(
                 f"paths[{i}] has the length {length.total:.3g} rad and gives up {self.blend:g} rad to each of its "

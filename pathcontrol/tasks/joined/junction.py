@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol.geometry.arc_length import curvature_vector
-from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.base import PathPoint
+from pathcontrol.tasks.task import PathTask
 
 _SAME = 1e-6  # rad; without unit for directions and speeds, 1/rad for curvatures
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, as_array, readonly
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.base import PathTask
-from pathcontrol.tasks.batch.task_batch import refuse_batch
+from pathcontrol.tasks.base import refuse_batch
+from pathcontrol.tasks.task import PathTask
 
 _MEET = 1e-3  # rad
 

@@ -10,11 +10,12 @@ import numpy as np
 
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import InputError, UnknownNameError
-from pathcontrol.tasks.base import PathPoint, PathTask
+from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.domain import refuse_two_rates, take_domain
 from pathcontrol.tasks.profile import ConstantSpeed
 from pathcontrol.tasks.symbolic.functions import compiled, derivatives
 from pathcontrol.tasks.symbolic.parser import RESERVED, number, parse
+from pathcontrol.tasks.task import PathTask
 
 if TYPE_CHECKING:
     import sympy

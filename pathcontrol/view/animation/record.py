@@ -25,7 +25,7 @@ from pathcontrol.view.animation.tables import tables
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel
     from pathcontrol.simulation.run import Run
-    from pathcontrol.tasks.base import PathTask
+    from pathcontrol.tasks.task import PathTask
 
 MOST_GHOSTS = 6  # with a label each: those of more would hide the arm, and the legend names them anyway
 

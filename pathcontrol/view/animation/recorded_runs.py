@@ -12,8 +12,8 @@ from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch.task_batch import rows_of
+from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.animation.rollout import Take
 from pathcontrol.view.animation.scene.palette import run_color
 from pathcontrol.view.bodies.sticks import stick_figure

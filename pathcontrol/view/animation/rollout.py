@@ -18,7 +18,7 @@ from pathcontrol.view.bodies.visuals import LinkVisual
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel
     from pathcontrol.simulation.run import Run
-    from pathcontrol.tasks.base import PathTask
+    from pathcontrol.tasks.task import PathTask
 
 _ABSURD = 1e6  # rad, or m: beyond any arm
 _PROBES = 1001  # of a path

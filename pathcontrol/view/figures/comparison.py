@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.figures.errors import draw_norm, norm_label, norms
 from pathcontrol.view.figures.inset import later
 from pathcontrol.view.figures.limits import aspect, extent, over_time

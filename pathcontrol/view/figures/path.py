@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.figures.limits import aspect, equal_plane, extent, span
 from pathcontrol.view.figures.lines import curve, drawable
 from pathcontrol.view.figures.shown import Runs, Shown, of_one_arm, path_parameters, readable, readable_like, shown

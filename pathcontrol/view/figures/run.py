@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.figures.errors import error_figure as error_figure
 from pathcontrol.view.figures.path import path_figure as path_figure
 from pathcontrol.view.figures.speed import speed_figure

@@ -14,9 +14,9 @@ from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.batch.task_batch import rows_of
 from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.figures.lines import drawable
 from pathcontrol.view.figures.style import RUN_COLOURS
 from pathcontrol.view.figures.words import plain

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.known import where_known
 from pathcontrol.analysis.tool import feed_along, tool_of, tool_speed
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.figures.inset import magnified
 from pathcontrol.view.figures.limits import extent, over_time, span
 from pathcontrol.view.figures.lines import drawable, series

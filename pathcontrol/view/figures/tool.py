@@ -15,8 +15,8 @@ from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.task import PathTask
 from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.view.figures.limits import aspect, equal_plane, extent
 from pathcontrol.view.figures.lines import curve, drawable

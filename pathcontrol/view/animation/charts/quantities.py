@@ -12,7 +12,7 @@ from pathcontrol.analysis.limit_shares import RATIOS, limit_shares
 from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.analysis.tool import feed_along, tool_of, tool_speed
 from pathcontrol.analysis.torque_limits import torque_limits
-from pathcontrol.tasks.base import PathTask
+from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.animation.charts.chart import Chart, Curve
 from pathcontrol.view.animation.drawn_rollout import Shot
 from pathcontrol.view.animation.path_error import MILLIMETRE

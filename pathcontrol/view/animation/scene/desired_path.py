@@ -10,8 +10,8 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import TaskError
-from pathcontrol.tasks.base import PathTask
 from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.task import PathTask
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.view.animation.rollout import Take

@@ -1,0 +1,1 @@
+"""The compiled engine: the sampled loop, nearest points and one control tick, in C++ without dependencies."""

@@ -1,0 +1,62 @@
+"""Whether a path moves on with s everywhere: it neither stands still nor turns back."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import TaskError
+from pathcontrol.tasks.base import Task
+
+_SAMPLES = 129
+_HALVINGS = 40  # of the stretch between two samples, down to rounding
+_OPPOSITE = -0.99  # cosine of an angle
+
+
+def check_moves(task: Task) -> None:
+    """Check that a path moves on with s everywhere on its domain: it neither stands still nor turns back.
+
+    Raises:
+        TaskError: it does, and where.
+    """
+    name, s = type(task).__name__, np.linspace(*task.sampled_interval, _SAMPLES)
+    _check_regular(task, name, s)
+    _check_cusps(task, name, s)
+
+
+def _check_regular(task: Task, name: str, s: Array) -> None:
+    """The path never stands still: q_d' vanishes nowhere."""
+    length = np.linalg.norm(task.dq_d(s), axis=-1)
+    if not length.min() > 1e-9 * length.max():
+        raise TaskError(
+            f"{name}.dq_d(s={s[int(np.argmin(length))]:g}) has length {length.min():.1e}, expected a path that moves "
+            "with s everywhere: q_d' = 0 is a cusp or a standstill"
+        )
+
+
+def _check_cusps(task: Task, name: str, s: Array) -> None:
+    """The path turns back nowhere: between samples its direction does not jump to the opposite one."""
+    directions = _directions(task, s)
+    turns = np.flatnonzero((directions[1:] * directions[:-1]).sum(-1) < 0)
+    if not turns.size:
+        return
+    left, right, before = s[turns], s[turns + 1], directions[turns]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (left + right)
+        ahead = (_directions(task, middle) * before).sum(-1) > 0
+        left, right = np.where(ahead, middle, left), np.where(ahead, right, middle)
+    cosine = (_directions(task, left) * _directions(task, right)).sum(-1)
+    # between the paths of a sequence the arm comes to rest, and may turn round
+    rests = np.asarray(getattr(task, "starts", ()))
+    cosine[np.isclose(left[:, None], rests, rtol=0, atol=1e-9 * (s[-1] - s[0])).any(-1)] = 1.0
+    if cosine.min() < _OPPOSITE:
+        raise TaskError(
+            f"{name} turns back at s = {left[int(np.argmin(cosine))]:g}, expected a path without cusps: no arm that "
+            "moves can turn round at once; end the path there, or round the tip"
+        )
+
+
+def _directions(task: Task, s: Array) -> Array:
+    """q_d'/‖q_d'‖, (*batch, n)."""
+    tangent = np.asarray(task.dq_d(s))
+    return tangent / np.maximum(np.linalg.norm(tangent, axis=-1, keepdims=True), np.finfo(float).tiny)
