@@ -26,7 +26,7 @@ from pathcontrol import (
     simulate,
     steady_state,
 )
-from pathcontrol.analysis.metrics import UNITS
+from pathcontrol.analysis.run_metrics import UNITS
 
 START = np.deg2rad([40.0, 70.0])
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from pathcontrol.analysis.lyapunov import lyapunov
+from pathcontrol.analysis.lyapunov_functions import lyapunov
 from pathcontrol.control.projection import Projection
 from pathcontrol.errors import SimulationError, TaskError
 from pathcontrol.robot.loading import load_robot

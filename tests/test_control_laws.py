@@ -21,7 +21,7 @@ from pathcontrol import (
     SlotineLi,
     simulate,
 )
-from pathcontrol.analysis.lyapunov import extended_motion_plan_lyapunov, projection_lyapunov
+from pathcontrol.analysis.lyapunov_functions import extended_motion_plan_lyapunov, projection_lyapunov
 
 START = np.deg2rad([40.0, 70.0])
 states = st.tuples(vectors(2, 2.0), vectors(2, 4.0), floats(0, 6))

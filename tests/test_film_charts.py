@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from test_film import Reel, made_up_run, reel
 
 from pathcontrol import Circle, ContinuousTime, ExtendedMotionPlan, Projection, RobotModel, Run, load_robot, simulate
-from pathcontrol.analysis.metrics import contour_error, metrics
 from pathcontrol.analysis.readable import readable_number
+from pathcontrol.analysis.run_metrics import contour_error, metrics
 from pathcontrol.view.animation.charts.chart import MOST_POINTS, Chart, Curve, extremes
 from pathcontrol.view.animation.charts.quantities import short_names
 from pathcontrol.view.animation.payload import Film

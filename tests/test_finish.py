@@ -29,8 +29,8 @@ from pathcontrol import (
     metrics,
     simulate,
 )
-from pathcontrol.analysis.lyapunov import projection_lyapunov
-from pathcontrol.analysis.metrics import UNITS, end_error
+from pathcontrol.analysis.lyapunov_functions import projection_lyapunov
+from pathcontrol.analysis.run_metrics import UNITS, end_error
 from pathcontrol.control.ending import Ending
 
 T = 0.1  # s, the time constant of the end

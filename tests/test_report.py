@@ -19,8 +19,8 @@ from strategies import floats
 
 import pathcontrol as pc
 from pathcontrol import Circle, InputError, RobotModel, Run, metrics
-from pathcontrol.analysis.metrics import LABELS, UNITS
 from pathcontrol.analysis.readable import reading
+from pathcontrol.analysis.run_metrics import LABELS, UNITS
 from pathcontrol.simulation.context import Origin
 from pathcontrol.view.report.pictures import pictures
 from pathcontrol.view.report.report import report

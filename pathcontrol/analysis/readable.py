@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.metrics import UNITS
+from pathcontrol.analysis.run_metrics import UNITS
 from pathcontrol.simulation.run import Run
 
 _NOTHING = 1e-7  # of the largest of several numbers

@@ -69,7 +69,7 @@ def command(
 
 
 def _tell(result: SweepResult, as_json: bool) -> None:
-    from pathcontrol.analysis.metrics import UNITS
+    from pathcontrol.analysis.run_metrics import UNITS
 
     table = result.table()
     numbers = {str(name): v for name, v in table.data_vars.items() if v.dtype.kind == "f" and name != "diverged_time"}

@@ -11,7 +11,7 @@ from typing import Any
 from pathcontrol._files import whole_file
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.analysis.deviation import toolpath_metrics
-from pathcontrol.analysis.metrics import UNITS, metrics
+from pathcontrol.analysis.run_metrics import UNITS, metrics
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.experiments.build import Setup

@@ -14,7 +14,7 @@ import numpy as np
 from pathcontrol._files import whole_file
 from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import refuse_suffix
-from pathcontrol.analysis.metrics import peak, steady_state
+from pathcontrol.analysis.run_metrics import peak, steady_state
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.projection import Projection

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array
-from pathcontrol.analysis.metrics import UNITS, metrics
 from pathcontrol.analysis.progress import unfinished
+from pathcontrol.analysis.run_metrics import UNITS, metrics
 from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError, SimulationError, UnknownNameError
 from pathcontrol.simulation.engines import Engine

@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.metrics import LABELS, UNITS
 from pathcontrol.analysis.readable import readable_parameters
+from pathcontrol.analysis.run_metrics import LABELS, UNITS
 from pathcontrol.errors import InputError, PathControlWarning
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.variables import OUTCOMES

@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.metrics import LABELS, UNITS
 from pathcontrol.analysis.readable import readable_number, readable_parameters
+from pathcontrol.analysis.run_metrics import LABELS, UNITS
 from pathcontrol.errors import UnknownNameError
 from pathcontrol.sweeps.objectives import costs, excess, failed, front, metric, within
 from pathcontrol.tuning.problem import Terms

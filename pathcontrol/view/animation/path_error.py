@@ -9,8 +9,8 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import tool_deviation
-from pathcontrol.analysis.metrics import contour_error
 from pathcontrol.analysis.readable import in_degrees
+from pathcontrol.analysis.run_metrics import contour_error
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import TaskError
 from pathcontrol.view.animation.rollout import Take

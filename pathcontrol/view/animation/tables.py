@@ -11,9 +11,9 @@ from pathcontrol.analysis.contours import contour_table
 from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.laps import lap_table
 from pathcontrol.analysis.limit_shares import RATIOS, is_passed
-from pathcontrol.analysis.metrics import LABELS, metrics
 from pathcontrol.analysis.readable import readable_number, unit_of
 from pathcontrol.analysis.remarks import remarks
+from pathcontrol.analysis.run_metrics import LABELS, metrics
 from pathcontrol.analysis.window import told
 from pathcontrol.view.animation.rollout import Take
 from pathcontrol.view.animation.settings import settings

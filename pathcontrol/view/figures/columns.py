@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
-from pathcontrol.analysis.metrics import LABELS
 from pathcontrol.analysis.readable import reading
+from pathcontrol.analysis.run_metrics import LABELS
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.sweeps import objectives as goals
 from pathcontrol.sweeps.result import SweepResult

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from pathcontrol.analysis.metrics import LABELS
+from pathcontrol.analysis.run_metrics import LABELS
 from pathcontrol.view.figures.columns import readable_metric
 from pathcontrol.view.figures.pareto import pareto_figure
 from pathcontrol.view.figures.sweep import basin_figure, robustness_figure

@@ -13,8 +13,8 @@ from markupsafe import Markup, escape
 
 from pathcontrol.analysis.contours import contour_table
 from pathcontrol.analysis.laps import lap_table
-from pathcontrol.analysis.metrics import UNITS
 from pathcontrol.analysis.remarks import remarks
+from pathcontrol.analysis.run_metrics import UNITS
 from pathcontrol.analysis.window import told
 from pathcontrol.simulation.run import Run
 from pathcontrol.sweeps.result import SweepResult

@@ -12,9 +12,9 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.limit_shares import RATIOS, is_passed, limit_ratios
-from pathcontrol.analysis.metrics import LABELS, metrics
 from pathcontrol.analysis.progress import got_there
 from pathcontrol.analysis.readable import counted, reading, unit_of, without_rounding
+from pathcontrol.analysis.run_metrics import LABELS, metrics
 from pathcontrol.analysis.torque import torque_metrics
 from pathcontrol.analysis.window import samples_of
 from pathcontrol.cartesian.toolpath_task import ToolpathTask

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pathcontrol.analysis.metrics import LABELS
+from pathcontrol.analysis.run_metrics import LABELS
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.view.figures.columns import never, readable_metric
 from pathcontrol.view.figures.overview import overview
