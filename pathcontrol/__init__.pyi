@@ -1,3 +1,5 @@
+from . import analysis as analysis
+from . import figures as figures
 from .analysis.deviation import tool_deviation as tool_deviation
 from .analysis.deviation import toolpath_metrics as toolpath_metrics
 from .analysis.gamma import distance_to_gamma as distance_to_gamma
@@ -40,6 +42,9 @@ from .errors import TaskError as TaskError
 from .errors import ToolpathError as ToolpathError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import UrdfError as UrdfError
+from .experiments.runner import run_experiment as run_experiment
+from .experiments.sweep_runner import run_sweep as run_sweep
+from .experiments.tune_runner import run_tune as run_tune
 from .profiles.jerk.start_stop import SmoothStartStop as SmoothStartStop
 from .profiles.limited.limited import limited as limited
 from .profiles.limited.motion_limit import MotionLimit as MotionLimit

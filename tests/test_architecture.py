@@ -75,8 +75,8 @@ def test_no_module_imports_itself_around_a_corner():
 @pytest.mark.parametrize("name", sorted(MODULES))
 def test_imports_run_down(name):
     mine = floor(name)
-    if name in {"pathcontrol", "pathcontrol.__main__"}:
-        return
+    if name in {"pathcontrol", "pathcontrol.__main__", "pathcontrol.figures"}:
+        return  # they stand before the house
     for target in GRAPH[name]:
         theirs = floor(target)
         if mine is None:

@@ -101,7 +101,7 @@ def test_the_table_of_variables_is_that_of_a_run():
 def test_every_public_name_is_in_the_api_page():
     source = (DOCS / "api.md").read_text(encoding="utf-8")
     modules = set(re.findall(r"automodule:: (\S+)", source))
-    for name in pathcontrol.__all__:
+    for name in set(pathcontrol.__all__) - {"analysis", "figures"}:  # packages, whose functions are there as well
         module = getattr(pathcontrol, name).__module__
         assert module in modules or re.search(rf"{module}\.{name}$", source, re.MULTILINE), f"api.md lacks {name}"
 

@@ -1,0 +1,13 @@
+from .deviation import tool_deviation as tool_deviation
+from .deviation import toolpath_metrics as toolpath_metrics
+from .gamma import distance_to_gamma as distance_to_gamma
+from .lyapunov_functions import lyapunov as lyapunov
+from .pareto import non_dominated as non_dominated
+from .run_metrics import contour_error as contour_error
+from .run_metrics import end_error as end_error
+from .run_metrics import lag_error as lag_error
+from .run_metrics import metrics as metrics
+from .run_metrics import peak as peak
+from .run_metrics import rms as rms
+from .run_metrics import settling_time as settling_time
+from .run_metrics import steady_state as steady_state
