@@ -10,17 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from pathcontrol._expect import expect
 from pathcontrol._files import whole_file
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.errors import InputError
-from pathcontrol.view.figures.ticks import SpacedLocator
+from pathcontrol.view.figures.layout import SettledLayout, laid_out
+from pathcontrol.view.figures.ticks import SpacedLocator, label_plainly
 
 # Okabe and Ito's colours, told apart with any colour vision; their yellow is too pale on white
 BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
@@ -46,7 +45,6 @@ FORMATS = ("svg", "png", "pdf")
 _SUFFIXES = (".svg", ".png", ".pdf")
 SMALL = 7.0  # pt, of numbers on axes and in insets
 _NOTEBOOK_DPI = 144
-_LAYOUTS, _SETTLED = 6, 5e-4  # at most so many, shares of the figure
 
 _STYLE: Any = {
     "font.size": 8.0,
@@ -96,31 +94,7 @@ class NotebookFigure(Figure):
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure [in]."""
-    return NotebookFigure(figsize=(width, height), layout=_SettledLayout(w_pad=0.03, h_pad=0.03))
-
-
-class _SettledLayout(ConstrainedLayoutEngine):
-    """Repeated until nothing moves: with equal scales on both axes, labels are off the page after the first time."""
-
-    def execute(self, fig: Any) -> None:
-        before = _places(fig)
-        for _ in range(_LAYOUTS):
-            super().execute(fig)
-            places = _places(fig)
-            if np.allclose(places, before, rtol=0.0, atol=_SETTLED):
-                break
-            before = places
-        _round_places(fig)
-
-
-def _places(figure: Figure) -> list[tuple[float, ...]]:
-    return [axes.get_position(original=True).bounds for axes in figure.axes]
-
-
-def _round_places(figure: Figure) -> None:
-    """The solver differs in the last bit from draw to draw, and names inside SVG files come from these numbers."""
-    for axes in figure.axes:
-        axes._set_position(np.round(axes.get_position(original=True).bounds, 9).tolist())  # type: ignore[attr-defined]
+    return NotebookFigure(figsize=(width, height), layout=SettledLayout())
 
 
 def dressed(axes: Axes) -> Axes:
@@ -129,6 +103,7 @@ def dressed(axes: Axes) -> Axes:
     axes.tick_params(labelsize=SMALL, width=0.7, length=2.5, pad=2.5)
     for axis in (axes.xaxis, axes.yaxis):
         axis.get_offset_text().set_fontsize(SMALL)
+        label_plainly(axis)
     axes.xaxis.set_major_locator(SpacedLocator(SMALL))
     return axes
 
@@ -162,7 +137,7 @@ def save_figure(figure: Figure, path: str | Path, formats: Sequence[str] = ("svg
     if unknown := [name for name in wanted if name not in FORMATS]:
         raise InputError(f"formats has {unknown[0]!r}, expected some of {', '.join(map(repr, FORMATS))}")
     targets = {name: stem.with_name(f"{stem.name}.{name}") for name in wanted}
-    with style(), ExitStack() as files:
+    with style(), laid_out(figure, mpl.rcParams["savefig.dpi"]), ExitStack() as files:
         for name, target in targets.items():
             figure.savefig(files.enter_context(whole_file(target)), format=name, metadata=_METADATA[name])
     return list(targets.values())

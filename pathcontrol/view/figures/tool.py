@@ -33,6 +33,7 @@ from pathcontrol.view.figures.style import (
     new_figure,
     style,
 )
+from pathcontrol.view.figures.ticks import label_plainly
 from pathcontrol.view.figures.words import legend
 from pathcontrol.view.tool import with_tool
 
@@ -135,6 +136,7 @@ def coloured_way(figure: Figure, axes: Axes, way: Array, deviation: Array, cutti
     bar = figure.colorbar(lines, cax=axes.inset_axes((1.03, 0.0, 0.035, 1.0)))
     bar.set_label(f"distance [{unit}]")
     bar.outline.set_visible(False)
+    label_plainly(bar.ax.yaxis)
     bar.ax.tick_params(labelsize=SMALL, width=0.7, length=2.5, pad=2.5)
 
 
