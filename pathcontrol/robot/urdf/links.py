@@ -74,7 +74,7 @@ def read_joint(element: etree._Element) -> Joint:
         element.get("type", ""),
         element.find("parent").get("link"),
         element.find("child").get("link"),
-        _pose(element.find("origin")),
+        read_pose(element.find("origin")),
         _vector(element.find("axis"), "xyz", "1 0 0"),
         None if limit is None else Limit(**_numbers(limit, "effort", "velocity", "lower", "upper")),  # type: ignore[arg-type]
         None if dynamics is None else Dynamics(**_numbers(dynamics, "damping", "friction")),
@@ -85,7 +85,7 @@ def _inertial(element: etree._Element) -> Inertial:
     mass, inertia = element.find("mass"), element.find("inertia")
     ixx, ixy, ixz, iyy, iyz, izz = (float(inertia.get(f"i{axes}")) for axes in ("xx", "xy", "xz", "yy", "yz", "zz"))
     tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    return Inertial(float(mass.get("value")), tensor, _pose(element.find("origin")))
+    return Inertial(float(mass.get("value")), tensor, read_pose(element.find("origin")))
 
 
 def _numbers(element: etree._Element, *names: str) -> dict[str, float | None]:
@@ -100,8 +100,11 @@ def _vector(element: etree._Element | None, name: str, default: str) -> np.ndarr
     return np.array([float(word) for word in text.split()])
 
 
-def _pose(origin: etree._Element | None) -> np.ndarray | None:
-    """The transform (4, 4) of an ``<origin>``: turns about x, then y, then z, fixed axes, and then the shift."""
+def read_pose(origin: etree._Element | None) -> np.ndarray | None:
+    """Return the transform (4, 4) of an ``<origin>``, None where there is none.
+
+    It turns about x, then y, then z, fixed axes, and then shifts.
+    """
     if origin is None:
         return None
     (cr, cp, cy), (sr, sp, sy) = (turn(_vector(origin, "rpy", "0 0 0")) for turn in (np.cos, np.sin))

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
-from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import yourdfpy
-from lxml import etree
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import PathControlWarning, UrdfError
 from pathcontrol.robot.urdf import parse_urdf
+from pathcontrol.robot.urdf.links import read_pose
 from pathcontrol.robot.urdf.mesh_files import find_mesh
 from pathcontrol.view.bodies.links import reach
-from pathcontrol.view.bodies.meshes import read_mesh
 from pathcontrol.view.bodies.shapes import Box, Color, Cylinder, Shape, Sphere
 
 if TYPE_CHECKING:
@@ -80,38 +76,40 @@ def _visuals(
     link: str, element: Any, palette: dict[str, Color], source: UrdfSource, detail: float
 ) -> Iterator[LinkVisual]:
     try:
-        visual = _read(element)
-        origin = np.eye(4) if visual.origin is None else np.asarray(visual.origin, dtype=np.float64)
-        shapes = _shapes(visual.geometry, source, detail)
+        pose = read_pose(element.find("origin"))
+        shapes = _shapes(next(element.iterfind("geometry/*"), None), source, detail)
+        color = _color(element.find("material"), palette)
     except (UrdfError, LookupError, TypeError, ValueError) as error:
         mesh = element.find("geometry/mesh")
         what = "a visual" if mesh is None else f"mesh {mesh.get('filename')!r}"
         told = f"{what} of link {link!r} is left out of the picture: {error}"
         warnings.warn(told, PathControlWarning, stacklevel=5)
         return
-    color = _color(visual.material, palette)
     for shape, own_color in shapes:
-        yield LinkVisual(link, visual.name or "", origin, shape, own_color or color)
+        yield LinkVisual(link, element.get("name", ""), np.eye(4) if pose is None else pose, shape, own_color or color)
 
 
-def _read(element: Any) -> yourdfpy.urdf.Visual:
-    """One ``<visual>`` as yourdfpy reads it, alone, so that a broken one costs no other."""
-    robot = etree.Element("robot", name="one")
-    link = etree.SubElement(robot, "link", name="one")
-    link.append(deepcopy(element))
-    file = BytesIO(etree.tostring(robot))
-    return yourdfpy.URDF.load(file, build_scene_graph=False, load_meshes=False).robot.links[0].visuals[0]
+def _shapes(shape: Any, source: UrdfSource, detail: float) -> list[tuple[Shape, Color | None]]:
+    """The shapes of an element inside ``<geometry>``, those of a mesh with their own colours."""
+    if shape is None:
+        raise UrdfError("it has no geometry")
+    if shape.tag == "mesh":
+        from pathcontrol.view.bodies.meshes import read_mesh  # loads trimesh, which takes half a second
+
+        path = find_mesh(shape.get("filename", ""), source.base_dir, source.package_dirs)
+        return [*read_mesh(path, _numbers(shape.get("scale", "").strip() or "1"), detail)]
+    if shape.tag == "box":
+        return [(Box(np.broadcast_to(_numbers(shape.attrib["size"]), 3)), None)]
+    if shape.tag == "cylinder":
+        return [(Cylinder(float(shape.attrib["radius"]), float(shape.attrib["length"])), None)]
+    if shape.tag == "sphere":
+        return [(Sphere(float(shape.attrib["radius"])), None)]
+    raise UrdfError(f"it is a <{shape.tag}>, expected a box, cylinder, sphere or mesh")
 
 
-def _shapes(geometry: yourdfpy.urdf.Geometry, source: UrdfSource, detail: float) -> list[tuple[Shape, Color | None]]:
-    if (mesh := geometry.mesh) is not None:
-        path = find_mesh(mesh.filename or "", source.base_dir, source.package_dirs)
-        return [*read_mesh(path, 1.0 if mesh.scale is None else mesh.scale, detail)]
-    if (box := geometry.box) is not None:
-        return [(Box(np.broadcast_to(box.size, 3)), None)]
-    if (cylinder := geometry.cylinder) is not None:
-        return [(Cylinder(cylinder.radius, cylinder.length), None)]
-    return [(Sphere(geometry.sphere.radius), None)]
+def _numbers(text: str) -> Array:
+    """Numbers with spaces or commas between."""
+    return np.array(text.replace(",", " ").split(), dtype=np.float64)
 
 
 def _palette(root: Any) -> dict[str, Color]:
@@ -124,12 +122,13 @@ def _palette(root: Any) -> dict[str, Color]:
     return found
 
 
-def _color(material: yourdfpy.urdf.Material | None, palette: dict[str, Color]) -> Color:
+def _color(material: Any, palette: dict[str, Color]) -> Color:
+    """The colour that a ``<material>`` has, or that others of its name have."""
     if material is None:
         return UNPAINTED
-    if material.color is not None:
-        return _rgba(material.color.rgba)
-    return palette.get(material.name or "", UNPAINTED)
+    if (own := material.find("color")) is not None:
+        return _rgba(own.get("rgba", "1 1 1 1").split())
+    return palette.get(material.get("name", ""), UNPAINTED)
 
 
 def _rgba(values: Any) -> Color:
