@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import groupby
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from pathcontrol.analysis.coverage import Points, even_points, passed, refined, traverse
 from pathcontrol.analysis.known import where_known
 from pathcontrol.analysis.tool import LedCurve, feed_along, tool_of, tool_speed
-from pathcontrol.cartesian.path import CartesianPath
+from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.cartesian.tool import Tool
-from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
-from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.segments.base import Polyline
+
+if TYPE_CHECKING:
+    from pathcontrol.toolpaths.contour import Contour
 
 _MOST = 20_000  # points of a segment
 _FINER = 0.5  # of the tolerance, between points of a drawing
@@ -137,15 +137,18 @@ def _texts(number: int, one: ContourNumbers) -> list[str]:
 
 def feed_of(contour: Contour | LedCurve, task: PathSequence, paths: Sequence[int], robot: RobotModel) -> float:
     """The speed [m/s] that is asked for on a contour that some ``paths`` follow; of other paths its mean along them."""
-    if not isinstance(task, ToolpathTask) or isinstance(contour, LedCurve):
+    toolpath = as_toolpath(task)
+    if toolpath is None or isinstance(contour, LedCurve):
         return _feed_of_path(task.paths[paths[0]], robot)
     if contour.rapid:
-        return float(task.rapid_speed)
-    return float(contour.feed or task.feed or np.nan)
+        return float(toolpath.rapid_speed)
+    return float(contour.feed or toolpath.feed or np.nan)
 
 
 def _feed_of_path(path: PathTask, robot: RobotModel) -> float:
     """The speed [m/s] that a path asks of the tool, its mean over s where it changes."""
+    from pathcontrol.cartesian.path import CartesianPath
+
     if isinstance(path, CartesianPath):
         return path.speed
     return float(np.mean(feed_along(path, robot, traverse(path))))
@@ -153,6 +156,8 @@ def _feed_of_path(path: PathTask, robot: RobotModel) -> float:
 
 def contour_points(contour: Contour, tolerance: float) -> Points:
     """Points of a contour [m], (k, 3), no farther apart than half of the ``tolerance``, each on the contour itself."""
+    from pathcontrol.toolpaths.segments.base import Polyline
+
     parts = []
     for segment in contour.segments:
         if isinstance(segment, Polyline):
@@ -165,11 +170,12 @@ def contour_points(contour: Contour, tolerance: float) -> Points:
 
 def _grouped(task: PathSequence, tool: Tool) -> Sequence[tuple[Contour | LedCurve, list[int]]]:
     """Each contour with the paths that follow it: several where the arm stops at corners."""
-    if not isinstance(task, ToolpathTask):
+    toolpath = as_toolpath(task)
+    if toolpath is None:
         return [(LedCurve(path, tool), [i]) for i, path in enumerate(task.paths)]
-    every = list(enumerate(task.contours))
+    every = list(enumerate(toolpath.contours))
     return [
-        (task.contours[paths[0]], paths)
+        (toolpath.contours[paths[0]], paths)
         for _, group in groupby(every, key=lambda pair: id(pair[1]))
         if (paths := [i for i, _ in group])
     ]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
@@ -82,6 +81,8 @@ def distance_to_trace(x: Array, trace: Array, resolution: float) -> Array:
     fine = refined(trace[(np.abs(trace) < FARTHEST).all(-1)], _FINER * resolution)
     if not len(fine):
         return np.full(len(x), np.inf)
+    from scipy.spatial import cKDTree  # takes a fifth of a second to load
+
     nearest = cKDTree(fine, balanced_tree=False).query(x)[1]
     sides = [(np.maximum(nearest - 1, 0), nearest), (nearest, np.minimum(nearest + 1, len(fine) - 1))]
     return np.min([_to_line(x, fine[a], fine[b]) for a, b in sides], axis=0)

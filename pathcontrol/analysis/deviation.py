@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -15,13 +15,16 @@ from pathcontrol.analysis.limit_shares import limit_ratios
 from pathcontrol.analysis.progress import progress
 from pathcontrol.analysis.tool import LedCurve, made_for, orientation_error, tool_speed
 from pathcontrol.analysis.window import Samples, Window, own_samples, samples_of
-from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
-from pathcontrol.toolpaths.contour import Contour
+
+if TYPE_CHECKING:
+    from pathcontrol.cartesian.toolpath_task import ToolpathTask
+    from pathcontrol.toolpaths.contour import Contour
 
 
 def tool_positions(run: Run, robot: RobotModel | None = None, frame: str | None = None) -> Array:
@@ -81,8 +84,8 @@ def geometry_of(task: PathTask, robot: RobotModel) -> Sequence[Geometry]:
         InputError: the path was made for no frame of the arm.
         TaskError: the path goes on for ever without repeating.
     """
-    if isinstance(task, ToolpathTask):
-        return task.contours
+    if (toolpath := as_toolpath(task)) is not None:
+        return toolpath.contours
     paths, tool = task.paths if isinstance(task, PathSequence) else [task], made_for(robot, task)
     return [LedCurve(path, tool) for path in paths]
 

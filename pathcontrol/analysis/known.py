@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
-from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.closest_point.cells import FARTHEST
 from pathcontrol.simulation.context import check_sequence
@@ -17,6 +18,9 @@ from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
+
+if TYPE_CHECKING:
+    from pathcontrol.cartesian.toolpath_task import ToolpathTask
 
 
 def known_task(run: Run, task: PathTask | None) -> PathTask:
@@ -45,12 +49,13 @@ def known_toolpath(run: Run, task: ToolpathTask | None) -> ToolpathTask:
         InputError: the task is none, or not known.
     """
     found = known_task(run, task)
-    if not isinstance(found, ToolpathTask):
+    toolpath = as_toolpath(found)
+    if toolpath is None:
         raise InputError(
             f"the run follows a {type(found).__name__}, expected a ToolpathTask; give task=…, or give "
             "it to simulate_sequence(…, task=…)"
         )
-    return found
+    return toolpath
 
 
 def of_rollouts(function: Callable[[Run, PathTask], Array], run: Run, task: PathTask | None) -> Array:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.coverage import Points, even_points, traverse
@@ -48,6 +47,8 @@ class LedCurve:
     name, rapid = "", False
 
     def __init__(self, task: PathTask, tool: Tool) -> None:
+        from scipy.interpolate import CubicHermiteSpline  # takes a tenth of a second to load
+
         s = traverse(task)
         there = tool.kinematics(task.q_d(s))
         self.points: Points = even_points(there.position)

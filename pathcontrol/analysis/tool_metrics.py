@@ -11,7 +11,6 @@ from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import contour_deviation, geometry_of
 from pathcontrol.analysis.tool import tool_signals
 from pathcontrol.analysis.window import Samples
-from pathcontrol.cartesian.path import CartesianPath
 from pathcontrol.errors import TaskError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.task import PathTask
@@ -34,6 +33,8 @@ def tool_metrics(run: Run, task: PathTask, counted: Samples, only: Collection[st
     signals = tool_signals(run, task, *(counted.within(run.array(name)) for name in ("s", "q", "qd")))
     if signals is None:
         return {}
+    from pathcontrol.cartesian.path import CartesianPath  # its paths are there if the tool is
+
     values = {
         "tool_speed_mean": counted.reduced(np.mean, signals.speed),
         "tool_speed_peak": counted.reduced(np.max, signals.speed),

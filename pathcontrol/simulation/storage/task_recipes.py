@@ -7,13 +7,12 @@ to the last bit. Any other path is kept as samples, a :class:`RecordedPath`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pathcontrol._arrays import as_array, finite
-from pathcontrol.cartesian.recorded_toolpath import RecordedToolpath
-from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.tabulated import TabulatedProfile
 from pathcontrol.simulation.storage.array_store import Shelf
@@ -26,7 +25,9 @@ from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, VelocityProfile
 from pathcontrol.tasks.recorded import RecordedPath, RecordedProfile, recorded_profile
 from pathcontrol.tasks.task import PathSection, PathTask, Reprofiled, ReversedPath, ScaledPath, ShiftedPath
-from pathcontrol.toolpaths.recipes import contour_of, contour_recipe
+
+if TYPE_CHECKING:
+    from pathcontrol.cartesian.toolpath_task import ToolpathTask
 
 #: what is made again from its constructor's arguments, which are attributes of the same names
 _MADE: dict[type, tuple[str, ...]] = {
@@ -79,8 +80,8 @@ def task_recipe(task: PathTask, shelf: Shelf, upto: float | None = None, rated: 
 def _task_recipe(task: PathTask, shelf: Shelf, upto: float | None, rated: bool) -> dict[str, Any]:
     if isinstance(task, TaskBatch):
         return {"class": "TaskBatch"} | shared([task_recipe(one, shelf, upto) for one in task])
-    if isinstance(task, ToolpathTask):
-        return _toolpath_recipe(task, shelf)
+    if (toolpath := as_toolpath(task)) is not None:
+        return _toolpath_recipe(toolpath, shelf)
     if isinstance(task, PathSequence):
         return _recipe(PathSequence, task, shelf, upto, rated)
     if isinstance(task, Reprofiled):
@@ -141,6 +142,8 @@ def _unchanged(task: PathTask) -> bool:
 
 
 def _toolpath_recipe(task: ToolpathTask, shelf: Shelf) -> dict[str, Any]:
+    from pathcontrol.toolpaths.recipes import contour_recipe
+
     placed = list(dict.fromkeys(task.contours))
     rank = {contour: i for i, contour in enumerate(placed)}
     return {
@@ -172,12 +175,20 @@ def _made(recipe: Any, shelf: Shelf, parts: Sequence[Any] = ()) -> Any:
         return TaskBatch(_made(recipe["tasks"], shelf, made))
     values = {name: value for name, value in recipe.items() if name != "class"}
     if recipe["class"] == "RecordedToolpath":
-        contours = [contour_of(contour, shelf.get) for contour in values.pop("placed")]
-        arguments = {name: _made(value, shelf, parts) for name, value in values.items()}
-        return RecordedToolpath(placed=contours, **arguments)
+        return _made_toolpath(values, shelf, parts)
     if recipe["class"] not in _CLASSES:
         raise InputError(f"class {recipe['class']!r} of a task, expected one of {', '.join(_CLASSES)}")
     return _tried(_CLASSES[recipe["class"]](**{name: _made(value, shelf, parts) for name, value in values.items()}))
+
+
+def _made_toolpath(values: dict[str, Any], shelf: Shelf, parts: Sequence[Any]) -> PathTask:
+    """The toolpath of a recipe."""
+    from pathcontrol.cartesian.recorded_toolpath import RecordedToolpath
+    from pathcontrol.toolpaths.recipes import contour_of
+
+    contours = [contour_of(contour, shelf.get) for contour in values.pop("placed")]
+    arguments = {name: _made(value, shelf, parts) for name, value in values.items()}
+    return RecordedToolpath(placed=contours, **arguments)
 
 
 def _tried(made: Any) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +12,11 @@ from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import tool_deviation
 from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.analysis.run_metrics import contour_error
-from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import TaskError
 from pathcontrol.view.animation.rollout import Take
+
+if TYPE_CHECKING:
+    from pathcontrol.cartesian.toolpath_task import ToolpathTask
 
 MILLIMETRE, MICROMETRE = 1e3, 1e6
 _LITTLE_MORE = 1.25

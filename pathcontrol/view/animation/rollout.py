@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.view.bodies.shapes import Color
 from pathcontrol.view.bodies.visuals import LinkVisual
 
 if TYPE_CHECKING:
+    from pathcontrol.cartesian.toolpath_task import ToolpathTask
     from pathcontrol.robot.model import RobotModel
     from pathcontrol.simulation.run import Run
     from pathcontrol.tasks.task import PathTask
@@ -76,8 +77,7 @@ class Take:
     @property
     def toolpath(self) -> ToolpathTask | None:
         """The task if it is a drawing that the tool follows, contour by contour."""
-        followed = "path_index" in self.run.data.coords
-        return self.task if isinstance(self.task, ToolpathTask) and followed else None
+        return as_toolpath(self.task) if "path_index" in self.run.data.coords else None
 
     @cached_property
     def poses(self) -> dict[str, Array]:

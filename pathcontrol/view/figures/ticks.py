@@ -63,7 +63,7 @@ class PlainLogFormatter(LogFormatterSciNotation):
 
 
 def label_plainly(axis: Axis) -> None:
-    """Write plain numbers along an axis, of a logarithmic one between powers of ten too where there are few of these."""
+    """Write plain numbers along an axis; of a logarithmic one between powers of ten too where these are few."""
     if axis.get_scale() == "log":
         axis.set_major_formatter(PlainLogFormatter())
         axis.set_minor_formatter(PlainLogFormatter(labelOnlyBase=False))

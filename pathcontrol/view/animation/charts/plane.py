@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.readable import in_degrees
-from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.view.animation.drawn_rollout import Shot
 from pathcontrol.view.animation.payload import Film
 from pathcontrol.view.animation.rollout import Take
 from pathcontrol.view.animation.scene.desired_path import Line, alike, desired_joints
 from pathcontrol.view.animation.scene.keyframes import line_keys
 from pathcontrol.view.animation.scene.tube import simplified
+
+if TYPE_CHECKING:
+    from pathcontrol.cartesian.toolpath_task import ToolpathTask
 
 _FINE = 1 / 2000  # of the extent: less than a pixel
 _MOST_POINTS = 4000

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
-from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.view.animation.rollout import Take
 from pathcontrol.view.animation.scene.tube import distinct
+
+if TYPE_CHECKING:
+    from pathcontrol.cartesian.toolpath_task import ToolpathTask
+    from pathcontrol.toolpaths.contour import Contour
 
 _SAMPLES = 2001  # along a path in joint space …
 _SAMPLES_EACH = 201  # … and along each path of a sequence
@@ -78,6 +80,8 @@ def _drawing(task: ToolpathTask) -> list[Line]:
 
 def _outline(contour: Contour) -> Array:
     """Points of a contour [m], (k, 3), near enough for a picture."""
+    from pathcontrol.toolpaths.segments.base import Polyline
+
     u = np.linspace(0.0, 1.0, _CURVE_SAMPLES + 1)
     parts = [segment.points if isinstance(segment, Polyline) else segment.point(u) for segment in contour.segments]
     return np.concatenate(parts)
