@@ -69,7 +69,7 @@ def contour_numbers(
     tool = Tool(robot, str(task.frame), task.tool_pose)
     x = where_known(lambda q: tool.kinematics(q).position, q, shape=(3,))[0]
     speed = tool_speed(run, robot, task)[0, :stop]
-    which, finish = run["path_index"].to_numpy()[:stop], run.data["path_finish_time"].to_numpy()
+    which, finish = run.array("path_index")[:stop], run.array("path_finish_time")
     found = []
     for contour, paths in _grouped(task, tool):
         there = np.isin(which, paths)

@@ -94,7 +94,7 @@ def contour_deviation(run: Run, contours: Sequence[Geometry], x: Array) -> Array
     """Distance [m], (rollout, time), of x (rollout, time, 3) from the contour of the path that the run was on."""
     if len(contours) == 1 or "path_index" not in run:
         return np.min([where_known(contour.distance, x) for contour in contours], axis=0)
-    which, deviation = run["path_index"].to_numpy(), np.empty(x.shape[:-1])
+    which, deviation = run.array("path_index"), np.empty(x.shape[:-1])
     for i in np.unique(which):
         deviation[:, which == i] = where_known(contours[i].distance, x[:, which == i])
     return deviation
@@ -133,7 +133,7 @@ def toolpath_metrics(
     """
     task, arm = known_toolpath(run, task), run.robot if robot is None else robot
     own, counted = samples_of(run, "all"), samples_of(run, window)
-    on_cuts = np.array([not contour.rapid for contour in task.contours])[run["path_index"].to_numpy()]
+    on_cuts = np.array([not contour.rapid for contour in task.contours])[run.array("path_index")]
     cutting = np.where(on_cuts, 1.0, np.nan)
     signals = {
         "tool_deviation": tool_deviation(run, arm, task.frame, task.contours),

@@ -56,14 +56,14 @@ def limit_shares(run: Run) -> dict[str, Array]:
 
 def worst_shares(run: Run, own: Samples, rollout: int = 0) -> dict[str, Worst]:
     """Where each kind of share is largest in a rollout, by its metric; left out without a limit."""
-    joints, found = run["joint"].to_numpy(), {}
+    joints, found = run.joints, {}
     for name, shares in limit_shares(run).items():
         mine = shares[rollout, own.first[rollout] : own.stop[rollout]]
         if not np.isfinite(mine).any():
             continue
         sample, joint = np.unravel_index(int(np.nanargmax(mine)), mine.shape)
         time = float(run.time[own.first[rollout] + sample])
-        found[name] = Worst(str(joints[joint]), time, float(mine[sample, joint]))
+        found[name] = Worst(joints[joint], time, float(mine[sample, joint]))
     return found
 
 

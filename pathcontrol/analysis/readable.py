@@ -62,7 +62,7 @@ def unit_of(metric: str, run: Run) -> str:
 
 def _units(unit: str, run: Run) -> list[str]:
     """What stands for a unit where joints turn, slide, or both."""
-    return str(run[_VARIABLES[unit]].attrs["units"]).split(" or ") if _VARIABLES.get(unit, "") in run else [unit]
+    return run.unit(_VARIABLES[unit]).split(" or ") if _VARIABLES.get(unit, "") in run else [unit]
 
 
 def readable_parameters(parameters: Mapping[str, Any], digits: int = 4) -> str:

@@ -41,7 +41,8 @@ def steady_state(run: Run, fraction: float = 0.5) -> Run:
     own, time = samples_of(run, None, fraction), run.time
     last = time[own.stop.max() - 1]
     begin = last - fraction * (last - time[0])
-    return run.with_data(run.data.sel(time=(time >= begin) & (time <= last)))
+    start, stop = np.flatnonzero((time >= begin) & (time <= last))[[0, -1]]
+    return run.excerpt(np.arange(run.rollouts), int(stop) + 1, int(start))
 
 
 def peak(values: Array) -> Array:

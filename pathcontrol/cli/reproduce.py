@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from pathcontrol.cli.group import import_all, json_option, open_option, open_page, uninterrupted
+from pathcontrol.cli.group import json_option, open_option, open_page, uninterrupted
 
 
 @click.command("reproduce")
@@ -25,9 +25,7 @@ def command(out: Path, sensitivity: bool, samples: int | None, opened: bool, as_
     """Run the paper's two experiments on the bundled arm."""
     if samples is not None and not sensitivity:
         raise click.UsageError("--samples counts the combinations of --sensitivity; give that, too")
-    import_all()
-    if sensitivity:
-        _import_sweep()
+    _import_all(sensitivity)
     from pathcontrol.experiments.reproduce import PAPER
     from pathcontrol.experiments.reproduce import reproduce as run_both
 
@@ -43,12 +41,20 @@ def command(out: Path, sensitivity: bool, samples: int | None, opened: bool, as_
             open_page(out / f"{name}.html")
 
 
-def _import_sweep() -> None:
-    """What a sweep needs beside a simulation; if an extra is missing, that is told before anything is simulated."""
+def _import_all(sensitivity: bool) -> None:
+    """Load what the runs, their files, and a sweep will need; a missing extra is told before anything is simulated."""
     with uninterrupted():
-        from pathcontrol.sweeps.store import parquet
+        import pathcontrol.experiments.reproduce
+        import pathcontrol.simulation.storage.netcdf
+        import pathcontrol.view.animation.record
+        import pathcontrol.view.figures.errors
+        import pathcontrol.view.figures.path
+        import pathcontrol.view.page.html  # noqa: F401
 
-        parquet()
+        if sensitivity:
+            from pathcontrol.sweeps.store import parquet
+
+            parquet()
 
 
 def _vary(out: Path, samples: int | None, as_json: bool) -> dict[str, Any]:

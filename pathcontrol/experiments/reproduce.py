@@ -126,7 +126,8 @@ def compare_engines(experiments: Iterable[Experiment], robot: RobotModel) -> dic
 def _write(experiment: Experiment, robot: RobotModel, out: Path) -> None:
     """Data, figures and animation of one experiment."""
     from pathcontrol.view.animation.record import record
-    from pathcontrol.view.figures.run import error_figure, path_figure
+    from pathcontrol.view.figures.errors import error_figure
+    from pathcontrol.view.figures.path import path_figure
     from pathcontrol.view.figures.style import save_figure
 
     run, task = experiment.run, experiment.controller.task

@@ -164,6 +164,11 @@ class Run:
         return self.array("time")
 
     @property
+    def joints(self) -> list[str]:
+        """Names of the joints."""
+        return [str(name) for name in self.array("joint")]
+
+    @property
     def rollouts(self) -> int:
         """Number of rollouts."""
         return len(self.array("rollout"))
@@ -211,6 +216,16 @@ class Run:
         plain = None if self._samples is None else self._samples.plain(name)
         return self[name].to_numpy() if plain is None else plain
 
+    def unit(self, name: str) -> str:
+        """The unit of one variable, ``"1"`` where it has none; ``"rad or m"`` of turning and sliding joints together.
+
+        Raises:
+            UnknownNameError: the run has no such variable.
+        """
+        if self._samples is None or self._samples.plain(name) is None:
+            return str(self[name].attrs.get("units", "1"))
+        return self._samples.unit(name)
+
     def norm(self, name: str) -> Array:
         """Euclidean norm over the joints, (rollout, time), as ‖e_p‖ of ``run.norm("e_p")``; inf beyond 1e154.
 
@@ -223,6 +238,9 @@ class Run:
         """One of the rollouts as a run of its own."""
         if not -self.rollouts <= index < self.rollouts:
             raise InputError(f"rollout {index} does not exist: the run has {self.rollouts}, counted from 0")
+        if self._samples is not None:
+            alone = self._samples.alone(index)
+            return Run(alone, self.config, self._origin.rollout(int(alone.rollout[0])))
         part = self.data.isel(rollout=[index])
         return Run(part, self.config, self._origin.rollout(int(part["rollout"][0])))
 
@@ -247,14 +265,14 @@ class Run:
         data = data.assign_coords(label_outcome(complete_outcome(1, outcome)))
         return Run(data, config, self._origin.path(index))
 
-    def excerpt(self, rows: NDArray[np.intp], stop: int) -> Run:
-        """Return the first samples, up to ``stop``, of the rollouts in some ``rows`` (k,) as a run of their own.
+    def excerpt(self, rows: NDArray[np.intp], stop: int, start: int = 0) -> Run:
+        """Return the samples from ``start`` to ``stop`` of the rollouts in some ``rows`` (k,) as a run of their own.
 
         Their arrays are laid out as if these rollouts had been alone, so that sums over time have the same bits.
         """
         if self._samples is not None:
-            return Run(self._samples.excerpt(rows, stop), self.config, self._origin)
-        data = self.data.isel(rollout=rows, time=slice(0, stop))
+            return Run(self._samples.excerpt(rows, stop, start), self.config, self._origin)
+        data = self.data.isel(rollout=rows, time=slice(start, stop))
         flat = {name: (v.dims, np.ascontiguousarray(v.to_numpy()), v.attrs) for name, v in data.data_vars.items()}
         return self.with_data(data.assign(flat))
 
@@ -264,7 +282,7 @@ class Run:
 
     def with_robot(self, robot: RobotModel) -> Run:
         """The same run with the ``robot`` given, where it does not know its own."""
-        return Run(self.data, self.config, self._origin.with_robot(robot))
+        return Run(self._held, self.config, self._origin.with_robot(robot))
 
     def save(self, path: str | Path) -> Path:
         """Write netCDF, whole or not at all; :meth:`load` reads it back, :attr:`robot` and :attr:`task` included.
@@ -277,10 +295,10 @@ class Run:
             InputError: the name does not end with ``.nc``; the message names what writes other formats.
             OSError: the file cannot be written, as on a full disk; what was there before stays.
         """
-        from pathcontrol.simulation.storage.netcdf import write_run  # loads xarray and HDF5
+        from pathcontrol.simulation.storage.netcdf import write_run  # loads HDF5
 
         path = check_suffix(path, "a run", ".nc")
-        write_run(path, self.data, self.config, self._stored())
+        write_run(path, self._held, self.config, self._stored())
         return path
 
     @classmethod
@@ -295,8 +313,13 @@ class Run:
         data, config, stored = read_run(Path(path))
         return cls(data, config, None if stored is None else Origin.load(stored))
 
+    @property
+    def _held(self) -> xr.Dataset | Samples:
+        """What there is: the data, or the samples that nobody has asked the labels of."""
+        return self._data if self._samples is None else self._samples
+
     def _stored(self) -> Stored:
-        return self._origin.stored(float(self.data["s"].max()) if "s" in self.data else 0.0)
+        return self._origin.stored(float(np.fmax.reduce(self.array("s"), axis=None)) if "s" in self else 0.0)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # a task may hold functions that cannot be pickled, what a file holds of it always can

@@ -42,41 +42,58 @@ class Samples(NamedTuple):
             return self.time if name == "time" else self.rollout
         return self.arrays[name] if name in self.arrays else self.outcome.get(name)
 
-    def excerpt(self, rows: NDArray[np.intp], stop: int) -> Samples:
-        """Return the first samples, up to ``stop``, of some ``rows``, laid out in memory as if these had been alone."""
-        some = _as_slice(rows)
-        cut = {"rollout": some, "time": slice(stop), "joint": slice(None), "path": slice(None)}
+    def excerpt(self, rows: NDArray[np.intp], stop: int, start: int = 0) -> Samples:
+        """Return the samples from ``start`` to ``stop`` of some ``rows``, laid out as if these had been alone."""
+        some, moments = _as_slice(rows), slice(start, stop)
+        cut = {"rollout": some, "time": moments, "joint": slice(None), "path": slice(None)}
         outcome = {name: value[tuple(cut[dim] for dim in OUTCOMES[name][0])] for name, value in self.outcome.items()}
-        return Samples(self.time[:stop], self.joints, _Cut(self.arrays, some, stop), outcome, self.rollout[some])
+        return Samples(self.time[moments], self.joints, _Cut(self.arrays, some, moments), outcome, self.rollout[some])
+
+    def alone(self, row: int) -> Samples:
+        """Return the samples of one rollout, in memory of their own."""
+        arrays = {name: array[[row]] for name, array in self.arrays.items()}
+        outcome = {name: v[[row]] if "rollout" in OUTCOMES[name][0] else v.copy() for name, v in self.outcome.items()}
+        return Samples(self.time.copy(), self.joints, arrays, outcome, self.rollout[[row]])
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a variable, of an arm with turning and sliding joints all that occur: ``rad or m``."""
+        if name not in VARIABLES:
+            return "s" if name == "time" else OUTCOMES.get(name, ("", "", ""))[1] or "1"
+        _, unit, _ = VARIABLES[name]
+        kinds = sorted(set(self.joints.values()), reverse=True)
+        units = [unit if kind == "rad" else unit.replace("rad", "m").replace("N m", "N") for kind in kinds]
+        return " or ".join(dict.fromkeys(units))
+
+    def labelled(self) -> tuple[dict[str, Labelled], dict[str, Labelled]]:
+        """Return variables and coordinates by their names, with dimensions and what there is to say of them."""
+        variables = {}
+        for name, array in self.arrays.items():
+            dims, _, meaning = VARIABLES[name]
+            variables[name] = (dims, array, {"units": self.unit(name), "long_name": meaning})
+        axes: dict[str, Labelled] = {
+            "rollout": (("rollout",), self.rollout, {}),
+            "time": (("time",), self.time, {"units": "s"}),
+            "joint": (("joint",), np.array(list(self.joints)), {}),
+        }
+        return variables, axes | label_outcome(self.outcome)
 
     def dataset(self) -> xr.Dataset:
         """Return all of it with names and units, as the ``data`` of a run."""
         import xarray as xr  # it takes a third of a second to load
 
-        kinds = sorted(set(self.joints.values()), reverse=True)
-        variables = {}
-        for name, array in self.arrays.items():
-            dims, unit, meaning = VARIABLES[name]
-            units = {unit if kind == "rad" else unit.replace("rad", "m").replace("N m", "N"): None for kind in kinds}
-            variables[name] = (dims, array, {"units": " or ".join(units), "long_name": meaning})
-        coords = {
-            "rollout": self.rollout,
-            "time": ("time", self.time, {"units": "s"}),
-            "joint": list(self.joints),
-        }
-        return xr.Dataset(variables, coords).assign_coords(label_outcome(self.outcome))
+        return xr.Dataset(*self.labelled())
 
 
 class _Cut(Mapping[str, Array]):
     """Parts of arrays, each copied when it is first asked for: metrics need few of them."""
 
-    def __init__(self, whole: Mapping[str, Array], rows: slice | NDArray[np.intp], stop: int) -> None:
-        self._whole, self._rows, self._stop = whole, rows, stop
+    def __init__(self, whole: Mapping[str, Array], rows: slice | NDArray[np.intp], moments: slice) -> None:
+        self._whole, self._rows, self._moments = whole, rows, moments
         self._copied: dict[str, Array] = {}
 
     def __getitem__(self, name: str) -> Array:
         if name not in self._copied:
-            self._copied[name] = np.ascontiguousarray(self._whole[name][self._rows, : self._stop])
+            self._copied[name] = np.ascontiguousarray(self._whole[name][self._rows, self._moments])
         return self._copied[name]
 
     def __contains__(self, name: object) -> bool:

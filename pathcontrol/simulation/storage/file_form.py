@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py  # type: ignore[import-untyped]
 import numpy as np
-import xarray as xr
 
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _DEEPEST = 50
 _DENSEST = 1100  # numbers that deflate makes of one byte are fewer than 1032

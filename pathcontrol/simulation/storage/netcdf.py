@@ -7,21 +7,25 @@ import json
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5netcdf  # type: ignore[import-untyped]
 import h5py  # type: ignore[import-untyped]
 import numpy as np
-import xarray as xr
-from xarray.backends import H5NetCDFStore
 
 from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError, PathControlWarning
 from pathcontrol.simulation.context import Stored
+from pathcontrol.simulation.samples import Samples
 from pathcontrol.simulation.storage.file_form import check_form, check_sizes
+from pathcontrol.simulation.storage.labels import put_labelled
 from pathcontrol.simulation.storage.seal import check_seal, digest_of, seal
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 
+if TYPE_CHECKING:
+    import xarray as xr
+
+_LEVEL = 1  # of compression: the noise of errors does not become shorter by more
 _CONFIG = "pathcontrol_config"
 _DIGEST = "pathcontrol_sha256"
 _GROUP = "origin"
@@ -30,7 +34,7 @@ _RECIPE = {"long_name": "robot and task of the run, JSON in UTF-8"}
 _NUMBERS = {"long_name": "arrays of the recipe, one after another"}
 
 
-def write_run(path: Path, data: xr.Dataset, config: Mapping[str, Any], stored: Stored) -> None:
+def write_run(path: Path, data: xr.Dataset | Samples, config: Mapping[str, Any], stored: Stored) -> None:
     """Write a run, whole or not at all, with its checksum.
 
     The file is made in memory: HDF5 ends the process by a segmentation fault where it cannot write to a full disk.
@@ -40,10 +44,13 @@ def write_run(path: Path, data: xr.Dataset, config: Mapping[str, Any], stored: S
     """
     memory, text = io.BytesIO(), json.dumps(config)
     recipe = np.frombuffer(stored.text.encode(), dtype=np.uint8)
-    origin = xr.Dataset({"recipe": ("byte", recipe, _RECIPE), "numbers": ("number", stored.numbers, _NUMBERS)})
+    origin = {"recipe": (("byte",), recipe, _RECIPE), "numbers": (("number",), stored.numbers, _NUMBERS)}
     with h5netcdf.File(memory, "w") as file:
-        _put(file, data.assign_attrs({_CONFIG: text, _DIGEST: _digest_of_run(data, text)}), 1)
-        _put(file.create_group(_GROUP), origin.assign_attrs({_DIGEST: _digest_of_origin(stored)}), 4)
+        _put(file, data)
+        file.attrs.update({_CONFIG: text, _DIGEST: _digest_of_run(data, text)})
+        group = file.create_group(_GROUP)
+        put_labelled(group, origin, {}, 4)
+        group.attrs[_DIGEST] = _digest_of_origin(stored)
     content = memory.getbuffer()
     with whole_file(path) as temporary, temporary.open("wb") as written:
         written.write(content)
@@ -59,6 +66,8 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], Stored | None]:
     Raises:
         InputError: there is no such file, it is damaged, or it is not a saved run.
     """
+    import xarray as xr  # takes half a second to load
+
     if not path.is_file():
         raise InputError(f"there is no file {str(path)!r}")
     try:
@@ -95,6 +104,8 @@ def _remedy(path: Path) -> str:
 
 
 def _read_origin(path: Path) -> Stored | None:
+    import xarray as xr
+
     try:
         origin = xr.load_dataset(path, engine="h5netcdf", group=_GROUP)
     except OSError:  # there is no such group: the file is older than runs that know their robot
@@ -112,7 +123,10 @@ def _check_digest(told: Any, digest: Callable[[], str]) -> None:
         raise InputError("it is damaged, or was changed: its checksum is another one; take another copy of it")
 
 
-def _digest_of_run(data: xr.Dataset, text: str) -> str:
+def _digest_of_run(data: xr.Dataset | Samples, text: str) -> str:
+    if isinstance(data, Samples):
+        found = {name: data.plain(name) for name in _KNOWN}
+        return digest_of({name: values for name, values in found.items() if values is not None}, text)
     return digest_of({name: data[name].to_numpy() for name in _KNOWN if name in data.variables}, text)
 
 
@@ -120,6 +134,12 @@ def _digest_of_origin(stored: Stored) -> str:
     return digest_of({"numbers": stored.numbers}, stored.text)
 
 
-def _put(group: h5netcdf.Group, data: xr.Dataset, level: int) -> None:
-    packed = {name: {"zlib": True, "complevel": level, "shuffle": True} for name in data.data_vars}
-    data.dump_to_store(H5NetCDFStore(group), encoding=packed)
+def _put(file: h5netcdf.File, data: xr.Dataset | Samples) -> None:
+    """Write the data of a run."""
+    if isinstance(data, Samples):
+        put_labelled(file, *data.labelled(), _LEVEL)
+        return
+    from xarray.backends import H5NetCDFStore  # which has been loaded, and knows whatever else was put into the data
+
+    packed = {name: {"zlib": True, "complevel": _LEVEL, "shuffle": True} for name in data.data_vars}
+    data.dump_to_store(H5NetCDFStore(file), encoding=packed)

@@ -69,7 +69,7 @@ def path_error(take: Take) -> PathError | None:
         error = contour_error(take.run, take.task)[0]
     except TaskError:  # an endless path has no nearest point
         return None
-    values, unit = in_degrees(error, str(take.run["q"].attrs["units"]))
+    values, unit = in_degrees(error, take.run.unit("q"))
     return PathError("contour error", unit, values)
 
 
@@ -84,7 +84,7 @@ def in_fitting_units(errors: Sequence[PathError | None]) -> list[PathError | Non
 
 def _deviation(take: Take, task: ToolpathTask) -> Array:
     """Distance of the tool from the contour it should be on [m], (k,); NaN on rapids."""
-    cutting = np.array([not contour.rapid for contour in task.contours])[take.run["path_index"].to_numpy()]
+    cutting = np.array([not contour.rapid for contour in task.contours])[take.run.array("path_index")]
     deviation = np.full(len(cutting), np.nan)
     if cutting.any():
         deviation[cutting] = tool_deviation(take.run, take.robot, task.frame, task.contours)[0, cutting]

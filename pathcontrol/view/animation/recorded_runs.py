@@ -55,7 +55,7 @@ def cast_takes(
         path = part.task if task is None else rows_of(task, np.array([rollout]))
         if arm.source not in looks:
             looks[arm.source] = link_visuals(arm.source, FINENESS) or stick_figure(arm.source)
-        path = path if "s" in one.data else None  # where on it the arm should be is not known
+        path = path if "s" in one else None  # where on it the arm should be is not known
         arm, frame = with_tool(arm, path, tool)
         part, visuals = _until_it_diverged(part), looks[arm.source]
         takes.append(Take(str(name), part, arm, path, frame, visuals, run_color(i), one.rollouts))

@@ -77,7 +77,7 @@ class Take:
     @property
     def toolpath(self) -> ToolpathTask | None:
         """The task if it is a drawing that the tool follows, contour by contour."""
-        return as_toolpath(self.task) if "path_index" in self.run.data.coords else None
+        return as_toolpath(self.task) if "path_index" in self.run else None
 
     @cached_property
     def poses(self) -> dict[str, Array]:
@@ -112,7 +112,7 @@ def check_filmed(run: Run, robot: RobotModel, task: PathTask | None) -> None:
     Raises:
         InputError: they do not, or the times or the joint positions of the run make no film.
     """
-    joints = tuple(str(name) for name in run.data["joint"].to_numpy())
+    joints = tuple(run.joints)
     if joints != robot.joint_names:
         raise InputError(f"the run is of the joints {joints}, {robot.name} has {robot.joint_names}")
     if task is not None and task.n != robot.n:
@@ -133,7 +133,7 @@ def check_filmed(run: Run, robot: RobotModel, task: PathTask | None) -> None:
 
 def _check_path(run: Run, task: PathTask) -> None:
     """Check that the path is where an arm could be, at the parameters of the run and from its begin to its end."""
-    s = run.array("s").ravel() if "s" in run.data else np.empty(0)
+    s = run.array("s").ravel() if "s" in run else np.empty(0)
     s = np.concatenate([s, np.linspace(*task.sampled_interval, _PROBES)])
     s = s if task.closed else np.clip(s, task.s0, task.s_end)
     near = (np.abs(task.q_d(s)) <= _ABSURD).all(-1)  # a parameter that is no number has no place either

@@ -42,7 +42,7 @@ def settings(take: Take) -> dict[str, str]:
 
 
 def _rollout(take: Take) -> int:
-    return int(take.run.data["rollout"].to_numpy()[0])
+    return int(take.run.array("rollout")[0])
 
 
 def _friction(plant: Mapping[str, Any]) -> str | None:

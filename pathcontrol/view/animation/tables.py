@@ -53,7 +53,7 @@ def _contours(takes: Sequence[Take]) -> list[dict[str, Any]]:
         len(takes) > 1
         or takes[0].toolpath is None
         or _idle(takes[0])
-        or not set(takes[0].run.data.data_vars) >= _NEEDED
+        or not _measurable(takes[0])
     ):
         return []
     heads, *rows = contour_table(takes[0].run, takes[0].robot) or [[]]
@@ -90,12 +90,17 @@ def _idle(take: Take) -> bool:
     """Whether nothing was cut, so that there is nothing to be measured."""
     if take.toolpath is None:
         return False
-    followed = np.unique(take.run["path_index"].to_numpy())
+    followed = np.unique(take.run.array("path_index"))
     return all(take.toolpath.contours[i].rapid for i in followed)
 
 
+def _measurable(take: Take) -> bool:
+    """Whether the run has what metrics are made of."""
+    return all(name in take.run for name in _NEEDED)
+
+
 def _numbers(take: Take) -> dict[str, Any]:
-    if take.task is None or not set(take.run.data.data_vars) >= _NEEDED or _idle(take):
+    if take.task is None or not _measurable(take) or _idle(take):
         return {}
     if take.toolpath is not None:
         return toolpath_metrics(take.run, take.robot, take.toolpath)

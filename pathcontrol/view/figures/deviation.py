@@ -77,7 +77,7 @@ def _measured(one: Shown, robot: RobotModel | None) -> tuple[Array, Array, Array
     assert isinstance(task, ToolpathTask)
     way = (tool_positions(one.run, robot, task.frame)[0] - task.workpiece[:3, 3]) @ task.workpiece[:3, :3]
     distance = drawable(tool_deviation(one.run, robot, task.frame, task.contours)[0])
-    cutting = np.array([not contour.rapid for contour in task.contours])[one.run["path_index"].to_numpy()]
+    cutting = np.array([not contour.rapid for contour in task.contours])[one.run.array("path_index")]
     return way, distance, cutting
 
 

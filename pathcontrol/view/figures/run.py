@@ -35,7 +35,7 @@ def run_figure(
     """
     refuse_suffix(path, "figures", ".svg", ".png", ".pdf")
     figures = {"errors": error_figure(run)}
-    if run.data.sizes["joint"] > 1:
+    if len(run.joints) > 1:
         figures["path"] = path_figure(run, task, joints)
     figures |= {"torque": torque_figure(run, limits), "speed": speed_figure(run, task)}
     return [file for name, figure in figures.items() for file in save_figure(figure, named(path, name))]

@@ -59,7 +59,7 @@ class Shown(NamedTuple):
     @property
     def joints(self) -> list[str]:
         """Names of the joints."""
-        return [str(name) for name in self.run["joint"].to_numpy()]
+        return self.run.joints
 
 
 def shown(run: Runs, task: PathTask | None = None, rollout: int | None = None) -> list[Shown]:
@@ -96,7 +96,7 @@ def _alone(run: Run, rollout: int) -> Run:
     part = run.rollout(rollout)
     if run.rollouts == 1 or part.status[0] != "finished":
         return part
-    return part.with_data(part.data.isel(time=slice(0, int(own_samples(part)[0]))))
+    return part.excerpt(np.arange(1), int(own_samples(part)[0]))
 
 
 def of_one_arm(runs: Sequence[Shown]) -> list[str]:
@@ -139,7 +139,7 @@ def readable(run: Run, name: str, joint: int | None = None) -> tuple[Array, str]
 
     Degrees for angles; sliding joints stay in metres, and so does all of an arm that has both.
     """
-    values, unit = run.array(name), str(run[name].attrs.get("units", "1"))
+    values, unit = run.array(name), run.unit(name)
     if joint is not None:
         values, unit = values[..., joint], _unit_of_joint(run, unit, joint)
     return in_degrees(drawable(values), unit)
@@ -153,13 +153,13 @@ def readable_like(values: Array, unit: str) -> Array:
 def _unit_of_joint(run: Run, unit: str, joint: int) -> str:
     """Which of the units of an arm with turning and sliding joints is that of one of them, where that is known."""
     robot = own_robot(run) if " or " in unit else None
-    if robot is None or robot.n != run.data.sizes["joint"]:
+    if robot is None or robot.n != len(run.joints):
         return unit
     return unit.split(" or ")[0 if robot.position_units[joint] == "rad" else 1]
 
 
 def _fitting(run: Run, task: PathTask | None) -> PathTask | None:
     task = run.task if task is None else task
-    if task is not None and task.n != run.data.sizes["joint"]:
-        raise InputError(f"the task is for {task.n} joints, the run has {run.data.sizes['joint']}")
+    if task is not None and task.n != len(run.joints):
+        raise InputError(f"the task is for {task.n} joints, the run has {len(run.joints)}")
     return task

@@ -71,7 +71,7 @@ def draw_speed(axes: Axes, one: Shown) -> Array:
 def _has_tool(one: Shown) -> bool:
     """Whether a run is along a path that was made for a tool of its arm, whose speed is known."""
     arm = own_robot(one.run)
-    return arm is not None and one.task is not None and "qd" in one.run.data and tool_of(arm, one.task) is not None
+    return arm is not None and one.task is not None and "qd" in one.run and tool_of(arm, one.task) is not None
 
 
 def _draw_feed(axes: Axes, one: Shown) -> Array:

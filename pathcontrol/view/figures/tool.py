@@ -170,9 +170,9 @@ def _positions(robot: RobotModel, q: Array, frame: str) -> Array:
 
 def _cutting(one: Shown) -> Array:
     """Whether the arm follows no rapid, (time,)."""
-    if "path_index" not in one.run.data.coords or not isinstance(one.task, PathSequence):
+    if "path_index" not in one.run or not isinstance(one.task, PathSequence):
         return np.ones(len(one.run.time), dtype=bool)
-    return ~np.array(_rapids(one.task))[one.run["path_index"].to_numpy()]
+    return ~np.array(_rapids(one.task))[one.run.array("path_index")]
 
 
 def _rapids(task: PathSequence) -> list[bool]:

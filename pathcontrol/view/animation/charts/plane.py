@@ -62,7 +62,7 @@ class Plane:
 def plane(shots: Sequence[Shot]) -> Plane:
     """The plane that shows the runs best: that of a drawing, of two joints, or else of the tool."""
     toolpath = next((shot.take.toolpath for shot in shots if shot.take.toolpath is not None), None)
-    units = {shot.take.run["q"].attrs["units"] for shot in shots}
+    units = {shot.take.run.unit("q") for shot in shots}
     if toolpath is None and len(units) == 1 and all(shot.take.robot.n == 2 for shot in shots):
         return _joint_plane(shots, units.pop())
     return _tool_plane(shots, toolpath)

@@ -38,8 +38,8 @@ def charts(shots: Sequence[Shot]) -> list[Chart]:
 def _norms(shot: Shot, index: int, several: bool) -> list[_Entry]:
     take, entries = shot.take, []
     for name, symbol, words in (("e_p", "‖e_p‖", "position error"), ("e_v", "‖e_v‖", "velocity error")):
-        if name in take.run.data:
-            values, unit = in_degrees(take.run.norm(name)[0], take.run[name].attrs["units"])
+        if name in take.run:
+            values, unit = in_degrees(take.run.norm(name)[0], take.run.unit(name))
             curve = Curve(take.name if several else symbol, take.time, values, index)
             entries.append((f"{words} {symbol}", unit, [curve]))
     return entries
@@ -55,9 +55,9 @@ def _error(shot: Shot, index: int, several: bool) -> list[_Entry]:
 def _rates(shot: Shot, index: int, several: bool) -> list[_Entry]:
     """The rate of the path parameter, beside the one that the task asks for there."""
     take = shot.take
-    if "sdot" not in take.run.data:
+    if "sdot" not in take.run:
         return []
-    if take.task is not None and "qd" in take.run.data and tool_of(take.robot, take.task) is not None:
+    if take.task is not None and "qd" in take.run and tool_of(take.robot, take.task) is not None:
         return _feeds(take, take.task, index, several)
     curves = [Curve(take.name if several else "σ̇", take.time, take.run.array("sdot")[0], index)]
     if take.task is not None:
@@ -80,14 +80,14 @@ def _feeds(take: Take, task: PathTask, index: int, several: bool) -> list[_Entry
 def _torques(shot: Shot, index: int, several: bool) -> list[_Entry]:
     """Torques in percent of their limits: of each joint, or of several runs the largest; in N m without limits."""
     take = shot.take
-    if "tau" not in take.run.data:
+    if "tau" not in take.run:
         return []
     tau, joints = take.run.array("tau")[0], take.robot.joint_names
     limits = torque_limits(take.run, take.robot)
     limited = np.flatnonzero(np.isfinite(limits))
     if not len(limited):
         lines = np.abs(tau).max(-1)[:, None] if several else tau
-        return [("torque", take.run["tau"].attrs["units"], _curves(take, index, several, lines, joints))]
+        return [("torque", take.run.unit("tau"), _curves(take, index, several, lines, joints))]
     share = 100 * tau[:, limited] / limits[limited]
     share = np.abs(share).max(-1)[:, None] if several else share
     curves = _curves(take, index, several, share, [joints[j] for j in limited])
@@ -100,7 +100,7 @@ def _shares(shot: Shot, index: int, several: bool) -> list[_Entry]:
     """The largest shares [%] of limits of position and velocity; those of torques have a chart of their own."""
     take = shot.take
     curves: list[Curve] = []
-    if "qd" not in take.run.data:
+    if "qd" not in take.run:
         return []
     for name, shares in limit_shares(take.run.with_robot(take.robot)).items():
         limited = np.isfinite(shares[0]).any(0)
