@@ -167,10 +167,14 @@ class Controller(ABC):
 def _phi(x: Array) -> tuple[Array, Array]:
     """φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x, by their series where x is small."""
     small = np.abs(x) < 1e-3
-    safe = np.where(small, 1.0, x)
-    phi_1 = np.where(small, 1 + x / 2 * (1 + x / 3 * (1 + x / 4)), np.expm1(safe) / safe)
-    phi_2 = np.where(small, 0.5 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5))), (phi_1 - 1) / safe)
-    return phi_1, phi_2
+    if not small.any():
+        phi_1 = np.expm1(x) / x
+        return phi_1, (phi_1 - 1) / x
+    series = 1 + x / 2 * (1 + x / 3 * (1 + x / 4)), 0.5 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5)))
+    if small.all():
+        return series
+    large = _phi(np.where(small, 1.0, x))
+    return np.where(small, series[0], large[0]), np.where(small, series[1], large[1])
 
 
 def diagonal_gain(name: str, value: ArrayLike, n: int, joints: Sequence[str] | None = None) -> Array:

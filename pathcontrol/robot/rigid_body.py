@@ -68,7 +68,8 @@ def together(n: int, arguments: Mapping[str, ArrayLike], joints: Sequence[str] |
         InputError: one of them has another last axis than n, or their batch axes do not fit together.
     """
     arrays = [joint_array(name, value, n, joints) for name, value in arguments.items()]
-    if len({a.shape for a in arrays}) == 1:
+    first = arrays[0].shape
+    if all(a.shape == first for a in arrays):
         return arrays
     try:
         shape = np.broadcast_shapes(*(a.shape for a in arrays))

@@ -17,7 +17,7 @@ from pathcontrol.simulation.checks.mobility import mobility
 _WEAK = 4.0
 
 _Rows = NDArray[np.intp]
-_Dry = tuple[Array, Array, Array]  # friction of forward and of backward motion, and that of the present direction
+_Dry = tuple[Array, Array, Array]  # friction of forward and of backward motion, and (N, n) of the present direction
 
 
 class Plant:
@@ -50,6 +50,7 @@ class Plant:
         self._viscous = robot.friction.viscous
         self._inertia = robot.with_armature(0.5 * step * self._viscous)
         self._strong = has_strong_friction(robot)
+        self._damps = bool(self._strong.any())
 
     def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
         """(q, q̇) one step later under the constant torque ``tau``; all (N, n)."""
@@ -59,7 +60,7 @@ class Plant:
         dry = self._dry(middle_qd)
         middle_q = q + 0.25 * h * (qd + middle_qd)
         next_qd = self._free(middle_q, middle_qd, qd, drive, dry, h)
-        if not self._strong.any():
+        if not self._damps:
             self._hinder(next_qd, middle_q, middle_qd, dry, h)
             return q + 0.5 * h * (qd + next_qd), next_qd
         damped = np.flatnonzero(np.broadcast_to(self._strong, len(q)))
@@ -70,9 +71,12 @@ class Plant:
         return next_q, next_qd
 
     def _dry(self, qd: Array) -> _Dry:
-        """Dry friction of forward and of backward motion, and in the direction of q̇, or any where that is 0, (N, n)."""
-        (plus, minus), zero = self.robot.friction.levels(qd), np.zeros_like(qd)
-        forward, backward = zero + plus, zero - minus
+        """Dry friction of forward and of backward motion, and in the direction of q̇, or any where that is 0.
+
+        The first two broadcast against q̇ (N, n).
+        """
+        forward, minus = self.robot.friction.levels(qd)
+        backward = np.subtract(0.0, minus)
         return forward, backward, np.where(qd > 0, forward, backward)
 
     def _free(self, q: Array, u: Array, start: Array, drive: Array, dry: _Dry, duration: float) -> Array:
@@ -98,9 +102,12 @@ class Plant:
 
         The inertia is M + h/2 B, and M̃ (k, n, n) for the rows (k,) that are ``damped``.
         """
-        forward, backward, friction = dry
+        turned = v * u <= 0
+        if not turned.any():  # as nearly always
+            return
+        forward, backward, friction = np.broadcast_arrays(*dry)
         # a diverged arm must not be taken for one that sticks
-        turned = (v * u <= 0) & np.isfinite(v) & (forward > backward)
+        turned &= np.isfinite(v) & (forward > backward)
         rows = np.flatnonzero(turned.any(-1))
         if not len(rows):
             return

@@ -44,7 +44,7 @@ class Film:
         header = json.dumps(self.header, allow_nan=False).encode()
         header += b" " * (-(4 + len(header)) % _ALIGNMENT)
         whole = b"".join([len(header).to_bytes(4, "little"), header, *self._blocks])
-        return gzip.compress(whole, compresslevel=9, mtime=0)
+        return gzip.compress(whole, compresslevel=6, mtime=0)
 
     def text(self) -> str:
         """All of it in base64, in which no markup can be."""

@@ -49,12 +49,7 @@ def _mind(takes: Sequence[Take]) -> list[dict[str, Any]]:
 
 def _contours(takes: Sequence[Take]) -> list[dict[str, Any]]:
     """What became of each contour, of a single take: several have tables too large to be compared."""
-    if (
-        len(takes) > 1
-        or takes[0].toolpath is None
-        or _idle(takes[0])
-        or not _measurable(takes[0])
-    ):
+    if len(takes) > 1 or takes[0].toolpath is None or _idle(takes[0]) or not _measurable(takes[0]):
         return []
     heads, *rows = contour_table(takes[0].run, takes[0].robot) or [[]]
     return [{"title": "Contours", "columns": heads, "rows": rows}]

@@ -11,6 +11,7 @@ from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
@@ -94,7 +95,9 @@ class NotebookFigure(Figure):
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure [in]."""
-    return NotebookFigure(figsize=(width, height), layout=SettledLayout())
+    figure = NotebookFigure(figsize=(width, height), layout=SettledLayout())
+    FigureCanvasAgg(figure)  # so that words are measured once, for the layout and for PNG
+    return figure
 
 
 def dressed(axes: Axes) -> Axes:

@@ -105,7 +105,7 @@ def _player() -> str:
 def _viewer() -> tuple[str, str]:
     """Meshcat's viewer, zipped and in base64 as it is four times as long, and the digest that lets it run."""
     script = resources.files("meshcat").joinpath("viewer", "dist", "main.min.js").read_text("utf-8")
-    zipped = gzip.compress(script.encode(), compresslevel=9, mtime=0)
+    zipped = gzip.compress(script.encode(), compresslevel=6, mtime=0)
     return base64.b64encode(zipped).decode(), _digest(script)
 
 
