@@ -10,10 +10,10 @@ import xarray as xr
 from pathcontrol import (
     ExtendedMotionPlan,
     Line,
+    PathControlWarning,
     Projection,
     Run,
     SampledLoop,
-    StepWarning,
     UnknownNameError,
     simulate,
     simulate_sequence,
@@ -37,7 +37,7 @@ def many(arm, circle):
 def diverged(arm, circle):
     """One of two rollouts has far too much gain."""
     law = ExtendedMotionPlan(arm, circle, [[800.0, 800.0], [1e9, 1e9]], [45.0, 100.0], 20.0)
-    with pytest.warns(StepWarning, match="rollout 1"):
+    with pytest.warns(PathControlWarning, match="rollout 1"):
         return simulate(law, [[0.7, 1.2]] * 2, duration=0.2, progress=False)
 
 

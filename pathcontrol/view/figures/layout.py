@@ -11,12 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 _PAD = 0.03  # in, around panels
+_LAYOUTS, _SETTLED = 6, 5e-4  # at most so many, shares of the figure
 
 
 class SettledLayout(ConstrainedLayoutEngine):
-    """A constrained layout that is the same every time, panels with equal scales included.
+    """A constrained layout that is the same every time.
 
-    Matplotlib's own finds room at the sides of a panel with equal scales, and puts its labels off the page.
+    With equal scales on both axes it is repeated until nothing moves: after the first time labels are off the page.
     """
 
     def __init__(self) -> None:
@@ -24,8 +25,13 @@ class SettledLayout(ConstrainedLayoutEngine):
 
     def execute(self, fig: Any) -> None:
         """Move and resize the panels of a figure."""
-        with _stretched(fig):
+        before = _places(fig)
+        for _ in range(_LAYOUTS):
             super().execute(fig)
+            places = _places(fig)
+            if not _has_equal_scales(fig) or np.allclose(places, before, rtol=0.0, atol=_SETTLED):
+                break
+            before = places
         _round_places(fig)
 
 
@@ -46,17 +52,14 @@ def laid_out(figure: Figure, dpi: float) -> Iterator[None]:
         figure.dpi = before
 
 
-@contextmanager
-def _stretched(figure: Figure) -> Iterator[None]:
-    """Inside, panels with equal scales fill their place, so that labels are measured where the room is tight."""
-    aspects = {axes: axes.get_aspect() for axes in figure.axes if axes.get_aspect() != "auto"}
-    for axes in aspects:
-        axes.set_aspect("auto")
-    try:
-        yield
-    finally:
-        for axes, aspect in aspects.items():
-            axes.set_aspect(aspect)
+def _has_equal_scales(figure: Figure) -> bool:
+    """Whether a panel has a shape of its own, and does not fill its place."""
+    return any(axes.get_aspect() != "auto" for axes in figure.axes)
+
+
+def _places(figure: Figure) -> list[tuple[float, ...]]:
+    """Where the places of all panels are, as shares of the figure."""
+    return [axes.get_position(original=True).bounds for axes in figure.axes]
 
 
 def _round_places(figure: Figure) -> None:

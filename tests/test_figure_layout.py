@@ -1,0 +1,151 @@
+"""A figure is laid out once for all its files, with every word on the page, and its numbers are plain text."""
+
+from __future__ import annotations
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from test_pareto import table as front_table
+from test_sweep_figures import table as sweep_table
+from test_view_figures_layout import assert_readable, made, makers
+
+from pathcontrol import (
+    Circle,
+    basin_figure,
+    pareto_figure,
+    read_toolpath,
+    robustness_figure,
+    save_figure,
+    tool_figure,
+    toolpath_figure,
+)
+from pathcontrol.view.figures.style import dressed, new_figure, style
+
+MINUS = "−"  # as figures write it
+
+
+def wide_table():
+    data = sweep_table().assign_coords(k=("sample", np.geomspace(1.0, 1e4, 30)))
+    data["e_p_peak"] = ("sample", np.geomspace(1e-3, 1e2, 30), {"units": "rad"})
+    return data
+
+
+def tiny_table():
+    data = front_table()
+    data["b"] = 1e-6 * data["b"]
+    return data
+
+
+@pytest.fixture(scope="module")
+def rectangle(tmp_path_factory):
+    """Makes the figure of a rectangle of some width and height [mm] that is cut."""
+    folder = tmp_path_factory.mktemp("drawings")
+
+    def draw(width, height):
+        path = folder / f"{width} {height}.nc"
+        path.write_text(f"G21 G90\nG0 X0 Y0\nG1 X{width} F600\nG1 Y{height}\nG1 X0\nG1 Y0\n")
+        return toolpath_figure(read_toolpath(path.rename(path.with_suffix(".gcode"))))
+
+    return draw
+
+
+OF_TABLES = {
+    "basin": lambda: basin_figure(sweep_table(), "q[0]", "q[1]", "e_p_peak"),
+    "basin, wide": lambda: basin_figure(wide_table(), "k", "q[1]", "e_p_peak"),
+    "spread": lambda: robustness_figure(sweep_table((0, 7)), "q[0]", "e_p_peak"),
+    "spread, wide": lambda: robustness_figure(wide_table(), "k", "e_p_peak"),
+    "front": lambda: pareto_figure(front_table(), "e_p_peak", "b", colour="k"),
+    "front, tiny": lambda: pareto_figure(tiny_table(), "e_p_peak", "b", colour="k"),
+}
+
+
+@pytest.mark.parametrize("name", OF_TABLES)
+def test_words_of_sweeps_are_on_the_page_and_apart(name, tmp_path):
+    figure = OF_TABLES[name]()
+    save_figure(figure, tmp_path / "figure")
+    assert_readable(figure, name)
+
+
+@pytest.mark.parametrize("size", [(200, 20), (20, 200), (70, 71), (0.02, 0.01), (900, 1000)])
+def test_words_of_drawings_are_on_the_page_and_apart(size, rectangle):
+    assert_readable(rectangle(*size), str(size))
+
+
+@pytest.mark.parametrize("errors", [False, True])
+def test_words_of_tools_are_on_the_page_and_apart(errors, arm):
+    run = made(2, samples=200, scale=1.1, task=False)
+    assert_readable(tool_figure(run, arm, Circle(1.0, 2.0), errors=errors), "tool")
+
+
+@pytest.mark.parametrize("kind", ["path", "errors", "comparison", "torque"])
+def test_all_formats_have_one_layout_and_the_figure_keeps_its_own(kind, tmp_path):
+    figure = makers(made(3, scale=1.3))[kind]()
+    engine, dpi, places = figure.get_layout_engine(), figure.dpi, []
+    figure.canvas.mpl_connect("draw_event", lambda _: places.append([a.get_position().bounds for a in figure.axes]))
+    save_figure(figure, tmp_path / "figure", ["png", "svg", "pdf"])
+    assert len(places) >= 1
+    assert all(np.array_equal(place, places[0]) for place in places)
+    assert (figure.get_layout_engine(), figure.dpi) == (engine, dpi)
+
+
+def test_figures_of_others_are_laid_out_as_they_say(tmp_path):
+    figure = Figure(layout="tight")
+    figure.add_subplot().set_ylabel("a tall label", fontsize=40)
+    engine = figure.get_layout_engine()
+    save_figure(figure, tmp_path / "theirs")
+    assert figure.get_layout_engine() is engine
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    assert figure.axes[0].yaxis.label.get_window_extent().x0 > 0
+
+
+def test_a_figure_that_is_changed_is_laid_out_again(tmp_path):
+    figure = makers(made(2))["errors"]()
+    save_figure(figure, tmp_path / "before")
+    figure.axes[0].set_ylabel("much\ntaller\nthan\nit was")
+    save_figure(figure, tmp_path / "after")
+    assert_readable(figure, "changed")
+
+
+def panel(low, high):
+    """A panel from ``low`` to ``high`` both ways."""
+    with style():
+        figure = new_figure(3.0, 3.0)
+        axes = dressed(figure.add_subplot())
+        axes.set(xlim=(low, high), ylim=(low, high))
+    return figure, axes
+
+
+@settings(max_examples=25, deadline=None)
+@given(middle=st.floats(-1e6, 1e6), half=st.floats(1e-9, 1e9))
+def test_numbers_are_plain_text_and_are_what_they_stand_at(middle, half):
+    half = max(half, 1e-6 * abs(middle))
+    figure, axes = panel(middle - half, middle + half)
+    with style(), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        FigureCanvasAgg(figure).draw()
+        for axis in (axes.xaxis, axes.yaxis):
+            found = [
+                (p, t.get_text()) for p, t in zip(axis.get_majorticklocs(), axis.get_majorticklabels(), strict=True)
+            ]
+            power = axis.get_offset_text().get_text()
+            assert "$" not in "".join(text for _, text in found)
+            scale = 10.0 ** float(re.search(r"\^\{(.*?)\}", power)[1].replace(MINUS, "-")) if power else 1.0
+            step = np.diff(axis.get_majorticklocs()).min()
+            for place, text in found:
+                if text:
+                    assert float(text.replace(MINUS, "-")) * scale == pytest.approx(place, rel=1e-6, abs=1e-3 * step)
+
+
+def test_a_power_of_ten_is_written_once():
+    figure, axes = panel(0.0, 3e-6)
+    with style():
+        FigureCanvasAgg(figure).draw()
+    assert [t.get_text() for t in axes.get_xticklabels()] == ["0", "1", "2", "3"]
+    assert "10^{" + MINUS + "6}" in axes.xaxis.get_offset_text().get_text()
