@@ -99,7 +99,7 @@ def test_what_is_no_shape_is_told(geometry):
 def test_an_arm_of_simple_shapes_is_filmed_without_a_library_of_meshes(arm):
     assert parse_urdf(arm.source.text).find("link/visual/geometry/mesh") is None
     code = (
-        "import sys, pathcontrol as pc; from pathcontrol.view.film.recorder import record; "
+        "import sys, pathcontrol as pc; from pathcontrol.view.animation.record import record; "
         "from pathcontrol.view.bodies.visuals import link_visuals; "
         "assert link_visuals(pc.load_robot('cicese_2dof').source); print({'trimesh', 'yourdfpy'} & {*sys.modules})"
     )
