@@ -25,7 +25,7 @@ def as_array(name: str, value: ArrayLike) -> Array:
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:  # OverflowError: an integer of hundreds of digits
-        raise InputError(f"{name} = {value!r}, expected numbers") from error
+        raise InputError(f"{name} = {value!r}, expected numbers", argument=name, value=value) from error
 
 
 def joint_array(name: str, value: Any, n: int, joints: Sequence[str] | None = None) -> Array:
@@ -36,7 +36,9 @@ def joint_array(name: str, value: Any, n: int, joints: Sequence[str] | None = No
         array = as_array(name, value if joints is None else unlabelled(name, value, joints))
     if array.ndim == 0 or array.shape[-1] != n:
         raise InputError(
-            f"{name} has shape {array.shape}, expected (*batch, {n}): one value for each of the {n} joints last"
+            f"{name} has shape {array.shape}, expected (*batch, {n}): one value for each of the {n} joints last",
+            argument=name,
+            value=value,
         )
     return array
 
@@ -55,7 +57,11 @@ def finite(name: str, array: Array) -> Array:
     """``array`` itself if all of it is finite."""
     if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise InputError(f"{name}{list(where) if where else ''} is {array[where]}, expected finite numbers")
+        raise InputError(
+            f"{name}{list(where) if where else ''} is {array[where]}, expected finite numbers",
+            argument=name,
+            value=float(array[where]),
+        )
     return array
 
 
@@ -74,12 +80,14 @@ def scalar(name: str, value: Any, *, positive: bool = False, least: float | None
     """``value`` as a finite float, optionally positive or not below ``least``."""
     array = as_array(name, value)
     if array.ndim != 0 or not np.isfinite(array):
-        raise InputError(f"{name} = {value!r}, expected one finite number")
+        raise InputError(f"{name} = {value!r}, expected one finite number", argument=name, value=value)
     number = float(array)
     if positive and number <= 0:
-        raise InputError(f"{name} = {number:g}, expected a number greater than 0")
+        raise InputError(f"{name} = {number:g}, expected a number greater than 0", argument=name, value=number)
     if least is not None and number < least:
-        raise InputError(f"{name} = {number:g}, expected a number not below {least:g}")
+        raise InputError(
+            f"{name} = {number:g}, expected a number not below {least:g}", argument=name, value=number, limit=least
+        )
     return number
 
 
@@ -87,7 +95,12 @@ def quantity(name: str, value: Any) -> float:
     """``value`` as a float from 1e-12 to 1e30, such as a mass, so that dynamics can compute with it."""
     number = scalar(name, value, positive=True)
     if not SMALLEST <= number < LARGEST:
-        raise InputError(f"{name} = {number:g}, expected SI units, from {SMALLEST:g} to {LARGEST:g}")
+        raise InputError(
+            f"{name} = {number:g}, expected SI units, from {SMALLEST:g} to {LARGEST:g}",
+            argument=name,
+            value=number,
+            limit=(SMALLEST, LARGEST),
+        )
     return number
 
 

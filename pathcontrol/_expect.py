@@ -57,7 +57,9 @@ def expect(name: str, value: Any, *kinds: type, error: type[PathControlError] = 
     if given in _SOURCES and given != wanted:
         advice += "; are arguments swapped?"
     raise error(
-        f"{name} {described(value)}, expected {_article(wanted)} {wanted}{also}" + (f": {advice}" if advice else "")
+        f"{name} {described(value)}, expected {_article(wanted)} {wanted}{also}" + (f": {advice}" if advice else ""),
+        argument=name,
+        value=value,
     )
 
 

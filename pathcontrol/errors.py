@@ -11,7 +11,43 @@ from typing import Any
 
 
 class PathControlError(Exception):
-    """Root of all errors raised on purpose by :mod:`pathcontrol`."""
+    """Root of all errors raised on purpose by :mod:`pathcontrol`.
+
+    What a program may want to know stands beside the message, ``None`` where the error is not about it.
+
+    Args:
+        message: for a person to read.
+        **details: values of the attributes.
+
+    Attributes:
+        argument: name of the argument that was refused.
+        value: what was given, or what came out.
+        limit: what the value is held to, a number or both ends.
+        choices: the names that there are.
+        joint: name of the joint.
+        s: path parameter [rad, m or -].
+        time: time of the simulation [s].
+        file: path of the file, as text.
+        line: number of the line in the file, from 1.
+    """
+
+    argument: str | None = None
+    value: Any = None
+    limit: Any = None
+    choices: tuple[str, ...] | None = None
+    joint: str | None = None
+    s: float | None = None
+    time: float | None = None
+    file: str | None = None
+    line: int | None = None
+
+    def __init__(self, message: object = "", **details: Any) -> None:
+        super().__init__(message)
+        vars(self).update(details)
+
+    def details_with(self, **more: Any) -> dict[str, Any]:
+        """Return what stands beside the message, and ``more``, for an error that says this one with its place."""
+        return vars(self) | more
 
 
 class PathControlWarning(UserWarning):
@@ -23,7 +59,13 @@ class InputError(PathControlError, ValueError):
 
 
 class UrdfError(PathControlError, ValueError):
-    """A robot description cannot be used; the message lists what is wrong in it."""
+    """A robot description cannot be used; the message lists what is wrong in it.
+
+    Attributes:
+        findings: those of :func:`check_urdf` that are errors.
+    """
+
+    findings: tuple[Any, ...] = ()
 
 
 class UnknownNameError(PathControlError, LookupError):
@@ -35,11 +77,13 @@ class MissingExtraError(PathControlError, ImportError):
 
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         super().__init__(
-            f"{purpose} needs the package {package!r}, which is not installed; try: pip install 'pathcontrol[{extra}]'"
+            f"{purpose} needs the package {package!r}, which is not installed; try: pip install 'pathcontrol[{extra}]'",
+            value=package,
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return copyreg.__newobj__, (type(self), *self.args)  # type: ignore[attr-defined]  # not by __init__ again
+        rebuild = copyreg.__newobj__  # type: ignore[attr-defined]  # not by __init__ again
+        return rebuild, (type(self), *self.args), vars(self)
 
 
 class TaskError(PathControlError, ValueError):
@@ -51,7 +95,13 @@ class ToolpathError(PathControlError, ValueError):
 
 
 class ExperimentError(PathControlError, ValueError):
-    """An experiment file is invalid; the message names the key and the choices."""
+    """An experiment file is invalid; the message names the key and the choices.
+
+    Attributes:
+        findings: what is wrong, a text each that begins with the key.
+    """
+
+    findings: tuple[str, ...] = ()
 
 
 class ClusterError(PathControlError, RuntimeError):
@@ -69,9 +119,10 @@ class SimulationError(PathControlError, RuntimeError):
         run: the :class:`Run` up to there, where all rollouts diverged; else ``None``.
     """
 
-    def __init__(self, message: str, run: Any = None) -> None:
-        super().__init__(message)
-        self.run = run
+    run: Any = None
+
+    def __init__(self, message: str, run: Any = None, **details: Any) -> None:
+        super().__init__(message, run=run, **details)
 
 
 def warn_of_single(name: str) -> None:

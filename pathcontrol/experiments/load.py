@@ -41,7 +41,10 @@ def invalid(path: str | Path, findings: Iterable[str]) -> ExperimentError:
     told = list(findings)
     more = ["and more"] if len(told) > _MOST_TOLD else []
     lines = "\n".join([*told[:_MOST_TOLD], *more]).replace("\n", "\n  ")
-    return ExperimentError(f"{str(path)!r} is not a valid experiment:\n  {lines}")
+    line = re.search(r"\bline (\d+)", told[0]) if len(told) == 1 else None
+    where = {"line": int(line[1])} if line else {}
+    message = f"{str(path)!r} is not a valid experiment:\n  {lines}"
+    return ExperimentError(message, file=str(path), findings=tuple(told), **where)
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:

@@ -55,7 +55,8 @@ class ArcLength:
             i = int(np.argmin(np.nan_to_num(steps, nan=-1.0)))
             raise TaskError(
                 f"{name} has length {steps[i]:g} from s = {self._ends[i]:g} to {self._ends[i + 1]:g}, "
-                "expected a path that moves with s everywhere: q_d' = 0 is a standstill"
+                "expected a path that moves with s everywhere: q_d' = 0 is a standstill",
+                s=float(self._ends[i]),
             )
 
     @property

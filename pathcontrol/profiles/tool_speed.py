@@ -55,5 +55,7 @@ class ToolSpeed(VelocityProfile):
         if still.any():
             raise TaskError(
                 f"the path does not move the origin of {self.frame!r} at s = {s[still].flat[0]:g}, so its speed cannot "
-                f"be {self.speed:g} m/s; name a frame that moves there, or limit the joints: ConstantSpeed, limited"
+                f"be {self.speed:g} m/s; name a frame that moves there, or limit the joints: ConstantSpeed, limited",
+                value=self.speed,
+                s=float(s[still].flat[0]),
             )

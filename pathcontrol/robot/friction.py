@@ -346,5 +346,9 @@ def friction_of(description: Mapping[str, Any]) -> FrictionLaw:
     if name == "FrictionSum":
         return FrictionSum(tuple(friction_of(term) for term in values["terms"]))
     if name not in _LAWS:
-        raise UnknownNameError(f"friction law {name!r}, expected one of {', '.join(_LAWS)} or a FrictionSum of them")
+        raise UnknownNameError(
+            f"friction law {name!r}, expected one of {', '.join(_LAWS)} or a FrictionSum of them",
+            value=name,
+            choices=tuple(_LAWS),
+        )
     return _LAWS[name](**values)

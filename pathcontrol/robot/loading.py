@@ -77,7 +77,7 @@ def _parsed(urdf: UrdfSource, label: str) -> Parsed:
     try:
         return parse_and_mend(urdf.text)
     except UrdfError as error:
-        raise UrdfError(f"{label} cannot be used: {error}") from None
+        raise UrdfError(f"{label} cannot be used: {error}", **error.details_with()) from None
 
 
 def checked_model(urdf: UrdfSource, label: str, locked: Sequence[str] = (), threads: int = 1) -> RobotModel:
@@ -93,7 +93,8 @@ def checked_model(urdf: UrdfSource, label: str, locked: Sequence[str] = (), thre
 def _checked(urdf: UrdfSource, label: str, locked: Sequence[str]) -> UrdfReport:
     report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=tuple(locked))
     if not report.ok:
-        raise UrdfError("\n".join([f"{label} cannot be used:", *(f"  {finding}" for finding in report.errors)]))
+        message = "\n".join([f"{label} cannot be used:", *(f"  {finding}" for finding in report.errors)])
+        raise UrdfError(message, findings=tuple(report.errors))
     return report
 
 

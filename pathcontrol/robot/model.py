@@ -126,7 +126,12 @@ class RobotModel:
     def joint_index(self, joint: str) -> int:
         """The position of a joint in ``joint_names``."""
         if joint not in self.joint_names:
-            raise UnknownNameError(f"{self.name} has no movable joint {joint!r}; it has {', '.join(self.joint_names)}")
+            raise UnknownNameError(
+                f"{self.name} has no movable joint {joint!r}; it has {', '.join(self.joint_names)}",
+                joint=joint,
+                value=joint,
+                choices=self.joint_names,
+            )
         return self.joint_names.index(joint)
 
     # --- dynamics -------------------------------------------------------------------------------------------
@@ -421,7 +426,11 @@ class RobotModel:
         # getFrameId answers nframes for a frame that does not exist, so ask first
         model = self.pinocchio_model
         if not model.existFrame(frame):
-            raise UnknownNameError(f"{self.name} has no frame {frame!r}; it has {', '.join(self.frame_names)}")
+            raise UnknownNameError(
+                f"{self.name} has no frame {frame!r}; it has {', '.join(self.frame_names)}",
+                value=frame,
+                choices=self.frame_names,
+            )
         if model.existFrame(frame, pin.FrameType.BODY):  # a link and a joint may share a name
             return model.getFrameId(frame, pin.FrameType.BODY)
         return model.getFrameId(frame)

@@ -115,7 +115,7 @@ class Divergence:
                 f"all {len(self.time)} rollouts diverged, the last one, {last}, at t = {self.time[last]:.4g} s: "
                 f"{self._told(last)}"
             )
-        raise SimulationError(message, run)
+        raise SimulationError(message, run, time=float(self.time.max()))
 
 
 def sound(q: Array, qd: Array) -> Array:

@@ -40,7 +40,9 @@ def check_task(task: PathTask, n: int) -> None:
         i = int(np.argmax(~(theta > 0)))
         raise TaskError(
             f"{name}.theta(s={s[i]:g}) = {theta[i]:g}, expected ϑ > 0 everywhere: where it is not, the motion plan "
-            "ṡ = ϑ(s) stops for ever"
+            "ṡ = ϑ(s) stops for ever",
+            value=float(theta[i]),
+            s=float(s[i]),
         )
     _check_period(task, name)
     for method in ("dq_d", "ddq_d", "dtheta"):
@@ -55,7 +57,7 @@ def _check_each(batch: TaskBatch, n: int) -> None:
         try:
             check_task(task, n)
         except TaskError as error:
-            raise TaskError(f"tasks[{rows[0]}]: {error}") from error
+            raise TaskError(f"tasks[{rows[0]}]: {error}", **error.details_with()) from error
 
 
 def _check_domain(task: PathTask, name: str) -> None:
@@ -80,7 +82,8 @@ def _check_derivative(task: PathTask, name: str, s: Array, function: str, deriva
         i = tuple(np.argwhere(off)[0])
         raise TaskError(
             f"{name}.{derivative}(s={inside[i[0]]:g}) = {np.asarray(given)[i[0]]}, but {name}.{function} changes at "
-            f"the rate {difference[i[0]]}; correct it, or leave {derivative} out and have it computed"
+            f"the rate {difference[i[0]]}; correct it, or leave {derivative} out and have it computed",
+            s=float(inside[i[0]]),
         )
 
 
@@ -117,7 +120,11 @@ def _check_values(label: str, function: Callable[[Any], Any], s: Array, n: int |
     values = np.asarray(function(s), dtype=np.float64) + (np.zeros_like(s) if n is None else 0.0)
     if not np.isfinite(values).all():
         i = int(np.argwhere(~np.isfinite(values))[0][0])
-        raise TaskError(f"{label}(s={s[i]:g}) = {values[i].tolist()}, expected finite numbers on the whole domain")
+        raise TaskError(
+            f"{label}(s={s[i]:g}) = {values[i].tolist()}, expected finite numbers on the whole domain",
+            value=values[i].tolist(),
+            s=float(s[i]),
+        )
     return values
 
 

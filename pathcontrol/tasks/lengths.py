@@ -68,5 +68,11 @@ def _inside(task: Task, name: str, s: ArrayLike) -> Array:
     slack = 1e-12 * (1 + np.abs(s))
     outside = (s < task.s0 - slack) | (s > task.s_end + slack)
     if not task.closed and outside.any():
-        raise InputError(f"{name} = {s[outside].flat[0]:g}, expected a number from {task.s0:g} to {task.s_end:g}")
+        raise InputError(
+            f"{name} = {s[outside].flat[0]:g}, expected a number from {task.s0:g} to {task.s_end:g}",
+            argument=name,
+            value=s[outside].flat[0],
+            limit=(task.s0, task.s_end),
+            s=s[outside].flat[0],
+        )
     return s

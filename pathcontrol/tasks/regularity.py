@@ -30,7 +30,8 @@ def _check_regular(task: Task, name: str, s: Array) -> None:
     if not length.min() > 1e-9 * length.max():
         raise TaskError(
             f"{name}.dq_d(s={s[int(np.argmin(length))]:g}) has length {length.min():.1e}, expected a path that moves "
-            "with s everywhere: q_d' = 0 is a cusp or a standstill"
+            "with s everywhere: q_d' = 0 is a cusp or a standstill",
+            s=float(s[int(np.argmin(length))]),
         )
 
 
@@ -52,7 +53,8 @@ def _check_cusps(task: Task, name: str, s: Array) -> None:
     if cosine.min() < _OPPOSITE:
         raise TaskError(
             f"{name} turns back at s = {left[int(np.argmin(cosine))]:g}, expected a path without cusps: no arm that "
-            "moves can turn round at once; end the path there, or round the tip"
+            "moves can turn round at once; end the path there, or round the tip",
+            s=float(left[int(np.argmin(cosine))]),
         )
 
 

@@ -163,12 +163,20 @@ class Tuning:
 
     def _objective(self, name: str | None) -> str:
         if name is not None and name not in self.objectives:
-            raise UnknownNameError(f"objective {name!r}: expected one of {', '.join(self.objectives)}")
+            raise UnknownNameError(
+                f"objective {name!r}: expected one of {', '.join(self.objectives)}",
+                value=name,
+                choices=tuple(self.objectives),
+            )
         return next(iter(self.objectives)) if name is None else name
 
     def _known(self, limit: str) -> str:
         if limit not in self.limits:
-            raise UnknownNameError(f"limit {limit!r}: expected one of {', '.join(self.limits) or 'none'}")
+            raise UnknownNameError(
+                f"limit {limit!r}: expected one of {', '.join(self.limits) or 'none'}",
+                value=limit,
+                choices=tuple(self.limits),
+            )
         return limit
 
     def _others(self, limit: str) -> Mapping[str, tuple[float, float]]:

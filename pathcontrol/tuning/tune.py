@@ -193,5 +193,10 @@ def _space(given: Space | Mapping[str, Any], method: str) -> Space:
 
 def _reduce(given: Any) -> Reduce:
     if given not in get_args(Reduce):
-        raise UnknownNameError(f"reduce = {given!r}, expected one of {', '.join(map(repr, get_args(Reduce)))}")
+        raise UnknownNameError(
+            f"reduce = {given!r}, expected one of {', '.join(map(repr, get_args(Reduce)))}",
+            argument="reduce",
+            value=given,
+            choices=get_args(Reduce),
+        )
     return given

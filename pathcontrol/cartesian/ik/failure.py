@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from pathcontrol.cartesian.ik.joint_range import distance_to_limits
 from pathcontrol.cartesian.ik.nearest_posture import nearest_postures
 from pathcontrol.cartesian.orientation import FreeOrientation
 from pathcontrol.errors import TaskError
+from pathcontrol.robot.model import RobotModel
 
 _SEEDS = 64
 _AHEAD = np.array([1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0])  # parts of the curve
@@ -29,7 +31,9 @@ def refusal(constraint: ToolConstraint, trail: Trail, tries: int = 1) -> TaskErr
     best = f", from the best of {tries} start postures" if tries > 1 else ""
     return TaskError(
         f"{_tool(constraint)} follows the curve to {place(constraint, s)}, {along:.3g} % of it{best}: "
-        f"{_reason(constraint, trail)}"
+        f"{_reason(constraint, trail)}",
+        s=float(s),
+        **_limit_details(constraint, trail),
     )
 
 
@@ -40,7 +44,8 @@ def unreached(constraint: ToolConstraint, start: Array | None = None) -> TaskErr
     other = "" if start is None else "; give another start posture, or none to have one searched"
     return TaskError(
         f"{_tool(constraint)} does not reach the first point of the curve {whence}: at "
-        f"{place(constraint, constraint.curve.s0)}, {_gap(constraint, seeds, constraint.curve.s0)}{other}"
+        f"{place(constraint, constraint.curve.s0)}, {_gap(constraint, seeds, constraint.curve.s0)}{other}",
+        s=float(constraint.curve.s0),
     )
 
 
@@ -51,7 +56,10 @@ def not_closing(constraint: ToolConstraint, trail: Trail) -> TaskError:
     return TaskError(
         f"{_tool(constraint)} follows the closed curve, but at {place(constraint, trail.s[-1])}, one lap on, "
         f"{robot.joint_names[i]} is {change[i]:+.6g} {robot.position_units[i]} from where it began, so the path of the "
-        f"joints does not close; closed=False makes one lap an open path{_also_freedom(constraint)}"
+        f"joints does not close; closed=False makes one lap an open path{_also_freedom(constraint)}",
+        joint=robot.joint_names[i],
+        value=float(change[i]),
+        s=float(trail.s[-1]),
     )
 
 
@@ -72,11 +80,25 @@ def _reason(constraint: ToolConstraint, trail: Trail) -> str:
     return _out_of_reach(constraint, trail) or _stuck(constraint, trail)
 
 
-def _limit(constraint: ToolConstraint, beyond: Array) -> str:
-    robot = constraint.tool.robot
+def _passed_limit(robot: RobotModel, beyond: Array) -> tuple[int, str, float]:
+    """The joint farthest beyond its limits, on which side, and the limit."""
     i = int(np.argmin(distance_to_limits(robot, beyond)))
     upper = beyond[i] > robot.limits.upper[i]
-    side, value = ("upper", robot.limits.upper[i]) if upper else ("lower", robot.limits.lower[i])
+    return (i, "upper", robot.limits.upper[i]) if upper else (i, "lower", robot.limits.lower[i])
+
+
+def _limit_details(constraint: ToolConstraint, trail: Trail) -> dict[str, Any]:
+    """The joint that stops a trail at its limit, with both, for a program."""
+    if trail.stop is not Stop.LIMIT:
+        return {}
+    robot = constraint.tool.robot
+    i, _, limit = _passed_limit(robot, trail.beyond)
+    return {"joint": robot.joint_names[i], "value": float(trail.beyond[i]), "limit": float(limit)}
+
+
+def _limit(constraint: ToolConstraint, beyond: Array) -> str:
+    robot = constraint.tool.robot
+    i, side, value = _passed_limit(robot, beyond)
     return (
         f"there {robot.joint_names[i]} is at its {side} limit, {value:.6g} {robot.position_units[i]}; give another "
         f"start posture or move the curve{_also_freedom(constraint)}"

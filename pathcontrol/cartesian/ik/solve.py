@@ -64,7 +64,13 @@ def posture(robot: RobotModel, start: ArrayLike) -> Array:
     if outside(robot, q):
         i = int(np.argmin(distance_to_limits(robot, q)))
         low, high = robot.limits.lower[i], robot.limits.upper[i]
-        raise InputError(f"start has {robot.joint_names[i]} at {q[i]:g}, outside its limits from {low:g} to {high:g}")
+        raise InputError(
+            f"start has {robot.joint_names[i]} at {q[i]:g}, outside its limits from {low:g} to {high:g}",
+            argument="start",
+            joint=robot.joint_names[i],
+            value=float(q[i]),
+            limit=(float(low), float(high)),
+        )
     return np.clip(q, robot.limits.lower, robot.limits.upper)
 
 

@@ -59,7 +59,8 @@ class Tangential(NamedTuple):
         if still.any():
             raise TaskError(
                 f"{self.motion} all but stands still at s = {self.s[np.argmax(still), 0]:g} of the path, so its "
-                "tangential acceleration cannot be limited there; limit that of the joints instead"
+                "tangential acceleration cannot be limited there; limit that of the joints instead",
+                s=float(self.s[np.argmax(still), 0]),
             )
 
 

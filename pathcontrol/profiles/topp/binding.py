@@ -48,7 +48,11 @@ def refuse_static_overload(limits: JointLimits, samples: Samples, torques: Torqu
     raise TaskError(
         f"at s = {knots.s[cell + end]:.6g} weight and dry friction take {load:.4g}, more than the "
         f"{limits.text(kind, joint)}: the arm cannot pass the posture {_text(knots.q[cell + end])} slowly; lower the "
-        "payload or the margin, or lead the path elsewhere"
+        "payload or the margin, or lead the path elsewhere",
+        joint=limits.robot.joint_names[joint],
+        value=float(load),
+        limit=float(limits.torque[joint]),
+        s=float(knots.s[cell + end]),
     )
 
 
@@ -65,7 +69,11 @@ def refuse_rate(limits: JointLimits, samples: Samples, cells: Cells, name: str, 
     limit = limits.text(str(used.kinds[knot]), int(used.joints[knot]))
     raise TaskError(
         f"{name} = {rate:g} 1/s is too fast: at s = {samples.s[knot]:.6g}, posture {_text(samples.q[knot])}, the arm "
-        f"can have {np.sqrt(x[knot]):.4g} 1/s, where the {limit}, binds"
+        f"can have {np.sqrt(x[knot]):.4g} 1/s, where the {limit}, binds",
+        argument=name,
+        value=rate,
+        limit=float(np.sqrt(x[knot])),
+        s=float(samples.s[knot]),
     )
 
 

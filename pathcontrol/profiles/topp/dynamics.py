@@ -65,7 +65,11 @@ def sample(path: Path, knots: Array, n: int) -> Samples:
             )
         if not np.isfinite(value).all():
             i = int(np.argmin(np.isfinite(value).all(-1)))
-            raise TaskError(f"{type(path).__name__}.{name}(s={s[i]:g}) = {value[i].tolist()}, expected finite numbers")
+            raise TaskError(
+                f"{type(path).__name__}.{name}(s={s[i]:g}) = {value[i].tolist()}, expected finite numbers",
+                value=value[i].tolist(),
+                s=float(s[i]),
+            )
     return Samples(s, q, dq, ddq, k)
 
 

@@ -63,7 +63,8 @@ def fastest(demand: Demand) -> tuple[Array, Binding]:
         allowed = tightened(allowed, cells, over, x)
     where = samples.knots.s[over.cells.argmax()]
     raise TaskError(
-        f"{len(x)} points do not resolve the path near s = {where:.6g}: limits are exceeded between them; give more"
+        f"{len(x)} points do not resolve the path near s = {where:.6g}: limits are exceeded between them; give more",
+        s=float(where),
     )
 
 

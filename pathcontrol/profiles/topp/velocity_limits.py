@@ -39,5 +39,6 @@ def refuse_endless(samples: Samples, x: Array, endless: float) -> None:
     if x[fastest] > 0.9 * endless or np.isinf(x[fastest]):
         raise InputError(
             f"nothing limits the speed at s = {samples.knots.s[fastest]:.6g}, where joints without limits move; limit "
-            "their velocity"
+            "their velocity",
+            s=float(samples.knots.s[fastest]),
         )

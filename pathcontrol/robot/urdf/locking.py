@@ -131,7 +131,13 @@ def check_tip(tip: str | None) -> None:
 
 def _known(argument: str, name: str, joints: Collection[str]) -> str:
     if name not in joints:
-        raise UnknownNameError(f"{argument}: the robot has no movable joint {name!r}; it has {', '.join(joints)}")
+        raise UnknownNameError(
+            f"{argument}: the robot has no movable joint {name!r}; it has {', '.join(joints)}",
+            argument=argument,
+            joint=name,
+            value=name,
+            choices=tuple(joints),
+        )
     return name
 
 
@@ -141,7 +147,12 @@ def _carrying(root: etree._Element, tip: str, joints: Collection[str]) -> Iterat
     links = [link.get("name", "") for link in root.iterfind("link")]
     by_name = {joint.get("name", ""): joint for joint in root.iterfind("joint")}
     if tip not in links and tip not in by_name:
-        raise UnknownNameError(f"tip = {tip!r}: there is no such frame; there are {', '.join(links)}")
+        raise UnknownNameError(
+            f"tip = {tip!r}: there is no such frame; there are {', '.join(links)}",
+            argument="tip",
+            value=tip,
+            choices=tuple(links),
+        )
     joint, seen = over.get(tip) if tip in links else by_name[tip], set()
     while joint is not None and joint not in seen:  # a loop is refused by the checks
         seen.add(joint)

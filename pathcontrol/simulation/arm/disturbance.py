@@ -183,7 +183,9 @@ def check_disturbance(disturbance: Any, q: Array, qd: Array) -> None:
     try:
         torque = np.asarray(disturbance.torque(0.0, q, qd), dtype=np.float64)
     except ValueError as error:
-        raise InputError(f"{name}.torque fails for {len(q)} rollouts of {q.shape[1]} joints: {error}") from error
+        raise InputError(
+            f"{name}.torque fails for {len(q)} rollouts of {q.shape[1]} joints: {error}", argument=name
+        ) from error
     if torque.shape not in ((), q.shape[1:], (1, q.shape[1]), q.shape):
         raise InputError(f"{name}.torque has shape {torque.shape}, expected {q.shape}: rollouts and joints")
 

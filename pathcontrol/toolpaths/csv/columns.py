@@ -50,7 +50,7 @@ class Columns:
         places = {name: k for k, name in enumerate(names) if name}
         if (mistake := _mistake(names, places, flat=flat)) is not None:
             there = reprlib.repr(" ".join(name.text for name in header.names) or " ".join(names))
-            raise ToolpathError(f"line {header.line}: columns {there}, {mistake}")
+            raise ToolpathError(f"line {header.line}: columns {there}, {mistake}", line=int(header.line))
         _tell(_called(header, chosen), places, passed)
         rows.trim(header.width)
         return cls(places, header.width, header.unit(places))
@@ -115,7 +115,8 @@ def _names(rows: Rows, header: Header, chosen: Chosen | None, *, flat: bool) -> 
             reason = "z= is for tables of x and y alone: leave it out"
         raise ToolpathError(
             f"line {header.line}: {header.width} values between {rows.between} and no names of columns, expected "
-            f"{'2 (x y)' if flat else '3 (x y z)'}; {reason}"
+            f"{'2 (x y)' if flat else '3 (x y z)'}; {reason}",
+            line=int(header.line),
         )
     return POINT[: header.width]
 

@@ -72,7 +72,10 @@ class Header:
         units = {self.names[places[name]].unit for name in POINT if name in places} if self.names else {None}
         if len(units) > 1:
             listed = ", ".join(sorted(repr(unit or "no unit") for unit in units))
-            raise ToolpathError(f"line {self.line}: x, y and z in different units, {listed}, expected the same for all")
+            raise ToolpathError(
+                f"line {self.line}: x, y and z in different units, {listed}, expected the same for all",
+                line=int(self.line),
+            )
         return units.pop() or self.said
 
 

@@ -78,7 +78,7 @@ def read_csv(
         table = Table.of(rows, found, UNITS[unit], decimal or _decimal(rows, found, passed), z)
         contours = [_contour(table, first, end, feed) for first, end in table.parts]
     except ToolpathError as error:
-        raise ToolpathError(f"{os.fspath(path)}: {error}") from None
+        raise ToolpathError(f"{os.fspath(path)}: {error}", **error.details_with(file=os.fspath(path))) from None
     if "qx" in found.places:
         passed.tell("of the orientations qx qy qz qw the tool's z axis is kept, not how it is turned about that")
     return Toolpath(tuple(contours), os.fspath(path), unit, passed.notes)
@@ -115,7 +115,8 @@ def _contour(table: Table, first: int, end: int, feed: float | None) -> Contour:
     if len(kept) < 2:
         raise ToolpathError(
             f"line {table.lines[first]}: the contour that begins here is one point, expected at least two that differ; "
-            f"an empty line, or another value in the column {CONTOUR!r}, begins the next contour"
+            f"an empty line, or another value in the column {CONTOUR!r}, begins the next contour",
+            line=int(table.lines[first]),
         )
     closed = len(kept) > 2 and math.dist(points[0], points[kept[-1]]) <= _NOTHING
     axes = None
@@ -143,4 +144,6 @@ def _check_axes(axes: Array, kept: Array, lines: list[int]) -> None:
     turned = np.abs(axes - axes[stays]).max(1) > _NOTHING
     if turned.any():
         line = lines[int(np.argmax(turned))]
-        raise ToolpathError(f"line {line}: the tool axis turns on the spot, expected another point, or the same axis")
+        raise ToolpathError(
+            f"line {line}: the tool axis turns on the spot, expected another point, or the same axis", line=int(line)
+        )

@@ -117,7 +117,7 @@ def _unquoted(line: int, text: str, separator: str | None) -> str:
         try:
             values = next(csv.reader([text], delimiter=separator, skipinitialspace=True))
         except csv.Error as error:
-            raise ToolpathError(f"line {line}: {error}") from None
+            raise ToolpathError(f"line {line}: {error}", line=int(line)) from None
     return _INSIDE.join(value.strip().replace(_INSIDE, " ") for value in values)
 
 

@@ -46,7 +46,10 @@ class Table:
     def of(cls, rows: Rows, columns: Columns, scale: float, decimal: str, z: float | None) -> Table:
         """The table with the coordinates in ``scale`` metres, and z [m] where there is no such column."""
         if len(rows.texts) > MAX_SEGMENTS:
-            raise ToolpathError(f"line {rows.lines[MAX_SEGMENTS]}: more than {MAX_SEGMENTS} points; split the file")
+            raise ToolpathError(
+                f"line {rows.lines[MAX_SEGMENTS]}: more than {MAX_SEGMENTS} points; split the file",
+                line=int(rows.lines[MAX_SEGMENTS]),
+            )
         labels, starts = None, {0, *rows.after_gap}
         if (place := columns.places.get(CONTOUR)) is not None:
             _find_wrong_width(rows, columns)
@@ -59,7 +62,9 @@ class Table:
         far = np.abs(points).max(1) > MAX_COORDINATE
         if far.any():
             line = rows.lines[int(np.argmax(far))]
-            raise ToolpathError(f"line {line}: further than {MAX_COORDINATE:g} m from the origin; is the unit right?")
+            raise ToolpathError(
+                f"line {line}: further than {MAX_COORDINATE:g} m from the origin; is the unit right?", line=int(line)
+            )
         return cls(points, _axes(axes, rows.lines), rows.lines, labels, sorted(starts))
 
     @property
@@ -92,7 +97,8 @@ def decimal_mark(rows: Rows, columns: Columns) -> str:
         field, line = next(iter(commas.items()))
         raise ToolpathError(
             f"line {line}: is {reprlib.repr(field)} a number with a decimal comma, or with a comma between thousands? "
-            "Read the file with decimal=',' or write decimal points alone"
+            "Read the file with decimal=',' or write decimal points alone",
+            line=int(line),
         )
     return ","
 
@@ -110,7 +116,10 @@ def _values(rows: Rows, columns: Columns, decimal: str) -> Array:
     if not np.isfinite(values).all():
         row, column = np.argwhere(~np.isfinite(values))[0]
         name = list(columns.numeric)[column]
-        raise ToolpathError(f"line {rows.lines[row]}: {name} = {values[row, column]}, expected a finite number")
+        raise ToolpathError(
+            f"line {rows.lines[row]}: {name} = {values[row, column]}, expected a finite number",
+            line=int(rows.lines[row]),
+        )
     return values
 
 
@@ -123,7 +132,8 @@ def _find_wrong_width(rows: Rows, columns: Columns) -> None:
             names = sorted(columns.places, key=columns.places.__getitem__)
             raise ToolpathError(
                 f"line {line}: {found} values between {rows.between}, expected {width}: {' '.join(names)}"
-                f"{' and what is passed over' if len(names) < width else ''}"
+                f"{' and what is passed over' if len(names) < width else ''}",
+                line=int(line),
             )
 
 
@@ -138,7 +148,8 @@ def _find_mistake(rows: Rows, columns: Columns, decimal: str) -> None:
                 comma = decimal == "." and ("," in fields[at] or split_up)
                 raise ToolpathError(
                     f"line {line}: {name} = {reprlib.repr(fields[at])}, expected a number with {mark}"
-                    f"{', or read the file with decimal=' + repr(',') if comma else ''}"
+                    f"{', or read the file with decimal=' + repr(',') if comma else ''}",
+                    line=int(line),
                 )
 
 
@@ -150,7 +161,9 @@ def _axes(values: Array, lines: list[int]) -> Array | None:
     if not largest.all():
         line = lines[int(np.argmin(largest))]
         what = "the tool axis i j k is 0 0 0, expected a direction"
-        raise ToolpathError(f"line {line}: {what if values.shape[1] == 3 else 'the quaternion is 0 0 0 0'}")
+        raise ToolpathError(
+            f"line {line}: {what if values.shape[1] == 3 else 'the quaternion is 0 0 0 0'}", line=int(line)
+        )
     unit = values / largest  # so that squares neither overflow nor vanish
     unit /= np.linalg.norm(unit, axis=-1, keepdims=True)
     if values.shape[1] == 3:
@@ -159,7 +172,8 @@ def _axes(values: Array, lines: list[int]) -> Array | None:
     if off.any():
         line = lines[int(np.argmax(off))]
         raise ToolpathError(
-            f"line {line}: the quaternion qx qy qz qw has not the norm 1; are its columns the right ones?"
+            f"line {line}: the quaternion qx qy qz qw has not the norm 1; are its columns the right ones?",
+            line=int(line),
         )
     x, y, z, w = unit.T
     return np.stack([-2 * (x * z + w * y), 2 * (w * x - y * z), 2 * (x * x + y * y) - 1], axis=-1)

@@ -57,7 +57,7 @@ class Entities:
             yield
         except Exception as error:  # ezdxf raises whatever its parts raise on malformed entities
             name = f"{entity.dxftype()} {entity.dxf.get('handle') or ''}".strip()
-            raise ToolpathError(f"{self.source}, {name} on layer {layer!r}: {error}") from error
+            raise ToolpathError(f"{self.source}, {name} on layer {layer!r}: {error}", file=str(self.source)) from error
 
     def _inside(self, layout: Any, matrix: Array, parent: str | None, depth: int) -> Iterator[Drawn]:
         for entity in layout:

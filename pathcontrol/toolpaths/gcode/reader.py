@@ -77,7 +77,7 @@ def read_gcode(
         if not contours:
             raise ToolpathError("there is no move in it between places that it gives, expected G0, G1, G2 or G3")
     except ToolpathError as error:
-        raise ToolpathError(f"{os.fspath(path)}: {error}") from None
+        raise ToolpathError(f"{os.fspath(path)}: {error}", **error.details_with(file=os.fspath(path))) from None
     return Toolpath(contours, os.fspath(path), program.modes.known_unit("the program").name, passed.notes)
 
 
@@ -113,4 +113,4 @@ def _run(program: Program, texts: Sequence[str], passed: Passed) -> None:
                 if PLAIN.fullmatch(text):  # what follows other lines is rarely plain, and looking for it takes time
                     number += program.follow(texts, number)
         except ToolpathError as error:
-            raise ToolpathError(f"line {number}: {error}") from None
+            raise ToolpathError(f"line {number}: {error}", **error.details_with(line=number)) from None

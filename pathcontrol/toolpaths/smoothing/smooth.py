@@ -59,7 +59,12 @@ def smooth(contour: Contour, tolerance: float = 1e-4, corner: Corners = "blend")
     expect("contour", contour, Contour)
     tolerance = scalar("tolerance", tolerance, positive=True)
     if corner not in get_args(Corners):
-        raise UnknownNameError(f"corner = {corner!r}, expected one of {', '.join(map(repr, get_args(Corners)))}")
+        raise UnknownNameError(
+            f"corner = {corner!r}, expected one of {', '.join(map(repr, get_args(Corners)))}",
+            argument="corner",
+            value=corner,
+            choices=get_args(Corners),
+        )
     parts = split(contour, TURN_BACK if corner == "blend" else SHARP)
     done = [piece for part in parts for piece in _pieces(part, tolerance)]
     curves, deviations, normals = zip(*done, strict=True)

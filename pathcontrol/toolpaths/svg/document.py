@@ -56,7 +56,10 @@ class Document:
         try:
             yield
         except (InputError, ToolpathError) as error:
-            raise ToolpathError(f"{self.path}, line {element.sourceline}, {label_of(element)}: {error}") from error
+            where = error.details_with(file=str(self.path), line=element.sourceline)
+            raise ToolpathError(
+                f"{self.path}, line {element.sourceline}, {label_of(element)}: {error}", **where
+            ) from error
 
     def style(self, element: Any) -> dict[str, str]:
         """The properties of an element that have a say in the geometry."""

@@ -131,12 +131,17 @@ def _refuse_xacro(root: etree._Element) -> None:
         name = etree.QName(element)
         is_macro = "xacro" in (name.namespace or "")
         if is_macro or (element in ours and _uses_xacro(element)):
-            raise UrdfError(f"line {element.sourceline}: <{name.localname}> is xacro, not URDF; {_RUN_XACRO}")
+            raise UrdfError(
+                f"line {element.sourceline}: <{name.localname}> is xacro, not URDF; {_RUN_XACRO}",
+                line=element.sourceline,
+            )
 
 
 def _refuse_other_roots(root: etree._Element) -> None:
     if etree.QName(root).localname != "robot":
-        raise UrdfError(f"line {root.sourceline}: the root is {shown(root.tag)}; expected <robot>")
+        raise UrdfError(
+            f"line {root.sourceline}: the root is {shown(root.tag)}; expected <robot>", line=root.sourceline
+        )
     for element in _own_elements(root):
         name = etree.QName(element)
         if name.namespace and (element is root or element.prefix is None):
