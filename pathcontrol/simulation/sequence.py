@@ -24,13 +24,12 @@ from pathcontrol.simulation.arguments import (
     plant_of,
     record_of,
 )
-from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
-from pathcontrol.simulation.checks.slips import warn_of_slips
-from pathcontrol.simulation.checks.too_long import warn_of_steps
+from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.divergence import Divergence
-from pathcontrol.simulation.engines import Engine, check_engine, choose_engine
+from pathcontrol.simulation.engines import Engine, check_engine
 from pathcontrol.simulation.finish import Finish, finish_of
 from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
+from pathcontrol.simulation.prepare import prepare
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import refuse_batch
 from pathcontrol.tasks.joined.sequence import PathSequence
@@ -108,21 +107,19 @@ def simulate_sequence(
     for law in laws:
         check_joints(law, robot)
         check_law(law, q0, qd0, law.start(q0, qd0))
-    slip = warn_of_slips(robot, whole, q0)
-    check_disturbance(disturbance, q0, qd0)
-    (arm, said), legs = choose_engine(engine, laws, loop, robot, q0, qd0, Outside(disturbance)), []
-    slow = warn_of_steps(laws, loop, robot, q0, qd0, disturbance, float(durations.sum()))
+    ready = prepare(laws, whole, robot, loop, q0, qd0, Outside(disturbance), float(durations.sum()), engine)
+    arm, legs = ready.arm, []
     for law, longest, finish in zip(laws, durations, ends, strict=True):
         arrays = arm.run(law, longest, finish, progress)
         legs.append(_Leg(arrays, float(finish.time[0]), law.task.s0, _length(law.task, laps)))
         if arm.divergence.any or np.isnan(legs[-1].finish_time):
             break
-    arm.divergence.explain(slip or slow)
+    arm.divergence.explain(ready.advice)
     arrays, outcome = _joined(legs, len(laws), period, arm.divergence)
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws))
     paths = f"{len(laws)} path{'s' if len(laws) > 1 else ''}"
     described = {"controller": f"{paths} with {names}", "sequence": [law.describe() for law in laws]}
-    config = record_of(described, robot, loop, disturbance, duration=durations.tolist(), laps=laps, **said)
+    config = record_of(described, robot, loop, disturbance, duration=durations.tolist(), laps=laps, **ready.engine)
     time = period * np.arange(arrays["s"].shape[1])
     run = Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=whole, model=laws[0].robot)
     arm.divergence.check(run)

@@ -23,12 +23,12 @@ from pathcontrol.simulation.arguments import (
     start_of_each,
     states_of_each,
 )
-from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
-from pathcontrol.simulation.checks.slips import warn_if_still, warn_of_slips
-from pathcontrol.simulation.checks.too_long import warn_of_steps
-from pathcontrol.simulation.engines import Engine, check_engine, choose_engine
+from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.checks.slips import warn_if_still
+from pathcontrol.simulation.engines import Engine, check_engine
 from pathcontrol.simulation.finish import Until, finish_of, first_and_last, whole_laps
 from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
+from pathcontrol.simulation.prepare import prepare
 from pathcontrol.simulation.run import Run
 
 
@@ -95,14 +95,12 @@ def simulate(
     q0, qd0, z0 = start_of_each(controller, *states_of_each(q, qd, robot, controller.task), disturbance)
     period, finish = period_of(loop, duration), finish_of(controller.task, laps, until, len(q0))
     check_length(duration, loop, len(q0), robot.n, finish is not None and finish.ends_run)
-    slip = warn_of_slips(robot, controller.task, q0, first)
-    check_disturbance(disturbance, q0, qd0)
-    arm, said = choose_engine(engine, [controller], loop, robot, q0, qd0, Outside(disturbance, first))
-    slow = "" if first else warn_of_steps([controller], loop, robot, q0, qd0, disturbance, duration)
-    settings = {"duration": duration, "laps": laps, "until": until, "first_rollout": first} | said
-    config = record_of(controller.describe(), robot, loop, disturbance, **settings)
+    settings = {"duration": duration, "laps": laps, "until": until, "first_rollout": first}
+    ready = prepare([controller], controller.task, robot, loop, q0, qd0, Outside(disturbance, first), duration, engine)
+    config = record_of(controller.describe(), robot, loop, disturbance, **settings, **ready.engine)
+    arm = ready.arm
     arrays = arm.run(controller, duration, finish, progress, z0)
-    arm.divergence.explain(slip or slow)
+    arm.divergence.explain(ready.advice)
     outcome = arm.divergence.outcome() | ({} if finish is None else {"finish_time": finish.time})
     if controller.task.closed:
         outcome["laps"] = whole_laps(controller.task, *first_and_last(arrays["s"]))
