@@ -21,7 +21,8 @@ from pathcontrol import (
     simulate,
 )
 from pathcontrol.control.branch import BranchPolicy
-from pathcontrol.experiments.controller_sections import ProjectionController
+from pathcontrol.experiments.derived import section_of
+from pathcontrol.registry import LAWS
 
 SPACING, WIDTH, EACH = 0.002, 0.6, 40
 
@@ -233,7 +234,7 @@ def test_a_bad_policy_is_refused(ideal_arm):
 
 
 def test_the_capture_distance_of_a_file_is_an_angle():
-    section = ProjectionController(k_p=800.0, K_v=45.0, branch="follow", capture=9.0)
+    section = section_of(Projection, given=LAWS.given)(k_p=800.0, K_v=45.0, branch="follow", capture=9.0)
     assert section.arguments(np.deg2rad) == {
         "k_p": 800.0,
         "K_v": 45.0,

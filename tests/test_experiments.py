@@ -31,13 +31,11 @@ from pathcontrol import (
     load_robot,
     simulate,
 )
-from pathcontrol.experiments.controller_sections import LAWS, LOOPS
 from pathcontrol.experiments.load import load_experiment
-from pathcontrol.experiments.profile_sections import PROFILES
 from pathcontrol.experiments.runner import load_setup, run_experiment
 from pathcontrol.experiments.schema import Experiment
-from pathcontrol.experiments.task_sections import CURVES
 from pathcontrol.experiments.template import example_text
+from pathcontrol.registry import KINDS, LOOPS
 
 BASE = {
     "duration": 0.05,
@@ -52,7 +50,7 @@ DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" width="300mm" height="120mm
 
 OWN_TASK = """
 import numpy as np
-from pathcontrol import PathTask
+from pathcontrol import ComputedTorque, PathTask
 
 class Spiral(PathTask):
     s_end = 4.0
@@ -81,6 +79,10 @@ class Broken(Spiral):
 
 class NoTask:
     pass
+
+class Law(ComputedTorque):
+    def __init__(self, robot, task, K, **options):
+        super().__init__(robot, task, K, 45.0, **options)
 """
 
 
@@ -192,15 +194,17 @@ def test_template_options_are_valid(write, section, line):
 @pytest.mark.parametrize("block", template_sections())
 def test_template_alternatives_are_valid(write, block):
     section = re.match(r"\[(\w+)\]", block)[1]
-    text = re.sub(rf"(?ms)^\[{section}\].*?\n\n", block + "\n", example_text(), count=1)
-    text = text.replace("my_task.py:MyTask", "tasks.py:Spiral")
+    text, replaced = re.subn(rf"(?ms)^\[{section}\].*?\n\n", block + "\n", example_text(), count=1)
+    text = text if replaced or section != "disturbance" else f"{text}\n{block}"
+    text = text.replace("my_task.py:MyTask", "tasks.py:Spiral").replace("my_law.py:MyLaw", "tasks.py:Law")
     load_setup(write(text))
 
 
 def test_template_shows_every_choice():
     text = example_text()
-    for name in [*CURVES, *PROFILES, *LAWS, *LOOPS]:
-        assert f'= "{name}"' in text
+    for kind in (*KINDS, LOOPS):
+        for name in kind.members:
+            assert f'= "{name}"' in text
 
 
 # --- what is written is what is built -----------------------------------------------------------------------

@@ -16,8 +16,6 @@ from pathcontrol._units import quantity
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.load import load_experiment
 from pathcontrol.experiments.runner import load_setup
-from pathcontrol.experiments.schema import Experiment
-from pathcontrol.experiments.section import Section
 
 ANGLE = {"deg": math.pi / 180, "rad": 1.0, "mrad": 1e-3, "rev": 2 * math.pi}
 LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
@@ -184,20 +182,6 @@ def test_a_grid_of_a_sweep_may_have_units(tmp_path):
     data = {"task": {"speed": 1.0}}
     put(data, "task.speed", "90 deg/s")
     assert data == {"task": {"speed": "90 deg/s"}}
-
-
-def test_every_angle_has_a_unit():
-    """What ``angle_unit`` applies to is a quantity: the two lists of a section do not drift apart."""
-
-    def sections(kind):
-        yield kind
-        for other in kind.__subclasses__():
-            yield from sections(other)
-
-    for kind in sections(Section):
-        assert set(kind.angles) <= set(kind.units), kind
-        assert set(kind.units) <= set(kind.model_fields), kind
-    assert Experiment in set(sections(Section))
 
 
 def test_units_of_files_that_are_only_read_are_checked_too(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +13,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.curve import ToolCurve
 
@@ -71,7 +73,7 @@ class FixedOrientation(Orientation):
         rotation: rotation matrix (3, 3) of the tool in the base frame, or a unit quaternion (x, y, z, w).
     """
 
-    def __init__(self, rotation: ArrayLike) -> None:
+    def __init__(self, rotation: Annotated[ArrayLike, Form.ARRAY]) -> None:
         given = finite("rotation", as_array("rotation", rotation))
         if given.shape not in ((3, 3), (4,)):
             raise InputError(f"rotation has shape {given.shape}, expected a matrix (3, 3) or a quaternion (x, y, z, w)")
@@ -99,7 +101,7 @@ class TangentOrientation(Orientation):
         InputError: on evaluation, where the tangent is parallel to ``up``.
     """
 
-    def __init__(self, up: ArrayLike = (0.0, 0.0, 1.0)) -> None:
+    def __init__(self, up: Annotated[ArrayLike, Form.NUMBERS] = (0.0, 0.0, 1.0)) -> None:
         self.up = readonly(_direction("up", up))
 
     def frames(self, curve: ToolCurve, s: Array) -> Array:
@@ -127,9 +129,9 @@ class NormalOrientation(Orientation):
 
     def __init__(
         self,
-        normals: ArrayLike | Callable[[Array], Array],
-        at: ArrayLike | None = None,
-        reference: ArrayLike | None = None,
+        normals: Annotated[ArrayLike, Form.ARRAY] | Callable[[Array], Array],
+        at: Annotated[ArrayLike, Form.NUMBERS, Unit("m")] | None = None,
+        reference: Annotated[ArrayLike, Form.NUMBERS] | None = None,
     ) -> None:
         self.reference = None if reference is None else readonly(_direction("reference", reference))
         self.rows = 2 if reference is None else 3

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, readonly, scalar
 from pathcontrol._expect import expect
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.solve import posture, solve
 from pathcontrol.cartesian.orientation import FixedOrientation, FreeOrientation, Orientation
@@ -74,14 +75,14 @@ class CartesianPath(SplinePath):
         self,
         robot: RobotModel,
         frame: str,
-        curve: ToolCurve | ArrayLike,
+        curve: ToolCurve | Annotated[ArrayLike, Form.POINTS, Unit("m")],
         orientation: Orientation | Literal["keep"] | None = None,
         *,
-        speed: float = 0.1,
-        start: ArrayLike | None = None,
-        tolerance: float = 1e-5,
-        angle_tolerance: float = 1e-4,
-        tool: ArrayLike | None = None,
+        speed: Annotated[float, Form.POSITIVE, Unit("m/s")] = 0.1,
+        start: Annotated[ArrayLike, Form.NUMBERS, Unit("rad", "m")] | None = None,
+        tolerance: Annotated[float, Form.POSITIVE, Unit("m")] = 1e-5,
+        angle_tolerance: Annotated[float, Form.POSITIVE, Unit("rad")] = 1e-4,
+        tool: Annotated[ArrayLike, Form.ARRAY, Unit("m")] | None = None,
         closed: bool | None = None,
     ) -> None:
         expect("robot", robot, RobotModel)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
@@ -40,7 +41,13 @@ class ExtendedMotionPlan(Controller):
     gains = ("K_p", "K_v", "k")
 
     def __init__(
-        self, robot: RobotModel, task: PathTask, K_p: ArrayLike, K_v: ArrayLike, k: ArrayLike, **options: Any
+        self,
+        robot: RobotModel,
+        task: PathTask,
+        K_p: Annotated[ArrayLike, Form.GAIN, Unit("1/s^2")],
+        K_v: Annotated[ArrayLike, Form.GAIN, Unit("1/s")],
+        k: Annotated[ArrayLike, Form.GAIN_OR_ZERO, Unit("1/rad^2/s")],
+        **options: Any,
     ) -> None:
         super().__init__(robot, task, **options)
         self.K_p, self.K_v = (

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask
@@ -42,7 +43,7 @@ class MotionController(Controller):
 
 
 class ProportionalDerivative(MotionController):
-    """A tracking law with a gain on q̃ and one on dq̃/dt, in whatever unit its subclass says.
+    """A tracking law with a gain on q̃ and one on dq̃/dt; a subclass annotates them anew if their units are others.
 
     Args:
         robot: the model the law uses.
@@ -53,6 +54,9 @@ class ProportionalDerivative(MotionController):
     """
 
     gains = ("K_p", "K_v")
+
+    K_p: Annotated[Array, Form.GAIN, Unit("1/s^2")]
+    K_v: Annotated[Array, Form.GAIN, Unit("1/s")]
 
     def __init__(self, robot: RobotModel, task: PathTask, K_p: ArrayLike, K_v: ArrayLike, **options: Any) -> None:
         super().__init__(robot, task, **options)
@@ -83,6 +87,9 @@ class PDPlus(ProportionalDerivative):
     K_p in N m/rad, K_v in N m s/rad; arguments as for :class:`ProportionalDerivative`.
     """
 
+    K_p: Annotated[Array, Form.GAIN, Unit("N m/rad")]
+    K_v: Annotated[Array, Form.GAIN, Unit("N m s/rad")]
+
     def torque(self, q: Array, qd: Array, ref: Tracking) -> Array:
         return self.robot.inverse_dynamics(q, qd, ref.acceleration, velocity=ref.velocity) + self.correction(ref)
 
@@ -102,7 +109,14 @@ class SlotineLi(MotionController):
 
     gains = ("Lambda", "K_d")
 
-    def __init__(self, robot: RobotModel, task: PathTask, Lambda: ArrayLike, K_d: ArrayLike, **options: Any) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        task: PathTask,
+        Lambda: Annotated[ArrayLike, Form.GAIN, Unit("1/s")],
+        K_d: Annotated[ArrayLike, Form.GAIN, Unit("N m s/rad")],
+        **options: Any,
+    ) -> None:
         super().__init__(robot, task, **options)
         self.Lambda, self.K_d = (
             diagonal_gain("Lambda", Lambda, robot.n, robot.joint_names),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain, scalar_gain
 from pathcontrol.control.branch import Branch, BranchPolicy
 from pathcontrol.robot.model import RobotModel
@@ -57,10 +58,10 @@ class Projection(Controller):
         self,
         robot: RobotModel,
         task: PathTask,
-        k_p: ArrayLike,
-        K_v: ArrayLike,
+        k_p: Annotated[ArrayLike, Form.GAIN, Unit("1/s^2")],
+        K_v: Annotated[ArrayLike, Form.GAIN, Unit("1/s")],
         branch: Branch = "follow",
-        capture: float = 0.1,
+        capture: Annotated[float, Form.POSITIVE, Unit("rad")] = 0.1,
         **options: Any,
     ) -> None:
         # an open path may end close to where it begins, and an arm at its begin be nearer to the end

@@ -3,31 +3,31 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import PlainValidator, model_validator
 
-from pathcontrol.experiments.section import Section, Units
+from pathcontrol.arguments import Unit
+from pathcontrol.experiments.derived import chooser, section_of
+from pathcontrol.experiments.section import Section
 from pathcontrol.experiments.values import Number, Numbers, Text, expected
+from pathcontrol.registry import FRICTION_LAWS, load
 
 
 class Payload(Section):
     """A point mass [kg] carried by ``frame``, at ``com`` [m] in it."""
 
-    units: ClassVar[Units] = {"mass": "kg", "com": "m"}
-    mass: Number
+    mass: Annotated[Number, Unit("kg")]
     frame: Text
-    com: Numbers | None = None
+    com: Annotated[Numbers | None, Unit("m")] = None
 
 
 class ToolFrame(Section):
     """A frame ``name`` more, at ``position`` [m] and ``rpy``, in ``angle_unit``, in ``frame``."""
 
-    units: ClassVar[Units] = {"position": "m", "rpy": "rad"}
-    angles = ("rpy",)
     frame: Text
-    position: Numbers | None = None
-    rpy: Numbers | None = None
+    position: Annotated[Numbers | None, Unit("m")] = None
+    rpy: Annotated[Numbers | None, Unit("rad")] = None
     name: Text = "tip"
 
 
@@ -40,9 +40,8 @@ def _density(value: Any) -> Any:
 class Robot(Section):
     """The arm as the controller knows it. ``lock`` is in ``angle_unit``, and in metres for sliding joints."""
 
-    units: ClassVar[Units] = {"lock": ("rad", "m")}
     source: Text
-    lock: dict[str, Number] | None = None
+    lock: Annotated[dict[str, Number] | None, Unit("rad", "m")] = None
     keep: list[Text] | None = None
     tip: Text | None = None
     estimated_inertia: Annotated[bool | float, PlainValidator(_density)] = False
@@ -54,36 +53,28 @@ class Robot(Section):
 class Directions(Section):
     """Coulomb levels [N m] by the direction of motion, one for each joint."""
 
-    units: ClassVar[Units] = {"positive": "N m", "negative": "N m"}
-    positive: Numbers
-    negative: Numbers
-
-
-class StribeckFriction(Section):
-    """Dry friction that falls from ``static`` to ``coulomb`` [N m] at ``velocity``, one for each joint."""
-
-    units: ClassVar[Units] = {"coulomb": "N m", "static": "N m", "velocity": "rad/s"}
-    angles = ("velocity",)
-    coulomb: Numbers
-    static: Numbers
-    velocity: Numbers
+    positive: Annotated[Numbers, Unit("N m")]
+    negative: Annotated[Numbers, Unit("N m")]
 
 
 def _levels(value: Any) -> Any:
-    if isinstance(value, dict | Directions):
-        return Directions.model_validate(value)
+    if value is None or isinstance(value, dict | Directions):
+        return value if value is None else Directions.model_validate(value)
     if not isinstance(value, list) or not value:
         raise expected("a list with one number for each joint, or a table of 'positive' and 'negative' lists")
     return value
 
 
+def _stribeck(value: Any) -> Any:
+    return None if value is None else section_of(load(FRICTION_LAWS.members["stribeck"])).model_validate(value)
+
+
 class FrictionTable(Section):
     """The sum of the friction laws given."""
 
-    units: ClassVar[Units] = {"viscous": "N m s/rad", "coulomb": "N m"}
-    viscous: Numbers | None = None
-    coulomb: Annotated[list[float] | Directions, PlainValidator(_levels)] | None = None
-    stribeck: StribeckFriction | None = None
+    viscous: Annotated[Numbers | None, Unit("N m s/rad")] = None
+    coulomb: Annotated[list[float] | Directions | None, PlainValidator(_levels), Unit("N m")] = None
+    stribeck: Annotated[Any, PlainValidator(_stribeck)] = None
 
     @model_validator(mode="after")
     def _one_dry_law(self) -> Self:
@@ -94,16 +85,26 @@ class FrictionTable(Section):
         return self
 
 
+_LAW = chooser(FRICTION_LAWS)
+
+
 def _friction(value: Any) -> Any:
-    if isinstance(value, dict | FrictionTable):
+    if isinstance(value, list | tuple) and value:
+        return [_LAW(one) for one in value]
+    if isinstance(value, Section) or (isinstance(value, dict) and "type" in value):
+        return value if isinstance(value, FrictionTable) else _LAW(value)
+    if isinstance(value, dict):
         return FrictionTable.model_validate(value)
     if value not in ("urdf", "none"):
-        raise expected("'urdf', 'none' or a table of 'viscous', 'coulomb' and 'stribeck'")
+        raise expected(
+            "'urdf', 'none', a table of 'viscous', 'coulomb' and 'stribeck', or a friction law with its 'type', or a "
+            "list of such laws"
+        )
     return value
 
 
 class Plant(Section):
     """The arm that is simulated: the controller's model, but for what is said here."""
 
-    friction: Annotated[Literal["urdf", "none"] | FrictionTable, PlainValidator(_friction)] = "urdf"
+    friction: Annotated[Any, PlainValidator(_friction)] = "urdf"
     payload: Payload | None = None

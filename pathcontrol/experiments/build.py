@@ -11,29 +11,23 @@ import numpy as np
 
 from pathcontrol._arrays import Array, finite, joint_array
 from pathcontrol.control.base import Controller
-from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
-from pathcontrol.control.motion import ComputedTorque, PDPlus, SlotineLi
-from pathcontrol.control.projection import Projection
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.build_arms import build_arms
 from pathcontrol.experiments.build_duration import build_duration
 from pathcontrol.experiments.build_task import build_task
-from pathcontrol.experiments.controller_sections import ContinuousSection
 from pathcontrol.experiments.keyed import keyed, refuse_unit, users_code
+from pathcontrol.experiments.making import Place, make
 from pathcontrol.experiments.schema import Experiment, Output
+from pathcontrol.registry import DISTURBANCES, LAWS
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
+from pathcontrol.simulation.arm.noise import NoiseSource
 from pathcontrol.simulation.engines import Engine
+from pathcontrol.simulation.finish import Until
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop, torque_limits
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 
-_LAWS: dict[str, type[Controller]] = {
-    "extended_motion_plan": ExtendedMotionPlan,
-    "projection": Projection,
-    "computed_torque": ComputedTorque,
-    "pd_plus": PDPlus,
-    "slotine_li": SlotineLi,
-}
 _MOST_SAMPLES = 10_000_000
 
 
@@ -51,6 +45,8 @@ class Setup(NamedTuple):
         laps: how many times a closed path is gone round, or None.
         engine: which engine runs it.
         output: the files to write.
+        until: when the run ends.
+        disturbance: what else pushes the plant, or None.
     """
 
     controllers: tuple[Controller, ...]
@@ -63,6 +59,8 @@ class Setup(NamedTuple):
     laps: int | None
     engine: Engine
     output: Output
+    until: Until = "end"
+    disturbance: Disturbance | None = None
 
     @property
     def controller(self) -> Controller:
@@ -80,34 +78,61 @@ def build(experiment: Experiment, base_dir: str | Path = ".") -> Setup:
     Raises:
         ExperimentError: something does not exist, does not fit together or is out of range.
     """
-    base_dir = Path(base_dir)
+    place = Place(Path(base_dir), experiment.to_radians)
     with np.errstate(all="ignore"):  # absurd numbers overflow in the checks, which find that themselves
-        model, plant = build_arms(experiment, base_dir)
-        task = build_task(experiment.task, model, base_dir, experiment.to_radians)
+        model, plant = build_arms(experiment, place.folder)
+        task = build_task(experiment.task, model, place)
         _refuse_joints(experiment.output, model)
-        controllers = _controllers(experiment, model, task)
+        controllers = _controllers(experiment, model, task, place)
         duration, laps = build_duration(experiment, task)
-        loop = _loop(experiment, plant, float(np.max(duration)))
+        loop = _loop(experiment, plant, float(np.max(duration)), place)
         q, qd = _state(experiment, controllers[0])
-    return Setup(controllers, task, plant, loop, q, qd, duration, laps, experiment.engine, experiment.output)
+        disturbance = _disturbance(experiment, plant, (q, qd), place)
+    setup = Setup(controllers, task, plant, loop, q, qd, duration, laps, experiment.engine, experiment.output)
+    return setup._replace(until=experiment.until, disturbance=disturbance)
 
 
-def _controllers(experiment: Experiment, model: RobotModel, task: PathTask) -> tuple[Controller, ...]:
+def _controllers(experiment: Experiment, model: RobotModel, task: PathTask, place: Place) -> tuple[Controller, ...]:
     """The law for the task, or one for each path of a sequence."""
-    return tuple(law_of(experiment, model, path) for path in (task.paths if isinstance(task, PathSequence) else [task]))
+    if not isinstance(task, PathSequence):
+        return (law_of(experiment, model, task, place),)
+    if experiment.until != "end":
+        raise ExperimentError(
+            f"until = {experiment.until!r}, expected 'end': each path of a sequence is followed to it"
+        )
+    return tuple(law_of(experiment, model, path, place) for path in task.paths)
 
 
 def law_of(
-    experiment: Experiment, model: RobotModel, task: PathTask, gains: Mapping[str, Array] = MappingProxyType({})
+    experiment: Experiment,
+    model: RobotModel,
+    task: PathTask,
+    place: Place,
+    gains: Mapping[str, Array] = MappingProxyType({}),
 ) -> Controller:
     """The law of an experiment for one path, with other ``gains`` where some are given.
 
     Raises:
         ExperimentError: an argument is out of range.
     """
-    law = experiment.controller.arguments(experiment.to_radians) | dict(gains)
-    with keyed("controller", law):
-        return _LAWS[experiment.controller.type](model, task, **law)
+    law: Controller = make("controller", experiment.controller, LAWS, place, {"robot": model, "task": task}, gains)
+    return law
+
+
+def _disturbance(
+    experiment: Experiment, plant: RobotModel, state: tuple[Array, Array], place: Place
+) -> Disturbance | None:
+    """What pushes the plant, which has been tried once: the sum of all that the file says."""
+    given, several = experiment.disturbance, isinstance(experiment.disturbance, list)
+    sections = given if several else [] if given is None else [given]
+    total: Disturbance | None = None
+    for i, section in enumerate(sections):
+        key = f"disturbance[{i}]" if several else "disturbance"
+        one: Disturbance = make(key, section, DISTURBANCES, place, {"robot": plant})
+        with users_code(key, f"{type(one).__name__} at the start"):
+            check_disturbance(one, *(part[None] for part in state))
+        total = one if total is None else total + one
+    return total
 
 
 def _refuse_joints(output: Output, robot: RobotModel) -> None:
@@ -119,20 +144,19 @@ def _refuse_joints(output: Output, robot: RobotModel) -> None:
         )
 
 
-def _loop(experiment: Experiment, plant: RobotModel, duration: float) -> SampledLoop | ContinuousTime:
+def _loop(experiment: Experiment, plant: RobotModel, duration: float, place: Place) -> SampledLoop | ContinuousTime:
     """The loop, with encoders and torque limits that fit the simulated arm."""
-    section, arguments = experiment.loop, experiment.loop.arguments(experiment.to_radians)
-    with keyed("loop", arguments):
-        if isinstance(section, ContinuousSection):
-            continuous = ContinuousTime(**arguments)
-            torque_limits(continuous, plant)
-            _refuse_too_long(duration, "output_period", continuous.output_period)
-            return continuous
-        sampled = SampledLoop(**arguments)
-        sampled.sensors(plant)
-        torque_limits(sampled, plant)
-        _refuse_too_long(duration, "period", sampled.period, sampled.delay)
-    return sampled
+    loop: SampledLoop | ContinuousTime = make("loop", experiment.loop, None, place)
+    with keyed("loop", type(experiment.loop).model_fields):
+        torque_limits(loop, plant)
+        if isinstance(loop, ContinuousTime):
+            _refuse_too_long(duration, "output_period", loop.output_period)
+        else:
+            loop.sensors(plant)
+            if loop.noise is not None:
+                NoiseSource(loop.noise, (1, plant.n), 0)
+            _refuse_too_long(duration, "period", loop.period, loop.delay)
+    return loop
 
 
 def _refuse_too_long(duration: float, name: str, period: float, delay: float = 0.0) -> None:

@@ -8,6 +8,7 @@ from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.arm_sections import Payload
 from pathcontrol.experiments.build_friction import with_friction
 from pathcontrol.experiments.keyed import keyed, refuse_unit
+from pathcontrol.experiments.making import Place
 from pathcontrol.experiments.placement import pose_of
 from pathcontrol.experiments.schema import Experiment
 from pathcontrol.experiments.section import converted
@@ -25,7 +26,7 @@ def build_arms(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, Robo
         ExperimentError: a robot, joint or frame does not exist, or a value is out of range.
     """
     bare, model = build_models(experiment, base_dir)
-    return model, build_plant(experiment, bare, model)
+    return model, build_plant(experiment, bare, model, base_dir)
 
 
 def build_models(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, RobotModel]:
@@ -38,7 +39,7 @@ def build_models(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, Ro
     return bare, _carrying("robot.payload", bare, experiment.robot.payload)
 
 
-def build_plant(experiment: Experiment, bare: RobotModel, model: RobotModel) -> RobotModel:
+def build_plant(experiment: Experiment, bare: RobotModel, model: RobotModel, base_dir: Path) -> RobotModel:
     """The simulated arm, of the arm without a payload and the controller's model.
 
     Raises:
@@ -46,7 +47,7 @@ def build_plant(experiment: Experiment, bare: RobotModel, model: RobotModel) -> 
     """
     plant = experiment.plant
     carrier = model if plant.payload is None else _carrying("plant.payload", bare, plant.payload)
-    return with_friction(carrier, plant.friction, experiment.to_radians)
+    return with_friction(carrier, plant.friction, Place(base_dir, experiment.to_radians))
 
 
 def _load(experiment: Experiment, base_dir: Path) -> RobotModel:

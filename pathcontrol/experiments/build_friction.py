@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import reduce
 from operator import add
+from typing import Any
 
 import numpy as np
 
@@ -12,30 +12,40 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 from pathcontrol.experiments.arm_sections import Directions, FrictionTable
 from pathcontrol.experiments.keyed import keyed
+from pathcontrol.experiments.making import Place, make
+from pathcontrol.registry import FRICTION_LAWS
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Stribeck, Viscous
 from pathcontrol.robot.model import RobotModel
 
+_KEY = "plant.friction"
 
-def with_friction(robot: RobotModel, section: FrictionTable | str, to_radians: Callable[[float], float]) -> RobotModel:
-    """``robot`` with the friction of its URDF, with none, or with the laws of a table.
+
+def with_friction(robot: RobotModel, section: Any, place: Place) -> RobotModel:
+    """``robot`` with the friction of its URDF, with none, or with the laws of a section or of several.
 
     Raises:
         ExperimentError: a coefficient is negative, or there is not one for each joint.
     """
-    if not isinstance(section, FrictionTable):
+    if isinstance(section, str):
         return robot if section == "urdf" else robot.with_friction(None)
-    with keyed("plant.friction", FrictionTable.model_fields):
-        return robot.with_friction(reduce(add, _laws(section, robot.n, to_radians)))
+    with keyed(_KEY, FrictionTable.model_fields):
+        if isinstance(section, FrictionTable):
+            laws = _laws(section, robot.n, place)
+        elif isinstance(section, list):
+            laws = [make(f"{_KEY}[{i}]", one, FRICTION_LAWS, place) for i, one in enumerate(section)]
+        else:
+            laws = [make(_KEY, section, FRICTION_LAWS, place)]
+        return robot.with_friction(reduce(add, laws))
 
 
-def _laws(section: FrictionTable, n: int, to_radians: Callable[[float], float]) -> list[FrictionLaw]:
+def _laws(section: FrictionTable, n: int, place: Place) -> list[FrictionLaw]:
     laws: list[FrictionLaw] = []
     if section.viscous is not None:
         laws.append(Viscous(_each_joint("viscous", section.viscous, n)))
     if section.coulomb is not None:
         laws.append(_coulomb(section.coulomb, n))
     if section.stribeck is not None:
-        values = section.stribeck.arguments(to_radians)
+        values = section.stribeck.arguments(place.to_radians)
         laws.append(Stribeck(**{name: _each_joint(f"stribeck.{name}", v, n) for name, v in values.items()}))
     return laws
 

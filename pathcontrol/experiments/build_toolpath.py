@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.experiments.keyed import keyed
+from pathcontrol.experiments.making import Place
 from pathcontrol.experiments.placement import pose_of
 from pathcontrol.experiments.toolpath_section import ToolpathSection
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.toolpaths.read import read_toolpath
 
 
-def build_toolpath(
-    section: ToolpathSection, robot: RobotModel, base_dir: Path, to_radians: Callable[[float], float]
-) -> ToolpathTask:
+def build_toolpath(section: ToolpathSection, robot: RobotModel, place: Place) -> ToolpathTask:
     """Read the file and follow its contours with the arm.
 
     Raises:
         ExperimentError: the file cannot be used, or a contour cannot be followed.
     """
-    workpiece = pose_of("task.workpiece", section.workpiece.arguments(to_radians))
+    workpiece = pose_of("task.workpiece", section.workpiece.arguments(place.to_radians))
     keys = {name.removeprefix("tool_"): name for name in (*section.reader_options, "feed")}
     with keyed("task.file", keys):
-        toolpath = read_toolpath(base_dir / section.file, **section.reading)
-    arguments = section.arguments(to_radians)
+        toolpath = read_toolpath(place.folder / section.file, **section.reading)
+    arguments = section.arguments(place.to_radians)
     with keyed("task", ToolpathSection.model_fields):
         return ToolpathTask(robot, arguments.pop("frame"), toolpath, workpiece, **arguments)

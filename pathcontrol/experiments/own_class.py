@@ -1,4 +1,4 @@
-"""A task class from the user's own Python file."""
+"""A class from the user's own Python file, or from a module that is installed."""
 
 from __future__ import annotations
 
@@ -10,38 +10,50 @@ from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 
-from pathcontrol.errors import ExperimentError
+from pathcontrol.errors import InputError
 from pathcontrol.experiments.keyed import told
-from pathcontrol.tasks.task import PathTask
-
-_KEY = "task.type"
+from pathcontrol.registry import Kind, load
 
 
-def own_class(file: Path, name: str) -> type[PathTask]:
-    """The class ``name``, a :class:`PathTask` subclass, of a Python file, which is run once to define it.
+def own_class(folder: Path, source: str, name: str, kind: Kind) -> type:
+    """Return the class ``name``, of a ``kind``, of a Python file, which is run once to define it, or of a module.
 
     Raises:
-        ExperimentError: the file is missing or fails, or has no such class; the message lists those it has.
+        InputError: the file is missing or fails, or has no such class; the message lists those it has.
     """
-    if not file.is_file():
-        raise ExperimentError(f"{_KEY}: there is no Python file {str(file)!r}; the path is relative to the TOML file")
-    module = _run(file, file.read_bytes())
+    base = load(kind.base)
+    module = _of_file(folder / source) if source.endswith(".py") else _installed(source)
     found = getattr(module, name, None)
-    if isinstance(found, type) and issubclass(found, PathTask):
+    if isinstance(found, type) and issubclass(found, base):
         return found
-    tasks = [key for key, value in vars(module).items() if _defined_task(value, module)]
-    there = f"its PathTask subclasses are {', '.join(tasks)}" if tasks else "it defines no PathTask subclass"
+    own = [key for key, value in vars(module).items() if _defines(module, value, base)]
+    kinds = f"{base.__name__} subclass"
+    there = f"its {kinds}es are {', '.join(own)}" if own else f"it defines no {kinds}"
+    where = Path(source).name
     if found is None:
-        problem = f"there is no {name!r} in {file.name}"
-    else:
-        problem = f"{name!r} in {file.name} is not a subclass of pathcontrol.PathTask"
-    raise ExperimentError(f"{_KEY}: {problem}; {there}")
+        raise InputError(f"there is no {name!r} in {where}; {there}")
+    raise InputError(f"{name!r} in {where} is not a subclass of pathcontrol.{base.__name__}; {there}")
+
+
+def _of_file(file: Path) -> ModuleType:
+    if not file.is_file():
+        raise InputError(f"there is no Python file {str(file)!r}; the path is relative to the TOML file")
+    return _run(file, file.read_bytes())
+
+
+def _installed(name: str) -> ModuleType:
+    try:
+        return importlib.import_module(name)
+    except (Exception, SystemExit) as error:
+        raise InputError(
+            f"the module {name!r} cannot be imported: {told(error)}; a file beside the TOML file is named with its .py"
+        ) from error
 
 
 @lru_cache(maxsize=16)
 def _run(file: Path, source: bytes) -> ModuleType:
-    """The module of a file with this ``source``, the same one as long as it has it: so tasks are of one class."""
-    module_name = f"pathcontrol_task_{file.stem}"
+    """The module of a file with this ``source``, the same one as long as it has it: so its objects are of one class."""
+    module_name = f"pathcontrol_file_{file.stem}"
     spec = importlib.util.spec_from_file_location(module_name, file)
     assert spec is not None
     assert spec.loader is not None
@@ -51,7 +63,7 @@ def _run(file: Path, source: bytes) -> ModuleType:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[module_name]
-        raise ExperimentError(f"{_KEY}: {file.name} fails{_line(error, file)} with {told(error)}") from error
+        raise InputError(f"{file.name} fails{_line(error, file)} with {told(error)}") from error
     return module
 
 
@@ -62,6 +74,7 @@ def _line(error: BaseException, file: Path) -> str:
     return f" at line {lines[-1]}" if lines else ""
 
 
-def _defined_task(value: object, module: ModuleType) -> bool:
-    own = isinstance(value, type) and issubclass(value, PathTask) and value.__module__ == module.__name__
+def _defines(module: ModuleType, value: object, base: type) -> bool:
+    """Whether a value is a class that can be made, defined by the module and derived from ``base``."""
+    own = isinstance(value, type) and issubclass(value, base) and value.__module__ == module.__name__
     return own and not inspect.isabstract(value)

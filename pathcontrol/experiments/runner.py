@@ -56,11 +56,12 @@ def run_experiment(
 
 
 def _simulated(setup: Setup, progress: bool) -> Run:
-    options: dict[str, Any] = {"plant": setup.plant, "loop": setup.loop, "engine": setup.engine, "progress": progress}
+    options: dict[str, Any] = {"plant": setup.plant, "loop": setup.loop, "disturbance": setup.disturbance}
+    options |= {"engine": setup.engine, "progress": progress}
     if isinstance(setup.task, PathSequence):
         options["task"] = setup.task
         return simulate_sequence(setup.controllers, setup.q, setup.qd, duration=setup.duration, **options)
-    options["laps"] = setup.laps
+    options |= {"laps": setup.laps, "until": setup.until}
     return simulate(setup.controller, setup.q, setup.qd, duration=float(setup.duration), **options)
 
 

@@ -7,24 +7,44 @@ from collections.abc import Callable
 from pathlib import PurePath
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import PlainValidator
+from pydantic import Field, PlainValidator
 
+from pathcontrol.arguments import Unit
 from pathcontrol.experiments.arm_sections import Plant, Robot
-from pathcontrol.experiments.controller_sections import Law, Loop, SampledSection
-from pathcontrol.experiments.section import Section, Units
+from pathcontrol.experiments.derived import chooser
+from pathcontrol.experiments.section import Section
 from pathcontrol.experiments.sweep_section import SweepSection
 from pathcontrol.experiments.task_sections import Task
 from pathcontrol.experiments.tune_section import TuneSection
 from pathcontrol.experiments.values import Numbers, Positive, Whole, expected
+from pathcontrol.registry import DISTURBANCES, LAWS, LOOPS
 
 
 class Start(Section):
     """``[start]``: the initial state, in ``angle_unit``; at rest at the beginning of the path unless told."""
 
-    units: ClassVar[Units] = {"q": ("rad", "m"), "qd": ("rad/s", "m/s")}
-    angles = ("q", "qd")
-    q: Numbers | None = None
-    qd: Numbers | None = None
+    q: Annotated[Numbers | None, Unit("rad", "m")] = None
+    qd: Annotated[Numbers | None, Unit("rad/s", "m/s")] = None
+
+
+class LoopSection(Section):
+    """``[loop]``: how the loop is closed; ``target`` is the class of it."""
+
+    mode: str = "sampled"
+    target: ClassVar[Callable[..., Any]]
+
+
+_LOOP = chooser(LOOPS, LoopSection, None, key="mode", default="sampled")
+_DISTURBANCE = chooser(DISTURBANCES)
+
+
+def _disturbances(value: Any) -> Any:
+    """One table, or a list of them, which add up."""
+    if isinstance(value, list | tuple):
+        if not value:
+            raise expected("a table with the key 'type', or a list of such tables")
+        return [_DISTURBANCE(one) for one in value]
+    return None if value is None else _DISTURBANCE(value)
 
 
 def _file(*suffixes: str) -> PlainValidator:
@@ -74,25 +94,27 @@ class Experiment(Section):
         duration: longest simulated time [s]; left out, a path that ends has twice its time by ϑ and 5 s more, each
             path of a toolpath for itself.
         laps: how many times a closed path is gone round; left out, as often as ``duration`` allows.
+        until: ``"duration"`` to go on when the path has come to its end, see :func:`pathcontrol.simulate`.
         engine: which engine runs the simulation, see :func:`pathcontrol.simulate`.
-        angle_unit: of all angles and angular rates: ``lock``, the task's lengths, speeds and phases,
-            ``start``, the Stribeck velocity and ``friction_width``. All else is in SI units, as gains are, or
-            taken as it is, as ``task.parameters`` are.
+        angle_unit: of all angles and angular rates, whose SI unit is rad, rad/s or rad/s². All else is in SI units, as
+            gains are, or taken as it is, as formulas are.
+        disturbance: what else pushes the simulated arm, or a list of such tables, which add up.
         sweep: keys that vary, for :func:`run_sweep`; an experiment by itself does without.
         tune: keys that are searched, for :func:`run_tune`; likewise.
     """
 
-    units: ClassVar[Units] = {"duration": "s"}
     angle_unit: Literal["rad", "deg"] = "rad"
-    duration: Positive | None = None
+    duration: Annotated[Positive | None, Unit("s")] = None
     laps: Whole | None = None
+    until: Literal["end", "duration"] = "end"
     engine: Literal["auto", "compiled", "pinocchio"] = "auto"
     robot: Robot
     task: Task
-    controller: Law
+    controller: Annotated[Any, PlainValidator(chooser(LAWS))]
     start: Start = Start()
     plant: Plant = Plant()
-    loop: Loop = SampledSection()
+    loop: Annotated[Any, PlainValidator(_LOOP)] = Field(default_factory=lambda: _LOOP({}))
+    disturbance: Annotated[Any, PlainValidator(_disturbances)] = None
     output: Output = Output()
     sweep: SweepSection | None = None
     tune: TuneSection | None = None

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from typing import Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from pathcontrol._units import Quantity, is_quantity, offered, quantity
+from pathcontrol.arguments import Unit
 from pathcontrol.errors import InputError
 from pathcontrol.experiments.values import did_you_mean, expected, shown
 
-#: the SI unit of each field that is a quantity, or several
-Units = Mapping[str, str | tuple[str, ...]]
+#: the SI units of each field that is a quantity, one or several
+Units = Mapping[str, tuple[str, ...]]
+Finder = Callable[[str], type["Section"] | None]
 _EXPLAINED = "explained"
 _MOST_TOLD = 21  # errors of a section: one more than a message has
 _Wrong = dict[tuple[int | str, ...], InitErrorDetails]
@@ -23,23 +26,21 @@ _Wrong = dict[tuple[int | str, ...], InitErrorDetails]
 class Section(BaseModel):
     """A table of an experiment file. Its fields are named as the arguments of what is built from it.
 
+    A field that is a quantity has a :class:`Unit` in its annotation; it may be a text, as ``"50 mm/s"``.
+
     Attributes:
-        angles: names of the fields that the file's ``angle_unit`` applies to.
-        units: SI units of the fields that are quantities, which may be texts, as ``"50 mm/s"``; where a field
-            has several units, of the dimension of one of them.
         not_arguments: names of the fields that are no arguments.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-    angles: ClassVar[tuple[str, ...]] = ()
-    units: ClassVar[Units] = {}
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
     not_arguments: ClassVar[tuple[str, ...]] = ("type", "mode")
 
     def arguments(self, to_radians: Callable[[float], float]) -> dict[str, Any]:
         """Keyword arguments in SI units; what the file leaves out is left to the defaults."""
         names = [name for name in type(self).model_fields if name not in self.not_arguments]
         given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
-        return {k: converted(v, to_radians) if k in self.angles else v for k, v in given.items()}
+        units = self.units_of(given)
+        return {name: in_radians(value, units.get(name, ()), to_radians) for name, value in given.items()}
 
     @model_validator(mode="wrap")
     @classmethod
@@ -47,7 +48,8 @@ class Section(BaseModel):
         """Read texts with units, and say in every error what to write instead; here the valid keys are known."""
         wrong: _Wrong = {}
         if isinstance(value, dict):
-            value = {key: in_si((key,), v, cls.units_of(value).get(key, ()), wrong) for key, v in value.items()}
+            units = cls.units_of(value)
+            value = {key: in_si((key,), v, units.get(key, ()), wrong) for key, v in value.items()}
         try:
             made = handler(value)
         except ValidationError as error:
@@ -60,30 +62,39 @@ class Section(BaseModel):
 
     @classmethod
     def units_of(cls, given: Mapping[str, Any]) -> Units:
-        """Return :attr:`units`, where they depend on what else the table says."""
-        return cls.units
+        """Return the units of the fields that are quantities, which may depend on whether a frame is ``given``."""
+        return units_of(_quantities(cls), given)
 
 
-def chooser(
-    key: str, sections: Mapping[str, type[Section]], default: str | None = None, also: str = ""
-) -> Callable[[Any], Any]:
-    """A validator that takes the section named by the value of ``key``; errors list names and ``also``."""
-
-    def choose(value: Any) -> Any:
-        if isinstance(value, tuple(sections.values())):
-            return value
-        if not isinstance(value, dict):
-            raise expected(f"a table with the key {key!r}")
-        kind = value.get(key, default)
-        section = sections.get(kind) if isinstance(kind, str) else None
-        if section is None:
-            raise _wrong_choice(key, kind, sections, also)
-        return section.model_validate(value)
-
-    return choose
+@lru_cache(maxsize=256)
+def _quantities(section: type[Section]) -> dict[str, Unit]:
+    fields = section.model_fields.items()
+    return {name: mark for name, field in fields for mark in field.metadata if isinstance(mark, Unit)}
 
 
-def in_si(at: tuple[int | str, ...], value: Any, units: str | tuple[str, ...], wrong: _Wrong) -> Any:
+def units_of(quantities: Mapping[str, Unit], given: Mapping[str, Any]) -> Units:
+    """Return the units that quantities have beside what else is ``given``: of a frame's motion, or of the joints'."""
+    motion = given.get("motion")
+    frame = given.get("frame") or (motion.get("frame") if isinstance(motion, dict) else getattr(motion, "frame", None))
+    return {name: (unit.tool,) if frame and unit.tool else unit.names for name, unit in quantities.items()}
+
+
+def choose(
+    value: Any, key: str, find: Finder, choices: Iterable[str], default: str | None = None, also: str = ""
+) -> Any:
+    """Make of a table the section that its value of ``key`` names; errors list the ``choices`` and ``also``."""
+    if isinstance(value, Section):
+        return value
+    if not isinstance(value, dict):
+        raise expected(f"a table with the key {key!r}")
+    kind = value.get(key, default)
+    section = find(kind) if isinstance(kind, str) else None
+    if section is None:
+        raise _wrong_choice(key, kind, list(choices), also)
+    return section.model_validate(value)
+
+
+def in_si(at: tuple[int | str, ...], value: Any, units: tuple[str, ...], wrong: _Wrong) -> Any:
     """Return ``value`` with each text in it read as a quantity; what is none goes to ``wrong``, by where it is."""
     if not units or isinstance(value, int | float):
         return value
@@ -95,7 +106,7 @@ def in_si(at: tuple[int | str, ...], value: Any, units: str | tuple[str, ...], w
         try:
             if len(wrong) > _MOST_TOLD:
                 return value
-            return quantity(value, *((units,) if isinstance(units, str) else units))
+            return quantity(value, *units)
         except InputError as error:
             wrong[at] = _explained(at, value, f" = {shown(value)}, {error}")
     return value
@@ -106,20 +117,25 @@ def _told(at: tuple[int | str, ...], wrong: _Wrong) -> bool:
     return any(all(a == b for a, b in zip(at, other, strict=False)) for other in wrong)
 
 
+def in_radians(value: Any, units: tuple[str, ...], to_radians: Callable[[float], float]) -> Any:
+    """Return an angle or an angular rate converted from the file's ``angle_unit``, and anything else as it is."""
+    return converted(value, to_radians) if units and units[0].startswith("rad") else value
+
+
 def converted(value: Any, function: Callable[[float], float]) -> Any:
     """``value`` with ``function`` applied to each number in it that was given without a unit."""
-    if isinstance(value, Quantity):
+    if isinstance(value, Quantity | bool):
         return value
     if isinstance(value, dict):
         return {key: converted(item, function) for key, item in value.items()}
     return [converted(item, function) for item in value] if isinstance(value, list) else function(value)
 
 
-def _wrong_choice(key: str, kind: Any, sections: Mapping[str, Any], also: str) -> ValidationError:
-    choices = ", ".join(map(repr, sections)) + also
+def _wrong_choice(key: str, kind: Any, names: list[str], also: str) -> ValidationError:
+    choices = ", ".join(map(repr, names)) + also
     text = f": missing; choose one of {choices}"
     if kind is not None:
-        text = f" = {shown(kind)}, expected one of {choices}{did_you_mean(kind, sections)}"
+        text = f" = {shown(kind)}, expected one of {choices}{did_you_mean(kind, names)}"
     return ValidationError.from_exception_data("choice", [_explained((key,), kind, text)])
 
 
@@ -149,8 +165,8 @@ def _text(section: type[Section], error: Any) -> str:
 def _or_with_unit(section: type[Section], error: Any) -> str:
     """The units that a text might have had, where it stands for a quantity."""
     about_text = error["loc"] and isinstance(error["input"], str)
-    units = section.units.get(error["loc"][0]) if about_text else None
-    return "" if units is None else f", or one with a unit: {offered([units] if isinstance(units, str) else units)}"
+    units = section.units_of({}).get(error["loc"][0]) if about_text else None
+    return "" if units is None else f", or one with a unit: {offered(units)}"
 
 
 def _wanted(error: Any) -> str:

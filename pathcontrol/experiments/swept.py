@@ -6,9 +6,9 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
-from functools import partial
+from functools import lru_cache, partial
 from itertools import combinations, pairwise
 from pathlib import Path
 from types import MappingProxyType
@@ -19,19 +19,25 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from pathcontrol._arrays import Array
+from pathcontrol.arguments import Form, parameters_of
+from pathcontrol.control.base import Controller
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.build import Setup, build, law_of
 from pathcontrol.experiments.build_arms import build_models, build_plant
 from pathcontrol.experiments.keyed import keyed
 from pathcontrol.experiments.load import finding
+from pathcontrol.experiments.making import Place, arguments_of, target_of
 from pathcontrol.experiments.named_files import named_files, relative
 from pathcontrol.experiments.schema import Experiment
 from pathcontrol.experiments.swept_tasks import SweptTask, joined, refuse_sequence, rows_together, swept_tasks
 from pathcontrol.experiments.values import shown
+from pathcontrol.registry import LAWS
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.sweeps.cluster.user_code import Luggage
+from pathcontrol.tasks.task import PathTask
 
-_GAIN = re.compile(r"controller\.(K_p|K_v|k|k_p|Lambda|K_d)(\[\d+\])?")
+_GAIN = re.compile(r"controller\.(?:parameters\.)?(\w+)(\[\d+\])*")
+_MAY_BE_ZERO = {Form.GAIN: False, Form.GAIN_OR_ZERO: True}
 _TOGETHER = re.compile(r"(start|plant|task)\.")  # what may differ from rollout to rollout of a batch, as gains may
 _KEY = re.compile(r"[^\[\].]+(\[\d+\])*(\.[^\[\].]+(\[\d+\])*)*")
 _STEP = re.compile(r"([^\[\].]+)|\[(\d+)\]")
@@ -90,7 +96,7 @@ class SweptExperiment:
         _check_keys(list(design), self._where)
         count = len(next(iter(design.values())))
         for i in range(count):
-            _check_gains(self._experiment(design, i, i), i, self._where)
+            self._check_gains(self._experiment(design, i, i), i)
         self({name: values[:1] for name, values in design.items()}, np.zeros(1, dtype=np.int64))
 
     def __call__(
@@ -99,7 +105,8 @@ class SweptExperiment:
         """The rows that fit in one batch, and the arguments of simulate() for them."""
         experiments = [self._experiment(parameters, row, int(i)) for row, i in enumerate(samples)]
         plants, tasks = (any(name.startswith(key) for name in parameters) for key in ("plant.", "task."))
-        apart = [name for name in parameters if not (_TOGETHER.match(name) or _GAIN.fullmatch(name))]
+        gains = set.intersection(*(set(self._gains(experiment)) for experiment in experiments))
+        apart = [name for name in parameters if not (_TOGETHER.match(name) or _named(name) in gains)]
         groups: dict[str, list[int]] = {}
         for row in range(len(samples)):
             groups.setdefault(json.dumps([parameters[name][row].tolist() for name in apart]), []).append(row)
@@ -123,8 +130,36 @@ class SweptExperiment:
             chosen, own = [experiments[i] for i in some], [found[i] for i in some]
             plant: Any = setup.plant
             if plants:
-                plant = [build_plant(experiment, bare, model) for experiment in chosen]
-            yield rows[some], _arguments(setup, model, chosen, own) | {"plant": plant}
+                plant = [build_plant(experiment, bare, model, self._base_dir) for experiment in chosen]
+            law = self._law(model, chosen, joined(own))
+            yield rows[some], {"controller": law, "plant": plant} | _arguments(setup, chosen, own)
+
+    def _law(self, model: RobotModel, experiments: list[Experiment], task: PathTask) -> Controller:
+        """The law of some samples, with a row for each of them of the gains that differ."""
+        first, arguments = experiments[0], [self._law_arguments(experiment) for experiment in experiments]
+        names = self._gains(first).keys() & arguments[0].keys()
+        gains = {name: _rows([each[name] for each in arguments]) for name in names}
+        return law_of(first, model, task, Place(self._base_dir, first.to_radians), gains)
+
+    def _law_arguments(self, experiment: Experiment) -> dict[str, Any]:
+        place = Place(self._base_dir, experiment.to_radians)
+        return arguments_of("controller", experiment.controller, LAWS, place)
+
+    def _gains(self, experiment: Experiment) -> dict[str, bool]:
+        """The arguments of the law that are gains, of which a batch may have a row for each rollout; which may be 0."""
+        place = Place(self._base_dir, experiment.to_radians)
+        return _gains_of(target_of("controller", experiment.controller, LAWS, place))
+
+    def _check_gains(self, experiment: Experiment, sample: int) -> None:
+        zero, arguments = self._gains(experiment), self._law_arguments(experiment)
+        for name in zero.keys() & arguments.keys():
+            numbers = np.asarray(arguments[name])
+            numbers = numbers.diagonal() if numbers.ndim > 1 else numbers
+            if (numbers < 0).any() or (not zero[name] and (numbers == 0).any()):
+                raise ExperimentError(
+                    f"{self._where}: controller.{name} = {shown(arguments[name])} in sample {sample}, expected gains "
+                    "greater than 0; choose another distribution, such as log_uniform"
+                )
 
     def _experiment(self, parameters: Mapping[str, Array], row: int, sample: int) -> Experiment:
         values = {name: column[row].tolist() for name, column in parameters.items()}
@@ -193,39 +228,37 @@ def _entry(inside: Any, step: str | int, key: str) -> Any:
         ) from error
 
 
-def _check_gains(experiment: Experiment, sample: int, where: str) -> None:
-    for name, value in experiment.controller.arguments(float).items():
-        numbers = np.asarray(value if _GAIN.fullmatch(f"controller.{name}") else 1.0)
-        numbers = numbers.diagonal() if numbers.ndim > 1 else numbers
-        if (numbers < 0).any() or (name != "k" and (numbers == 0).any()):
-            raise ExperimentError(
-                f"{where}: controller.{name} = {shown(value)} in sample {sample}, expected gains greater "
-                "than 0; choose another distribution, such as log_uniform"
-            )
+@lru_cache(maxsize=64)
+def _gains_of(law: Callable[..., Any]) -> dict[str, bool]:
+    """The gains among the arguments of a law, and which of them may be 0."""
+    forms = {name: one.form for name, one in parameters_of(law).items()}
+    return {name: _MAY_BE_ZERO[form] for name, form in forms.items() if form in _MAY_BE_ZERO}
 
 
-def _rows(name: str, experiments: list[Experiment]) -> Array:
-    """A gain of one number for all, (), or of all rollouts, (N, 1), (N, 1, n), and (N,) of the gain k."""
-    values = [getattr(experiment.controller, name) for experiment in experiments]
+def _named(key: str) -> str:
+    """The argument of the law that a dotted key sets, or an empty text."""
+    match = _GAIN.fullmatch(key)
+    return match[1] if match else ""
+
+
+def _rows(values: list[Any]) -> Array:
+    """A gain of one number for all, (), or of all rollouts, (N, 1), (N, 1, n)."""
     if all(value == values[0] for value in values):
         return np.asarray(values[0], dtype=np.float64)
-    rows = np.asarray(values, dtype=np.float64)
-    return rows if name == "k" else rows[:, None]
+    return np.asarray(values, dtype=np.float64)[:, None]
 
 
-def _arguments(
-    setup: Setup, model: RobotModel, experiments: list[Experiment], tasks: list[SweptTask]
-) -> dict[str, Any]:
-    """Those of simulate() beside the plant."""
-    law = {name: _rows(name, experiments) for name in type(setup.controller).gains}
+def _arguments(setup: Setup, experiments: list[Experiment], tasks: list[SweptTask]) -> dict[str, Any]:
+    """Those of simulate() beside the law and the plant."""
     q, qd = _states(setup, experiments, tasks)
     return {
-        "controller": law_of(experiments[0], model, joined(tasks), law),
         "q": q,
         "qd": qd,
         "duration": tasks[0].duration,
         "laps": tasks[0].laps,
+        "until": setup.until,
         "loop": setup.loop,
+        "disturbance": setup.disturbance,
         "engine": setup.engine,
     }
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.build_duration import build_duration
 from pathcontrol.experiments.build_task import build_task
+from pathcontrol.experiments.making import Place
 from pathcontrol.experiments.schema import Experiment
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.batch.checks import kind_of
@@ -39,7 +40,7 @@ def swept_tasks(experiments: Sequence[Experiment], model: RobotModel, base_dir: 
     for experiment in experiments:
         key = experiment.task.model_dump_json()
         if key not in made:
-            task = build_task(experiment.task, model, base_dir, experiment.to_radians)
+            task = build_task(experiment.task, model, Place(base_dir, experiment.to_radians))
             refuse_sequence(task)
             duration, laps = build_duration(experiment, task)
             made[key] = SweptTask(task, float(duration), laps)

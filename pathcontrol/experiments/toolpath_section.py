@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pathcontrol.experiments.section import Section, Units
+from pathcontrol.arguments import Unit
+from pathcontrol.experiments.section import Section
 from pathcontrol.experiments.values import Columns, NotNegative, Number, Numbers, Positive, Text
 
 
@@ -16,10 +17,8 @@ class Workpiece(Section):
         rpy: roll, pitch and yaw, in ``angle_unit``: turned about the base frame's x, then y, then z, as in a URDF.
     """
 
-    units: ClassVar[Units] = {"position": "m", "rpy": "rad"}
-    angles = ("rpy",)
-    position: Numbers | None = None
-    rpy: Numbers | None = None
+    position: Annotated[Numbers | None, Unit("m")] = None
+    rpy: Annotated[Numbers | None, Unit("rad")] = None
 
 
 class ToolpathSection(Section):
@@ -29,19 +28,6 @@ class ToolpathSection(Section):
     ``start``, which is ``tool_start``. Lengths are in metres and metres per second, ``start`` is in ``angle_unit``.
     """
 
-    units: ClassVar[Units] = {
-        "feed": "m/s",
-        "rapid_speed": "m/s",
-        "acceleration": "m/s^2",
-        "tolerance": "m",
-        "clearance": "m",
-        "gap": "m",
-        "arc_tolerance": "m",
-        "z": "m",
-        "tool_start": "m",
-        "start": ("rad", "m"),
-    }
-    angles = ("start",)
     reader_options: ClassVar[tuple[str, ...]] = (
         *("unit", "layers", "skip", "gap", "ppi", "tool_start", "arc_tolerance", "columns", "decimal", "z", "unknown"),
     )
@@ -53,22 +39,22 @@ class ToolpathSection(Section):
     unit: Text | None = None
     layers: list[Text] | None = None
     skip: list[Text] | None = None
-    gap: NotNegative | None = None
+    gap: Annotated[NotNegative | None, Unit("m")] = None
     ppi: Positive | None = None
-    tool_start: Numbers | None = None
-    arc_tolerance: Positive | None = None
+    tool_start: Annotated[Numbers | None, Unit("m")] = None
+    arc_tolerance: Annotated[Positive | None, Unit("m")] = None
     columns: Columns | None = None
     decimal: Literal[".", ","] | None = None
-    z: Number | None = None
+    z: Annotated[Number | None, Unit("m")] = None
     unknown: Literal["refuse", "warn"] | None = None
     orientation: Literal["free", "down", "normals", "tangent"] | None = None
-    feed: Positive | None = None
-    rapid_speed: Positive | None = None
-    acceleration: Positive | None = None
-    tolerance: Positive | None = None
+    feed: Annotated[Positive | None, Unit("m/s")] = None
+    rapid_speed: Annotated[Positive | None, Unit("m/s")] = None
+    acceleration: Annotated[Positive | None, Unit("m/s^2")] = None
+    tolerance: Annotated[Positive | None, Unit("m")] = None
     corner: Literal["blend", "stop"] | None = None
-    clearance: NotNegative | None = None
-    start: Numbers | None = None
+    clearance: Annotated[NotNegative | None, Unit("m")] = None
+    start: Annotated[Numbers | None, Unit("rad", "m")] = None
 
     @property
     def reading(self) -> dict[str, Any]:

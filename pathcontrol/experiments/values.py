@@ -6,10 +6,13 @@ import difflib
 import math
 import reprlib
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Annotated, Any
 
 from pydantic import PlainValidator
 from pydantic_core import PydanticCustomError
+
+from pathcontrol.arguments import Form
 
 _REPR = reprlib.Repr()
 _REPR.maxstring = _REPR.maxother = _REPR.maxlong = 80
@@ -45,6 +48,10 @@ def _is_positive(value: Any) -> bool:
     return _is_number(value) and value > 0
 
 
+def _is_not_negative(value: Any) -> bool:
+    return _is_number(value) and value >= 0
+
+
 def _is_limit(value: Any) -> bool:
     return _is_positive(value) or value == math.inf
 
@@ -55,12 +62,6 @@ def _is_whole(value: Any) -> bool:
 
 def _is_flag(value: Any) -> bool:
     return isinstance(value, bool)
-
-
-def _is_columns(value: Any) -> bool:
-    if isinstance(value, dict):
-        return all(_is_text(at) or (_is_whole(at) and at >= 0) for at in value.values())
-    return _is_text(value) or (isinstance(value, list) and all(map(_is_text, value)))
 
 
 def _is_text(value: Any) -> bool:
@@ -75,38 +76,68 @@ def _either(*tests: Callable[[Any], bool]) -> Callable[[Any], bool]:
     return lambda value: any(test(value) for test in tests)
 
 
-def _only(test: Callable[[Any], bool], what: str) -> PlainValidator:
-    """Values that pass ``test``, integers as they are; others are told that ``what`` was expected."""
-
-    def check(value: Any) -> Any:
-        if not test(value):
-            raise expected(what)
-        return list(value) if isinstance(value, tuple) else value
-
-    return PlainValidator(check)
+def _is_formula(value: Any) -> bool:
+    return _is_number(value) or _is_text(value)
 
 
-Text = Annotated[str, _only(_is_text, "a text in quotes")]
-Flag = Annotated[bool, _only(_is_flag, "true or false")]
-Whole = Annotated[int, _only(_is_whole, "a whole number")]
+def _is_array(value: Any) -> bool:
+    return _is_number(value) or _list_of(_is_array)(value)
+
+
+def _is_columns(value: Any) -> bool:
+    if isinstance(value, dict):
+        return all(_is_text(at) or (_is_whole(at) and at >= 0) for at in value.values())
+    return _is_text(value) or (isinstance(value, list) and all(map(_is_text, value)))
+
+
+_TESTS: dict[Form, Callable[[Any], bool]] = {
+    Form.TEXT: _is_text,
+    Form.TEXTS: _list_of(_is_text),
+    Form.FLAG: _is_flag,
+    Form.WHOLE: _is_whole,
+    Form.WHOLES: _list_of(_is_whole),
+    Form.NUMBER: _is_number,
+    Form.NUMBERS: _list_of(_is_number),
+    Form.POSITIVE: _is_positive,
+    Form.POSITIVES: _list_of(_is_positive),
+    Form.NOT_NEGATIVE: _is_not_negative,
+    Form.DEVIATIONS: _either(_is_not_negative, _list_of(_is_not_negative)),
+    Form.POINTS: _list_of(_list_of(_is_number)),
+    Form.ARRAY: _is_array,
+    Form.GAIN: _either(_is_number, _list_of(_is_number), _list_of(_list_of(_is_number))),
+    Form.GAIN_OR_ZERO: _is_number,
+    Form.LIMITS: _either(_is_flag, _list_of(_is_limit)),
+    Form.FORMULA: _is_formula,
+    Form.FORMULAS: _list_of(_is_formula),
+}
+
+
+def check(form: Form, value: Any) -> Any:
+    """Return a value that has the ``form``, integers as they are; others are told what was expected."""
+    return checked(_TESTS[form], form.value, value)
+
+
+def checked(test: Callable[[Any], bool], what: str, value: Any) -> Any:
+    """Return a value that passes ``test``; others are told that ``what`` was expected."""
+    if not test(value):
+        raise expected(what)
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _of(form: Form) -> PlainValidator:
+    return PlainValidator(partial(check, form))
+
+
+Text = Annotated[str, _of(Form.TEXT)]
+Flag = Annotated[bool, _of(Form.FLAG)]
+Whole = Annotated[int, _of(Form.WHOLE)]
 Columns = Annotated[
     str | list[str] | dict[str, int | str],
-    _only(_is_columns, "names of columns in their order, or a table with the number or the name of each"),
-]
-Number = Annotated[float, _only(_is_number, "a finite number")]
-Positive = Annotated[float, _only(_is_positive, "a number greater than 0")]
-NotNegative = Annotated[float, _only(lambda value: _is_number(value) and value >= 0, "a number not below 0")]
-Numbers = Annotated[list[float], _only(_list_of(_is_number), "a list of finite numbers")]
-Positives = Annotated[list[float], _only(_list_of(_is_positive), "a list of numbers greater than 0")]
-Wholes = Annotated[list[int], _only(_list_of(_is_whole), "a list of whole numbers")]
-Gain = Annotated[
-    float | list[float] | list[list[float]],
-    _only(
-        _either(_is_number, _list_of(_is_number), _list_of(_list_of(_is_number))),
-        "a finite number, or a list with one for each joint",
+    PlainValidator(
+        partial(checked, _is_columns, "names of columns in their order, or a table with the number or the name of each")
     ),
 ]
-FlagOrLimits = Annotated[
-    bool | list[float],
-    _only(_either(_is_flag, _list_of(_is_limit)), "true, false or a list with one number above 0 for each joint"),
-]
+Number = Annotated[float, _of(Form.NUMBER)]
+Positive = Annotated[float, _of(Form.POSITIVE)]
+NotNegative = Annotated[float, _of(Form.NOT_NEGATIVE)]
+Numbers = Annotated[list[float], _of(Form.NUMBERS)]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import TaskError
 from pathcontrol.profiles.motion import ToolMotion, growth
 from pathcontrol.robot.extent import question_speed
@@ -32,7 +35,7 @@ class ToolSpeed(VelocityProfile):
         TaskError: on evaluation, where the path does not move the frame's origin.
     """
 
-    def __init__(self, robot: RobotModel, frame: str, speed: float) -> None:
+    def __init__(self, robot: RobotModel, frame: str, speed: Annotated[float, Form.POSITIVE, Unit("m/s")]) -> None:
         self.motion, self.frame = ToolMotion(robot, frame), frame
         self.speed = scalar("speed", speed, positive=True)
         question_speed("speed", self.speed, robot, frame)

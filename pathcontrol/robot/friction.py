@@ -13,13 +13,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import SMALLEST, Array, as_array, physical, readonly
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.registry import FRICTION_LAWS
 
 
 def _coefficients(name: str, value: ArrayLike) -> Array:
@@ -95,7 +97,7 @@ def _of_joints(value: ArrayLike, joints: list[int]) -> Any:
 class Viscous(FrictionLaw):
     """Viscous friction f = b q̇ with ``coefficients`` b [N m s/rad], shape (n,)."""
 
-    coefficients: Array
+    coefficients: Annotated[Array, Form.NUMBERS, Unit("N m s/rad")]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coefficients", _coefficients("viscous coefficients", self.coefficients))
@@ -113,8 +115,8 @@ class Viscous(FrictionLaw):
 class Coulomb(FrictionLaw):
     """Coulomb friction with stiction: level ``plus`` [N m] for q̇ > 0 and ``minus`` for q̇ < 0 (default: the same)."""
 
-    plus: Array
-    minus: Array | None = None
+    plus: Annotated[Array, Form.NUMBERS, Unit("N m")]
+    minus: Annotated[Array, Form.NUMBERS, Unit("N m")] | None = None
 
     def __post_init__(self) -> None:
         plus = _coefficients("Coulomb friction for positive velocity", self.plus)
@@ -143,9 +145,9 @@ class Stribeck(FrictionLaw):
     (Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30, 1994).
     """
 
-    coulomb: Array
-    static: Array
-    velocity: Array
+    coulomb: Annotated[Array, Form.NUMBERS, Unit("N m")]
+    static: Annotated[Array, Form.NUMBERS, Unit("N m")]
+    velocity: Annotated[Array, Form.NUMBERS, Unit("rad/s")]
 
     def __post_init__(self) -> None:
         for name in ("coulomb", "static", "velocity"):
@@ -336,19 +338,20 @@ _LAWS = {law.__name__: law for law in (Viscous, Coulomb, Stribeck)}
 
 
 def friction_of(description: Mapping[str, Any]) -> FrictionLaw:
-    """The law that :meth:`FrictionLaw.describe` described.
+    """The law that :meth:`FrictionLaw.describe` described, of the library or a class that the user has defined by now.
 
     Raises:
-        UnknownNameError: it is no law of the library.
+        UnknownNameError: there is no such law, or it describes itself in its own way.
     """
     values = dict(description)
     name = values.pop("law", None)
     if name == "FrictionSum":
         return FrictionSum(tuple(friction_of(term) for term in values["terms"]))
-    if name not in _LAWS:
-        raise UnknownNameError(
-            f"friction law {name!r}, expected one of {', '.join(_LAWS)} or a FrictionSum of them",
-            value=name,
-            choices=tuple(_LAWS),
-        )
-    return _LAWS[name](**values)
+    own = {key: law for key, law in FRICTION_LAWS.defined().items() if law.describe is FrictionLaw.describe}
+    if name in (known := own | _LAWS):
+        return known[name](**values)
+    raise UnknownNameError(
+        f"friction law {name!r}, expected one of {', '.join(_LAWS)} or a FrictionSum of them",
+        value=name,
+        choices=tuple(_LAWS),
+    )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
-from typing import Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, scalar
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
@@ -17,6 +18,9 @@ from pathcontrol.simulation.arm.noise import SensorNoise
 from pathcontrol.simulation.arm.sensors import Sensors
 
 MOST_SUBSTEPS = 10_000
+
+Seconds = Annotated[float, Form.POSITIVE, Unit("s")]
+TorqueLimits = bool | Annotated[ArrayLike, Form.LIMITS, Unit("N m", "N")]
 
 
 class Outside(NamedTuple):
@@ -52,13 +56,13 @@ class SampledLoop:
         noise: noise of the sensors, or None.
     """
 
-    period: float = 2.5e-3
+    period: Seconds = 2.5e-3
     substeps: int = 1
-    encoders: bool | ArrayLike = False
+    encoders: bool | Annotated[ArrayLike, Form.LIMITS] = False
     velocity: Literal["exact", "difference"] = "exact"
-    filter_hz: float | None = None
-    torque_limits: bool | ArrayLike = False
-    delay: float = 0.0
+    filter_hz: Annotated[float, Form.POSITIVE, Unit("Hz")] | None = None
+    torque_limits: TorqueLimits = False
+    delay: Annotated[float, Unit("s")] = 0.0
     noise: SensorNoise | None = None
 
     def __post_init__(self) -> None:
@@ -112,11 +116,11 @@ class ContinuousTime:
         torque_limits: as for :class:`SampledLoop`.
     """
 
-    output_period: float = 2.5e-3
-    rtol: float = 1e-8
-    atol: float = 1e-10
-    friction_width: float = 1e-3
-    torque_limits: bool | ArrayLike = False
+    output_period: Seconds = 2.5e-3
+    rtol: Annotated[float, Form.POSITIVE] = 1e-8
+    atol: Annotated[float, Form.POSITIVE] = 1e-10
+    friction_width: Annotated[float, Form.POSITIVE, Unit("rad/s")] = 1e-3
+    torque_limits: TorqueLimits = False
 
     def __post_init__(self) -> None:
         for name in ("output_period", "rtol", "atol", "friction_width"):

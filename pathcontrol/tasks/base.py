@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -50,6 +50,8 @@ class Task(ABC):
         tool_pose: pose in that frame of what follows the path, (4, 4); ``None`` for the frame itself.
         rotations: how many rotations of that the path prescribes: 3, 2 where it may turn about its z axis, or 0.
         rollouts: for how many rollouts it has a task each; ``None`` for one task that is that of any.
+        kept_by_arguments: whether a saved run keeps it by the arguments of its constructor, which are attributes of the
+            same names; others are kept by samples.
     """
 
     s0: float = 0.0
@@ -59,6 +61,7 @@ class Task(ABC):
     tool_pose: Array | None = None
     rotations: int = 0
     rollouts: int | None = None
+    kept_by_arguments: ClassVar[bool] = False
 
     def __init_subclass__(cls, single: bool | None = None, **options: Any) -> None:
         super().__init_subclass__(**options)

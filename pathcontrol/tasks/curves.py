@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol.arguments import Form, Posture, Speed, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.profile import ConstantSpeed
@@ -58,13 +60,14 @@ class Ellipse(JointCurve):
     """
 
     period = 2 * np.pi
+    kept_by_arguments = True
 
     def __init__(
         self,
-        semi_axes: Sequence[float],
-        speed: float,
-        center: ArrayLike = (0.0, 0.0),
-        joints: Sequence[int] = (0, 1),
+        semi_axes: Annotated[Sequence[float], Form.POSITIVES, Unit("rad")],
+        speed: Speed,
+        center: Posture = (0.0, 0.0),
+        joints: Annotated[Sequence[int], Form.WHOLES] = (0, 1),
         clockwise: bool = False,
     ) -> None:
         super().__init__(speed)
@@ -114,10 +117,10 @@ class Circle(Ellipse):
 
     def __init__(
         self,
-        radius: float,
-        speed: float,
-        center: ArrayLike = (0.0, 0.0),
-        joints: Sequence[int] = (0, 1),
+        radius: Annotated[float, Form.POSITIVE, Unit("rad")],
+        speed: Speed,
+        center: Posture = (0.0, 0.0),
+        joints: Annotated[Sequence[int], Form.WHOLES] = (0, 1),
         clockwise: bool = False,
     ) -> None:
         self.radius = scalar("radius", radius, positive=True)
@@ -156,13 +159,15 @@ class Lissajous(JointCurve):
         center: c [rad], shape (n,); default 0.
     """
 
+    kept_by_arguments = True
+
     def __init__(
         self,
-        amplitudes: ArrayLike,
-        frequencies: ArrayLike,
-        speed: float,
-        phases: ArrayLike = 0.0,
-        center: ArrayLike = 0.0,
+        amplitudes: Posture,
+        frequencies: Annotated[ArrayLike, Form.WHOLES],
+        speed: Speed,
+        phases: Posture = 0.0,
+        center: Posture = 0.0,
     ) -> None:
         super().__init__(speed)
         given = {"amplitudes": amplitudes, "frequencies": frequencies, "phases": phases, "center": center}
@@ -213,7 +218,9 @@ class Line(JointCurve):
         speed: path speed ‖q̇‖ [rad/s].
     """
 
-    def __init__(self, start: ArrayLike, end: ArrayLike, speed: float) -> None:
+    kept_by_arguments = True
+
+    def __init__(self, start: Posture, end: Posture, speed: Speed) -> None:
         super().__init__(speed)
         self.start, self.end = _posture("start", start), _posture("end", end)
         if self.start.shape != self.end.shape:

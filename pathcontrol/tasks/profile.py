@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
+from pathcontrol.arguments import Rate, Speed
 
 #: time constant [s] T with which every controller brings its plan to rest on the end of an open path, ṡ ∝ (s_end − s)/T
 END_TIME = 0.1
@@ -37,7 +38,14 @@ class Path(Protocol):
 
 
 class VelocityProfile(ABC):
-    """ϑ(s) > 0 for any path; the motion plan (6) is ṡ = ϑ(s)."""
+    """ϑ(s) > 0 for any path; the motion plan (6) is ṡ = ϑ(s).
+
+    Attributes:
+        kept_by_arguments: whether a saved run keeps it by the arguments of its constructor, which are attributes of the
+            same names; others are kept by samples.
+    """
+
+    kept_by_arguments: ClassVar[bool] = False
 
     @abstractmethod
     def theta(self, path: Path, s: Array) -> Array:
@@ -64,7 +72,8 @@ class VelocityProfile(ABC):
 class ConstantRate(VelocityProfile):
     """ϑ(s) = ``rate`` [1/s]: the path parameter grows steadily."""
 
-    rate: float
+    kept_by_arguments = True
+    rate: Rate
 
     def __post_init__(self) -> None:
         scalar("rate", self.rate, positive=True)
@@ -80,7 +89,8 @@ class ConstantRate(VelocityProfile):
 class ConstantSpeed(VelocityProfile):
     """ϑ(s) = v₀/‖q_d'(s)‖: the joints move at the path speed ‖q̇‖ = ``speed`` [rad/s]."""
 
-    speed: float
+    kept_by_arguments = True
+    speed: Speed
 
     def __post_init__(self) -> None:
         scalar("speed", self.speed, positive=True)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol.arguments import Form, Speed, Unit
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.tasks.spline import SplinePath
 
@@ -36,11 +37,11 @@ class WaypointPath(SplinePath):
 
     def __init__(
         self,
-        points: ArrayLike,
-        speed: float,
+        points: Annotated[ArrayLike, Form.POINTS, Unit("rad")],
+        speed: Speed,
         closed: bool = False,
-        tolerance: float = 0.0,
-        parametrisation: Parametrisation | ArrayLike = "centripetal",
+        tolerance: Annotated[float, Form.NOT_NEGATIVE, Unit("rad")] = 0.0,
+        parametrisation: Parametrisation | Annotated[ArrayLike, Form.NUMBERS] = "centripetal",
     ) -> None:
         self.points = readonly(_checked_points(points, closed))
         self.tolerance = scalar("tolerance", tolerance, least=0.0)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import TaskError
 from pathcontrol.profiles.distance import distance
 from pathcontrol.profiles.jerk.ramps import Course
@@ -51,10 +52,10 @@ class SmoothStartStop(VelocityProfile):
         self,
         path: Path,
         profile: VelocityProfile,
-        acceleration: float,
-        jerk: float,
+        acceleration: Annotated[float, Form.POSITIVE, Unit("rad/s^2", tool="m/s^2")],
+        jerk: Annotated[float, Form.POSITIVE, Unit("rad/s^3", tool="m/s^3")],
         motion: Motion | None = None,
-        start_speed: float | None = None,
+        start_speed: Annotated[float, Form.POSITIVE, Unit("rad/s", tool="m/s")] | None = None,
     ) -> None:
         _check_open(path)
         self.profile, self.motion = profile, JointMotion() if motion is None else motion

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import scalar
 from pathcontrol._expect import expect
+from pathcontrol.arguments import Form, Rate, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.limited.demands import Demands
 from pathcontrol.profiles.limited.grid import below, edges, quarters, refined
 from pathcontrol.profiles.limited.motion_limit import MotionLimit
 from pathcontrol.profiles.limited.tangential import all_steps
 from pathcontrol.profiles.limited.two_pass import largest
+from pathcontrol.profiles.motion import JointMotion, ToolMotion
 from pathcontrol.profiles.tabulated import TabulatedProfile
+from pathcontrol.profiles.topp.joint_limits import VelocityLimit, joint_values
+from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.profile import Path
 from pathcontrol.tasks.task import PathTask
 
@@ -23,7 +29,7 @@ def limited(
     *limits: MotionLimit,
     velocity: ArrayLike | None = None,
     points: int = 1000,
-    start_rate: float | None = None,
+    start_rate: Rate | None = None,
 ) -> TabulatedProfile:
     """The largest ϑ(s) that keeps every limit: curvature- and tolerance-limited speed with bounded acceleration.
 
@@ -59,3 +65,39 @@ def limited(
     if not np.isfinite(squared).all():
         raise InputError(f"nothing limits the speed at s = {s[np.argmax(squared)]:g}; give a MotionLimit with a speed")
     return TabulatedProfile(s, squared, path.period)
+
+
+def limited_motion(
+    robot: RobotModel,
+    path: Path,
+    frame: str | None = None,
+    *,
+    speed: Annotated[float, Form.POSITIVE, Unit("rad/s", tool="m/s")] | None = None,
+    tangential: Annotated[float, Form.POSITIVE, Unit("rad/s^2", tool="m/s^2")] | None = None,
+    normal: Annotated[float, Form.POSITIVE, Unit("rad/s^2", tool="m/s^2")] | None = None,
+    chord_error: Annotated[float, Form.POSITIVE, Unit("rad", tool="m")] | None = None,
+    control_period: Annotated[float, Form.POSITIVE, Unit("s")] = 2.5e-3,
+    velocity: VelocityLimit = None,
+    points: int = 1000,
+    start_rate: Rate | None = None,
+) -> TabulatedProfile:
+    """As :func:`limited`, with one :class:`MotionLimit` on the joints, or on a frame of the arm, as files have it.
+
+    Args:
+        robot: the arm.
+        path: a path that ends or closes.
+        frame: name of the frame whose motion is limited; left out, the limits are on the joints.
+        speed: largest speed [rad/s or m/s].
+        tangential: largest acceleration along the path [rad/s² or m/s²].
+        normal: largest acceleration across the path [rad/s² or m/s²].
+        chord_error: largest distance of the path from its chord over one control period [rad or m].
+        control_period: that period [s].
+        velocity: largest velocity of each joint [rad/s], (n,), or ``True`` for the limits of the URDF.
+        points: cells of the table.
+        start_rate: largest ϑ at the start of an open path [1/s].
+    """
+    motion = JointMotion() if frame is None else ToolMotion(robot, frame)
+    most = joint_values("velocity", velocity, robot.limits.velocity, robot)
+    given = (speed, tangential, normal, chord_error)
+    limits = [] if np.isfinite(most).any() and not any(given) else [MotionLimit(motion, *given, control_period)]
+    return limited(path, *limits, velocity=most, points=points, start_rate=start_rate)

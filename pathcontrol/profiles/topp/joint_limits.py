@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, scalar, unlabelled
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 
 #: ``True`` for the limits of the URDF, ``None`` or ``False`` for none, or values
 LimitChoice = ArrayLike | bool | None
+VelocityLimit = Annotated[LimitChoice, Form.LIMITS, Unit("rad/s", "m/s")]
 
 _UNITS = {
     "rad": {"velocity": "rad/s", "acceleration": "rad/s²", "torque": "N m"},
@@ -71,9 +73,9 @@ def joint_limits(
         raise InputError("acceleration = True, but a URDF has no acceleration limits; give one for each joint")
     limits = JointLimits(
         robot,
-        _values("velocity", velocity, robot.limits.velocity, robot),
-        _values("acceleration", acceleration, None, robot),
-        (1 - margin) * _values("torque", torque, robot.limits.effort, robot),
+        joint_values("velocity", velocity, robot.limits.velocity, robot),
+        joint_values("acceleration", acceleration, None, robot),
+        (1 - margin) * joint_values("torque", torque, robot.limits.effort, robot),
         margin,
     )
     if not np.isfinite(limits[1:4]).any():
@@ -81,7 +83,12 @@ def joint_limits(
     return limits
 
 
-def _values(kind: str, choice: LimitChoice, own: Array | None, robot: RobotModel) -> Array:
+def joint_values(kind: str, choice: LimitChoice, own: Array | None, robot: RobotModel) -> Array:
+    """Return the limit that was chosen for each joint, (n,), its ``own`` for ``True``; ``inf`` for none.
+
+    Raises:
+        InputError: a limit is not positive or has a wrong shape.
+    """
     if choice is None or choice is False:
         return np.full(robot.n, np.inf)
     values = own if own is not None and choice is True else as_array(kind, unlabelled(kind, choice, robot.joint_names))

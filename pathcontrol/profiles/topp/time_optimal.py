@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array, readonly, scalar
 from pathcontrol._expect import expect
+from pathcontrol.arguments import Form, Rate, Unit
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.profiles.tabulated import TabulatedProfile
 from pathcontrol.profiles.topp.dynamics import sample, torques
-from pathcontrol.profiles.topp.joint_limits import LimitChoice, joint_limits
+from pathcontrol.profiles.topp.joint_limits import LimitChoice, VelocityLimit, joint_limits
 from pathcontrol.profiles.topp.solve import Demand, fastest
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.profile import Path
@@ -54,14 +55,14 @@ def time_optimal(
     robot: RobotModel,
     path: Path,
     *,
-    velocity: LimitChoice = True,
-    acceleration: LimitChoice = None,
-    torque: LimitChoice = True,
-    margin: float = 0.05,
+    velocity: VelocityLimit = True,
+    acceleration: Annotated[LimitChoice, Form.LIMITS, Unit("rad/s^2", "m/s^2")] = None,
+    torque: Annotated[LimitChoice, Form.LIMITS, Unit("N m", "N")] = True,
+    margin: Annotated[float, Form.NOT_NEGATIVE] = 0.05,
     points: int = 1000,
-    start_rate: float | None = None,
-    end_rate: float | None = None,
-    end_time: float | None = None,
+    start_rate: Rate | None = None,
+    end_rate: Rate | None = None,
+    end_time: Annotated[float, Form.POSITIVE, Unit("s")] | None = None,
 ) -> TimeOptimal:
     """The profile ϑ(s) that takes an arm along a path in the least time within the limits of its joints.
 

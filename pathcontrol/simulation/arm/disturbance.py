@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol._expect import expect
+from pathcontrol.arguments import Form, Torques, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.profile import plain_attributes
+
+Begin = Annotated[ArrayLike, Form.NUMBER, Unit("s")]
+Span = Annotated[ArrayLike, Form.POSITIVE, Unit("s")]
+Frequency = Annotated[ArrayLike, Form.NUMBER, Unit("Hz")]
+Phase = Annotated[ArrayLike, Form.NUMBER, Unit("rad")]
 
 
 class Disturbance(ABC):
@@ -88,7 +94,7 @@ class Push(_Timed):
         duration: how long it acts [s], or for each rollout, (N,).
     """
 
-    def __init__(self, magnitude: ArrayLike, start: ArrayLike = 0.0, duration: ArrayLike = np.inf) -> None:
+    def __init__(self, magnitude: Torques, start: Begin = 0.0, duration: Span = np.inf) -> None:
         super().__init__(start, duration)
         self.magnitude = readonly(finite("magnitude", as_array("magnitude", magnitude)))
 
@@ -105,7 +111,7 @@ class Harmonic(Disturbance):
         phase: φ [rad], or for each rollout, (N,).
     """
 
-    def __init__(self, amplitude: ArrayLike, frequency: ArrayLike, phase: ArrayLike = 0.0) -> None:
+    def __init__(self, amplitude: Torques, frequency: Frequency, phase: Phase = 0.0) -> None:
         self.amplitude = readonly(finite("amplitude", as_array("amplitude", amplitude)))
         self.frequency, self.phase = _each("frequency", frequency), _each("phase", phase)
 
@@ -131,9 +137,9 @@ class FrameForce(_Timed):
         self,
         robot: RobotModel,
         frame: str,
-        force: ArrayLike,
-        start: ArrayLike = 0.0,
-        duration: ArrayLike = np.inf,
+        force: Annotated[ArrayLike, Form.NUMBERS, Unit("N")],
+        start: Begin = 0.0,
+        duration: Span = np.inf,
     ) -> None:
         super().__init__(start, duration)
         expect("robot", robot, RobotModel)

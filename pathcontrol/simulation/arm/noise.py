@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.random import SeedSequence, default_rng
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, finite
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError
 
 _DRAWN = 1 << 20  # numbers drawn in advance, of all rollouts together
@@ -30,8 +31,8 @@ class SensorNoise:
         seed: where the generators begin, a whole number from 0.
     """
 
-    position: ArrayLike = 0.0
-    velocity: ArrayLike = 0.0
+    position: Annotated[ArrayLike, Form.DEVIATIONS, Unit("rad")] = 0.0
+    velocity: Annotated[ArrayLike, Form.DEVIATIONS, Unit("rad/s")] = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:

@@ -12,46 +12,36 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pathcontrol._arrays import as_array, finite
+from pathcontrol.arguments import parameters_of
 from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.tabulated import TabulatedProfile
+from pathcontrol.registry import PROFILES, TASKS, load
 from pathcontrol.simulation.storage.array_store import Shelf
 from pathcontrol.simulation.storage.recipe_size import check_extent
 from pathcontrol.simulation.storage.shared_recipes import shared
 from pathcontrol.tasks.batch.task_batch import TaskBatch
-from pathcontrol.tasks.curves import Circle, Ellipse, Line, Lissajous
 from pathcontrol.tasks.joined.sequence import PathSequence
-from pathcontrol.tasks.laps import Laps
-from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, VelocityProfile
-from pathcontrol.tasks.recorded import RecordedPath, RecordedProfile, recorded_profile
-from pathcontrol.tasks.task import PathSection, PathTask, Reprofiled, ReversedPath, ScaledPath, ShiftedPath
+from pathcontrol.tasks.profile import ConstantRate, VelocityProfile
+from pathcontrol.tasks.recorded import RecordedPath, recorded_profile
+from pathcontrol.tasks.task import PathSection, PathTask, Reprofiled
 
 if TYPE_CHECKING:
     from pathcontrol.cartesian.toolpath_task import ToolpathTask
 
-#: what is made again from its constructor's arguments, which are attributes of the same names
-_MADE: dict[type, tuple[str, ...]] = {
-    Circle: ("radius", "speed", "center", "joints", "clockwise"),
-    Ellipse: ("semi_axes", "speed", "center", "joints", "clockwise"),
-    Lissajous: ("amplitudes", "frequencies", "speed", "phases", "center"),
-    Line: ("start", "end", "speed"),
-    ReversedPath: ("path",),
-    ShiftedPath: ("path", "offset"),
-    ScaledPath: ("path", "factor", "about"),
-    PathSection: ("path", "s0", "s_end"),
-    Laps: ("path", "laps"),
-    Reprofiled: ("path", "profile"),
-    PathSequence: ("paths", "gaps"),
-    RecordedPath: (
-        *("samples", "jets", "profile", "period", "endless", "projects", "knots"),
-        *("original", "frame", "tool_pose", "rotations"),
-    ),
-    ConstantRate: ("rate",),
-    ConstantSpeed: ("speed",),
-    TabulatedProfile: ("s", "squared", "period"),
-    RecordedProfile: ("s", "jets", "period"),
+#: where the classes are that no experiment file names, but that are made again from their arguments too
+_PLACES = {
+    "TabulatedProfile": "profiles.tabulated.TabulatedProfile",
+    "Reprofiled": "tasks.task.Reprofiled",
+    "Laps": "tasks.laps.Laps",
+    "RecordedPath": "tasks.recorded.RecordedPath",
+    "RecordedProfile": "tasks.recorded.RecordedProfile",
+    "PathSequence": "tasks.joined.sequence.PathSequence",
+    "PathSection": "tasks.task.PathSection",
+    "ReversedPath": "tasks.task.ReversedPath",
+    "ScaledPath": "tasks.task.ScaledPath",
+    "ShiftedPath": "tasks.task.ShiftedPath",
 }
-_CLASSES = {cls.__name__: cls for cls in _MADE}
 _TOOLPATH = (
     "frame",
     "workpiece",
@@ -89,7 +79,7 @@ def _task_recipe(task: PathTask, shelf: Shelf, upto: float | None, rated: bool) 
         if not rated:
             return path
         return {"class": "Reprofiled", "path": path, "profile": _profile_recipe(task, shelf, upto)}
-    if type(task) in _MADE and _unchanged(task):
+    if _class_of(type(task).__name__) is type(task) and _unchanged(task):
         return _recipe(type(task), task, shelf, task.s_end if isinstance(task, PathSection) else upto, rated)
     recorded = RecordedPath.of(task, None if rated else ConstantRate(1.0), upto)
     return _recipe(RecordedPath, recorded, shelf, upto, rated)
@@ -112,7 +102,7 @@ def task_of(recipe: Any, shelf: Shelf) -> PathTask:
 
 
 def _recipe(cls: type, made: Any, shelf: Shelf, upto: float | None, rated: bool = True) -> dict[str, Any]:
-    values = {name: _value(getattr(made, name), shelf, upto, rated) for name in _MADE[cls]}
+    values = {name: _value(getattr(made, name), shelf, upto, rated) for name in parameters_of(cls)}
     return {"class": cls.__name__} | values
 
 
@@ -131,13 +121,21 @@ def _profile_recipe(task: Reprofiled, shelf: Shelf, upto: float | None) -> dict[
     profile = task.profile
     if isinstance(profile, TabulatedProfile):  # or one that knows more, as TimeOptimal
         return _recipe(TabulatedProfile, profile, shelf, upto)
-    known = profile if type(profile) in _MADE else recorded_profile(task, upto)
+    known = profile if _class_of(type(profile).__name__) is type(profile) else recorded_profile(task, upto)
     return _recipe(type(known), known, shelf, upto)
+
+
+def _class_of(name: str) -> Any:
+    """Return the class of the library of this name that is made again from its arguments, or ``None``."""
+    if name in _PLACES:
+        return load(_PLACES[name])
+    found: list[Any] = [kind.find(name) for kind in (TASKS, PROFILES) if kind.has(name)]
+    return next((one for one in found if isinstance(one, type) and getattr(one, "kept_by_arguments", False)), None)
 
 
 def _unchanged(task: PathTask) -> bool:
     """Whether a task has the domain that its constructor gave it."""
-    twin = type(task)(**{name: getattr(task, name) for name in _MADE[type(task)]})
+    twin = type(task)(**{name: getattr(task, name) for name in parameters_of(type(task))})
     return (twin.s0, twin.s_end, twin.period) == (task.s0, task.s_end, task.period)
 
 
@@ -176,9 +174,12 @@ def _made(recipe: Any, shelf: Shelf, parts: Sequence[Any] = ()) -> Any:
     values = {name: value for name, value in recipe.items() if name != "class"}
     if recipe["class"] == "RecordedToolpath":
         return _made_toolpath(values, shelf, parts)
-    if recipe["class"] not in _CLASSES:
-        raise InputError(f"class {recipe['class']!r} of a task, expected one of {', '.join(_CLASSES)}")
-    return _tried(_CLASSES[recipe["class"]](**{name: _made(value, shelf, parts) for name, value in values.items()}))
+    cls = _class_of(recipe["class"])
+    if cls is None:
+        names = [place.rpartition(".")[2] for kind in (TASKS, PROFILES) for place in kind.members.values()]
+        known = [*filter(_class_of, names), *_PLACES]
+        raise InputError(f"class {recipe['class']!r} of a task, expected one of {', '.join(known)}")
+    return _tried(cls(**{name: _made(value, shelf, parts) for name, value in values.items()}))
 
 
 def _made_toolpath(values: dict[str, Any], shelf: Shelf, parts: Sequence[Any]) -> PathTask:

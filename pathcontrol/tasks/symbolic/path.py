@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from itertools import repeat
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
+from pathcontrol.arguments import Form, Speed
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.domain import refuse_two_rates, take_domain
@@ -48,11 +49,11 @@ class SymbolicPath(PathTask):
 
     def __init__(
         self,
-        q_d: Iterable[Formula],
-        speed: float | None = None,
+        q_d: Annotated[Iterable[Formula], Form.FORMULAS],
+        speed: Speed | None = None,
         *,
-        theta: Formula | None = None,
-        s: str | sympy.Symbol = "s",
+        theta: Annotated[Formula, Form.FORMULA] | None = None,
+        s: Annotated[Formula, Form.TEXT] = "s",
         s0: float = 0.0,
         s_end: float = np.inf,
         period: float | None = None,

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+from pathcontrol.arguments import parameters_of
+from pathcontrol.registry import Kind
+
 _LONGEST_LINE = 100
+_NOT_IMPORTED = ("__main__", "pathcontrol_file_")  # modules that a script cannot import
 
 
 class Name(str):
@@ -27,3 +32,19 @@ def _literal(value: Any) -> str:
     if isinstance(value, Name):
         return value
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+
+
+def class_code(kind: Kind, name: Any, described: Collection[str]) -> tuple[str, str] | None:
+    """Return what a class of a ``kind`` is called in a script, and the line that imports it, empty for the library's.
+
+    ``None`` where nobody knows: a class of the user that is not in a module that can be imported, one without
+    parameters that would say what it is, or one with some that are not ``described``.
+    """
+    if not isinstance(name, str) or kind.has(name):
+        return (f"pc.{name}", "") if isinstance(name, str) else None
+    own = kind.defined().get(name)
+    module = sys.modules.get("" if own is None else own.__module__)
+    if own is None or getattr(module, name, None) is not own or own.__module__.startswith(_NOT_IMPORTED):
+        return None
+    parameters = parameters_of(own).keys() - set(kind.given)
+    return (name, f"from {own.__module__} import {name}") if parameters and parameters <= set(described) else None

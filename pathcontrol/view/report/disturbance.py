@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
+from pathcontrol.arguments import Form, Parameter, parameters_of
+from pathcontrol.registry import DISTURBANCES
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.summaries import is_whole
-from pathcontrol.view.report.code import call
+from pathcontrol.view.report.code import call, class_code
 
-#: the arguments of the disturbances of this package, and how many axes each has for a single rollout
-_ARGUMENTS: dict[str, dict[str, int | None]] = {
-    "Push": {"magnitude": 1, "start": 0, "duration": 0},
-    "Harmonic": {"amplitude": 1, "frequency": 0, "phase": 0},
-    "FrameForce": {"frame": None, "force": 1, "start": 0, "duration": 0},
-}
+_AXES = {Form.NUMBERS: 1, Form.NUMBER: 0, Form.POSITIVE: 0}  # that a value has for a single rollout
 _DEEPEST = 20  # sums in one another
 
 
-def disturbance_code(described: Any, run: Run, depth: int = 0) -> str | None:
-    """Return the expression for a disturbance of this package, or a sum of them; ``None`` for any other one.
+class Code(NamedTuple):
+    """An expression, and the lines that import what it needs."""
+
+    text: str
+    imports: tuple[str, ...] = ()
+
+
+def disturbance_code(described: Any, run: Run, depth: int = 0) -> Code | None:
+    """Return the expression for a disturbance or a sum of them; ``None`` for one that a record does not know whole.
 
     Sums are put into brackets as they were made, since floating-point numbers do not add up in any order.
 
@@ -32,23 +36,30 @@ def disturbance_code(described: Any, run: Run, depth: int = 0) -> str | None:
         return None
     kind, terms = described.get("disturbance"), described.get("terms")
     if kind == "sum" and isinstance(terms, list) and len(terms) > 1:
-        codes = [disturbance_code(term, run, depth + 1) for term in terms]
-        if None in codes:
-            return None
-        added = " + ".join(str(code) for code in codes)
-        return f"({added})" if depth else added
-    return _term(str(kind), described, run)
+        codes = [code for term in terms if (code := disturbance_code(term, run, depth + 1))]
+        added = " + ".join(code.text for code in codes)
+        imports = tuple(dict.fromkeys(line for code in codes for line in code.imports))
+        return Code(f"({added})" if depth else added, imports) if len(codes) == len(terms) else None
+    return _term(kind, described, run)
 
 
-def _term(kind: str, described: Mapping[str, Any], run: Run) -> str | None:
+def _term(kind: Any, described: Mapping[str, Any], run: Run) -> Code | None:
     """One disturbance, whose arguments have the axes that they should have."""
-    axes = _ARGUMENTS.get(kind, {})
-    arm = _arm(described.get("robot"), run) if kind == "FrameForce" else None
-    if not axes or not all(_fits(described.get(name), most, run.rollouts) for name, most in axes.items()):
+    found = class_code(DISTURBANCES, kind, described)
+    if found is None:
         return None
-    if kind == "FrameForce" and arm is None:
+    parameters = dict(parameters_of(DISTURBANCES.find(kind)))
+    arm = _arm(described.get("robot"), run) if parameters.pop("robot", None) else ""
+    if arm is None or not all(_is_argument(one, described.get(name), run) for name, one in parameters.items()):
         return None
-    return call(f"pc.{kind}", [] if arm is None else [arm], {name: described[name] for name in axes})
+    return Code(call(found[0], [arm] if arm else [], {name: described[name] for name in parameters}), found[1:])
+
+
+def _is_argument(parameter: Parameter, value: Any, run: Run) -> bool:
+    """Whether a value has the axes that a parameter says, or any where it does not say."""
+    if parameter.form is None:
+        return str not in parameter.types or isinstance(value, str)
+    return _fits(value, _AXES[parameter.form], run.rollouts)
 
 
 def _arm(name: Any, run: Run) -> str | None:
@@ -57,10 +68,8 @@ def _arm(name: Any, run: Run) -> str | None:
     return known.get(name) if isinstance(name, str) else None
 
 
-def _fits(value: Any, axes: int | None, rollouts: int) -> bool:
-    """Whether a value has so many axes, or one more for the rollouts; without axes it is a text."""
-    if axes is None:
-        return isinstance(value, str)
+def _fits(value: Any, axes: int, rollouts: int) -> bool:
+    """Whether a value has so many axes, or one more for the rollouts."""
     if not isinstance(value, list):
         return axes == 0 and isinstance(value, int | float)
     if axes == 0 or (value and isinstance(value[0], list)):

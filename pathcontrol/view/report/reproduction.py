@@ -6,17 +6,16 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from pathcontrol.registry import LAWS
 from pathcontrol.simulation.config import laws, table
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.summaries import is_whole
-from pathcontrol.view.report.code import Name, call
+from pathcontrol.view.report.code import Name, call, class_code
 from pathcontrol.view.report.disturbance import disturbance_code
 from pathcontrol.view.report.downloads import Download, file_name, text_file
 from pathcontrol.view.report.settings import Setting
 
 _LOOPS = {"sampled": "SampledLoop", "continuous": "ContinuousTime"}
-#: the laws of this package; of another one only its user knows where it is
-_LAWS = ("ExtendedMotionPlan", "Projection", "ComputedTorque", "PDPlus", "SlotineLi")
 _NOT_ARGUMENTS = ("controller", "robot", "task")
 
 
@@ -59,7 +58,8 @@ def script(name: str, run: Run) -> str:
     """
     loop, several = table(run.config, "loop"), laws(run.config)
     sequence = isinstance(run.config.get("duration"), list)
-    if run.task is None or not _known(several, loop) or not _ended(run.config, sequence):
+    law = class_code(LAWS, several[0].get("controller"), several[0])
+    if run.task is None or law is None or not _known(several, loop) or not _ended(run.config, sequence):
         return ""
     outside = disturbance_code(run.config["disturbance"], run) if "disturbance" in run.config else None
     if (outside is None and "disturbance" in run.config) or table(run.config, "plant").get("arms", 1) != 1:
@@ -71,28 +71,29 @@ def script(name: str, run: Run) -> str:
     if "noise" in settings:
         settings["noise"] = Name(call("pc.SensorNoise", [], settings["noise"]))
     closed = call(f"pc.{_LOOPS[loop['loop']]}", [], settings)
+    imports = [line for line in dict.fromkeys([law[1], *(outside.imports if outside else ())]) if line]
     lines = [
-        "import pathcontrol as pc\n",
+        "\n".join([*imports, "import pathcontrol as pc\n"]),
         f'saved = pc.Run.load("{file_name(name)}.nc")  # knows its robot, the model of its law and its path',
         f"loop = {closed}",
         'q, qd = saved.array("q")[:, 0], saved.array("qd")[:, 0]',
-        *([] if outside is None else [f"disturbance = {outside}"]),
-        *(_of_sequence if sequence else _of_one)(several[0], run.config, more),
+        *([] if outside is None else [f"disturbance = {outside.text}"]),
+        *(_of_sequence if sequence else _of_one)(law[0], several[0], run.config, more),
     ]
     text = "\n".join(lines) + "\n"
     return f"from math import inf\n\n{text}" if re.search(r"\binf\b", text) else text
 
 
-def _of_one(law: Mapping[str, Any], config: Mapping[str, Any], more: Mapping[str, Any]) -> list[str]:
-    made = call(f"pc.{law['controller']}", ["saved.model", "saved.task"], _without(law, _NOT_ARGUMENTS))
+def _of_one(name: str, law: Mapping[str, Any], config: Mapping[str, Any], more: Mapping[str, Any]) -> list[str]:
+    made = call(name, ["saved.model", "saved.task"], _without(law, _NOT_ARGUMENTS))
     settings = {key: config[key] for key in ("duration", "laps", "until")} | {**more, "loop": Name("loop")}
     if config.get("first_rollout"):
         settings["first_rollout"] = config["first_rollout"]
     return [f"law = {made}", f"run = {call('pc.simulate', ['law', 'q', 'qd'], settings)}"]
 
 
-def _of_sequence(law: Mapping[str, Any], config: Mapping[str, Any], more: Mapping[str, Any]) -> list[str]:
-    made = call(f"pc.{law['controller']}", ["saved.model", "path"], _without(law, _NOT_ARGUMENTS))
+def _of_sequence(name: str, law: Mapping[str, Any], config: Mapping[str, Any], more: Mapping[str, Any]) -> list[str]:
+    made = call(name, ["saved.model", "path"], _without(law, _NOT_ARGUMENTS))
     times = config["duration"]
     duration = times[0] if all(each == times[0] for each in times) else times
     settings = {
@@ -107,7 +108,7 @@ def _of_sequence(law: Mapping[str, Any], config: Mapping[str, Any], more: Mappin
 
 
 def _known(several: Sequence[Mapping[str, Any]], loop: Mapping[str, Any]) -> bool:
-    """Whether the laws are one of this package with the same gains, and the loop is one of this package."""
+    """Whether the laws are one with the same gains, and the loop is one of this package."""
     first = several[0]
     alike = all(_without(law, ["robot", "task"]) == _without(first, ["robot", "task"]) for law in several)
     noise = loop.get("noise", {})
@@ -118,7 +119,6 @@ def _known(several: Sequence[Mapping[str, Any]], loop: Mapping[str, Any]) -> boo
         alike
         and all(is_whole(_without(law, ["robot", "task"])) for law in several)
         and is_whole(loop)
-        and first.get("controller") in _LAWS
         and loop.get("loop") in list(_LOOPS)
         and all(name.isidentifier() for name in names)
     )

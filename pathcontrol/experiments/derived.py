@@ -1,0 +1,129 @@
+"""Sections of an experiment file, derived from the signatures of the classes that they are for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import is_dataclass
+from functools import lru_cache, partial
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
+
+from pydantic import Field, PlainValidator, create_model
+
+from pathcontrol.arguments import Form, Parameter, parameters_of
+from pathcontrol.experiments.section import Section, choose
+from pathcontrol.experiments.values import check, did_you_mean, expected
+from pathcontrol.registry import Kind, kind_of
+
+_OWN = re.compile(r"(?P<file>.+\.py|[^\W\d]\w*(\.[^\W\d]\w*)*):(?P<name>[^\W\d]\w*)")
+_FORMS = {float: Form.NUMBER, int: Form.WHOLE, bool: Form.FLAG, str: Form.TEXT}
+
+
+class Chosen(Section):
+    """A section for one class of a kind, which ``type`` names."""
+
+    type: str = ""
+    target: ClassVar[Callable[..., Any]]
+
+
+def _own_type(value: Any) -> str:
+    if not _OWN.fullmatch(value):
+        raise expected("'FILE.py:ClassName'")
+    return value
+
+
+class OwnSection(Section):
+    """A class in a Python file, ``type = "FILE.py:ClassName"``, or in an installed module, ``"module:ClassName"``.
+
+    ``parameters`` are the keyword arguments of the class. They are taken as they are, but where its annotations have
+    a :class:`Unit`.
+    """
+
+    type: Annotated[str, PlainValidator(_own_type)]
+    parameters: dict[str, Any] = Field(default_factory=dict)
+
+    @property
+    def place(self) -> tuple[str, str]:
+        """The file or the module, and the name of the class in it."""
+        match = _OWN.fullmatch(self.type)
+        assert match is not None
+        return match["file"], match["name"]
+
+
+def chooser(
+    kind: Kind,
+    base: type[Section] = Chosen,
+    own: type[Section] | None = OwnSection,
+    more: Mapping[str, type[Section]] = MappingProxyType({}),
+    key: str = "type",
+    default: str | None = None,
+) -> Callable[[Any], Any]:
+    """Return a validator that takes a section for a class of the ``kind``, or one of ``more``, as ``key`` names it.
+
+    Args:
+        kind: the classes, of which the user's own are found too.
+        base: what the sections derive from.
+        own: the section for a class that is named with its file.
+        more: sections that are derived from no class, by the name of each.
+        key: the key whose value names the class.
+        default: the name where the file gives none.
+    """
+
+    def find(name: str) -> type[Section] | None:
+        if own is not None and (".py" in name or ":" in name):
+            return own
+        target = kind.find(name)
+        return more.get(name) if target is None else section_of(target, base, kind.given)
+
+    choices, also = [*kind.members, *more], "" if own is None else " or 'FILE.py:ClassName'"
+    return partial(choose, key=key, find=find, choices=choices, default=default, also=also)
+
+
+@lru_cache(maxsize=256)
+def section_of(target: Callable[..., Any], base: type[Section] = Section, given: tuple[str, ...] = ()) -> type[Section]:
+    """Return the section whose keys are the parameters of a class or function, but for those that are ``given``."""
+    fields: dict[str, Any] = {
+        name: (_annotation(parameter), ... if parameter.required else None)
+        for name, parameter in parameters_of(target).items()
+        if name not in given
+    }
+    made = create_model(getattr(target, "__name__", "section"), __base__=base, **fields)
+    made.target = target  # type: ignore[attr-defined]
+    return made
+
+
+def _annotation(parameter: Parameter) -> Any:
+    """Return the annotation of a field for a parameter."""
+    literals = [value for kind in parameter.types if get_origin(kind) is Literal for value in get_args(kind)]
+    validate, words = _validator(parameter)
+    if not literals:
+        return Annotated[Any, PlainValidator(validate), *parameter.marks]
+    if validate is _anything:
+        return Literal[tuple(literals)]
+    return Annotated[Any, PlainValidator(partial(_one_or, literals, words, validate)), *parameter.marks]
+
+
+def _validator(parameter: Parameter) -> tuple[Callable[[Any], Any], str]:
+    """Return what checks a value that is none of its literals, and what that expects in words."""
+    form = parameter.form or next((_FORMS[kind] for kind in parameter.types if kind in _FORMS), None)
+    if form is not None:
+        return partial(check, form), form.value
+    for one in parameter.types:
+        if (kind := kind_of(one)) is not None:
+            return chooser(kind), "a table with the key 'type'"
+        if is_dataclass(one) and isinstance(one, type):
+            return section_of(one).model_validate, "a table"
+    return _anything, ""
+
+
+def _anything(value: Any) -> Any:
+    """Return what its class has to check."""
+    return value
+
+
+def _one_or(literals: Iterable[str], words: str, validate: Callable[[Any], Any], value: Any) -> Any:
+    """Return one of some texts, or what ``validate`` makes of any other value."""
+    if not isinstance(value, str) or value in literals:
+        return value if isinstance(value, str) else validate(value)
+    raise expected(f"one of {', '.join(map(repr, literals))}, or {words}{did_you_mean(value, literals)}")

@@ -1,0 +1,106 @@
+"""From a section of an experiment file to the object that it names."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from pathcontrol.arguments import parameters_of
+from pathcontrol.errors import ExperimentError
+from pathcontrol.experiments.derived import OwnSection
+from pathcontrol.experiments.keyed import keyed, users_code
+from pathcontrol.experiments.own_class import own_class
+from pathcontrol.experiments.section import Section, in_radians, in_si, units_of
+from pathcontrol.registry import Kind
+
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+class Place(NamedTuple):
+    """Where and how an experiment file is read.
+
+    Attributes:
+        folder: the folder that paths in it are relative to.
+        to_radians: converts from its ``angle_unit``.
+    """
+
+    folder: Path
+    to_radians: Callable[[float], float]
+
+
+def make(
+    key: str,
+    section: Any,
+    kind: Kind | None,
+    place: Place,
+    given: Mapping[str, Any] = _NOTHING,
+    more: Mapping[str, Any] = _NOTHING,
+) -> Any:
+    """Return the object of a section, which errors call ``key``.
+
+    Args:
+        key: of the section.
+        section: a section for a class of the ``kind``.
+        kind: what the class has to be.
+        place: where the file is, and its angles.
+        given: what the class may ask for by the name of a parameter that is in no file, such as ``robot``.
+        more: arguments instead of those of the file.
+
+    Raises:
+        ExperimentError: it cannot be made.
+    """
+    target = target_of(key, section, kind, place)
+    arguments = arguments_of(key, section, kind, place, given) | dict(more)
+    needed = {name: one for name, one in given.items() if name in parameters_of(target)}
+    needed = {name: one for name, one in needed.items() if parameters_of(target)[name].required} | arguments
+    where = f"{key}.parameters" if isinstance(section, OwnSection) else key
+    try:
+        inspect.signature(target).bind(**needed)
+    except TypeError as error:
+        raise ExperimentError(f"{where}: {error}; it is {target.__name__}{inspect.signature(target)}") from error
+    with users_code(where, target.__name__, arguments):
+        return target(**needed)
+
+
+def target_of(key: str, section: Any, kind: Kind | None, place: Place) -> Callable[..., Any]:
+    """Return the class that a section is for; a file of the user is run to define it.
+
+    Raises:
+        ExperimentError: there is no such class.
+    """
+    if not isinstance(section, OwnSection):
+        return type(section).target
+    assert kind is not None
+    with keyed(f"{key}.type"):
+        return own_class(place.folder, *section.place, kind)
+
+
+def arguments_of(
+    key: str, section: Section, kind: Kind | None, place: Place, given: Mapping[str, Any] = _NOTHING
+) -> dict[str, Any]:
+    """Return the arguments that a section gives, in SI units, with objects in the place of sections.
+
+    Raises:
+        ExperimentError: a quantity is of another dimension, or an object cannot be made.
+    """
+    if isinstance(section, OwnSection):
+        return _own_arguments(f"{key}.parameters", target_of(key, section, kind, place), section.parameters, place)
+    found = section.arguments(place.to_radians)
+    return {
+        name: make(f"{key}.{name}", value, None, place, given) if isinstance(value, Section) else value
+        for name, value in found.items()
+    }
+
+
+def _own_arguments(key: str, target: Callable[..., Any], parameters: Mapping[str, Any], place: Place) -> dict[str, Any]:
+    """Return keyword arguments for a class of the user, with the units that its annotations have."""
+    quantities = {name: one.unit for name, one in parameters_of(target).items() if one.unit is not None}
+    units = units_of(quantities, parameters)
+    wrong: dict[Any, Any] = {}
+    values = {name: in_si((name,), value, units.get(name, ()), wrong) for name, value in parameters.items()}
+    for (name, *_), error in wrong.items():
+        raise ExperimentError(f"{key}.{name}{error['type'].message()}")
+    return {name: in_radians(value, units.get(name, ()), place.to_radians) for name, value in values.items()}
