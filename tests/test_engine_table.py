@@ -10,7 +10,7 @@ import pytest
 import pathcontrol as pc
 from pathcontrol.engine.gamma import distances_to_gamma
 from pathcontrol.engine.library import load_library
-from pathcontrol.engine.table import make_table, path_struct, same_projection
+from pathcontrol.engine.table import has_same_projection, make_table, path_struct
 from pathcontrol.errors import EngineError
 
 
@@ -95,12 +95,12 @@ def test_the_nearest_point_of_the_engine_is_that_of_the_task(name):
     away = [np.linalg.norm(task.q_d(s) - q, axis=-1) for s in (anywhere, numeric)]
     assert np.abs(away[0] - away[1]).max() < 1e-9
     assert np.abs(followed - pc.PathTask.sigma_bar(task, q, near=near)).max() < 1e-7
-    assert same_projection(task, path)
+    assert has_same_projection(task, path)
 
 
 def test_a_projection_of_its_own_that_is_not_the_nearest_point_is_noticed():
     task = Offset()
-    assert not same_projection(task, path_struct(task)[0])
+    assert not has_same_projection(task, path_struct(task)[0])
 
 
 def test_a_table_is_made_once_and_again_when_its_task_has_changed():

@@ -1,4 +1,4 @@
-"""What a controller is: a law whose state goes in and comes out."""
+"""The interface of a control law: its state is handed in and handed back, and the law itself keeps none."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Start = Literal["s0", "nearest"]
 
 
 class ControlOutput(NamedTuple):
-    """What a law says at one moment.
+    """The values of a control law at one moment.
 
     Attributes:
         tau: torque demand τ [N m], (*batch, n).
@@ -84,19 +84,19 @@ class Controller(ABC):
 
     @abstractmethod
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
-        """Torques for the joint positions q [rad] and velocities q̇ [rad/s], (*batch, n), at time t [s]."""
+        """Return the torques and rates for q [rad] and q̇ [rad/s], (*batch, n), at time t [s] and state z."""
 
     def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
-        """State z, (*batch, 1), for an arm that starts at (q, q̇)."""
+        """Return the state z, (*batch, 1), for an arm that starts at (q, q̇)."""
         q = joint_array("q", q, self.robot.n, self.robot.joint_names)
         joint_array("qd", qd, self.robot.n)
         s = np.full(q.shape[:-1], self.task.s0) if self.start_at == "s0" else self.task.sigma_bar(q)
         return np.asarray(s)[..., None]
 
     def advance(self, z: Array, out: ControlOutput, period: float) -> Array:
-        """State one control ``period`` [s] after z.
+        """Return the state one control ``period`` [s] after z.
 
-        ṡ = f(s, t), where t stands for the motion of the arm at its present velocity, is taken by the exponential
+        ṡ = f(s, t), where t stands for the motion of the arm at its present velocity, is integrated by the exponential
         Rosenbrock–Euler step s + h φ₁(hf_s) f + h² φ₂(hf_s) f_t, φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x: second
         order, exact where f is linear, and stable for any gain of the extended motion plan with the arm at rest. For
         k → ∞ it is a step of Newton's method for (29) from the present arm, plus hσ̄̇ for its motion.
@@ -112,7 +112,7 @@ class Controller(ABC):
         return f"{type(self).__name__}({self.robot.name}, {self.task!r}, {gains})"
 
     def describe(self) -> dict[str, Any]:
-        """Name, gains and choices, for the record of a run."""
+        """Return name, gains and choices, for the configuration of a run."""
         gains = {name: np.asarray(getattr(self, name)).tolist() for name in self.gains}
         name = {"controller": type(self).__name__, "friction": self.friction, "start": self.start_at}
         return name | gains | {"robot": self.robot.name, "task": self.task.describe()}
@@ -123,7 +123,7 @@ class Controller(ABC):
     # --- for laws -------------------------------------------------------------------------------------------
 
     def point(self, s: Array) -> PathPoint:
-        """The task at s, and on open paths how its plan comes to rest, :meth:`Ending.braked`.
+        """Return the task at s; on an open path with ϑ and ϑ' of the plan that comes to rest, :meth:`Ending.braked`.
 
         Outside [s0, s_end] the point is the end that was passed.
         """
@@ -134,11 +134,11 @@ class Controller(ABC):
         return self.ending.braked(self.task.at(np.minimum(np.maximum(s, self.task.s0), self.task.s_end)), s)
 
     def timed(self, s: Array) -> NDArray[np.bool_]:
-        """Where the plan σ̇ = ϑ(σ) must not wait for the arm: at the end of an open path, :class:`Ending`, (*batch,)."""
+        """Return where the plan follows σ̇ = ϑ(σ) without feedback, at the end of an open path, (*batch,)."""
         return np.zeros(s.shape, dtype=bool) if self.ending is None else s >= self.ending.begin
 
     def inside(self, s: Array, sdot: Array) -> Array:
-        """ṡ without the part that would leave an open path."""
+        """Return ṡ without the part that would leave an open path."""
         if self.task.closed:
             return sdot
         sdot = np.where(s >= self.task.s_end, np.minimum(sdot, 0.0), sdot)
@@ -146,11 +146,11 @@ class Controller(ABC):
 
     @property
     def compensated(self) -> Array:
-        """Viscous friction b̂ [N m s/rad] that the law compensates, (n,) or (N, n)."""
+        """The viscous friction b̂ [N m s/rad] that the law compensates, (n,) or (N, n)."""
         return np.zeros(self.robot.n) if self.friction == "none" else self._viscous
 
     def friction_torque(self, qd: Array, desired: Array | None = None) -> Array | float:
-        """f̂(q̇) [N m], the friction that the law compensates, (*batch, n).
+        """Return f̂(q̇) [N m], the friction that the law compensates, (*batch, n).
 
         Dry friction is compensated in the direction of motion, and where a joint rests, in that of its ``desired``
         velocity: else it would hold for ever an arm that is to start slowly.
@@ -165,7 +165,7 @@ class Controller(ABC):
 
 
 def _phi(x: Array) -> tuple[Array, Array]:
-    """φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x, by their series where x is small."""
+    """Return φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x, by their series where x is small."""
     small = np.abs(x) < 1e-3
     if not small.any():
         phi_1 = np.expm1(x) / x
@@ -192,12 +192,12 @@ def diagonal_gain(name: str, value: ArrayLike, n: int, joints: Sequence[str] | N
         InputError: it has another shape, is not positive, or is a matrix that is not diagonal.
     """
     given = value if joints is None else unlabelled(name, value, joints)
-    array = _without_matrix(name, finite(name, as_array(name, given)), n)
+    array = _diagonal_of_matrix(name, finite(name, as_array(name, given)), n)
     if array.ndim and array.shape[-1] not in (1, n):
         raise InputError(
             f"{name} has shape {array.shape}, expected a scalar, its diagonal ({n},) or a diagonal matrix ({n}, {n})"
         )
-    return _positive(name, array)
+    return _check_positive(name, array)
 
 
 def scalar_gain(name: str, value: ArrayLike) -> Array:
@@ -207,7 +207,7 @@ def scalar_gain(name: str, value: ArrayLike) -> Array:
         InputError: it has another shape, is not positive, or is a matrix other than kI.
     """
     array = finite(name, as_array(name, value))
-    array = _without_matrix(name, array, array.shape[-1] if array.ndim > 1 else 1)
+    array = _diagonal_of_matrix(name, array, array.shape[-1] if array.ndim > 1 else 1)
     if np.ndim(value) > 1 and array.ndim == 1 and (array == array[0]).all():
         array = array[:1]
     if array.ndim and array.shape[-1] != 1:
@@ -215,11 +215,11 @@ def scalar_gain(name: str, value: ArrayLike) -> Array:
             f"{name} = {np.asarray(value).tolist()}, expected a scalar: the Lyapunov function (42) is for one "
             f"gain; give one {name}, or weigh the joints with K_v"
         )
-    return _positive(name, array)
+    return _check_positive(name, array)
 
 
-def _without_matrix(name: str, array: Array, n: int) -> Array:
-    """``array`` with the diagonal in the place of a matrix (n, n), and (N, n) in that of (N, 1, n)."""
+def _diagonal_of_matrix(name: str, array: Array, n: int) -> Array:
+    """Return ``array`` with its diagonal in place of a matrix (n, n), and (N, n) in place of (N, 1, n)."""
     if array.ndim == 3 and array.shape[1:] == (1, n):
         return array[:, 0]
     if n < 2 or array.shape != (n, n) or not _is_matrix(array):
@@ -235,17 +235,19 @@ def _without_matrix(name: str, array: Array, n: int) -> Array:
 
 
 def _is_matrix(array: Array) -> bool:
-    """Whether a square array is one gain matrix, not a row of gains for each of n rollouts, which are never zero."""
+    """Tell a gain matrix (n, n) from the gains of n rollouts, one row each, which contain no zeros."""
     off = np.abs(array - np.diag(array.diagonal())).sum(-1)
     return bool((array == 0).any() or ((array == array.T).all() and (array.diagonal() > off).all()))
 
 
-def _positive(name: str, array: Array) -> Array:
+def _check_positive(name: str, array: Array) -> Array:
+    """Check that all gains are greater than 0; return them read-only."""
     if (array <= 0).any():
         raise InputError(f"{name} = {array.tolist()}, expected gains greater than 0")
     return readonly(array)
 
 
 def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    """Check that ``value`` is one of ``choices``."""
     if value not in choices:
         raise UnknownNameError(f"{name} = {value!r}, expected one of {', '.join(map(repr, choices))}")

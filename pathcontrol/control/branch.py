@@ -1,4 +1,4 @@
-"""Which branch of a path an arm belongs to, where the path crosses itself or passes close by itself."""
+"""The choice of the branch for the projection, where a path crosses itself or passes close by itself."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from pathcontrol.tasks.task import PathTask
 
 Branch = Literal["follow", "nearest", "local"]
 
-_NEARER = 0.5  # of the distance from the branch one is on
+_NEARER = 0.5  # share of the distance from the present branch within which another branch must lie
 
 
 @dataclass(frozen=True)
 class BranchPolicy:
-    """When the projection leaves the branch of the path that it is on.
+    """The rule by which the projection leaves the branch of the path that it is on.
 
     ``"local"``
         Never: σ̄ changes continuously with q as long as its branch has a nearest point, and else goes on downhill.
@@ -48,11 +48,13 @@ class BranchPolicy:
         object.__setattr__(self, "capture", scalar("capture", self.capture, positive=True))
 
     def sigma_bar(self, task: PathTask, q: Array, last: Array) -> Array:
-        """σ̄ (*batch,) for the arm at q (*batch, n), before it is asked whether it has been pushed away."""
-        return _in_lap(task, task.sigma_bar(q), last) if self.branch == "nearest" else task.sigma_bar(q, near=last)
+        """Return σ̄ (*batch,) for the arm at q (*batch, n), before a push to another branch is considered."""
+        return (
+            _shift_to_lap(task, task.sigma_bar(q), last) if self.branch == "nearest" else task.sigma_bar(q, near=last)
+        )
 
     def captured(self, task: PathTask, q: Array, s: Array, q_d: Array) -> Array:
-        """σ̄ on the branch that the arm has been pushed to; ``s``, with q_d = q_d(s), itself where there is none."""
+        """Return σ̄ on the branch that the arm was pushed to, or ``s``, with q_d = q_d(s), where there is none."""
         error = q_d - q
         # the first test is a quick one for all rollouts together
         if self.branch != "follow" or np.vdot(error, error) <= self.capture**2:
@@ -65,10 +67,10 @@ class BranchPolicy:
         other = there.sigma_bar(q[away])
         jumps = np.linalg.norm(there.q_d(other) - q[away], axis=-1) < _NEARER * distance[away]
         s = np.array(s)
-        s[away] = np.where(jumps, _in_lap(there, other, s[away]), s[away])
+        s[away] = np.where(jumps, _shift_to_lap(there, other, s[away]), s[away])
         return s
 
 
-def _in_lap(task: PathTask, s: Array, near: Array) -> Array:
-    """``s`` in the lap in which it is nearest to ``near``."""
+def _shift_to_lap(task: PathTask, s: Array, near: Array) -> Array:
+    """Return ``s`` in the lap in which it is nearest to ``near``."""
     return s if task.period is None else s + task.period * np.round((near - s) / task.period)

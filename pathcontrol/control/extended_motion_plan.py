@@ -1,4 +1,4 @@
-"""The first path controller: the path parameter's rate listens to the arm."""
+"""The first path controller: a motion plan whose rate has feedback from the arm."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pathcontrol.tasks.task import PathTask
 
 
 class ExtendedMotionPlan(Controller):
-    """Path control with the extended motion plan, eqs. (22) and (25), for any path.
+    """The extended motion plan, eqs. (22) and (25): a path controller for any path.
 
         σ̇ = ϑ(σ) − k e_pᵀq_d'(σ)
         τ = M(q)[r'(σ)σ̇ + K_v e_v + K_p e_p] + C(q,q̇)q̇ + g(q) + f̂(q̇),   r = q_d'ϑ
@@ -78,5 +78,5 @@ class ExtendedMotionPlan(Controller):
         return ControlOutput(tau, sdot[..., None], s, sdot, slope, drift, e_p, e_v, regular)
 
     def plan_gain(self, s: Array) -> Array:
-        """k(σ) [1/(rad² s)], (*batch,): ``k``, and 0 where the plan is timed."""
+        """Return k(σ) [1/(rad² s)], (*batch,): ``k``, and 0 where the plan is timed."""
         return self.k if self.ending is None else np.where(self.timed(s), 0.0, self.k)

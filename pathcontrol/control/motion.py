@@ -1,4 +1,4 @@
-"""Motion control: the task as the timed trajectory q_r(t) = q_d(s(t)) of its motion plan, eqs. (6) and (14)."""
+"""Motion control: the laws track the timed trajectory q_r(t) = q_d(s(t)) of the motion plan, eqs. (6) and (14)."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class Tracking(NamedTuple):
 
 
 class MotionController(Controller):
-    """A tracking law on the timed trajectory of the task. Its state is the plan's s; nothing of the arm slows it."""
+    """A tracking law on the timed trajectory of the task; its state is s, with no feedback from the arm."""
 
     @abstractmethod
     def torque(self, q: Array, qd: Array, ref: Tracking) -> Array:
-        """Torque [N m], (*batch, n), without the compensation of friction."""
+        """Return the torque [N m], (*batch, n), without the compensation of friction."""
 
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         s = z[..., 0]
@@ -43,7 +43,7 @@ class MotionController(Controller):
 
 
 class ProportionalDerivative(MotionController):
-    """A tracking law with a gain on q̃ and one on dq̃/dt; a subclass annotates them anew if their units are others.
+    """A tracking law with a gain on q̃ and one on dq̃/dt, in the units that its subclass states.
 
     Args:
         robot: the model the law uses.
@@ -66,7 +66,7 @@ class ProportionalDerivative(MotionController):
         )
 
     def correction(self, ref: Tracking) -> Array:
-        """K_v dq̃/dt + K_p q̃, (*batch, n)."""
+        """Return K_v dq̃/dt + K_p q̃, (*batch, n)."""
         return self.K_v * ref.velocity_error + self.K_p * ref.position_error
 
 

@@ -1,4 +1,4 @@
-"""The second path controller: the path parameter is that of the nearest point of the path."""
+"""The second path controller: its path parameter is that of the nearest point of the path."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from pathcontrol.tasks.task import PathTask
 
 # σ̄ is called irregular where dσ̄/dq exceeds this many times its value on the path
 _STEEPEST = 1e6
-# time constant [s] in which, in continuous time, the state comes to σ̄ where it was not
+# in continuous time: time constant [s] with which the state converges to σ̄ after it jumped
 _CATCH_UP = 1e-2
 
 
 class Projection(Controller):
-    """Path control by projection, eq. (39), for any path.
+    """Path control by projection, eq. (39): a path controller for any path.
 
         (q_d(σ̄) − q)ᵀq_d'(σ̄) = 0,    dσ̄/dt = q_d'ᵀq̇ / (‖q_d'‖² + e_pᵀq_d'')
         τ = M(q)[r'(σ̄)dσ̄/dt + K_v e_v + k_p e_p] + C(q,q̇)q̇ + g(q) + f̂(q̇),   r = q_d'ϑ
@@ -38,7 +38,7 @@ class Projection(Controller):
     Nothing here pulls along the path an arm that dry friction holds, so the end of an open path is reached by the
     timed plan σ̇ = ϑ(σ), once σ is where :class:`Ending` begins; V̇ is the same. There the arm is held by k_p.
 
-    The state is the last σ̄; it counts laps and tells branches apart. ``branch`` says when one is left for another.
+    The state is the last σ̄; it counts laps and tells branches apart. ``branch`` is the rule for leaving a branch.
 
     Args:
         robot: the model the law uses.
@@ -65,13 +65,13 @@ class Projection(Controller):
         **options: Any,
     ) -> None:
         # an open path may end close to where it begins, and an arm at its begin be nearer to the end
-        ends = np.all(np.isfinite(getattr(task, "s_end", np.inf)))  # what is no task is refused below
+        ends = np.all(np.isfinite(getattr(task, "s_end", np.inf)))  # the base class refuses what is no task
         super().__init__(robot, task, **({"start": "s0" if ends else "nearest"} | options))
         self.branches = BranchPolicy(branch, capture)
         self.k_p, self.K_v = scalar_gain("k_p", k_p), diagonal_gain("K_v", K_v, robot.n, robot.joint_names)
 
     def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
-        """State z, (*batch, 1): σ̄ of an arm that starts at (q, q̇), on the branch that ``start`` says."""
+        """Return the state z, (*batch, 1): σ̄ of an arm that starts at (q, q̇), on the branch that ``start`` names."""
         z = super().start(q, qd)
         q, qd = np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64)
         return self._project(q, np.broadcast_to(qd, q.shape), z[..., 0])[0][..., None]
@@ -88,7 +88,7 @@ class Projection(Controller):
         e_p, e_v = point.q_d - q, point.velocity - qd
         qdd = point.velocity_slope * sdot[..., None] + self.K_v * e_v + self.k_p * e_p
         tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd, point.velocity)
-        # in continuous time σ̄ is the state's own integral: what it is off by, as where a branch is left, dies away
+        # in continuous time the state integrates dσ̄/dt; its offset, as after a change of branch, decays exponentially
         zdot = sdot + np.where(regular, (s - last) / _CATCH_UP, 0.0)
         return ControlOutput(tau, zdot[..., None], s, sdot, slope, none, e_p, e_v, regular)
 
@@ -96,7 +96,7 @@ class Projection(Controller):
         return super().describe() | {"branch": self.branches.branch, "capture": self.branches.capture}
 
     def _project(self, q: Array, qd: Array, last: Array) -> tuple[Array, PathPoint, Array, Array]:
-        """σ̄, the task there, dσ̄/dt, and where they are defined."""
+        """Return σ̄, the task there, dσ̄/dt, and where these are defined."""
         s = self.branches.sigma_bar(self.task, q, last)
         point = self.point(s)
         if (elsewhere := self.branches.captured(self.task, q, s, point.q_d)) is not s:
@@ -112,7 +112,7 @@ class Projection(Controller):
         return s, point, sdot, regular
 
     def _held_by_end(self, s: Array, q: Array, point: PathPoint) -> Array:
-        """Where the nearest point of an open path is one of its ends, and stays there as the arm moves."""
+        """Return where the nearest point is an end of the open path and stays there as the arm moves."""
         if self.task.closed:
             return np.zeros(s.shape, dtype=bool)
         along = ((q - point.q_d) * point.dq_d).sum(-1)

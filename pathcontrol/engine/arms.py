@@ -1,4 +1,4 @@
-"""Arms made ready for the engine: their constants, compared with Pinocchio once."""
+"""The constants of arms as structs of the engine, compared with Pinocchio once."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from pathcontrol.errors import EngineError
 from pathcontrol.robot.constants import ArmConstants, arm_constants
 from pathcontrol.robot.model import RobotModel
 
-_STATES = 8  # random states at which the engine is compared with Pinocchio
-_CLOSE = 1e-11  # relative difference that is rounding
+_STATES = 8  # number of random states at which the engine is compared with Pinocchio
+_CLOSE = 1e-11  # relative difference that counts as rounding
 
 _READY: WeakKeyDictionary[RobotModel, Arm] = WeakKeyDictionary()
 
@@ -31,13 +31,13 @@ def arm_struct(robot: RobotModel) -> Arm:
     if known is None:
         if robot.n > MOST_JOINTS:
             raise EngineError(f"{robot.name} has {robot.n} joints, the compiled engine takes {MOST_JOINTS} at most")
-        known = filled_arm(arm_constants(robot))
+        known = fill_arm(arm_constants(robot))
         check_against_pinocchio(robot, known)
         _READY[robot] = known
     return known
 
 
-def filled_arm(constants: ArmConstants) -> Arm:
+def fill_arm(constants: ArmConstants) -> Arm:
     """Return constants as the struct of the engine."""
     arm = Arm(joints=len(constants.parent))
     for name in ("parent", "slides", "rotation", "origin", "mass", "moment", "inertia", "armature", "gravity"):
@@ -81,8 +81,8 @@ def mass_matrix(arm: Arm, q: Array) -> Array:
     return M
 
 
-def several_arms(robots: Sequence[RobotModel], index: Array | None, memory: Memory) -> Arms:
-    """Return arms of one structure for the engine, and which of them each rollout has (N,); None: all the first.
+def make_arms(robots: Sequence[RobotModel], index: Array | None, memory: Memory) -> Arms:
+    """Return arms of one structure for the engine, and the arm of each rollout (N,); None: the first for all.
 
     Raises:
         EngineError: their joints are joined in different ways.

@@ -53,18 +53,18 @@ class ControlTick:
 
     @property
     def s(self) -> float:
-        """Path parameter of the plan at the next call."""
+        """The path parameter of the plan at the next call."""
         return float(self._io[len(self._q) * 2])
 
     def start(self, q: ArrayLike, qd: ArrayLike | None = None) -> None:
-        """Begin anew with an arm at q [rad] and q̇ [rad/s], each (n,); default at rest."""
+        """Start again with an arm at q [rad] and q̇ [rad/s], each (n,); at rest by default."""
         n = self.law.robot.n
         position = joint_array("q", q, n)
         velocity = np.zeros(n) if qd is None else joint_array("qd", qd, n)
         self._io[2 * n] = self.law.start(position, velocity)[..., 0]
 
     def __call__(self, q: Array, qd: Array) -> Array:
-        """Return the torques [N m], (n,), for measured q [rad] and q̇ [rad/s], and take the plan one period on."""
+        """Return the torques [N m], (n,), for measured q [rad] and q̇ [rad/s]; advance the plan by a period."""
         self._q[:], self._qd[:] = q, qd
         self._function(*self._arguments)
         return self._tau

@@ -13,7 +13,7 @@ from pathcontrol.robot.friction import Coulomb, FrictionLaw, FrictionOfGroups, F
 
 
 class Coefficients(NamedTuple):
-    """f = b q̇ + F(q̇), F± = level± + Σ fall exp(−(q̇/velocity)²); each array is (n,) or (N, n).
+    """Coefficients of f = b q̇ + F(q̇), F± = level± + Σ fall exp(−(q̇/velocity)²); each array is (n,) or (N, n).
 
     Attributes:
         viscous: b [N m s/rad].
@@ -51,13 +51,14 @@ def coefficients_of(law: FrictionLaw) -> Coefficients:
     if type(law) is Stribeck:
         return Coefficients(zero, law.coulomb, law.coulomb, ((law.static - law.coulomb, law.velocity),))
     if type(law) is FrictionSum:
-        return _sum([coefficients_of(term) for term in law.terms])
+        return _add([coefficients_of(term) for term in law.terms])
     if type(law) is FrictionOfGroups:
-        return _grouped(law)
+        return _gather_groups(law)
     raise EngineError(f"the friction law {type(law).__name__} is not one of the library")
 
 
-def _sum(terms: list[Coefficients]) -> Coefficients:
+def _add(terms: list[Coefficients]) -> Coefficients:
+    """Add the coefficients of several laws."""
     falling = tuple(pair for term in terms for pair in term.falling)
     if len(falling) > MOST_STRIBECK:
         raise EngineError(f"the friction has {len(falling)} Stribeck terms, the engine takes {MOST_STRIBECK} at most")
@@ -69,8 +70,8 @@ def _sum(terms: list[Coefficients]) -> Coefficients:
     )
 
 
-def _grouped(law: FrictionOfGroups) -> Coefficients:
-    """Coefficients (N, n) of laws of different kinds; a law without a Stribeck term falls by 0."""
+def _gather_groups(law: FrictionOfGroups) -> Coefficients:
+    """Return the coefficients (N, n) of laws of different kinds; a law without a Stribeck term falls by 0."""
     parts = [(coefficients_of(part), rows) for part, rows in law.parts]
     shape, terms = (law.rows, law.n), max(len(part.falling) for part, _ in parts)
     falling = tuple((np.zeros(shape), np.ones(shape)) for _ in range(terms))

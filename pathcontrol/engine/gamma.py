@@ -1,4 +1,4 @@
-"""The distance of states to the curve Γ of a task by the engine, which follows the nearest point along a run."""
+"""The distance of states to the curve Γ of a task, by the engine, which follows the nearest point along a run."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from pathcontrol.engine.table import PathTable, bezier_points, task_table
 from pathcontrol.errors import EngineError
 from pathcontrol.tasks.task import PathTask
 
-_TURN = 1 / 8  # rad over a piece of a cell, which is taken to hold one minimum at most
+_TURN = 1 / 8  # rad; a piece of a cell that turns by no more is taken to hold at most one minimum
 _MOST_PIECES = 256
-_SAMPLES = 9  # of a cell, to see how Γ runs in it
-_LOOKS, _MOST_WORK = 16, 1 << 14  # points of Γ to look at, pieces that each may be compared with
-_CORNER = 1e-6  # of the largest ‖Γ'‖: a jump of Γ' that is a corner
+_SAMPLES = 9  # samples of Γ in a cell
+_LOOKS, _MOST_WORK = 16, 1 << 14  # probed points of Γ; allowed pieces to compare with each of them
+_CORNER = 1e-6  # a jump of Γ' by this share of the largest ‖Γ'‖ is a corner
 
 
-class _Ready(NamedTuple):
-    """A table with what the engine knows of its Γ, and the most pieces that a state on Γ has to be compared with."""
+class _TabulatedGamma(NamedTuple):
+    """A table with the engine's data of its Γ, and the most pieces that a state on Γ has to be compared with."""
 
     table: PathTable
     gamma: Gamma
@@ -33,7 +33,7 @@ class _Ready(NamedTuple):
     work: int
 
 
-_READY: KnownOf[PathTask, dict[tuple[float, bool], _Ready]] = KnownOf()
+_READY: KnownOf[PathTask, dict[tuple[float, bool], _TabulatedGamma]] = KnownOf()
 
 
 def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braking: bool) -> tuple[Array, Array]:
@@ -62,11 +62,13 @@ def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braki
         gamma = Gamma(addressof(memory.keep(path)), weight, braking)
         centre, radius = _balls(table, weight, braking)
         gamma.centre, gamma.radius = memory.address(centre), memory.address(radius)
-        shape = _shape(table, weight, braking)
+        shape = _measure_cells(table, weight, braking)
         gamma.pieces, gamma.smooth = memory.address(shape.pieces, np.int32), memory.address(shape.smooth, np.int32)
         gamma.length, gamma.straight = memory.address(shape.length), memory.address(shape.straight)
         memory.keep(kept)
-        known = ready[weight, braking] = _Ready(table, gamma, memory, _work(centre, radius, shape.pieces))
+        known = ready[weight, braking] = _TabulatedGamma(
+            table, gamma, memory, _count_candidates(centre, radius, shape.pieces)
+        )
     if known.work > _MOST_WORK:
         raise EngineError(f"{known.work} pieces of Γ may be nearest to a state on it, expected at most {_MOST_WORK}")
     *series, rows, joints = q.shape
@@ -78,14 +80,14 @@ def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braki
     return distance, s
 
 
-def _work(centre: Array, radius: Array, pieces: NDArray[np.int32]) -> int:
-    """The most pieces of Γ that may be nearest to one of some points of it, as far as the balls around cells tell."""
+def _count_candidates(centre: Array, radius: Array, pieces: NDArray[np.int32]) -> int:
+    """Return the most pieces of Γ that may be nearest to one of its points, judged by the balls around its cells."""
     away = (np.linalg.norm(centre - point, axis=-1) for point in centre[:: len(centre) // _LOOKS + 1])
     return max(int(pieces[d - radius <= (d + radius).min()].sum()) for d in away)
 
 
-def _velocity(table: PathTable) -> Array:
-    """r = q_d'ϑ as polynomials (K, 10, n) of s − knot, from the highest power down."""
+def _velocity_polynomials(table: PathTable) -> Array:
+    """Return r = q_d'ϑ as polynomials (K, 10, n) of s − knot, from the highest power down."""
     c = table.coefficients
     slope, rate = c[:, :-1, :-1] * np.arange(5, 0, -1)[:, None], c[..., -1]
     r = np.zeros((len(c), 10, slope.shape[-1]))
@@ -95,8 +97,14 @@ def _velocity(table: PathTable) -> Array:
 
 
 def _balls(table: PathTable, weight: float, braking: bool) -> tuple[Array, Array]:
-    """A ball around [q_d; w r] in each cell, centres (K, 2n) and radii (K,), by Bézier points, which enclose curves."""
-    q, r = bezier_points(table.knots, table.coefficients[..., :-1]), bezier_points(table.knots, _velocity(table))
+    """Return a ball around [q_d; w r] in each cell, centres (K, 2n) and radii (K,).
+
+    The hull of the Bézier points encloses the curve.
+    """
+    q, r = (
+        bezier_points(table.knots, table.coefficients[..., :-1]),
+        bezier_points(table.knots, _velocity_polynomials(table)),
+    )
     if braking and table.ending is not None:  # r times something between the shares at both ends
         left = (table.ending.s_end - table.knots) / table.ending.braking
         share = np.clip(left, 0.0, 1.0)[:, None, None]
@@ -110,13 +118,13 @@ def _balls(table: PathTable, weight: float, braking: bool) -> tuple[Array, Array
 
 
 class _Shape(NamedTuple):
-    """How Γ runs in each cell, (K,) each.
+    """The course of Γ in each cell, (K,) each.
 
     Attributes:
-        pieces: into how many a cell is cut so that Γ turns little over each.
-        length: of Γ.
-        straight: ‖Γ'‖²/‖Γ''‖ at least, the distance from a state up to which its square is a convex function of s.
-        smooth: whether Γ' does not jump where the cell begins.
+        pieces: number of pieces to cut the cell into, so that Γ turns little over each.
+        length: length of Γ in the cell.
+        straight: lower bound of ‖Γ'‖²/‖Γ''‖: up to this distance of a state its square is a convex function of s.
+        smooth: True where Γ' is continuous at the beginning of the cell.
     """
 
     pieces: NDArray[np.int32]
@@ -125,8 +133,8 @@ class _Shape(NamedTuple):
     smooth: NDArray[np.bool_]
 
 
-def _shape(table: PathTable, weight: float, braking: bool) -> _Shape:
-    """What is seen of Γ at some samples of each cell, with a tenth in hand."""
+def _measure_cells(table: PathTable, weight: float, braking: bool) -> _Shape:
+    """Estimate the course of Γ from samples of each cell, with a margin of a tenth."""
     width = np.diff(table.knots)
     tangent, bend = _derivatives(table, weight, braking, np.linspace(0.0, 1.0, _SAMPLES)[:, None] * width)
     speed, curvature = (np.linalg.norm(values, axis=-1) for values in (tangent, bend))
@@ -136,7 +144,7 @@ def _shape(table: PathTable, weight: float, braking: bool) -> _Shape:
     turn = 2 * np.arcsin(np.minimum(chord / 2, 1.0)).sum(0)
     straight = 0.9 * speed.min(0) ** 2 / np.maximum(1.1 * curvature.max(0), tiny)
     jump = np.linalg.norm(tangent[0] - np.roll(tangent[-1], 1, axis=0), axis=-1)
-    if braking and table.ending is not None:  # there Γ has a corner inside a cell
+    if braking and table.ending is not None:  # where braking begins, Γ has a corner inside a cell
         begin = table.ending.s_end - table.ending.braking
         straight = np.where((table.knots[:-1] <= begin) & (begin <= table.knots[1:]), 0.0, straight)
     return _Shape(
@@ -148,8 +156,8 @@ def _shape(table: PathTable, weight: float, braking: bool) -> _Shape:
 
 
 def _derivatives(table: PathTable, weight: float, braking: bool, x: Array) -> tuple[Array, Array]:
-    """Γ' and Γ'' at s − knot = x (m, K), (m, K, 2n) each."""
-    q, r = table.coefficients[..., :-1], _velocity(table)
+    """Return Γ' and Γ'' at s − knot = x (m, K), (m, K, 2n) each."""
+    q, r = table.coefficients[..., :-1], _velocity_polynomials(table)
     (_, dq, ddq), (velocity, dr, ddr) = (_jet(polynomials, x) for polynomials in (q, r))
     if braking and table.ending is not None:
         left = (table.ending.s_end - table.knots[:-1] - x) / table.ending.braking
@@ -159,7 +167,7 @@ def _derivatives(table: PathTable, weight: float, braking: bool, x: Array) -> tu
 
 
 def _jet(polynomials: Array, x: Array) -> tuple[Array, Array, Array]:
-    """Value, first and second derivative of polynomials (K, d + 1, n), from the highest power down, at x (m, K)."""
+    """Return value and two derivatives of polynomials (K, d + 1, n), from the highest power down, at x (m, K)."""
     value, slope, bend = np.zeros((3, *x.shape, polynomials.shape[-1]))
     for coefficient in np.moveaxis(polynomials, 1, 0):
         bend = bend * x[..., None] + 2 * slope

@@ -1,4 +1,4 @@
-"""The compiled library: found, loaded once and checked against the structs that Python fills."""
+"""The compiled library: it is found, loaded once and checked against the structs that Python fills."""
 
 from __future__ import annotations
 
@@ -37,10 +37,12 @@ def lanes(library: CDLL) -> int:
 
 
 def _file(build: str) -> Path:
+    """Return the path of a build of the library."""
     return _FOLDER / f"engine_{build}.so"
 
 
 def _open(build: str) -> CDLL:
+    """Load a build and check the sizes of its structs."""
     path = _file(build)
     if not path.exists():
         raise EngineError(
@@ -66,7 +68,7 @@ def _open(build: str) -> CDLL:
 
 
 def _declare(library: CDLL) -> None:
-    """Set argument types, so that a wrong argument is an error of Python's."""
+    """Set argument types, so that a wrong argument is an error in Python."""
     array = c_void_p
     library.pathcontrol_run.restype = c_longlong
     library.pathcontrol_run.argtypes = [c_void_p] * 3 + [array, c_void_p, c_longlong, c_longlong]

@@ -1,4 +1,4 @@
-"""The settings of a run for the engine, or the reason why it cannot be compiled."""
+"""The settings of a run as a struct of the engine, or the reason why the run cannot be compiled."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
-from pathcontrol.engine.arms import several_arms
+from pathcontrol.engine.arms import make_arms
 from pathcontrol.engine.friction import coefficients_of
 from pathcontrol.engine.structs import Memory, Path, Rows, Setup
-from pathcontrol.engine.table import path_struct, same_projection
+from pathcontrol.engine.table import has_same_projection, path_struct
 from pathcontrol.errors import EngineError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
@@ -51,17 +51,18 @@ def add_law(setup: Setup, controller: Controller, memory: Memory) -> None:
     setup.plan_gain = memory.numbers(getattr(controller, "k", 0.0))
     if isinstance(controller, Projection):
         setup.branch, setup.capture = _BRANCHES.index(controller.branches.branch), controller.branches.capture
-    setup.law_arms = several_arms([controller.robot], None, memory)
+    setup.law_arms = make_arms([controller.robot], None, memory)
     setup.law_friction = coefficients_of(controller.robot.friction).rows(n, memory)
     _add_paths(setup, controller.task, isinstance(controller, Projection), memory)
 
 
 def _add_paths(setup: Setup, task: PathTask, projected: bool, memory: Memory) -> None:
-    tasks, index = _distinct(task)
+    """Set the tables of the tasks, and the one that each rollout has."""
+    tasks, index = _find_distinct(task)
     paths = []
     for one in tasks:
         path, kept = path_struct(one)
-        if projected and not same_projection(one, path):
+        if projected and not has_same_projection(one, path):
             raise EngineError(f"{type(one).__name__}.sigma_bar is not the nearest point of its path")
         memory.keep(kept)
         paths.append(path)
@@ -69,8 +70,8 @@ def _add_paths(setup: Setup, task: PathTask, projected: bool, memory: Memory) ->
     setup.path_index = None if index is None else memory.address(index, np.int32)
 
 
-def _distinct(task: PathTask) -> tuple[list[PathTask], NDArray[np.intp] | None]:
-    """The different tasks of all rollouts, and which each has; None: there is one."""
+def _find_distinct(task: PathTask) -> tuple[list[PathTask], NDArray[np.intp] | None]:
+    """Return the different tasks of all rollouts, and the index of each rollout's task; None if there is one."""
     if not isinstance(task, TaskBatch):
         return [task], None
     found: dict[int, int] = {}
@@ -87,17 +88,17 @@ def _distinct(task: PathTask) -> tuple[list[PathTask], NDArray[np.intp] | None]:
 def add_plant(setup: Setup, robot: RobotModel | RobotBatch, damped: Array, memory: Memory) -> None:
     """Set the simulated arm, or one for each rollout, with its friction.
 
-    ``damped`` (N,) or (1,) says whose viscous friction is strong, see :func:`has_strong_friction`.
+    ``damped`` (N,) or (1,) marks arms with strong viscous friction, see :func:`has_strong_friction`.
 
     Raises:
         EngineError: an arm or its friction is beyond the engine.
     """
     bodies, index = (list(robot.bodies), robot.body) if isinstance(robot, RobotBatch) else ([robot], None)
-    setup.plant_arms = several_arms(bodies, index, memory)
+    setup.plant_arms = make_arms(bodies, index, memory)
     setup.plant_friction = coefficients_of(robot.friction).rows(robot.n, memory)
     setup.damped = memory.numbers(damped)
 
 
 def rows_or_none(values: Array | None, n: int, memory: Memory) -> Rows:
-    """Return values of the joints of each rollout, or rows of nothing."""
+    """Return values of the joints of each rollout, or empty rows."""
     return Rows(None, 0) if values is None else memory.rows(values, n)

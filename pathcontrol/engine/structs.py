@@ -1,4 +1,4 @@
-"""The structs of ``src/setup.hpp``, ``arm.hpp`` and ``path.hpp``, field by field, and how arrays are put into them."""
+"""The structs of ``src/setup.hpp``, ``arm.hpp`` and ``path.hpp``, field by field, and helpers to fill them."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ class Path(Structure):
 
 
 class Rows(Structure):
-    """Values of each rollout, with the distance from one to the next; 0: the same for all."""
+    """One row of values for each rollout, with the distance from one row to the next; 0: the same row for all."""
 
     _fields_ = [("data", _Doubles), ("stride", c_longlong)]
 
 
 class FrictionRows(Structure):
-    """Coefficients of friction of each rollout."""
+    """Friction coefficients of each rollout."""
 
     _fields_ = [
         ("viscous", Rows),
@@ -61,7 +61,7 @@ class FrictionRows(Structure):
 
 
 class Arms(Structure):
-    """Several arms, and which one each rollout has."""
+    """Several arms, and the index of the arm that each rollout has."""
 
     _fields_ = [("arms", c_void_p), ("index", c_void_p)]
 
@@ -121,7 +121,7 @@ class Record(Structure):
 
 
 class Span(Structure):
-    """Which ticks a call takes."""
+    """The ticks that one call takes."""
 
     _fields_ = [
         *((name, c_longlong) for name in ("law_tick", "arm_tick", "ticks", "rollouts")),
@@ -131,7 +131,7 @@ class Span(Structure):
 
 
 class Gamma(Structure):
-    """The curve Γ of a task, with what bounds it."""
+    """The curve Γ of a task, with its bounds."""
 
     _fields_ = [
         ("path", c_void_p),
@@ -146,12 +146,12 @@ class Gamma(Structure):
     ]
 
 
-#: what ``pathcontrol_layout`` says, in its order, but for the number of lanes
+#: the structs whose sizes ``pathcontrol_layout`` returns, in its order
 LAYOUT = (Arm, Path, Disturbance, Setup, State, Record, Span, Gamma)
 
 
 class Memory:
-    """Arrays and structs that C++ has addresses of, kept alive together."""
+    """Arrays and structs whose addresses C++ holds, kept alive together."""
 
     def __init__(self) -> None:
         self._kept: list[Any] = []
@@ -166,7 +166,7 @@ class Memory:
         return self.keep(np.ascontiguousarray(array, dtype=dtype)).ctypes.data
 
     def rows(self, values: Any, columns: int) -> Rows:
-        """Return values (), (columns,), (N, 1) or (N, columns) as rows of so many columns."""
+        """Return values (), (columns,), (N, 1) or (N, columns) as rows of ``columns`` numbers."""
         array = np.asarray(values, dtype=np.float64)
         several = array.ndim > 1 and len(array) > 1
         wide = np.broadcast_to(array, (len(array) if several else 1, columns))

@@ -1,4 +1,4 @@
-"""A task as a table of quintic pieces of q_d(s) and ϑ(s): the one kind of path that the compiled engine knows."""
+"""A task as a table of quintic pieces of q_d(s) and ϑ(s), the only form of path that the compiled engine takes."""
 
 from __future__ import annotations
 
@@ -21,14 +21,16 @@ from pathcontrol.tasks.profile import ConstantRate
 from pathcontrol.tasks.recorded import RecordedPath
 from pathcontrol.tasks.task import PathTask
 
-_NODES = 0.5 - 0.5 * np.cos(np.pi * (2 * np.arange(6) + 1) / 12)  # of a cell, where ϑ is met
-_PROBES = np.array([0.15, 0.5, 0.85])  # of a cell, where table and task are compared
-_VALUE, _SLOPE = 1e-11, 1e-9  # allowed differences, of the extent of q_d or the largest ϑ, and of the largest slopes
-_RATE, _RATE_SLOPE = 1e-13, 1e-11  # the same of ϑ and ϑ' where cells are halved: ϑ moves the arm at once
+_NODES = 0.5 - 0.5 * np.cos(np.pi * (2 * np.arange(6) + 1) / 12)  # places in a cell at which ϑ is interpolated
+_PROBES = np.array([0.15, 0.5, 0.85])  # places in a cell at which table and task are compared
+# allowed differences, as shares of the extent of q_d or the largest ϑ, and of the largest slopes
+_VALUE, _SLOPE = 1e-11, 1e-9
+# the same for ϑ and ϑ' where cells are halved; they are tighter, as ϑ acts on the arm at once
+_RATE, _RATE_SLOPE = 1e-13, 1e-11
 _ROUNDING = 64 * np.finfo(np.float64).eps
 _HALVINGS, _MOST_CELLS = 40, 1 << 16
 _DEGREE = 5
-_PLACES = np.modf((5**0.5 - 1) / 2 * np.arange(1, 65))[0]  # of the domain, spread evenly
+_PLACES = np.modf((5**0.5 - 1) / 2 * np.arange(1, 65))[0]  # places in the domain, as shares, evenly spread
 
 
 class PathTable(NamedTuple):
@@ -75,7 +77,7 @@ _TABLES: KnownOf[PathTask, tuple[PathTable, Path, Memory]] = KnownOf()
 
 
 def path_struct(task: PathTask) -> tuple[Path, Memory]:
-    """Return the table of ``task`` as the engine takes it, with what its arrays are kept alive by.
+    """Return the table of ``task`` as struct of the engine, with the memory that keeps its arrays alive.
 
     Raises:
         EngineError: the path goes on for ever without repeating, or is not smooth enough for a table.
@@ -84,13 +86,13 @@ def path_struct(task: PathTask) -> tuple[Path, Memory]:
 
 
 def task_table(task: PathTask) -> tuple[PathTable, Path, Memory]:
-    """Return the table of ``task``, also as the engine takes it; made once, and looked at again as tasks may change.
+    """Return the table of ``task`` and its struct; it is made once, and checked again, as tasks may change.
 
     Raises:
         EngineError: the path goes on for ever without repeating, or is not smooth enough for a table.
     """
     known = _TABLES.get(task)
-    if known is None or not _is_like(known[0], task):
+    if known is None or not _agrees(known[0], task):
         table, memory = make_table(task), Memory()
         known = _TABLES.keep(task, (table, table.struct(memory), memory))
     return known
@@ -109,47 +111,47 @@ def make_table(task: PathTask) -> PathTable:
         recorded = RecordedPath.of(task, ConstantRate(1.0))
     except Exception as error:  # code of the user, which need not answer everywhere
         raise EngineError(f"{name} cannot be tabulated: {error}") from error
-    samples = recorded.samples if task.knots is not None else _halved(recorded.samples)
-    knots = _refined(task, _with_corners(task, samples))
+    samples = recorded.samples if task.knots is not None else _halve(recorded.samples)
+    knots = _refine(task, _add_corners(task, samples))
     jets = recorded.jets if np.array_equal(knots, recorded.samples) else _jets(task, knots)
     rate = _rate_pieces(task, knots[:-1], knots[1:])
     coefficients = np.concatenate([hermite.coefficients(knots, jets), rate[..., None]], axis=-1)
     ending = Ending.of(task)
     arrival = np.inf if task.closed else arrival_parameter(task)
     table = PathTable(knots, np.moveaxis(coefficients, 0, 1), task.closed, ending, arrival)
-    if not _is_like(table, task):
+    if not _agrees(table, task):
         raise EngineError(
             f"{name} is not smooth enough for a table of quintics: q_d must have two derivatives that fit"
         )
     return table
 
 
-def same_projection(task: PathTask, path: Path) -> bool:
-    """Return whether σ̄ of a task, where its class says it, is the nearest point of its table near by the path."""
+def has_same_projection(task: PathTask, path: Path) -> bool:
+    """Check that σ̄ of a task whose class defines it is the nearest point of the task's table, close to the path."""
     if type(task).sigma_bar is PathTask.sigma_bar:
         return True
     s = path.s0 + (path.s_end - path.s0) * np.array([0.13, 0.38, 0.61, 0.87])
     q_d, aside = task.q_d(s), np.roll(task.dq_d(s), 1, axis=-1)
     aside /= np.maximum(np.linalg.norm(aside, axis=-1, keepdims=True), 1e-12)
-    q = np.ascontiguousarray(q_d + 1e-2 * np.ptp(q_d) * aside)  # beside the path, by a hundredth of its size
+    q = np.ascontiguousarray(q_d + 1e-2 * np.ptp(q_d) * aside)  # beside the path, at a hundredth of its size
     found = np.empty(len(s))
     load_library().pathcontrol_nearest(addressof(path), len(s), q.ctypes.data, s.ctypes.data, found.ctypes.data)
     return bool(np.allclose(task.sigma_bar(q, near=s), found, rtol=0, atol=1e-7 * (path.s_end - path.s0)))
 
 
 def _jets(task: PathTask, s: Array) -> Array:
-    """q_d, q_d' and q_d'' at s (m,), (3, m, n)."""
+    """Return q_d, q_d' and q_d'' at s (m,), (3, m, n)."""
     return np.stack([task.q_d(s), task.dq_d(s), task.ddq_d(s)])
 
 
 def _theta(task: PathTask, s: Array) -> tuple[Array, Array]:
-    """ϑ and ϑ' at s, each of the shape of s."""
+    """Return ϑ and ϑ' at s, each of the shape of s."""
     zero = np.zeros_like(s)
     return task.theta(s) + zero, task.dtheta(s) + zero
 
 
 def _rate_pieces(task: PathTask, left: Array, right: Array) -> Array:
-    """Quintics (6, K) that meet ϑ at the Chebyshev nodes of the cells from ``left`` to ``right``, (K,) each."""
+    """Return quintics (6, K) that interpolate ϑ at the Chebyshev nodes of the cells [left, right], (K,) each."""
     width = right - left
     s = left + _NODES[:, None] * width
     theta = _theta(task, s.reshape(-1))[0].reshape(s.shape)
@@ -157,8 +159,8 @@ def _rate_pieces(task: PathTask, left: Array, right: Array) -> Array:
     return np.linalg.solve(_NODES[:, None] ** powers, theta) / width ** powers[:, None]
 
 
-def _with_corners(task: PathTask, knots: Array) -> Array:
-    """``knots`` and those of the profile, where ϑ' may jump, in the first lap of a closed path."""
+def _add_corners(task: PathTask, knots: Array) -> Array:
+    """Add the knots of the profile, where ϑ' may jump, in the first lap of a closed path."""
     if task.profile_knots is None:
         return knots
     lower, upper = knots[0], knots[-1]
@@ -170,61 +172,63 @@ def _with_corners(task: PathTask, knots: Array) -> Array:
     return np.append(every[:-1][apart], upper)
 
 
-def _halved(knots: Array) -> Array:
-    """``knots`` with one more in the middle of each cell: q_d'' of a smooth path is 16 times closer then."""
+def _halve(knots: Array) -> Array:
+    """Add a knot in the middle of each cell: q_d'' of a smooth path is then 16 times closer."""
     return np.sort(np.concatenate([knots, 0.5 * (knots[1:] + knots[:-1])]))
 
 
-def _refined(task: PathTask, knots: Array) -> Array:
-    """``knots`` with cells halved until quintics follow ϑ in them, within shares of the largest ϑ and |ϑ'|."""
+def _refine(task: PathTask, knots: Array) -> Array:
+    """Halve cells until quintics follow ϑ in them, within shares of the largest ϑ and |ϑ'|."""
     theta, slope = _theta(task, 0.5 * (knots[1:] + knots[:-1]))
     largest = np.abs(theta).max()
     scale = largest, max(np.abs(slope).max(), largest / (knots[-1] - knots[0]))
-    coarse, most = _coarse(task, knots, np.arange(len(knots) - 1), *scale), len(knots) + _MOST_CELLS
+    coarse, most = _find_coarse(task, knots, np.arange(len(knots) - 1), *scale), len(knots) + _MOST_CELLS
     for _ in range(_HALVINGS):
         if not coarse.size or len(knots) + len(coarse) > most:
             break
         knots = np.insert(knots, coarse + 1, 0.5 * (knots[coarse] + knots[coarse + 1]))
         halves = coarse + np.arange(len(coarse))
-        coarse = _coarse(task, knots, np.sort(np.concatenate([halves, halves + 1])), *scale)
+        coarse = _find_coarse(task, knots, np.sort(np.concatenate([halves, halves + 1])), *scale)
     return knots
 
 
-def _coarse(task: PathTask, knots: Array, cells: NDArray[np.intp], largest: float, steepest: float) -> NDArray[np.intp]:
-    """Those of the ``cells`` in which ϑ and its quintic differ too much."""
+def _find_coarse(
+    task: PathTask, knots: Array, cells: NDArray[np.intp], largest: float, steepest: float
+) -> NDArray[np.intp]:
+    """Return those of the ``cells`` in which ϑ and its quintic differ too much."""
     left, right = knots[cells], knots[cells + 1]
     x = _PROBES[:, None] * (right - left)
     theta, slope = (part.reshape(x.shape) for part in _theta(task, (left + x).reshape(-1)))
     value, rise = horner(_rate_pieces(task, left, right)[:, None], x)
     local = np.abs(slope).max(0, initial=0.0)
-    # what is asked for cannot be less than what ϑ changes by in the rounding of s
+    # the tolerance cannot be less than the change of ϑ over the rounding of s
     rounding = _ROUNDING * (largest + local * np.abs(right))
     apart = np.abs(value - theta).max(0, initial=0.0) > _RATE * largest + rounding
     bent = np.abs(rise - slope).max(0, initial=0.0) > _RATE_SLOPE * (steepest + local) + 8 * rounding / (right - left)
     return cells[apart | bent]
 
 
-def _is_like(table: PathTable, task: PathTask) -> bool:
-    """Whether table and task agree at places spread over the domain."""
+def _agrees(table: PathTable, task: PathTask) -> bool:
+    """Return whether table and task agree at places spread over the domain."""
     domain = (task.s0, task.s_end if task.period is None else task.s0 + task.period)
     if (table.knots[0], table.knots[-1], table.closed) != (*domain, task.closed):
         return False
     s = domain[0] + (domain[1] - domain[0]) * _PLACES
-    found, expected = table.evaluate(s), _row(task, s)
+    found, expected = table.evaluate(s), _evaluate_task(task, s)
     if found[0].shape != expected[0].shape:
         return False
     extent, steepest = np.ptp(expected[0], axis=0), np.abs(expected[1]).max(0)
     extent[:-1], steepest[:-1] = extent[:-1].max(), steepest[:-1].max()
     extent[-1] = expected[0][:, -1].max()
-    steepest[-1] = max(steepest[-1], extent[-1] / (domain[1] - domain[0]))  # what ϑ' is less than that does not count
+    steepest[-1] = max(steepest[-1], extent[-1] / (domain[1] - domain[0]))  # smaller ϑ' do not count
     rounding = _ROUNDING * np.abs(expected[0]).max()
     close = np.abs(found[0] - expected[0]) <= 2 * _VALUE * extent + rounding
     along = np.abs(found[1] - expected[1]) <= 4 * _SLOPE * steepest + rounding / np.median(np.diff(table.knots)) + 1e-12
     return bool(close.all() and along.all())
 
 
-def _row(task: PathTask, s: Array) -> tuple[Array, Array]:
-    """Values and slopes (m, n + 1) of q_d, and of ϑ last, at s (m,)."""
+def _evaluate_task(task: PathTask, s: Array) -> tuple[Array, Array]:
+    """Return values and slopes (m, n + 1) of q_d, and of ϑ in the last column, at s (m,)."""
     theta, dtheta = _theta(task, s)
     return np.column_stack([task.q_d(s), theta]), np.column_stack([task.dq_d(s), dtheta])
 
@@ -239,7 +243,7 @@ def bezier_points(knots: Array, coefficients: Array) -> Array:
 
 
 def _balls(knots: Array, coefficients: Array) -> tuple[Array, Array]:
-    """A ball around each piece of q_d, centres (K, n) and radii (K,)."""
+    """Return a ball around each piece of q_d, centres (K, n) and radii (K,)."""
     points = bezier_points(knots, coefficients)
     centre = 0.5 * (points.min(1) + points.max(1))
     return centre, np.linalg.norm(points - centre[:, None], axis=-1).max(1) * (1 + 1e-12)

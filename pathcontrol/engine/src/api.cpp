@@ -4,7 +4,7 @@
 
 #define EXPORT extern "C" __attribute__((visibility("default")))
 
-// Which size is known to the compiler: that of the common arms. ONE_SIZE leaves these out, to compile fast.
+// Choose a kernel whose size the compiler knows, for common arms. ONE_SIZE leaves these out, to compile fast.
 template <class V, class C>
 static integer run_sized(const Setup &setup, const State &state, const Record &record, const double *noise, const Span &span, integer begin, integer end) {
   switch (setup.joints) {
@@ -17,7 +17,7 @@ static integer run_sized(const Setup &setup, const State &state, const Record &r
   }
 }
 
-// Run rollouts begin … end over a span of ticks; return how many samples were recorded of the last pack.
+// Run rollouts begin … end over a span of ticks; return the number of samples recorded by the last pack.
 EXPORT integer pathcontrol_run(const Setup *setup, const State *state, const Record *record, const double *noise, const Span *span, integer begin, integer end) {
   if (end - begin == 1) return run_sized<double, double>(*setup, *state, *record, noise, *span, begin, end);
   if (setup->law_arms.index || setup->plant_arms.index) return run_sized<pack, pack>(*setup, *state, *record, noise, *span, begin, end);
@@ -103,7 +103,7 @@ EXPORT integer pathcontrol_layout(int which) {
   const integer sizes[] = {sizeof(Arm<double>), sizeof(Path), sizeof(Disturbance), sizeof(Setup), sizeof(State), sizeof(Record), sizeof(Span), sizeof(Gamma), MOST_JOINTS, MOST_STRIBECK, LANES};
   return which >= 0 && which < (int)(sizeof(sizes) / sizeof(sizes[0])) ? sizes[which] : -1;
 }
-// Which instruction sets this processor has: 2 for AVX-512, 1 for AVX2, else 0.
+// The instruction set of this processor: 2 for AVX-512, 1 for AVX2, else 0.
 EXPORT int pathcontrol_instructions() {
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")) return 2;

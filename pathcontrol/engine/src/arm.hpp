@@ -21,7 +21,7 @@ template <class C> struct Arm {
   double gravity[3];                // [m/s²]
 };
 
-// What the algorithms know of a body at one configuration, in its own frame.
+// The quantities of a body at one configuration, in its own frame.
 template <class V> struct Body {
   V R[9], p[3];
   V w[3], dw[3], a[3];              // angular velocity, angular acceleration, acceleration of the origin less gravity
@@ -29,7 +29,7 @@ template <class V> struct Body {
   V m, h[3], I[6];                  // composite mass, moment and inertia
 };
 
-// Sizes known to the compiler where N > 0.
+// Sizes that the compiler knows where N > 0.
 template <int N> constexpr int room() { return N ? N : MOST_JOINTS; }
 template <int N> ALWAYS_INLINE int size(int joints) { return N ? N : joints; }
 
@@ -77,7 +77,7 @@ template <int N, class V, class C> static NOINLINE void place(const Arm<C> &arm,
   }
 }
 
-// What RNEA takes into account.
+// The terms of the dynamics that RNEA computes.
 enum Terms { ALL_TERMS, WITHOUT_ACCELERATION, CENTRIPETAL_ONLY };
 
 // τ = M(q)q̈ + C(q,q̇)q̇ + g(q) by the recursive Newton–Euler algorithm, after place(); q̈ = 0 WITHOUT_ACCELERATION, and gravity
@@ -180,7 +180,7 @@ static NOINLINE void mass_matrix(const Arm<C> &arm, Body<V> *bodies, V (*M)[room
   }
 }
 
-// A symmetric positive definite M as L D Lᵀ, and x = M⁻¹ b by it.
+// The factors L D Lᵀ of a symmetric positive definite M, and x = M⁻¹ b by them.
 template <int N, class V> struct Factors { V L[room<N>()][room<N>()], D[room<N>()], inverse[room<N>()]; };
 
 template <int N, class V> static NOINLINE void factorise(int joints, V (*M)[room<N>()], Factors<N, V> &F) {

@@ -7,7 +7,7 @@ constexpr int MOST_STRIBECK = 4;
 // Friction of the joints, f = b q̇ + F(q̇) with levels F± = level± + Σ_j fall_j exp(−(q̇/v_j)²); all per joint.
 template <class V> struct Friction {
   V viscous[MOST_JOINTS], forward[MOST_JOINTS], backward[MOST_JOINTS];  // backward ≥ 0 holds against q̇ < 0
-  int stribeck;                                                         // how many terms that fall with velocity
+  int stribeck;                                                         // number of terms that fall with velocity
   V fall[MOST_STRIBECK][MOST_JOINTS], velocity[MOST_STRIBECK][MOST_JOINTS];
 };
 

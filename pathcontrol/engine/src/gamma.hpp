@@ -1,6 +1,6 @@
 // The distance of states to the curve Γ of a task, [q_d(s); w q_d'(s)ϑ(s)], sample after sample of a run.
 //
-// The nearest point of all is searched for in the cells of the table whose ball, a bound on where Γ is, may hold it. From there
+// The global nearest point is searched for in the cells of the table whose ball, which encloses Γ, may hold it. From there
 // it is followed from sample to sample by Newton's method within a *reach* of cells around it: over these the distance to the
 // state is a convex function of s, so that they hold one minimum, and all others are farther than it by a gap. A distance
 // changes by no more than the state moves, so both hold until the state has moved by that gap. Then the reach is laid anew
@@ -14,9 +14,9 @@ struct Gamma {
   int brakes;                     // take ϑ with the ending of the controllers' plan
   const double *centre, *radius;  // (cells, 2 joints) and (cells,): a ball around Γ in each cell
   const int *pieces;              // (cells,): parts of a cell over which Γ turns little
-  const double *length;           // (cells,): of Γ in a cell
+  const double *length;           // (cells,): length of Γ in a cell
   const double *straight;         // (cells,): up to this distance from Γ, along a cell, the distance is convex
-  const int *smooth;              // (cells,): whether Γ' does not jump where the cell begins
+  const int *smooth;              // (cells,): 1 where Γ' is continuous at the beginning of the cell
 };
 
 // Distance² of a state x = [q; w q̇] to Γ at s, and the slope of half of it.
@@ -80,7 +80,7 @@ static inline void search_cell(const Gamma &gamma, int cell, const double *x, Ne
     low = s, before = here;
   }
 }
-// The nearest point of all, among the cells whose balls may hold it.
+// The global nearest point, searched for in the cells whose balls may hold it.
 static inline Nearest search_all(const Gamma &gamma, const double *x, Buffer<double> &bounds) {
   const int cells = gamma.path->cells;
   double farthest = INFINITY;
@@ -94,11 +94,11 @@ static inline Nearest search_all(const Gamma &gamma, const double *x, Buffer<dou
   return best;
 }
 
-// Where the nearest point may be followed: s from `low` to `high`, counted on over laps; Γ elsewhere is as far as `others` at least,
-// which is negative where there is no such stretch.
+// The reach within which the nearest point may be followed: s from `low` to `high`, counted on over laps. Γ outside it is at least
+// as far away as `others`, which is negative where there is no reach.
 struct Reach {
   double low, high, others;
-  bool holds(const Path &path, double s) const {  // a minimum at an end of the reach is none of Γ, but for an end of Γ
+  bool holds(const Path &path, double s) const {  // a minimum at an end of the reach is a minimum of Γ only at an end of Γ
     return (s > low || (s == low && !path.closed && low == path.s0)) && (s < high || (s == high && !path.closed && high == path.s_end));
   }
 };
@@ -138,12 +138,12 @@ template <int N> static inline GammaShape gamma_shape(const Gamma &gamma, double
   }
   return d;
 }
-// Cells around `best` over which the distance is convex, as long as the state has moved by less than all others are farther.
+// Cells around `best` over which the distance is convex, valid until the state has moved by the gap to all other cells.
 static inline Reach reach_around(const Gamma &gamma, const double *x, const Nearest &best, Buffer<double> &bounds) {
   const Path &path = *gamma.path;
   const int cells = path.cells, here = cell_of(path, path.closed ? in_first_lap(path, best.s) : best.s);
   const double away = sqrt(best.square);
-  int before = 0, after = 0;  // how many cells on either side
+  int before = 0, after = 0;  // number of cells on either side
   double behind = gamma.length[here], ahead = gamma.length[here], straight = gamma.straight[here];
   // a point of the reach is no farther from a state than that may be when it leaves the reach, plus the way along the reach
   if (!(away + 3 * gamma.length[here] < straight)) return {0, 0, -1};
@@ -170,7 +170,7 @@ static inline Reach reach_around(const Gamma &gamma, const double *x, const Near
   };
   return {knot(here - before), knot(here + after + 1), away < others ? others : -1};
 }
-// The minimum in a reach, from a guess by Newton's method; NaN where that does not get there.
+// The minimum in a reach by Newton's method from a guess; NaN where the method does not converge.
 template <int N> static inline Nearest follow(const Gamma &gamma, const double *x, const Reach &reach, double guess) {
   double s = guess < reach.low ? reach.low : guess > reach.high ? reach.high : guess;
   for (int step = 0; step < 8; step++) {
@@ -179,7 +179,7 @@ template <int N> static inline Nearest follow(const Gamma &gamma, const double *
     double next = s - d.slope / d.curvature;
     next = next < reach.low ? reach.low : next > reach.high ? reach.high : next;
     const double change = next - s, scale = 1e-14 * (1 + fabs(s));
-    // what a last step of Newton's method changes is known to its square
+    // Newton's method converges quadratically: the error after a step is about the square of the step
     if (change * change * d.curvature <= 1e-16 * d.square || fabs(change) <= scale)
       return {fmax(d.square + change * (2 * d.slope + change * d.curvature), 0.0), next};
     s = next;

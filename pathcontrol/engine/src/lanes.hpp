@@ -1,4 +1,4 @@
-// Numbers and packs of numbers that are computed with alike.
+// Arithmetic on numbers and on packs of numbers by the same code.
 //
 // Every kernel is a template over V: `double` for one rollout, or `pack` for LANES rollouts side by side in the vector
 // registers of the machine (vector types of GCC and Clang). A lane of a pack goes through the same operations in the
@@ -56,7 +56,7 @@ template <class V, class F> ALWAYS_INLINE V lanewise(F f, V x) {
 }
 template <class V> ALWAYS_INLINE V number(double x) { return V{} + x; }  // x in all lanes
 template <class V> ALWAYS_INLINE V square_root(V x) { return lanewise([](double a) { return sqrt(a); }, x); }
-// From the C library only what its compilers do not bring along in a version of their own, as some do with exp.
+// The C library is called only for functions that no compiler replaces by a version of its own, as some do with exp.
 template <class V> ALWAYS_INLINE V exponential_minus_1(V x) { return lanewise([](double a) { return expm1(a); }, x); }
 // exp x for x ≤ 0, within 2^-53 of the number itself, not relative to it.
 template <class V> ALWAYS_INLINE V small_exponential(V x) { return 1.0 + exponential_minus_1(x); }
@@ -77,7 +77,7 @@ ALWAYS_INLINE pack_mask as_integer(pack x) { return __builtin_convertvector(x, p
 ALWAYS_INLINE integer bit_mask(integer x, integer bit) { return -(integer)((x & bit) != 0); }
 ALWAYS_INLINE pack_mask bit_mask(pack_mask x, integer bit) { return (x & bit) != 0; }
 
-// Room on the heap for numbers or packs, not set to anything; all that would need a runtime library of C++ otherwise.
+// Uninitialised memory on the heap for numbers or packs; it spares the runtime library of C++.
 template <class T> struct Buffer {
   T *const at;
   explicit Buffer(integer count) : at((T *)aligned_alloc(64, (count * (integer)sizeof(T) / 64 + 1) * 64)) { if (!at) abort(); }

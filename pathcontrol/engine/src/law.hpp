@@ -1,10 +1,10 @@
-// The five control laws, written as control/ has them.
+// The five control laws, in the notation of control/.
 #pragma once
 #include "setup.hpp"
 
 template <class V> struct Output { V tau[MOST_JOINTS], e_p[MOST_JOINTS], e_v[MOST_JOINTS], s, sdot, slope, drift; Mask<V> regular; };
 
-// What the laws of the lanes of a pack are made of.
+// The parameters of the laws in the lanes of a pack.
 template <class V> struct Gains { V position[MOST_JOINTS], velocity[MOST_JOINTS], plan; };
 
 template <class V> ALWAYS_INLINE V dot(int n, const V *a, const V *b) {
@@ -13,7 +13,7 @@ template <class V> ALWAYS_INLINE V dot(int n, const V *a, const V *b) {
   return sum;
 }
 
-// Where the plan of an open path no longer waits for the arm, and where its parameter is at an end.
+// The lanes in which the plan of an open path is timed, and those in which its parameter is at an end.
 template <class V> ALWAYS_INLINE Mask<V> lanes_where(const Path *const *paths, V s, bool (*test)(const Path &, double)) {
   Mask<V> mask{};
   for (int lane = 0; lane < Lanes<V>::count; lane++) set_lane(mask, lane, test(*paths[lane], lane_of(s, lane)));

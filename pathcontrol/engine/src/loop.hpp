@@ -80,7 +80,7 @@ template <class V> static void mark(Rollouts<V> &r, Mask<V> lanes, double t, Rea
   r.diverged_time = select(news, number<V>(t), r.diverged_time), r.reason = select(news, number<V>((double)reason), r.reason);
   r.lost = select(lanes, number<V>(1.0), r.lost);
 }
-// Lost rollouts are put back to where they started and held there, where their law is known to work.
+// Put lost rollouts back to their initial states, at which their law is known to work, and hold them there.
 template <class V> static void hold_lost(const Setup &setup, Rollouts<V> &r) {
   const Mask<V> lost = lost_lanes(r);
   for (int i = 0; i < setup.joints; i++) {
@@ -103,7 +103,7 @@ template <class V> static void look_at_torque(const Setup &setup, Rollouts<V> &r
   if (any(~sound)) mark(r, ~sound, t, NO_NUMBERS);
 }
 
-// Note when lanes finish: at rest at the end of an open path for 50 ms, or after so many laps; see simulation/finish.py.
+// Record when lanes finish: at rest at the end of an open path for 50 ms, or after so many laps; see simulation/finish.py.
 template <class V> static void look_at_finish(const Setup &setup, const Path *const *paths, Rollouts<V> &r, V s, double t) {
   constexpr double AT_REST = 1e-2, REST = 0.05 * (1 - 1e-9);
   if (setup.finish == NEVER) return;
@@ -188,10 +188,10 @@ static void write_sample(const Record &record, integer at, const Place<V> &place
 }
 
 // --- the loop ---------------------------------------------------------------------------------------------------------
-// Which ticks a call takes: `ticks` of them with a period after each and, at the end of all, one `last` without.
+// The ticks that a call takes: `ticks` of them with a period after each and, at the end of the run, one `last` without.
 struct Span { integer law_tick, arm_tick, ticks, rollouts; int last, stops; };
 
-// Run the rollouts of a pack; return how many samples were recorded.
+// Run the rollouts of a pack; return the number of samples recorded.
 template <int N, class V, class C>
 static NOINLINE integer run_pack(const Setup &setup, const State &state, const Record &record, const double *noise, const Span &span, const Place<V> &place) {
   const int n = size<N>(setup.joints);

@@ -6,8 +6,8 @@
 struct Path {
   int joints, cells, buckets, closed, brakes;
   double s0, s_end, period;          // s_end is that of the first lap of a closed path
-  double braking, begin;             // of the ending of an open path: see control/ending.py
-  double arrival;                    // s from which on an arm has arrived
+  double braking, begin;             // the ending of an open path: see control/ending.py
+  double arrival;                    // the s from which on an arm has arrived
   double buckets_per_s;
   const double *knots;               // (cells + 1,)
   const int *bucket;                 // (buckets,), the cell in which each of equal parts of the domain begins
@@ -93,7 +93,7 @@ static inline double root_of_slope(const Path &path, const double *q, double low
   }
   return s;
 }
-// The nearest point of all, in [s0, s_end]: roots of g in the cells whose ball may hold it. NaN where q is not finite.
+// The global nearest point in [s0, s_end]: roots of g in the cells whose ball may hold it. NaN where q is not finite.
 static NOINLINE double nearest_point(const Path &path, const double *q) {
   double best = INFINITY, found = NAN;
   const int pieces = 8, n = path.joints;
@@ -144,8 +144,8 @@ static NOINLINE double downhill_point(const Path &path, const double *q, double 
   }
   return NAN;
 }
-// The local minimum downhill from `near`, the nearest point of a moment ago; the nearest of all only where `near` cannot have
-// been that. As PathTask.sigma_bar(q, near): see geometry/closest_point/downhill.py for the bounds on a step.
+// The local minimum downhill from `near`, the previous nearest point; the global minimum only where `near` cannot have been a
+// nearest point. As PathTask.sigma_bar(q, near): see geometry/closest_point/downhill.py for the bounds on a step.
 static NOINLINE double followed_point(const Path &path, const double *q, double near) {
   constexpr double TURN = 0.5, WINDOW = 0.125, CONVERGED = 1e-9;
   const double length = path.s_end - path.s0;

@@ -54,7 +54,7 @@ static NOINLINE void condense(int joints, V (*M)[room<N>()], const V *viscous, d
   invert<N>(n, A, third);
   for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++) {
-      const V X = first[i][j] + second[i][j] + 4.0 * third[i][j];  // of h/8, not of 1
+      const V X = first[i][j] + second[i][j] + 4.0 * third[i][j];  // X of h/8 rather than of 1
       inertia[i][j] = M[i][j] + eighth[i] * eighth[j] * X;
       if (i == j) inertia[i][j] += 4.0 * eighth[i];
       travel[i][j] = 0.125 * eighth[j] * X;
@@ -76,7 +76,7 @@ static NOINLINE void hinder(int joints, V (*M)[room<N>()], const Dynamics<N, V> 
   for (int i = 0; i < n; i++) {
     V sum = M[i][0] * v[0];
     for (int j = 1; j < n; j++) sum += M[i][j] * v[j];
-    momentum[i] = sum + t * at.dry[i];  // whatever friction a joint at rest got is taken back here
+    momentum[i] = sum + t * at.dry[i];  // undo the friction that a joint at rest was given
     low[i] = t * at.backward[i], high[i] = t * at.forward[i];
     const V direction = select(less(V{}, u[i]), number<V>(1.0), select(less(u[i], V{}), number<V>(-1.0), V{}));
     sign[i] = select(turned[i], V{}, direction);

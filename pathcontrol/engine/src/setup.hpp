@@ -1,4 +1,4 @@
-// What Python hands over: the settings of a run, its state, and room for what is recorded. engine/structs.py has the same
+// The structs that Python fills: the settings of a run, its state, and the addresses of its record. engine/structs.py has the same
 // fields in the same order; sizes are compared when the library is loaded.
 #pragma once
 #include "friction.hpp"
@@ -9,7 +9,7 @@ struct Rows { const double *data; integer stride; };
 
 struct FrictionRows { Rows viscous, forward, backward; integer stribeck; Rows fall[MOST_STRIBECK], velocity[MOST_STRIBECK]; };
 
-// Arms and which of them each rollout has; no index: all have the first.
+// Arms, and the index of each rollout's arm; no index: all have the first.
 struct Arms { const Arm<double> *arms; const int *index; };
 
 enum LawKind { COMPUTED_TORQUE, PD_PLUS, SLOTINE_LI, EXTENDED_MOTION_PLAN, PROJECTION };
@@ -22,7 +22,7 @@ enum Reason { SOUND, BEYOND_BOUNDS, NO_NUMBERS };
 struct Disturbance {
   int kind, body;               // the body that carries the frame of a force
   double offset[3];             // of the frame's origin in it [m]
-  const Arm<double> *arm;       // whose kinematics the force acts through
+  const Arm<double> *arm;       // the arm whose kinematics the force acts through
   Rows magnitude;               // torque [N m] or force [N]
   Rows start, duration;         // [s]
   Rows frequency, phase;        // [Hz], [rad]
