@@ -34,7 +34,7 @@ from pathcontrol.sweeps.chunk import Job
 from pathcontrol.sweeps.cluster import connection as cluster_module
 from pathcontrol.sweeps.cluster import dispatch as desk
 
-distributed = pytest.importorskip("distributed")
+distributed = pytest.importorskip("workers").distributed
 cloudpickle = pytest.importorskip("cloudpickle")
 pytest.importorskip("pyarrow")
 Parcel = pytest.importorskip("pathcontrol.sweeps.cluster.shipping").Parcel

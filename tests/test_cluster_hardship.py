@@ -24,7 +24,7 @@ from pathcontrol.cli import main
 from pathcontrol.errors import InputError
 from pathcontrol.sweeps.cluster import dispatch as desk
 
-distributed = pytest.importorskip("distributed")
+distributed = pytest.importorskip("workers").distributed
 pytest.importorskip("pyarrow")
 
 ROBOT = pc.load_robot("cicese_2dof")
