@@ -65,7 +65,7 @@ def when_chunks_are_there(folder, count, action):
 def test_others_take_over_from_a_frozen_worker(here, tmp_path, monkeypatch):
     monkeypatch.setattr(desk, "_SILENCE", 3.0)
     monkeypatch.setattr(desk, "_LOOK", 0.5)
-    monkeypatch.setattr(desk, "_RESTART", 15.0)  # what computes chunks may be sent to the frozen one, which takes it not
+    monkeypatch.setattr(desk, "_RESTART", 15.0)  # what computes chunks may go to the frozen one
     with distributed.LocalCluster(**QUIET) as cluster:
         frozen = pids(cluster)[0]
         when_chunks_are_there(tmp_path / "out", 2, lambda: os.kill(frozen, signal.SIGSTOP))
@@ -166,7 +166,7 @@ def test_what_the_page_starts_listens_on_this_machine_only(here, tmp_path):
     finally:
         for process in started[::-1]:
             process.terminate()
-            process.wait(30)
+            process.wait(PATIENCE)
 
 
 @pytest.fixture(scope="module")

@@ -352,7 +352,7 @@ def test_a_full_disk_is_an_error_and_no_crash(act, run, tmp_path):
     (tmp_path / "run.nc").write_bytes(b"before")
     process = multiprocessing.get_context("fork").Process(target=limited)
     process.start()
-    process.join(60)
+    process.join(PATIENCE)
     assert process.exitcode == 0
     assert (tmp_path / "run.nc").read_bytes() == b"before"
     assert [file.name for file in tmp_path.iterdir()] == ["run.nc"]

@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+from patience import PATIENCE
 
 from pathcontrol import _files
 from pathcontrol._files import whole_file, write_whole
@@ -73,7 +74,7 @@ try:
 except KeyboardInterrupt:
     assert temporary.exists()
 """
-    subprocess.run([sys.executable, "-c", program, str(tmp_path / "run.nc")], check=True, timeout=600)
+    subprocess.run([sys.executable, "-c", program, str(tmp_path / "run.nc")], check=True, timeout=PATIENCE)
     assert not list(tmp_path.iterdir())
 
 

@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+from patience import PATIENCE
 
 from pathcontrol.control.projection import Projection
 from pathcontrol.errors import SimulationError
@@ -55,5 +56,5 @@ def test_ctrl_c_interrupts_the_integrator():
     assert process.stdout.readline() == "integrating\n"
     time.sleep(0.2)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=600)
+    out, err = process.communicate(timeout=PATIENCE)
     assert (out, err, process.returncode) == ("interrupted\n", "", 0)
