@@ -38,6 +38,7 @@ from .errors import MissingExtraError as MissingExtraError
 from .errors import PathControlError as PathControlError
 from .errors import PathControlWarning as PathControlWarning
 from .errors import SimulationError as SimulationError
+from .errors import StorageError as StorageError
 from .errors import TaskError as TaskError
 from .errors import ToolpathError as ToolpathError
 from .errors import UnknownNameError as UnknownNameError

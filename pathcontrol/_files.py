@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import errno
 import fcntl
 import glob
 import os
@@ -14,9 +15,13 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from pathcontrol.errors import InputError, PathControlError
+from pathcontrol.errors import InputError, PathControlError, StorageError
 
 _HEX = "[0-9a-f]" * 8
+#: what keeps a disk from taking a file: no room, too large for it or for the user, or not writable at all
+_NOT_TAKEN = frozenset(
+    getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS", "EACCES", "EPERM", "ENAMETOOLONG")
+)
 _parts: set[Path] = set()  # temporary files that this process has, or is about to have
 
 
@@ -26,18 +31,70 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
     The content is on the disk before the name is, so that a loss of power leaves the old file or the new one. The
     suffix is kept, since some writers choose the format by it. What a killed process left of the same file is removed.
+
+    Raises:
+        InputError: ``path`` is a folder, or below a file.
+        StorageError: the disk is full, or does not take the file; what was there before stays.
     """
     target = Path(path).resolve()  # through a link, to the file that is meant
-    if target.is_dir():
-        raise InputError(f"{str(path)!r} is a folder, expected the name of a file to write")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    _remove_left_parts(target)
-    with _part_of(target) as temporary:
-        yield temporary
-        _flush(temporary)
-        temporary.replace(target)
-        with contextlib.suppress(OSError):  # not every file system can
-            _flush(target.parent)
+    with writing(target):
+        if target.is_dir():
+            raise InputError(f"{str(path)!r} is a folder, expected the name of a file to write")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        _remove_left_parts(target)
+        with _part_of(target) as temporary:
+            yield temporary
+            _flush(temporary)
+            temporary.replace(target)
+            with contextlib.suppress(OSError):  # not every file system can
+                _flush(target.parent)
+
+
+@contextlib.contextmanager
+def writing(target: Path) -> Iterator[None]:
+    """Say of which file or folder the operating system speaks where it does not take what the block writes.
+
+    Raises:
+        InputError: ``target`` is below a file.
+        StorageError: the disk is full, or does not take it.
+    """
+    try:
+        yield
+    except (FileExistsError, NotADirectoryError) as error:
+        where = f"{str(target)!r} cannot be written"
+        raise InputError(f"{where}: {error.filename!r} is a file, expected a folder") from error
+    except OSError as error:
+        if error.errno not in _NOT_TAKEN or isinstance(error, PathControlError):
+            raise
+        raise StorageError(
+            f"{str(target)!r} cannot be written: {error.strerror}; no half-written file is left behind", error.errno
+        ) from error
+
+
+def append_line(path: Path, line: str) -> None:
+    """Add a line to a file, all of it or nothing, and have it written to the disk.
+
+    Raises:
+        StorageError: the disk is full, or does not take it.
+    """
+    with writing(path):
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+        try:
+            _append(descriptor, f"{line}\n".encode())
+        finally:
+            os.close(descriptor)
+
+
+def _append(descriptor: int, content: bytes) -> None:
+    """Write bytes to the end of a file; where the disk takes some of them only, take those back."""
+    before = os.fstat(descriptor).st_size
+    try:
+        while content:
+            content = content[os.write(descriptor, content) :]
+        os.fsync(descriptor)
+    except OSError:
+        os.ftruncate(descriptor, before)
+        raise
 
 
 def write_whole(path: str | Path, content: bytes | memoryview) -> Path:

@@ -112,6 +112,18 @@ class EngineError(PathControlError, RuntimeError):
     """The compiled engine cannot be used, or not for what is asked of it; the message says why and what to do."""
 
 
+class StorageError(PathControlError, OSError):
+    """A file cannot be written, as on a full disk; the message says which and why.
+
+    Attributes:
+        errno: the operating system's number for the reason, as ``errno.ENOSPC``.
+    """
+
+    def __init__(self, message: str, number: int | None = None) -> None:
+        super().__init__(message)
+        self.errno = number
+
+
 class SimulationError(PathControlError, RuntimeError):
     """A simulation cannot go on; the message says at which time and why.
 

@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import io
 import json
+import warnings
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from scipy import stats
 import pathcontrol as pc
 from pathcontrol.errors import InputError, ToolpathError, UrdfError
 from pathcontrol.robot.urdf.xml.parse import parse_urdf
-from pathcontrol.sweeps.manifest import _digest
+from pathcontrol.sweeps.manifest import Manifest, _digest
 from pathcontrol.toolpaths.svg.reader import read_svg
 
 pa = pytest.importorskip("pyarrow")
@@ -125,3 +126,62 @@ def test_a_clip_path_of_huge_numbers_is_no_convex_one(tmp_path):
     )
     with contextlib.suppress(ToolpathError):
         assert np.isfinite(read_svg(tmp_path / "a.svg").contours[0].length)
+
+
+# --- lines of the log ---------------------------------------------------------------------------------------------
+
+
+def content(folder):
+    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
+FORGED = {
+    "goes": lambda files: {place: None for place in files if place.startswith("runs")},
+    "chunk goes": lambda files: {place: None for place in files if place.startswith("chunks")},
+    "another digest": lambda files: dict.fromkeys(files, "0" * 64),
+    "an old line": lambda files: files,
+    "a false checksum": lambda files: {"files": {next(iter(files)): None}, "sha256": "0" * 64},
+    "no table": lambda files: [1, 2],
+    "more": lambda files: {"files": {}, "sha256": "0" * 64, "and": 1},
+    "deep": lambda files: {"files": {"runs/../../x.nc": None}, "sha256": "0" * 64},
+}
+
+
+@pytest.mark.parametrize("line", FORGED.values(), ids=FORGED)
+def test_a_forged_line_of_the_log_is_named_and_not_believed(line, tmp_path):
+    """It is refused where a sweep is read, and named and left out where it is resumed."""
+    folder = tmp_path / "sweep"
+    sweep(folder)
+    before = content(folder)
+    files = json.loads((folder / "manifest.json").read_text())["files"]
+    (folder / "files.log").write_text(json.dumps(line(files)) + "\n")
+    with pytest.raises(InputError, match=r"files\.log' is damaged: line 1: .*; resume the sweep"):
+        pc.SweepResult(folder)
+    with pytest.warns(pc.PathControlWarning, match=r"is damaged, and is made again there: files\.log \(line 1: "):
+        sweep(folder, resume=True)
+    assert content(folder) == before
+
+
+@pytest.mark.parametrize("keep_going", [sweep, tune])
+def test_a_bit_that_flips_in_the_log_costs_a_chunk_and_no_more(keep_going, tmp_path):
+    """As where a process was killed: what the damaged line noted is made again."""
+    rng = np.random.default_rng(3)
+    folder = tmp_path / "folder"
+    keep_going(folder)
+    before = content(folder)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    for _ in range(5):
+        log = Manifest.begin(folder, manifest["samples"], manifest["definition"])
+        for place, digest in manifest["files"].items():
+            log.note({place: digest})
+        text = bytearray((folder / "files.log").read_bytes())
+        place = int(rng.integers(8 * len(text)))
+        text[place // 8] ^= 1 << place % 8
+        (folder / "files.log").write_bytes(bytes(text))
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            keep_going(folder, resume=True)
+        assert content(folder) == before
+        if text[-1:] != b"\n":
+            continue  # the last line lost its end, as if it had not been written
+        assert any("files.log (line" in str(one.message) for one in told)

@@ -21,7 +21,16 @@ from pathcontrol.errors import PathControlError, PathControlWarning
 
 
 class Group(click.Group):
-    """Turn the library's errors into one message and exit code 2, warnings into one line, Ctrl-C into exit code 130."""
+    """Turn errors into one message and exit code 2, warnings into one line, Ctrl-C into exit code 130."""
+
+    def main(self, *args: Any, **options: Any) -> Any:
+        try:
+            return super().main(*args, **options)
+        except OSError as error:  # standard output on a full disk, a folder that nobody may read
+            if error.errno == errno.EPIPE:  # whom we tell has gone; click ends quietly
+                raise
+            click.echo(f"error: {printable(str(error))}; no half-written file is left behind", err=True)
+            sys.exit(2)
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
@@ -29,11 +38,6 @@ class Group(click.Group):
                 return super().invoke(ctx)
         except PathControlError as error:
             click.echo(f"error: {printable(in_options(str(error), _chosen(ctx)))}", err=True)
-            sys.exit(2)
-        except OSError as error:  # a full disk, a folder that nobody may write to
-            if error.errno == errno.EPIPE:  # whom we tell has gone; click ends quietly
-                raise
-            click.echo(f"error: {printable(str(error))}; no half-written file is left behind", err=True)
             sys.exit(2)
         except KeyboardInterrupt:
             click.echo("interrupted; no half-written file is left behind", err=True)

@@ -79,7 +79,8 @@ def space_of(section: SweepSection) -> Space:
     """
     parameters = {key: values_of(f"sweep.parameters.{key}", given) for key, given in section.parameters.items()}
     if (section.method == "grid") != (section.samples is None):
-        said = "is as large as its grids; leave samples out" if section.method == "grid" else "needs samples = …"
+        large = "is as large as its grids; leave samples out, or take method = 'random'"
+        said = large if section.method == "grid" else "needs samples = …"
         raise ExperimentError(f"sweep.samples: method = {section.method!r} {said}")
     with keyed("sweep", ("samples",)):
         return Space(parameters, section.method, section.samples)

@@ -293,7 +293,7 @@ class Run:
 
         Raises:
             InputError: the name does not end with ``.nc``; the message names what writes other formats.
-            OSError: the file cannot be written, as on a full disk; what was there before stays.
+            StorageError: the file cannot be written, as on a full disk; what was there before stays.
         """
         from pathcontrol.simulation.storage.netcdf import write_run  # loads HDF5
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
 import re
 from collections.abc import Iterator, Mapping
@@ -17,7 +16,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from pathcontrol._files import write_whole
+from pathcontrol._files import append_line, write_whole
 from pathcontrol.errors import InputError
 from pathcontrol.sweeps.space import MOST_SAMPLES
 
@@ -27,6 +26,7 @@ PACKAGES = ("pathcontrol", "pin", "numpy", "scipy")
 _PLACE = re.compile(r"chunks/[0-9]+-[0-9]+\.parquet|runs/[0-9]+\.nc")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _MOST_BYTES = 1 << 28
+_TOLD = 3  # damaged lines of the log that a message names
 _DAMAGED = "it is damaged; take another copy of it, or begin the sweep anew in another folder"
 
 
@@ -44,6 +44,7 @@ class Manifest:
         files: the SHA-256 of each file by its place in the folder; ``None`` where it is not known, as the sweep was
             begun by an earlier version.
         listed: whether the sweep has noted its files from the beginning.
+        broken: which lines of the log are not what was written, and why; empty if none.
 
     Raises:
         InputError: there is none, or it is damaged.
@@ -51,7 +52,9 @@ class Manifest:
 
     def __init__(self, folder: Path, mending: bool = False) -> None:
         self.folder = folder
-        log = _read_log(folder / LOG, mending)  # first: while it is read, it may get into the manifest
+        log, self.broken = _read_log(folder / LOG)  # first: while it is read, it may get into the manifest
+        if self.broken and not mending:
+            raise InputError(f"{str(folder / LOG)!r} is damaged: {self.broken}; resume the sweep to mend it")
         content = _read(folder)
         self.samples: int = content["samples"]
         self.definition: dict[str, Any] = content["definition"]
@@ -69,13 +72,8 @@ class Manifest:
 
     def note(self, files: Mapping[str, str | None]) -> None:
         """Note files by their SHA-256, or by ``None`` that they are to go, all of them or none."""
-        line = json.dumps(files, sort_keys=True) + "\n"
-        descriptor = os.open(self.folder / LOG, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-        try:
-            os.write(descriptor, line.encode())
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        content = {"files": dict(files)}
+        append_line(self.folder / LOG, json.dumps(content | {"sha256": _digest(content)}, sort_keys=True))
         self._take(files)
 
     def settle(self) -> None:
@@ -184,28 +182,41 @@ def _wrong_files(files: Any, may_go: bool = False) -> Iterator[str]:
     for place, digest in files.items():
         if not _PLACE.fullmatch(place):
             yield f"files has {place!r:.80}, expected chunks and runs"
-        if not (isinstance(digest, str) and _SHA256.fullmatch(digest)) and not (may_go and digest is None):
+        goes = may_go and digest is None and place.startswith("runs")  # a chunk stays
+        if not goes and not (isinstance(digest, str) and _SHA256.fullmatch(digest)):
             yield f"{place} has {digest!r:.80}, expected a SHA-256"
 
 
-def _read_log(path: Path, mending: bool) -> list[dict[str, str | None]]:
-    """The lines of the log; the last one without an end was being written when the process was killed."""
+def _read_log(path: Path) -> tuple[list[dict[str, str | None]], str]:
+    """The files in the lines of the log, and which lines are not what was written.
+
+    The last one without an end was being written when the process was killed.
+    """
     try:
         text = path.read_bytes() if path.is_file() else b""
     except OSError as error:
         raise InputError(f"{str(path)!r} cannot be read: {error}") from error
-    lines = []
+    noted, broken = [], []
     for number, line in enumerate(text.split(b"\n")[:-1], 1):
         try:
-            files = json.loads(line)
-            wrong = next(_wrong_files(files, may_go=True), None)
+            content = json.loads(line)
+            if wrong := next(_wrong_line(content), None):
+                raise ValueError(wrong)
+            noted.append(content["files"])
         except (ValueError, RecursionError) as error:
-            wrong = str(error)
-        if not wrong:
-            lines.append(files)
-        elif not mending:
-            raise InputError(f"{str(path)!r} is damaged in line {number}: {wrong}; resume the sweep to mend it")
-    return lines
+            broken.append(f"line {number}: {error}")
+    more = f" and {len(broken) - _TOLD} lines more" if len(broken) > _TOLD else ""
+    return noted, "; ".join(broken[:_TOLD]) + more
+
+
+def _wrong_line(content: Any) -> Iterator[str]:
+    """What a line of the log says that none would."""
+    if not isinstance(content, dict) or content.keys() != {"files", "sha256"}:
+        yield "expected files and their checksum"
+        return
+    yield from _wrong_files(content["files"], may_go=True)
+    if content["sha256"] != _digest(content):
+        yield "its checksum is another one"
 
 
 def _differences(then: Any, now: Any, key: str = "") -> Iterator[str]:

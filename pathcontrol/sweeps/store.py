@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol._files import write_whole
+from pathcontrol._files import write_whole, writing
 from pathcontrol.errors import InputError, MissingExtraError, PathControlWarning
 from pathcontrol.sweeps.chunk import Chunk
 from pathcontrol.sweeps.histories import Keep
-from pathcontrol.sweeps.manifest import MANIFEST, Manifest
+from pathcontrol.sweeps.manifest import LOG, MANIFEST, Manifest
 
 _HEX = "[0-9a-f]" * 8
 _UNFINISHED = (f".manifest-{_HEX}.json", f"chunks/.*-{_HEX}.parquet", f"runs/.*-{_HEX}.nc")  # as whole_file has them
@@ -83,8 +83,9 @@ class Store:
         if any(folder.glob("chunks/*.parquet")):
             raise InputError(f"{str(folder)!r} holds the chunks of a sweep without its {MANIFEST}; name another folder")
         try:
-            for name in ("chunks", "runs"):
-                (folder / name).mkdir(parents=True, exist_ok=True)
+            with writing(folder):
+                for name in ("chunks", "runs"):
+                    (folder / name).mkdir(parents=True, exist_ok=True)
             Manifest.begin(folder, samples, definition)
         except BaseException:  # as on a full disk
             _remove_empty(folder)
@@ -156,6 +157,8 @@ class Store:
         self._adopt()
         bad = self._damaged("chunks") | self._damaged("runs")
         gone = set(bad)
+        if self.manifest.broken:
+            bad = {LOG: self.manifest.broken} | bad
         for place in self._places("chunks"):
             if place in bad or any(_sample(run) in _samples(place) for run in bad if run.startswith("runs")):
                 gone.add(place)
@@ -172,6 +175,12 @@ class Store:
         """Give the files of a sweep of an earlier version, which has none, their checksums, if they can be read."""
         if self.manifest.listed:
             return
+        warnings.warn(
+            f"the sweep in {str(self.folder)!r} has no checksums, as it was begun by an earlier version: its "
+            f"{len(self.manifest.files)} files are taken as they are",
+            PathControlWarning,
+            stacklevel=7,
+        )
         for place in list(self.manifest.files):
             with suppress(InputError):
                 if place.startswith("chunks"):
@@ -191,41 +200,69 @@ class Store:
         return [s[i : i + chunk].astype(np.int64) for s in stretches for i in range(0, len(s), chunk)]
 
     def write(self, chunk: Chunk, keep: Keep, at_random: NDArray[np.intp]) -> None:
-        """Add a chunk: histories that are to be kept so far, its table, and their checksums, with which it counts."""
-        import pyarrow as pa
+        """Add a chunk: histories that are to be kept so far, its table, and their checksums, with which it counts.
 
+        Raises:
+            StorageError: the disk is full, or does not take them; nothing of the chunk is left then.
+        """
         chosen = self._chosen(keep, at_random, chunk.columns) if chunk.runs else set()
         notes: dict[str, str | None] = {}
-        for number, run in chunk.runs.items():
-            if number in chosen:
-                notes[_run_place(number)] = _file_digest(run.save(self.run_file(number)))
-        sample = chunk.columns["sample"]
-        table = pa.table({name: _column(values) for name, values in chunk.columns.items()})
-        memory = io.BytesIO()
-        self._parquet.write_table(table, memory)
-        place = f"chunks/{sample[0]:09d}-{sample[-1]:09d}.parquet"
-        notes[place] = hashlib.sha256(memory.getbuffer()).hexdigest()
-        write_whole(self.folder / place, memory.getbuffer())
-        if chosen:
-            notes |= {_run_place(other): None for other in self.kept() if other not in chosen}
-        self.manifest.note(notes)
+        try:
+            for number, run in chunk.runs.items():
+                if number in chosen:
+                    notes[_run_place(number)] = _file_digest(run.save(self.run_file(number)))
+            notes |= self._write_table(chunk.columns)
+            if chosen:
+                notes |= {_run_place(other): None for other in self.kept() if other not in chosen}
+            self.manifest.note(notes)
+        except BaseException:
+            self._remove(place for place, digest in notes.items() if digest is not None)
+            raise
         self._remove(place for place, digest in notes.items() if digest is None)
+
+    def _write_table(self, columns: Mapping[str, Array]) -> dict[str, str]:
+        """Write the table of a chunk, and return its checksum by its place."""
+        import pyarrow as pa
+
+        sample, memory = columns["sample"], io.BytesIO()
+        self._parquet.write_table(pa.table({name: _column(values) for name, values in columns.items()}), memory)
+        place = f"chunks/{sample[0]:09d}-{sample[-1]:09d}.parquet"
+        write_whole(self.folder / place, memory.getbuffer())
+        return {place: hashlib.sha256(memory.getbuffer()).hexdigest()}
 
     def columns(self, names: list[str] | None = None) -> dict[str, Array]:
         """The finished samples in order, their numbers and texts, (k,) or (k, d) each; NaN or "" where one has none."""
         return _joined([self._read(place, names) for place in self._chunks()])
 
     def tidy(self, keep: Keep, at_random: NDArray[np.intp]) -> None:
-        """Remove the histories that need not be kept, and what a killed process left behind."""
+        """Remove the histories that need not be kept, and what a killed process left behind.
+
+        Chunks of a complete sweep that lack a history to be kept are told, and forgotten to be made again.
+        """
         for unfinished in _UNFINISHED:
             for left in self.folder.glob(unfinished):
                 left.unlink()
         chosen = self._chosen(keep, at_random)
+        if not self.missing(self.samples):  # else another sample may be chosen instead
+            self._forget_without(chosen)
         if needless := [_run_place(other) for other in self.kept() if other not in chosen]:
             self.manifest.note(dict.fromkeys(needless))
         there = [*self.folder.glob("chunks/*.parquet"), *self.folder.glob("runs/*.nc")]
         places = (file.relative_to(self.folder).as_posix() for file in there)
         self._remove(place for place in places if place not in self.manifest.files)
+
+    def _forget_without(self, chosen: set[int]) -> None:
+        """Forget chunks whose table is there without the histories that were ``chosen`` from it."""
+        lost = chosen.difference(self.kept())
+        gone = [place for place in self._chunks() if not lost.isdisjoint(_samples(place))]
+        for place in gone:
+            del self.manifest.files[place]
+        if gone:
+            warnings.warn(
+                f"the sweep in {str(self.folder)!r} lacks histories, which are made again: {', '.join(gone[:_TOLD])}",
+                PathControlWarning,
+                stacklevel=4,
+            )
 
     def _remove(self, places: Iterable[str]) -> None:
         for place in places:

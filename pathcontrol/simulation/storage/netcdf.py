@@ -40,7 +40,7 @@ def write_run(path: Path, data: xr.Dataset | Samples, config: Mapping[str, Any],
     The file is made in memory: HDF5 ends the process by a segmentation fault where it cannot write to a full disk.
 
     Raises:
-        OSError: it cannot be written.
+        StorageError: it cannot be written.
     """
     memory, text = io.BytesIO(), json.dumps(config)
     recipe = np.frombuffer(stored.text.encode(), dtype=np.uint8)
