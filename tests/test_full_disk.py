@@ -202,5 +202,5 @@ def test_every_writer_writes_whole_files():
             name = ast.unparse(call.func)
             writes = name.endswith((".write_text", ".write_bytes"))
             writes |= name.endswith("open") and any(ast.unparse(a) in ("'w'", "'wb'", "'a'") for a in call.args)
-            if writes and file.name != "parcel.py":  # on a worker's own scratch disk
+            if writes and file.name != "shipping.py":  # on a worker's own scratch disk
                 assert name.startswith("temporary."), f"{file}: line {call.lineno}: {name}"
