@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
+import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import repeat
+from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -85,42 +91,69 @@ def paper_experiment(name: str, robot: RobotModel, progress: bool = True, engine
     return Experiment(name, controller, run)
 
 
+class Part(NamedTuple):
+    """What is said of one experiment when its files have been written.
+
+    Attributes:
+        peaks: as :attr:`Experiment.peaks`.
+        config: that of its run.
+        apart: how far the compiled engine is from it, as :func:`compare_engines` says.
+    """
+
+    peaks: dict[str, float]
+    config: dict[str, Any]
+    apart: dict[str, Any]
+
+
 def reproduce(out: str | Path) -> dict[str, Any]:
     """Run both experiments and write data, figures, animations and ``summary.json`` to the folder ``out``.
+
+    Each has a process of its own where there are two cores and no other threads, which a fork would lose.
 
     Returns:
         What ``summary.json`` holds.
     """
-    out = refuse_suffix(out, "a folder")
-    began, robot, experiments = time.perf_counter(), load_robot("cicese_2dof"), {}
-    with progress_bar("reproducing", 2 * len(PAPER)) as update:
-        for i, name in enumerate(PAPER):
-            experiments[name] = paper_experiment(name, robot, progress=False)
-            update(2 * i + 1)
-            _write(experiments[name], robot, out)
-            update(2 * i + 2)
-    summary = summarise(experiments) | {"compiled_engine": compare_engines(experiments.values(), robot)}
-    summary |= {"seconds": round(time.perf_counter() - began, 2)}
+    out, began = refuse_suffix(out, "a folder"), time.perf_counter()
+    parts = {}
+    with _mapped() as apply, progress_bar("reproducing", len(PAPER)) as update:
+        for name, part in zip(PAPER, apply(_reproduce_one, PAPER, repeat(out)), strict=True):
+            parts[name] = part
+            update(len(parts))
+    summary = summarise(parts) | {"seconds": round(time.perf_counter() - began, 2)}
     with whole_file(out / "summary.json") as temporary:
         temporary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary
 
 
-def compare_engines(experiments: Iterable[Experiment], robot: RobotModel) -> dict[str, Any]:
-    """Return how far the compiled engine is from the runs of the reference: ``{name: {…}}``, or ``{"missing": why}``.
+@contextmanager
+def _mapped() -> Iterator[Callable[..., Iterable[Part]]]:
+    """Give ``map``, or one that computes in processes, which know all that has been loaded here."""
+    if threading.active_count() > 1 or len(os.sched_getaffinity(0)) < len(PAPER):
+        yield map
+        return
+    with ProcessPoolExecutor(len(PAPER), get_context("fork")) as pool:
+        yield pool.map
 
-    For each experiment the largest difference of a joint position over the run, ``q_rad``, and those of the two peaks.
+
+def _reproduce_one(name: str, out: Path) -> Part:
+    """Run one of the experiments and write its files."""
+    robot = load_robot("cicese_2dof")
+    experiment = paper_experiment(name, robot, progress=False)
+    _write(experiment, robot, out)
+    return Part(experiment.peaks, dict(experiment.run.config), compare_engines(experiment, robot))
+
+
+def compare_engines(reference: Experiment, robot: RobotModel) -> dict[str, Any]:
+    """Return how far the compiled engine is from an experiment on the reference, or ``{"missing": why}``.
+
+    The largest difference of a joint position over the run, ``q_rad``, and those of the two peaks.
     """
-    apart: dict[str, Any] = {}
-    for reference in experiments:
-        try:
-            other = paper_experiment(reference.name, robot, progress=False, engine="compiled")
-        except EngineError as error:
-            return {"missing": str(error)}
-        q = float(np.abs(other.run.array("q") - reference.run.array("q")).max())
-        peaks = {name: abs(other.peaks[name] - value) for name, value in reference.peaks.items()}
-        apart[reference.name] = {"q_rad": q, **peaks}
-    return apart
+    try:
+        other = paper_experiment(reference.name, robot, progress=False, engine="compiled")
+    except EngineError as error:
+        return {"missing": str(error)}
+    q = float(np.abs(other.run.array("q") - reference.run.array("q")).max())
+    return {"q_rad": q} | {name: abs(other.peaks[name] - value) for name, value in reference.peaks.items()}
 
 
 def _write(experiment: Experiment, robot: RobotModel, out: Path) -> None:
@@ -138,9 +171,11 @@ def _write(experiment: Experiment, robot: RobotModel, out: Path) -> None:
     record(run, robot, task=task).save(out / f"{experiment.name}.html")
 
 
-def summarise(experiments: dict[str, Experiment]) -> dict[str, Any]:
-    """Measured peaks beside the paper's, the versions and the settings."""
-    peaks = {name: experiment.peaks | {"paper": PAPER[name]} for name, experiment in experiments.items()}
-    configs = {name: dict(experiment.run.config) for name, experiment in experiments.items()}
+def summarise(parts: Mapping[str, Part]) -> dict[str, Any]:
+    """Measured peaks beside the paper's, the versions, the settings, and how far the compiled engine is from them."""
+    peaks = {name: part.peaks | {"paper": PAPER[name]} for name, part in parts.items()}
+    configs = {name: dict(part.config) for name, part in parts.items()}
     versions = [config.pop("versions") for config in configs.values()]  # the same for both
-    return peaks | {"versions": versions[0], "settings": configs}
+    missing = [part.apart for part in parts.values() if "missing" in part.apart]
+    apart = missing[0] if missing else {name: part.apart for name, part in parts.items()}
+    return peaks | {"versions": versions[0], "settings": configs, "compiled_engine": apart}
