@@ -1,15 +1,15 @@
-"""Advice in messages, said in the words of whoever reads it: keyword arguments as options, or as keys of a file."""
+"""Advice in messages, worded for its reader: keyword arguments become options or keys of a file."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
 
-#: what an argument and its value are called, or None where there is no such thing
+#: returns what the reader calls an argument and its value, or None if the reader has no such argument
 Speak = Callable[[str, str], str | None]
 
 _WORD = re.compile(
-    r"""(?<![\w=])'[^']*' | `[^`]*` | <[^>]*>                      # what is quoted is not ours
+    r"""(?<![\w=])'[^']*' | `[^`]*` | <[^>]*>                      # quoted text is left alone
     | (?<![-\w.&?\#/=$])(?<!\w\()(?P<name>[A-Za-z_]\w*)=(?!=)
       (?P<value>'[^']*'|\([^()]*\)|\[[^][]*\]|\{[^{}]*\}|[\w.…]+(?:\([^()]*\))?)?
     """,
@@ -26,8 +26,8 @@ _SETTING = re.compile(
 )
 
 
-def in_words_of(message: str, speak: Speak) -> str:
-    """Return ``message`` with ``name=value`` as ``speak`` calls it.
+def reword_advice(message: str, speak: Speak) -> str:
+    """Return ``message`` with each ``name=value`` replaced by what ``speak`` calls it.
 
     Where there is no such thing, the advice is left out, from the semicolon or comma before it to the one after it.
     """
@@ -48,22 +48,22 @@ def in_words_of(message: str, speak: Speak) -> str:
     return "".join(parts) + message[end:]
 
 
-def setting_in_words_of(message: str, speak: Speak) -> str:
-    """Return ``message`` with the ``name = value`` or ``name:`` at its beginning as ``speak`` calls it."""
+def reword_setting(message: str, speak: Speak) -> str:
+    """Return ``message`` with a leading ``name = value`` or ``name:`` replaced by what ``speak`` calls it."""
     if (named := re.match(r"([a-z]\w*)(?=: )", message)) and (said := speak(named[1], "")) is not None:
         return said + message[named.end() :]
     found = _SETTING.match(message)
-    said = None if found is None else speak(found["name"], _unquoted(found["value"]))
+    said = None if found is None else speak(found["name"], _unquote(found["value"]))
     return message if found is None or said is None else said + message[found.end() :]
 
 
-def _unquoted(value: str) -> str:
-    """The text in quotation marks, or the value itself."""
+def _unquote(value: str) -> str:
+    """Return the text inside quotation marks, or the value itself."""
     return value[1:-1] if value[0] in "'\"" else value
 
 
 def _end_of_advice(message: str, start: int, after: int) -> int:
-    """Where the advice from ``start`` on ends, ``after`` the word in it: at its bracket, or with the clause."""
+    """Return the end of the advice that begins at ``start``: its closing bracket, or the end of the clause."""
     if message[start] == " ":
         return message.find(")", after) + 1 or len(message)
     ends = (found.start() for found in _END.finditer(message, after))
@@ -71,5 +71,5 @@ def _end_of_advice(message: str, start: int, after: int) -> int:
 
 
 def _depth(text: str) -> int:
-    """How many brackets are open at the end of ``text``."""
+    """Return the number of brackets that are open at the end of ``text``."""
     return text.count("(") - text.count(")")

@@ -1,4 +1,4 @@
-"""Checks of array arguments, shared by every floor."""
+"""Checks and conversions of array arguments, shared by every floor."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pathcontrol._labels import by_name, labelled, refuse_labels
+from pathcontrol._labels import order_by_name, read_labels, refuse_labels
 from pathcontrol.errors import InputError
 
 #: an array of floats; shapes are said in docstrings
@@ -20,7 +20,7 @@ LARGEST, SMALLEST = 1e30, 1e-12
 
 
 def as_array(name: str, value: ArrayLike) -> Array:
-    """``value`` as a float array, or an error that names it; labels, which would be lost, are refused."""
+    """Convert ``value`` to a float array; errors name it, and labels, which would be lost, are refused."""
     refuse_labels(name, value)
     try:
         return np.asarray(value, dtype=np.float64)
@@ -29,11 +29,11 @@ def as_array(name: str, value: ArrayLike) -> Array:
 
 
 def joint_array(name: str, value: Any, n: int, joints: Sequence[str] | None = None) -> Array:
-    """``value`` as an array of shape (*batch, n), in the order of the ``joints`` if it is labelled by their names."""
+    """Convert ``value`` to an array (*batch, n), put in the order of ``joints`` if it is labelled by their names."""
     if type(value) is np.ndarray and value.dtype == np.float64:
         array: Array = value
     else:
-        array = as_array(name, value if joints is None else unlabelled(name, value, joints))
+        array = as_array(name, value if joints is None else strip_labels(name, value, joints))
     if array.ndim == 0 or array.shape[-1] != n:
         raise InputError(
             f"{name} has shape {array.shape}, expected (*batch, {n}): one value for each of the {n} joints last",
@@ -43,18 +43,18 @@ def joint_array(name: str, value: Any, n: int, joints: Sequence[str] | None = No
     return array
 
 
-def unlabelled(name: str, value: Any, joints: Sequence[str]) -> Any:
-    """``value`` in the order of the ``joints`` without its labels, if it has any.
+def strip_labels(name: str, value: Any, joints: Sequence[str]) -> Any:
+    """Return ``value`` without its labels, if it has any, put in the order of the ``joints``.
 
     Raises:
         InputError: the labels are not the names of the joints.
     """
-    found = labelled(name, value)
-    return value if found is None else by_name(name, found, joints)
+    found = read_labels(name, value)
+    return value if found is None else order_by_name(name, found, joints)
 
 
 def finite(name: str, array: Array) -> Array:
-    """``array`` itself if all of it is finite."""
+    """Check that all of ``array`` is finite, and return it."""
     if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(
@@ -66,7 +66,7 @@ def finite(name: str, array: Array) -> Array:
 
 
 def physical(name: str, array: Array) -> Array:
-    """``array`` itself if all of it is finite and below 1e30 in size, so that dynamics can compute with it."""
+    """Check that ``array`` is finite and below 1e30 in size, so that dynamics can compute with it; return it."""
     finite(name, array)
     if (np.abs(array) >= LARGEST).any():
         where = tuple(int(i) for i in np.argwhere(np.abs(array) >= LARGEST)[0])
@@ -77,7 +77,7 @@ def physical(name: str, array: Array) -> Array:
 
 
 def scalar(name: str, value: Any, *, positive: bool = False, least: float | None = None) -> float:
-    """``value`` as a finite float, optionally positive or not below ``least``."""
+    """Convert ``value`` to a finite float, optionally positive or not below ``least``."""
     array = as_array(name, value)
     if array.ndim != 0 or not np.isfinite(array):
         raise InputError(f"{name} = {value!r}, expected one finite number", argument=name, value=value)
@@ -92,7 +92,7 @@ def scalar(name: str, value: Any, *, positive: bool = False, least: float | None
 
 
 def quantity(name: str, value: Any) -> float:
-    """``value`` as a float from 1e-12 to 1e30, such as a mass, so that dynamics can compute with it."""
+    """Convert ``value`` to a float from 1e-12 to 1e30, such as a mass, so that dynamics can compute with it."""
     number = scalar(name, value, positive=True)
     if not SMALLEST <= number < LARGEST:
         raise InputError(
@@ -105,14 +105,14 @@ def quantity(name: str, value: Any) -> float:
 
 
 def readonly(array: Array) -> Array:
-    """A copy that cannot be written to, so that values stay values."""
+    """Return a copy that cannot be written to, so that values stay values."""
     copy = np.array(array)
     copy.setflags(write=False)
     return copy
 
 
-def in_common(values: Sequence[Array]) -> Array:
-    """What all rows have, (*shape,), or what each has, (N, *shape)."""
+def merge_rows(values: Sequence[Array]) -> Array:
+    """Return the value that all rows share, (*shape,), or else all of them stacked, (N, *shape)."""
     if all(value is values[0] for value in values):
         return values[0]
     rows = np.stack(values)
@@ -120,7 +120,7 @@ def in_common(values: Sequence[Array]) -> Array:
 
 
 def rigid(name: str, pose: ArrayLike, tolerance: float = 1e-9) -> Array:
-    """``pose`` as a homogeneous transform (4, 4) whose rotation is one up to ``tolerance``; errors name it."""
+    """Check that ``pose`` is a homogeneous transform (4, 4) of a rigid motion up to ``tolerance``; errors name it."""
     transform = finite(name, as_array(name, pose))
     if transform.shape != (4, 4):
         raise InputError(f"{name} has shape {transform.shape}, expected (4, 4), a homogeneous transform")

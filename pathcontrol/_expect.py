@@ -1,4 +1,4 @@
-"""Arguments of the wrong kind, told with what was given, what was expected and what to call."""
+"""A check of the kind of an argument, whose error says what was given, what was expected and what to call."""
 
 from __future__ import annotations
 
@@ -57,14 +57,14 @@ def expect(name: str, value: Any, *kinds: type, error: type[PathControlError] = 
     if given in _SOURCES and given != wanted:
         advice += "; are arguments swapped?"
     raise error(
-        f"{name} {described(value)}, expected {_article(wanted)} {wanted}{also}" + (f": {advice}" if advice else ""),
+        f"{name} {describe(value)}, expected {_article(wanted)} {wanted}{also}" + (f": {advice}" if advice else ""),
         argument=name,
         value=value,
     )
 
 
-def described(value: Any) -> str:
-    """Return what follows the name of an argument: ``= 'x'``, ``is a Circle, which is a PathTask``."""
+def describe(value: Any) -> str:
+    """Return how an error describes a value after its name: ``= 'x'``, ``is a Circle, which is a PathTask``."""
     if isinstance(value, type):
         return f"is the class {value.__name__}"
     family, name = _family(value), type(value).__name__
@@ -74,16 +74,17 @@ def described(value: Any) -> str:
 
 
 def _article(word: str) -> str:
-    """``a`` or ``an``."""
+    """Return ``a`` or ``an``."""
     return "an" if word[0] in "AEIO" else "a"
 
 
 def _family(value: Any) -> str:
-    """The kind of a value as the tables above have it, or an empty text."""
+    """Return the key of a value in the tables above, or an empty text."""
     if isinstance(value, str | PathLike):
         return "text"
     return next((kind.__name__ for kind in type(value).__mro__ if kind.__name__ in _SOURCES), "")
 
 
 def _text(value: Any) -> Any:
+    """Return a path as text, and any other value as it is."""
     return str(value) if isinstance(value, PathLike) else value

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, or are read within bounds, and folders that one process writes to."""
+"""Files that appear whole or not at all, bounded reading of files, and locks on folders."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def write_whole(path: str | Path, content: bytes | memoryview) -> Path:
 
 
 @contextlib.contextmanager
-def locked(path: Path) -> Iterator[bool]:
+def hold_lock(path: Path) -> Iterator[bool]:
     """Hold the operating system's lock on a file or folder; give False where another process holds it.
 
     The lock goes when the process does, however it ends, and leaves no file behind. On a file system without locks
@@ -120,16 +120,17 @@ def locked(path: Path) -> Iterator[bool]:
 
 @contextlib.contextmanager
 def scratch_folder(prefix: str) -> Iterator[Path]:
-    """Give a temporary folder, which is removed at the end; those that killed processes left are removed before."""
+    """Give a temporary folder that is removed at the end; first remove those that killed processes left."""
     for left in Path(tempfile.gettempdir()).glob(f"{glob.escape(prefix)}*"):
-        with contextlib.suppress(OSError), locked(left) as ours:
+        with contextlib.suppress(OSError), hold_lock(left) as ours:
             if ours and left.stat().st_uid == os.getuid():
                 shutil.rmtree(left, ignore_errors=True)
-    with tempfile.TemporaryDirectory(prefix=prefix) as folder, locked(Path(folder)):
+    with tempfile.TemporaryDirectory(prefix=prefix) as folder, hold_lock(Path(folder)):
         yield Path(folder)
 
 
 def _lock(descriptor: int) -> bool:
+    """Try to lock an open file; return False if another process holds the lock."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -170,7 +171,7 @@ atexit.register(_remove_own_parts)
 def _remove_left_parts(target: Path) -> None:
     """Remove the temporary files of ``target`` whose writer does not live any more."""
     for left in target.parent.glob(f".{glob.escape(target.stem)}-{_HEX}{glob.escape(target.suffix)}"):
-        with contextlib.suppress(OSError), locked(left) as ours:  # somebody else may be removing it too
+        with contextlib.suppress(OSError), hold_lock(left) as ours:  # somebody else may be removing it too
             if ours:
                 left.unlink()
 

@@ -1,4 +1,4 @@
-"""What is known of an object, as long as it lives."""
+"""A cache of values by the identity of the objects that they belong to."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ Key = TypeVar("Key")
 Value = TypeVar("Value")
 
 
-class KnownOf(Generic[Key, Value]):
-    """Values kept for objects by identity, until these are gone.
+class IdentityCache(Generic[Key, Value]):
+    """Values kept for objects by identity, for as long as these live.
 
     Unlike a ``WeakKeyDictionary`` it takes objects without a hash, such as a task that is a dataclass, and tells equal
     ones apart.
@@ -25,7 +25,7 @@ class KnownOf(Generic[Key, Value]):
         return None if found is None else found[1]
 
     def keep(self, key: Key, value: Value) -> Value:
-        """Keep, and return, the value of an object in place of another."""
+        """Set the value of an object, and return it."""
         known, which = self._known, id(key)
         known[which] = ref(key, lambda _: known.pop(which, None)), value
         return value

@@ -1,4 +1,4 @@
-"""Values that say what they are of: pandas and xarray objects, and mappings by the names of joints.
+"""Labelled values: pandas and xarray objects, and mappings from the names of joints.
 
 Neither library is imported; what has an index, columns or coordinates of names is taken for one of theirs.
 """
@@ -22,8 +22,8 @@ class Labelled(NamedTuple):
     names: tuple[str, ...]
 
 
-def labelled(name: str, value: Any) -> Labelled | None:
-    """The values and names of what has names along one axis, which becomes the last; ``None`` of all else.
+def read_labels(name: str, value: Any) -> Labelled | None:
+    """Return the values and names of a value with names along one axis, which becomes the last; else ``None``.
 
     Raises:
         InputError: two axes have names, or a name is there twice.
@@ -34,19 +34,19 @@ def labelled(name: str, value: Any) -> Labelled | None:
         return _of_rows(name, value)
     found = _of_mapping(value) or _of_xarray(name, value) or _of_pandas(value)
     if found is not None and len(set(found.names)) < len(found.names):
-        raise InputError(f"{name} has a label twice ({_listed(found.names)}), expected each joint once")
+        raise InputError(f"{name} has a label twice ({_enumerate(found.names)}), expected each joint once")
     return found
 
 
-def by_name(name: str, value: Labelled, joints: Sequence[str]) -> Any:
-    """The values in the order of the joints.
+def order_by_name(name: str, value: Labelled, joints: Sequence[str]) -> Any:
+    """Return the values in the order of the joints.
 
     Raises:
         InputError: the names are not those of the joints.
     """
     if set(value.names) != set(joints):
         raise InputError(
-            f"{name} is labelled {_listed(value.names)}, expected {_listed(joints)}; "
+            f"{name} is labelled {_enumerate(value.names)}, expected {_enumerate(joints)}; "
             "give a value for each joint by its name, or plain numbers in that order"
         )
     order = [value.names.index(joint) for joint in joints]
@@ -54,43 +54,45 @@ def by_name(name: str, value: Labelled, joints: Sequence[str]) -> Any:
 
 
 def refuse_labels(name: str, value: Any) -> None:
-    """Raise for a value with names where none are known to put it in order by.
+    """Refuse a value with names where no order of names is known.
 
     Raises:
         InputError: it has names.
     """
-    if (found := labelled(name, value)) is not None:
+    if (found := read_labels(name, value)) is not None:
         raise InputError(
-            f"{name} is labelled {_listed(found.names)}, but by which labels to order it is not known here; "
+            f"{name} is labelled {_enumerate(found.names)}, but by which labels to order it is not known here; "
             "put it in the order of robot.joint_names and give plain numbers (to_numpy)"
         )
 
 
 def _of_rows(name: str, rows: Sequence[Any]) -> Labelled | None:
-    """Several rows, each labelled, such as a list of postures; rows without labels are in the order of the first."""
+    """Read rows that are labelled one by one, such as a list of postures; all take the order of the first."""
     found = {
-        i: labelled(name, row) for i, row in enumerate(rows) if hasattr(row, "to_numpy") or isinstance(row, Mapping)
+        i: read_labels(name, row) for i, row in enumerate(rows) if hasattr(row, "to_numpy") or isinstance(row, Mapping)
     }
     named = {i: one for i, one in found.items() if one is not None}
     if not named:
         return None
     names = next(iter(named.values())).names
     if len(named) < len(rows):
-        raise InputError(f"{name} has rows with labels ({_listed(names)}) and rows without, expected all alike")
-    return Labelled(np.stack([by_name(f"{name}[{i}]", one, names) for i, one in named.items()]), names)
+        raise InputError(f"{name} has rows with labels ({_enumerate(names)}) and rows without, expected all alike")
+    return Labelled(np.stack([order_by_name(f"{name}[{i}]", one, names) for i, one in named.items()]), names)
 
 
 def _of_mapping(value: Any) -> Labelled | None:
-    if not isinstance(value, Mapping) or (names := _names(value)) is None:
+    """Read a mapping from names to values."""
+    if not isinstance(value, Mapping) or (names := _read_names(value)) is None:
         return None
     return Labelled(np.stack([np.asarray(one) for one in value.values()], axis=-1), names)
 
 
 def _of_xarray(name: str, value: Any) -> Labelled | None:
+    """Read an xarray object with one axis of names."""
     dims, coords = getattr(value, "dims", None), getattr(value, "coords", None)
     if not isinstance(dims, tuple) or coords is None or not hasattr(value, "values"):
         return None
-    found = {axis: _names(np.asarray(coords[dim])) for axis, dim in enumerate(dims) if dim in coords}
+    found = {axis: _read_names(np.asarray(coords[dim])) for axis, dim in enumerate(dims) if dim in coords}
     named = {axis: names for axis, names in found.items() if names is not None}
     if len(named) > 1 and _DIMENSION in dims:
         named = {axis: names for axis, names in named.items() if dims[axis] == _DIMENSION} or named
@@ -104,19 +106,21 @@ def _of_xarray(name: str, value: Any) -> Labelled | None:
 
 
 def _of_pandas(value: Any) -> Labelled | None:
+    """Read a pandas object whose columns or index are names."""
     for labels in (getattr(value, "columns", None), getattr(value, "index", None)):
         if labels is not None and not callable(labels) and hasattr(value, "to_numpy"):
-            names = _names(labels)
+            names = _read_names(labels)
             return None if names is None else Labelled(value.to_numpy(), names)
     return None
 
 
-def _names(labels: Iterable[Any]) -> tuple[str, ...] | None:
-    """The labels, if there are any and all of them are texts."""
+def _read_names(labels: Iterable[Any]) -> tuple[str, ...] | None:
+    """Return the labels as texts if there are any and all of them are texts, else ``None``."""
     found = () if isinstance(labels, np.ndarray) and labels.ndim != 1 else tuple(labels)
     return tuple(map(str, found)) if found and all(isinstance(one, str) for one in found) else None
 
 
-def _listed(names: Sequence[str], most: int = 8) -> str:
+def _enumerate(names: Sequence[str], most: int = 8) -> str:
+    """Return the names, separated by commas, at most so many of them."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more

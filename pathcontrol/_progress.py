@@ -1,4 +1,4 @@
-"""A progress bar on standard error for what takes longer than two seconds."""
+"""A progress bar on standard error, shown once a task has taken two seconds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _PATIENCE = 2.0
 
 @contextlib.contextmanager
 def progress_bar(description: str, total: float, enabled: bool = True) -> Iterator[Callable[[float], None]]:
-    """A function that takes how much of ``total`` is done; the bar shows up once two seconds have passed."""
+    """Give a function that takes how much of ``total`` is done; the bar appears after two seconds."""
     began = time.monotonic()
     shown = None
 
@@ -32,6 +32,7 @@ def progress_bar(description: str, total: float, enabled: bool = True) -> Iterat
 
 
 def _start():  # type: ignore[no-untyped-def]
+    """Start a progress bar of rich."""
     from rich.console import Console
     from rich.progress import Progress
 

@@ -1,4 +1,4 @@
-"""Names of files say what is in them: a name that promises another format is refused, with the call that writes it."""
+"""Checks of file names: a suffix of another format is refused, with the call that writes that format."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def check_suffix(path: str | Path, what: str, *suffixes: str) -> Path:
 
 
 def refuse_suffix(path: str | Path, what: str, *allowed: str) -> Path:
-    """Return ``path`` unless it ends like a format that is not among those ``allowed``; any other dot is a name's.
+    """Return ``path`` unless its suffix is that of a known format not among those ``allowed``.
 
     Raises:
         InputError: it does; the message names the call that writes such a file.
@@ -50,5 +50,6 @@ def refuse_suffix(path: str | Path, what: str, *allowed: str) -> Path:
 
 
 def _instead(path: Path) -> str:
+    """Return the advice to call the function that writes the format of ``path``, if there is one."""
     writer = _WRITERS.get(path.suffix.lower())
     return "" if writer is None else f"; {writer}"

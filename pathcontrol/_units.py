@@ -79,28 +79,28 @@ class Quantity(float):
 
 
 def quantity(text: str, *units: str) -> Quantity:
-    """Return ``text``, a number and a unit, in that of the SI ``units`` which is of its dimension.
+    """Convert ``text``, a number and a unit, to the one of the SI ``units`` that has its dimension.
 
     Raises:
         InputError: it is no number with a unit, or the unit is not known or of another dimension.
     """
     match = _QUANTITY.fullmatch(text) if len(text) <= _LONGEST else None
     if match is None:
-        raise InputError(f"expected a number with a unit, {offered(units)}")
+        raise InputError(f"expected a number with a unit, {list_units(units)}")
     if not match[2]:
-        raise InputError(f"expected a unit after the number, {offered(units)}, or the number without quotes")
-    given = _unit(match[2], units)
+        raise InputError(f"expected a unit after the number, {list_units(units)}, or the number without quotes")
+    given = _parse_unit(match[2], units)
     for unit in units:
-        if _dimension(given) == _dimension(_unit(unit, units)) or _without_angle(given, unit, units):
-            value = _scaled(float(match[1]), given.factor)
+        if _dimension(given) == _dimension(_parse_unit(unit, units)) or _without_angle(given, unit, units):
+            value = _scale(float(match[1]), given.factor)
             if not math.isfinite(value):
                 break
             return Quantity(value, unit)
-    raise InputError(f"expected a finite quantity in {offered(units)}")
+    raise InputError(f"expected a finite quantity in {list_units(units)}")
 
 
-def _scaled(value: float, factor: float) -> float:
-    """``value`` times ``factor``, to the last bit as a person would write it: ``5 mm`` is 0.005."""
+def _scale(value: float, factor: float) -> float:
+    """Return ``value`` times ``factor``, correct to the last bit: ``5 mm`` is 0.005."""
     inverse = 1 / factor
     return value / inverse if inverse.is_integer() else value * factor
 
@@ -111,13 +111,13 @@ def is_quantity(text: str) -> bool:
     return match is not None and bool(match[2])
 
 
-def offered(units: Iterable[str]) -> str:
-    """Return the units that a person may write where ``units`` are meant."""
+def list_units(units: Iterable[str]) -> str:
+    """Return the units that may be written where ``units`` are expected, for a message."""
     return " or ".join(f"{unit} ({_OTHERS[unit]})" if unit in _OTHERS else unit for unit in units)
 
 
-def _unit(text: str, wanted: Iterable[str]) -> _Unit:
-    """The product of the units in ``text``, as ``N m s/rad`` or ``mm/s²``: a slash is for the next unit only."""
+def _parse_unit(text: str, wanted: Iterable[str]) -> _Unit:
+    """Parse a product of units, as ``N m s/rad`` or ``mm/s²``: a slash divides by the next unit only."""
     compact = re.sub(r"\s*([*·/^]+)\s*", r"\1", text.translate(_POWERS))
     total, end = _Unit(1.0), 0
     for term in _TERM.finditer(re.sub(r"\s+", "·", compact)):
@@ -128,15 +128,16 @@ def _unit(text: str, wanted: Iterable[str]) -> _Unit:
         exponents = (a + power * b for a, b in zip(total[1:], unit[1:], strict=True))
         total, end = _Unit(total.factor * unit.factor**power, *exponents), term.end()
     if end != len(compact):
-        raise InputError(f"unknown unit {text!r}, expected {offered(wanted)}")
+        raise InputError(f"unknown unit {text!r}, expected {list_units(wanted)}")
     return total
 
 
 def _dimension(unit: _Unit) -> tuple[int, ...]:
+    """Return the exponents of m, kg, s and rad."""
     return unit[1:]
 
 
 def _without_angle(given: _Unit, unit: str, wanted: Iterable[str]) -> bool:
-    """Whether a torque over an angle, or the like, is given as it is often written, without the angle: ``N m s``."""
-    meant = _unit(unit, wanted)
+    """Return whether a unit per radian is given without the angle, as is often written: ``N m s``."""
+    meant = _parse_unit(unit, wanted)
     return meant.kg != 0 and given.rad == 0 and _dimension(given)[:3] == _dimension(meant)[:3]

@@ -21,7 +21,7 @@ from patience import PATIENCE
 from scipy import stats
 
 import pathcontrol as pc
-from pathcontrol._files import locked, scratch_folder, whole_file
+from pathcontrol._files import hold_lock, scratch_folder, whole_file
 from pathcontrol.cli import main
 from pathcontrol.errors import InputError, PathControlError, PathControlWarning
 from pathcontrol.experiments.sweep_runner import run_sweep
@@ -378,7 +378,7 @@ def test_what_killed_writers_left_is_removed_and_what_a_living_one_writes_stays(
         living.write_bytes(b"first")
     assert file.read_bytes() == b"first"
     assert sorted(tmp_path.iterdir()) == sorted([file, other])
-    with locked(file) as one, locked(file) as two:
+    with hold_lock(file) as one, hold_lock(file) as two:
         assert (one, two) == (True, False)
 
 

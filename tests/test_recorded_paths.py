@@ -36,7 +36,7 @@ from pathcontrol import (
     limited,
     time_optimal,
 )
-from pathcontrol.geometry.hermite import piecewise, sampled
+from pathcontrol.geometry.hermite import hermite_polynomials, sample_adaptively
 from pathcontrol.simulation.storage.array_store import Shelf
 from pathcontrol.simulation.storage.task_recipes import task_of, task_recipe
 from pathcontrol.tasks.laps import Laps
@@ -306,7 +306,7 @@ def test_the_error_falls_with_the_order(derivatives, order):
     def error(cells):
         s = np.linspace(0.0, 2.0, cells + 1)
         x = np.linspace(0.0, 2.0, 997)
-        return np.abs(piecewise(s, np.stack([f(s) for f in functions])[..., None])(x)[:, 0] - np.sin(x)).max()
+        return np.abs(hermite_polynomials(s, np.stack([f(s) for f in functions])[..., None])(x)[:, 0] - np.sin(x)).max()
 
     assert np.log2(error(4) / error(8)) == pytest.approx(order, abs=0.4)
 
@@ -318,7 +318,7 @@ def test_polynomials_of_the_degree_are_reproduced(coefficients, derivatives, wid
     jets = np.stack([polynomial.deriv(k)(s) if k else polynomial(s) for k in range(derivatives + 1)])[..., None]
     x = np.linspace(s[0], s[-1], 101)
     scale = 1 + np.abs(polynomial(x)).max()
-    assert np.abs(piecewise(s, jets)(x)[:, 0] - polynomial(x)).max() <= 1e-11 * scale
+    assert np.abs(hermite_polynomials(s, jets)(x)[:, 0] - polynomial(x)).max() <= 1e-11 * scale
 
 
 @given(wobbles())
@@ -327,11 +327,13 @@ def test_the_samples_are_values_of_the_function(task):
     def jet(s):
         return np.stack([task.q_d(s), task.exact_dq_d(s), task.exact_ddq_d(s)])
 
-    s, jets = sampled(jet, np.linspace(0, 2 * np.pi, 5))
+    s, jets = sample_adaptively(jet, np.linspace(0, 2 * np.pi, 5))
     assert np.array_equal(jets, jet(s))
     assert (np.diff(s) > 0).all()
     x = places(task)
-    assert np.abs(piecewise(s, jets)(x) - task.q_d(x)).max() <= 1e-11 * np.ptp(task.q_d(x), axis=0).max() + 1e-14
+    assert (
+        np.abs(hermite_polynomials(s, jets)(x) - task.q_d(x)).max() <= 1e-11 * np.ptp(task.q_d(x), axis=0).max() + 1e-14
+    )
 
 
 # --- what is no task ----------------------------------------------------------------------------------------

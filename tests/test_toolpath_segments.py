@@ -13,7 +13,7 @@ from scipy.special import ellipe, ellipeinc
 from strategies import floats
 
 from pathcontrol import InputError
-from pathcontrol.geometry.boxes import Boxes
+from pathcontrol.geometry.box_hierarchy import BoxHierarchy
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.lengths import ArcLength
 from pathcontrol.toolpaths.segments.arc import Arc
@@ -183,7 +183,7 @@ def test_boxes_name_all_that_is_nearer_than_the_bound(seed, count, points):
     x, bound = lower[rng.integers(count, size=points)] + rng.normal(size=(points, 3)), rng.exponential(size=points)
     named = {
         (int(r), int(b))
-        for rows, boxes in Boxes(lower, upper).nearer(x, bound)
+        for rows, boxes in BoxHierarchy(lower, upper).nearer(x, bound)
         for r, b in zip(rows, boxes, strict=True)
     }
     away = np.linalg.norm(x[:, None] - np.clip(x[:, None], lower, upper), axis=-1)

@@ -16,7 +16,7 @@ from typing import Any
 
 import click
 
-from pathcontrol._advice import in_words_of, setting_in_words_of
+from pathcontrol._advice import reword_advice, reword_setting
 from pathcontrol.errors import PathControlError, PathControlWarning
 
 
@@ -62,7 +62,7 @@ def in_options(message: str, command: click.Command | None) -> str:
             return None
         return option.opts[0] if option.is_flag or not value or value == "…" else _typed(option, value)
 
-    return setting_in_words_of(in_words_of(message, speak), speak)
+    return reword_setting(reword_advice(message, speak), speak)
 
 
 def _typed(option: click.Option, value: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly, unlabelled
+from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly, strip_labels
 from pathcontrol._expect import expect
 from pathcontrol.control.ending import Ending
 from pathcontrol.errors import InputError, UnknownNameError, warn_of_single
@@ -191,7 +191,7 @@ def diagonal_gain(name: str, value: ArrayLike, n: int, joints: Sequence[str] | N
     Raises:
         InputError: it has another shape, is not positive, or is a matrix that is not diagonal.
     """
-    given = value if joints is None else unlabelled(name, value, joints)
+    given = value if joints is None else strip_labels(name, value, joints)
     array = _diagonal_of_matrix(name, finite(name, as_array(name, given)), n)
     if array.ndim and array.shape[-1] not in (1, n):
         raise InputError(

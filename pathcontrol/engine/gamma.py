@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol._identity import KnownOf
+from pathcontrol._identity import IdentityCache
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.structs import Gamma, Memory
 from pathcontrol.engine.table import PathTable, bezier_points, task_table
@@ -33,7 +33,7 @@ class _TabulatedGamma(NamedTuple):
     work: int
 
 
-_READY: KnownOf[PathTask, dict[tuple[float, bool], _TabulatedGamma]] = KnownOf()
+_READY: IdentityCache[PathTask, dict[tuple[float, bool], _TabulatedGamma]] = IdentityCache()
 
 
 def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braking: bool) -> tuple[Array, Array]:

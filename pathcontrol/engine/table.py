@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol._identity import KnownOf
+from pathcontrol._identity import IdentityCache
 from pathcontrol.control.ending import Ending, arrival_parameter
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.structs import Memory, Path
@@ -73,7 +73,7 @@ class PathTable(NamedTuple):
         return horner(np.moveaxis(self.coefficients[cell], 1, 0), (s - self.knots[cell])[:, None])
 
 
-_TABLES: KnownOf[PathTask, tuple[PathTable, Path, Memory]] = KnownOf()
+_TABLES: IdentityCache[PathTask, tuple[PathTable, Path, Memory]] = IdentityCache()
 
 
 def path_struct(task: PathTask) -> tuple[Path, Memory]:

@@ -8,8 +8,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from pathcontrol._advice import in_words_of
-from pathcontrol._units import Quantity, offered
+from pathcontrol._advice import reword_advice
+from pathcontrol._units import Quantity, list_units
 from pathcontrol.errors import ExperimentError, PathControlError
 
 _LISTS = str.maketrans("()", "[]")  # of Python and of TOML
@@ -31,7 +31,7 @@ def keyed(key: str, fields: Iterable[str] | Mapping[str, str] = ()) -> Iterator[
     except (PathControlError, OSError) as error:
         word = re.match(r"\w*", str(error))
         joint = "." if word and word[0] in names else ": "
-        message = in_words_of(str(error), lambda name, value: _line(names[name], value) if name in names else None)
+        message = reword_advice(str(error), lambda name, value: _line(names[name], value) if name in names else None)
         raise ExperimentError(f"{key}{joint}{message}") from error
 
 
@@ -63,7 +63,7 @@ def refuse_unit(key: str, value: Any, unit: str) -> None:
         ExperimentError: it was.
     """
     if isinstance(value, Quantity) and value.unit != unit:
-        raise ExperimentError(f"{key} was given in {value.unit}, expected {offered([unit])}: so the joint moves")
+        raise ExperimentError(f"{key} was given in {value.unit}, expected {list_units([unit])}: so the joint moves")
 
 
 def told(error: BaseException) -> str:

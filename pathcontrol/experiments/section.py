@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from pathcontrol._units import Quantity, is_quantity, offered, quantity
+from pathcontrol._units import Quantity, is_quantity, list_units, quantity
 from pathcontrol.arguments import Unit
 from pathcontrol.errors import InputError
 from pathcontrol.experiments.values import did_you_mean, expected, shown
@@ -166,7 +166,7 @@ def _or_with_unit(section: type[Section], error: Any) -> str:
     """The units that a text might have had, where it stands for a quantity."""
     about_text = error["loc"] and isinstance(error["input"], str)
     units = section.units_of({}).get(error["loc"][0]) if about_text else None
-    return "" if units is None else f", or one with a unit: {offered(units)}"
+    return "" if units is None else f", or one with a unit: {list_units(units)}"
 
 
 def _wanted(error: Any) -> str:

@@ -65,18 +65,18 @@ class ArcLength:
         return float(self._lengths[-1])
 
     def __call__(self, s: Array) -> Array:
-        """L(s) [rad], (*batch,)."""
+        """Return the arc length L(s) [rad], (*batch,)."""
         laps, s = self._laps(s - self.lower, self.upper - self.lower)
         s = self.lower + s
         cell = self._cell(self._ends, s)
         return laps * self.total + self._lengths[cell] + self._quadrature(self._ends[cell], s)[0]
 
     def inverse(self, length: Array) -> Array:
-        """The s, (*batch,), up to which the path has the ``length`` [rad], (*batch,), by Newton's method."""
+        """Return the s, (*batch,), at the arc ``length`` [rad], (*batch,), by Newton's method."""
         laps, length = self._laps(length, self.total)
         cell = self._cell(self._lengths, length)
         a, b, rest = self._ends[cell], self._ends[cell + 1], length - self._lengths[cell]
-        s = self._guess(cell, rest)
+        s = self._estimate_inverse(cell, rest)
         moving = np.ones(s.shape, dtype=bool)
         for _ in range(_NEWTON_STEPS):
             reached, slope = self._quadrature(a, s)
@@ -88,38 +88,40 @@ class ArcLength:
                 break
         return s + laps * (self.upper - self.lower)
 
-    def _guess(self, cell: Array, rest: Array) -> Array:
-        """The s that lies ``rest`` behind the start of its cell, by the cubic with the ends and end slopes of L⁻¹."""
+    def _estimate_inverse(self, cell: Array, rest: Array) -> Array:
+        """Return a first estimate of the inverse in a cell: the cubic through the ends and end slopes of L⁻¹."""
         h, length = self._ends[cell + 1] - self._ends[cell], self._lengths[cell + 1] - self._lengths[cell]
         x, left, right = rest / length, length / self._speeds[cell], length / self._speeds[cell + 1]
         return self._ends[cell] + x * (left + x * (3 * h - 2 * left - right + x * (left + right - 2 * h)))
 
     def _laps(self, value: Array, one: float) -> tuple[Array, Array]:
-        """Whole laps in ``value`` and the rest, for a closed path."""
+        """Split ``value`` into whole laps of a closed curve and the rest."""
         if not self._closed:
             return np.zeros_like(value), value
         laps, rest = np.divmod(value, one)
         return laps, rest
 
     def _cell(self, ends: Array, value: Array) -> Array:
+        """Return the cells that hold the values."""
         return np.clip(np.searchsorted(ends, value, side="right") - 1, 0, len(ends) - 2)
 
     def _quadrature(self, a: Array, b: Array) -> tuple[Array, Array]:
-        """The length from a to b, each (*batch,), and ‖q_d'(b)‖."""
+        """Return the length from a to b, each (*batch,), and the speed ‖p'(b)‖."""
         h = (b - a)[..., None]
         speed = np.linalg.norm(self._derivative(a[..., None] + h * np.append(_NODES, 1.0)), axis=-1)
         # a product of matrices would round a row differently in another batch
         return h[..., 0] * (speed[..., :-1] * _WEIGHTS).sum(-1), speed[..., -1]
 
     def _first_ends(self) -> Array:
+        """Return equidistant ends of cells, joined by the knots of the curve."""
         ends = np.linspace(self.lower, self.upper, _FIRST_CELLS + 1)
         knots = self._knots
         if knots is None:
             return ends
-        return apart(np.union1d(ends, knots[(knots > self.lower) & (knots < self.upper)]))
+        return drop_coincident(np.union1d(ends, knots[(knots > self.lower) & (knots < self.upper)]))
 
     def _cells(self, ends: Array) -> tuple[Array, Array]:
-        """Ends of the cells, (K + 1,), and their lengths, (K,)."""
+        """Return the ends of the cells, (K + 1,), refined until the quadrature agrees, and their lengths, (K,)."""
         a, b = ends[:-1], ends[1:]
         whole, before = self._quadrature(a, b)[0], np.full(len(a), np.inf)
         starts, lengths, most, least = [], [], _MOST_CELLS + len(a), _ROUNDING * whole.sum()
@@ -140,8 +142,8 @@ class ArcLength:
         return np.append(np.concatenate(starts)[order], ends[-1]), np.concatenate(lengths)[order]
 
 
-def apart(ends: Array) -> Array:
-    """Return ``ends`` (K,), ascending, without those that only rounding tells from the one before or the last."""
+def drop_coincident(ends: Array) -> Array:
+    """Return ``ends`` (K,), ascending, without those that coincide up to rounding with the one before or the last."""
     nearest = _COINCIDENT * np.abs(ends[[0, -1]]).max()
     kept, last_kept = [ends[0]], ends[0]
     for end in ends[1:-1]:
@@ -152,6 +154,6 @@ def apart(ends: Array) -> Array:
 
 
 def curvature_vector(dq_d: Array, ddq_d: Array) -> Array:
-    """Second derivative by the arc length [1/rad], (*batch, n): the part of q_d'' normal to the path, over ‖q_d'‖²."""
+    """Return the second derivative by the arc length [1/rad], (*batch, n): the normal part of q_d'' over ‖q_d'‖²."""
     squared = (dq_d * dq_d).sum(-1, keepdims=True)
     return (ddq_d - (dq_d * ddq_d).sum(-1, keepdims=True) / squared * dq_d) / squared

@@ -30,7 +30,7 @@ class Differentiator:
         function: maps s of shape (*batch,) to values of shape (*batch,) or (*batch, n).
         lower: where the domain begins; -inf allowed.
         upper: where the domain ends; inf allowed.
-        width: half the width of the window; see :func:`best_width`.
+        width: half the width of the window; see :func:`find_width`.
     """
 
     function: Callable[[Array], Array]
@@ -39,7 +39,7 @@ class Differentiator:
     width: float
 
     def __call__(self, s: Array, order: int) -> Array:
-        """Derivative of ``order`` 1 or 2 at s (*batch,)."""
+        """Return the derivative of ``order`` 1 or 2 at s (*batch,)."""
         s = np.asarray(s, dtype=np.float64)
         centre = np.clip(s, self.lower + self.width, self.upper - self.width)
         values = np.asarray(self.function(centre[..., None] + self.width * _NODES))
@@ -50,25 +50,26 @@ class Differentiator:
 
 
 def _weights(u: Array, order: int) -> Array:
-    """Weights of the samples for the derivative at u in [-1, 1], the same for each u in any batch."""
+    """Return the weights of the samples for the derivative at u in [-1, 1], the same for each u in any batch."""
     inside = (u == 0)[..., None]
     if inside.all():  # nearly everywhere
         return np.broadcast_to(_IN_THE_MIDDLE[order], (*np.shape(u), _DEGREE + 1))
-    return np.where(inside, _IN_THE_MIDDLE[order], _weights_at(u, order))
+    return np.where(inside, _IN_THE_MIDDLE[order], _compute_weights(u, order))
 
 
-def _weights_at(u: Array, order: int) -> Array:
+def _compute_weights(u: Array, order: int) -> Array:
+    """Return the weights at u, computed one by one."""
     derivative = _DERIVATIVES[order]
     basis = chebyshev.chebvander(u, len(derivative) - 1).reshape(*np.shape(u), 1, len(derivative))
     # one product for each s, of numbers side by side: else a row would be rounded differently in another batch
     return (np.ascontiguousarray(basis) @ (derivative @ _TO_COEFFICIENTS))[..., 0, :]
 
 
-_IN_THE_MIDDLE = {order: _weights_at(np.array(0.0), order) for order in _DERIVATIVES}
+_IN_THE_MIDDLE = {order: _compute_weights(np.array(0.0), order) for order in _DERIVATIVES}
 
 
-def best_width(function: Callable[[Array], Array], lower: float, upper: float, samples: int = 33) -> float:
-    """The window on which the derivatives of ``function`` agree best with those of windows half as wide.
+def find_width(function: Callable[[Array], Array], lower: float, upper: float, samples: int = 33) -> float:
+    """Find the window whose derivatives of ``function`` agree best with those of a window half as wide.
 
     Truncation shrinks and rounding grows as the window narrows; the smallest disagreement of the second derivative
     over ``samples`` places of [lower, upper] marks the balance.

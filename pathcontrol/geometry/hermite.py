@@ -1,4 +1,4 @@
-"""A function of the path parameter as samples with derivatives: polynomials that meet both ends of each cell.
+"""Piecewise Hermite interpolation of a function by its values and derivatives at the ends of cells.
 
 The values of a function and its first, or its first two, derivatives at the ends of a cell of width h make a cubic or
 a quintic in between (Hermite interpolation). Splines of that degree are reproduced up to rounding, other smooth
@@ -29,15 +29,15 @@ _HALVINGS = 40
 _MOST_CELLS = 1 << 12  # more than there were at first
 
 
-def piecewise(s: Array, jets: Array) -> PPoly:
-    """The polynomials in the cells between s (m,), from the ``jets`` (2 or 3, m, n) there."""
+def hermite_polynomials(s: Array, jets: Array) -> PPoly:
+    """Return the polynomials in the cells between s (m,), from the ``jets`` (2 or 3, m, n) there."""
     from scipy.interpolate import PPoly  # takes longer to load than a simulation that needs none
 
     return PPoly(coefficients(s, jets), s)
 
 
 def coefficients(s: Array, jets: Array) -> Array:
-    """Coefficients (4 or 6, m - 1, n) of the polynomials in the cells between s (m,), from the highest power down."""
+    """Return the coefficients (4 or 6, m - 1, n) of the polynomials between s (m,), from the highest power down."""
     h = np.diff(s)[:, None]
     y, dy = jets[0, :-1], jets[1, :-1]
     if len(jets) == 2:
@@ -53,7 +53,7 @@ def coefficients(s: Array, jets: Array) -> Array:
 
 
 def horner(coefficients: Array, x: Array) -> tuple[Array, Array]:
-    """Value and slope of polynomials, coefficients (degree + 1, …) from the highest power down, at x."""
+    """Return value and slope at x of polynomials with ``coefficients`` (degree + 1, …) from the highest power down."""
     value, slope = coefficients[0], np.zeros_like(coefficients[0])
     for coefficient in coefficients[1:]:
         slope = slope * x + value
@@ -61,8 +61,8 @@ def horner(coefficients: Array, x: Array) -> tuple[Array, Array]:
     return value, slope
 
 
-def sampled(jet: Jet, s: Array) -> tuple[Array, Array]:
-    """Knots and the jets there that reproduce a function: cells between s (m,) are halved until they do.
+def sample_adaptively(jet: Jet, s: Array) -> tuple[Array, Array]:
+    """Sample a function densely enough: halve cells between s (m,) until the polynomials reproduce it.
 
     Inside the cells values differ by 1e-11 of the extent of the function and slopes by 1e-9 of the largest, or for
     cubics by 1e-9 and 1e-6. By more only where the function is less smooth than the polynomials, in cells too narrow to
@@ -72,7 +72,7 @@ def sampled(jet: Jet, s: Array) -> tuple[Array, Array]:
     room = _MOST_CELLS
     for _ in range(_HALVINGS):
         error = _error(jet, s, jets, cells)
-        coarse = cells[_worst(error, room)]
+        coarse = cells[_select_worst(error, room)]
         if not coarse.size:
             break
         middle = 0.5 * (s[coarse] + s[coarse + 1])
@@ -83,7 +83,7 @@ def sampled(jet: Jet, s: Array) -> tuple[Array, Array]:
 
 
 def _error(jet: Jet, s: Array, jets: Array, cells: NDArray[np.intp]) -> Array:
-    """How many times too far function and polynomial are apart in the ``cells``, (len(cells),)."""
+    """Return the error of the polynomials in the ``cells``, (len(cells),), as a multiple of what is allowed."""
     width = np.diff(s)[cells]
     beyond = _INSIDE[:, None] * width
     wanted = jet((s[cells] + beyond).reshape(-1))
@@ -95,7 +95,7 @@ def _error(jet: Jet, s: Array, jets: Array, cells: NDArray[np.intp]) -> Array:
     return np.max([a / np.maximum(b, np.finfo(float).tiny) for a, b in zip(apart, allowed, strict=True)], axis=0)
 
 
-def _worst(error: Array, room: int) -> NDArray[np.intp]:
-    """The cells with too large an error, or the worst of them where there is no ``room`` for all."""
+def _select_worst(error: Array, room: int) -> NDArray[np.intp]:
+    """Return the cells with too large an error, or the worst of them where there is no ``room`` for all."""
     index = np.flatnonzero(error > 1)
     return np.sort(index[np.argsort(-error[index], kind="stable")[: max(room, 0)]])

@@ -1,4 +1,4 @@
-"""Quintic curves in space by Hermite interpolation: between knots where p, p' and p'' are given."""
+"""Quintic curves in space by Hermite interpolation between knots with given p, p' and p''."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class CurvePoint(NamedTuple):
 
 
 def quintic_spline(s: Array, values: Array) -> PPoly:
-    """Return the quintics between knots s (k + 1,) where p, p' and p'', ``values`` (k + 1, 3, 3), are given."""
+    """Return the quintic spline with p, p' and p'', ``values`` (k + 1, 3, 3), at the knots s (k + 1,)."""
     points = quintic_points(np.diff(s), values[:-1], values[1:])
     return PPoly.from_bernstein_basis(BPoly(np.moveaxis(points, -2, 0), s))
 
 
 def quintic_points(length: Array, start: Array, end: Array) -> Array:
-    """Bézier points (*batch, 6, 3) of quintics of a ``length`` (*batch,) with p, p' and p'' (*batch, 3, 3) given."""
+    """Return the Bézier points (*batch, 6, 3) of quintics of a ``length`` (*batch,) from p, p', p'' (*batch, 3, 3)."""
     h = length[..., None]
     (p0, v0, a0), (p1, v1, a1) = (np.moveaxis(values, -2, 0) for values in (start, end))
     # a Bézier curve's end derivatives in terms of its control points, solved for them

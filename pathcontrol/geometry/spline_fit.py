@@ -22,29 +22,31 @@ _WORST = 0.25  # spans this near to the worst are divided together: where a step
 
 
 def fit_samples(q: ArrayLike, s: ArrayLike | None, tolerance: float, closed: bool) -> tuple[BSpline, float]:
-    """The spline and its largest deviation; see :meth:`SplinePath.from_samples`."""
+    """Fit a cubic spline; return it and its largest deviation; see :meth:`SplinePath.from_samples`."""
     tolerance = scalar("tolerance", tolerance, least=0.0)
-    samples = _checked_samples(q)
+    samples = _check_samples(q)
     if s is None:
-        samples, parameters = _by_length(samples, closed)
+        samples, parameters = _parametrize_by_length(samples, closed)
     else:
-        parameters = _checked_parameters(s, samples, closed)
+        parameters = _check_parameters(s, samples, closed)
     least = 3 if closed else 2
     if len(samples) < least:
         raise InputError(f"q has {len(samples)} different postures, expected at least {least} for this path")
-    spline = _refined(samples, parameters, tolerance, closed) if tolerance else None
+    spline = _refine(samples, parameters, tolerance, closed) if tolerance else None
     spline = spline or _interpolant(samples, parameters, closed)
     return spline, float(_distances(spline(parameters[: len(samples)]), samples).max())
 
 
-def _checked_samples(q: ArrayLike) -> Array:
+def _check_samples(q: ArrayLike) -> Array:
+    """Check that ``q`` is a finite array (m, n)."""
     samples = finite("q", as_array("q", q))
     if samples.ndim != 2 or not samples.shape[1]:
         raise InputError(f"q has shape {samples.shape}, expected (m, n): one sample a row")
     return samples
 
 
-def _checked_parameters(s: ArrayLike, samples: Array, closed: bool) -> Array:
+def _check_parameters(s: ArrayLike, samples: Array, closed: bool) -> Array:
+    """Check that ``s`` increases and has a value for each sample."""
     parameters = finite("s", as_array("s", s))
     if parameters.shape != (len(samples) + closed,):
         more = ", one of them for the return to the first sample" if closed else ""
@@ -59,8 +61,8 @@ def _checked_parameters(s: ArrayLike, samples: Array, closed: bool) -> Array:
     return parameters
 
 
-def _by_length(samples: Array, closed: bool) -> tuple[Array, Array]:
-    """The samples without repetitions, and the length of the polygon up to each."""
+def _parametrize_by_length(samples: Array, closed: bool) -> tuple[Array, Array]:
+    """Return the samples without repetitions, and the length of the polygon up to each."""
     ring = np.concatenate([samples, samples[:1]]) if closed else samples
     steps = _distances(ring[1:], ring[:-1])
     moves = steps > np.finfo(float).eps * steps.sum()
@@ -69,13 +71,13 @@ def _by_length(samples: Array, closed: bool) -> tuple[Array, Array]:
 
 
 def _interpolant(samples: Array, s: Array, closed: bool) -> BSpline:
-    """The spline through every sample: periodic, or natural at the ends."""
+    """Return the spline through every sample: periodic, or natural at the ends."""
     ring = np.concatenate([samples, samples[:1]]) if closed else samples
     return make_interp_spline(s, ring, k=_DEGREE, bc_type="periodic" if closed else "natural")
 
 
-def _refined(samples: Array, s: Array, tolerance: float, closed: bool) -> BSpline | None:
-    """Least squares on the first knots that keep the tolerance; ``None`` if nothing but interpolation does."""
+def _refine(samples: Array, s: Array, tolerance: float, closed: bool) -> BSpline | None:
+    """Fit with more and more knots until the tolerance is kept; ``None`` if nothing but interpolation does."""
     m = len(samples)
     if m <= _DEGREE:
         return None
@@ -95,7 +97,7 @@ def _refined(samples: Array, s: Array, tolerance: float, closed: bool) -> BSplin
 
 
 def _middles(knots: Array, far: Array, first: int, last: int) -> Array:
-    """The middle samples of the spans of ``knots`` that have a far sample, or of those next to them."""
+    """Return the middle samples of the spans of ``knots`` that have a far sample, or of those next to them."""
     left, right = knots[:-1], knots[1:]
     middle = np.clip((left + right) // 2, first, last)
     divisible = (left < middle) & (middle < right)
@@ -108,7 +110,7 @@ def _middles(knots: Array, far: Array, first: int, last: int) -> Array:
 
 
 def _least_squares(samples: Array, s: Array, breaks: Array, closed: bool) -> BSpline:
-    """The spline on ``breaks``, first and last included, that is nearest to the samples in the mean."""
+    """Fit a spline with the knots ``breaks``, first and last included, by least squares."""
     k, spans = _DEGREE, len(breaks) - 1
     if closed:
         period = breaks[-1] - breaks[0]
@@ -123,4 +125,5 @@ def _least_squares(samples: Array, s: Array, breaks: Array, closed: bool) -> BSp
 
 
 def _distances(a: Array, b: Array) -> Array:
+    """Return the distances ‖a − b‖ of rows."""
     return np.linalg.norm(a - b, axis=-1)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pathcontrol._arrays import Array, in_common
+from pathcontrol._arrays import Array, merge_rows
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.robot.actuation import Actuation, Limits
@@ -111,9 +111,9 @@ def _different(robots: Sequence[RobotModel]) -> tuple[list[RobotModel], NDArray[
 
 def _limits(robots: Sequence[RobotModel]) -> Limits:
     names = ("lower", "upper", "velocity", "effort")
-    return Limits(*(in_common([getattr(robot.limits, name) for robot in robots]) for name in names))
+    return Limits(*(merge_rows([getattr(robot.limits, name) for robot in robots]) for name in names))
 
 
 def _encoder_counts(robots: Sequence[RobotModel]) -> Array | None:
     counts: list[Any] = [robot.actuation.encoder_counts for robot in robots]
-    return None if any(count is None for count in counts) else in_common(counts)
+    return None if any(count is None for count in counts) else merge_rows(counts)

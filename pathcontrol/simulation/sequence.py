@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite
-from pathcontrol._expect import described, expect
+from pathcontrol._expect import describe, expect
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
@@ -162,7 +162,7 @@ def _length(task: PathTask, laps: int) -> float:
 def _checked_controllers(controllers: Iterable[Controller]) -> list[Controller]:
     laws = list(controllers) if isinstance(controllers, Iterable) else []
     if not laws or isinstance(controllers, str | PathTask):
-        raise InputError(f"controllers {described(controllers)}, expected a list with one controller for each path")
+        raise InputError(f"controllers {describe(controllers)}, expected a list with one controller for each path")
     for i, law in enumerate(laws):
         expect(f"controllers[{i}]", law, Controller)
         refuse_batch(f"the task of controllers[{i}]", law.task)

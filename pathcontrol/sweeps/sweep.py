@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
-from pathcontrol._files import locked, writing
+from pathcontrol._files import hold_lock, writing
 from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.errors import InputError
@@ -125,7 +125,7 @@ def opened(folder: Path, samples: int, definition: Mapping[str, Any], resume: bo
     refuse_suffix(folder, "the folder of a sweep")
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    with locked(folder) as ours:
+    with hold_lock(folder) as ours:
         if not ours:
             raise InputError(f"another process is writing to {str(folder)!r}; wait for it, or name another folder")
         begun = (folder / MANIFEST).exists()

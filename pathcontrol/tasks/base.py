@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError, TaskError, warn_of_single
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
-from pathcontrol.geometry.differentiation import Differentiator, best_width
+from pathcontrol.geometry.differentiation import Differentiator, find_width
 from pathcontrol.tasks.profile import plain_attributes
 
 _MOST_SHOWN = 16  # values of an array in a repr
@@ -171,7 +171,7 @@ class Task(ABC):
 
     def _differentiator(self, function: Any) -> Differentiator:
         lower, upper = self.sampled_interval
-        width = best_width(function, lower, upper)
+        width = find_width(function, lower, upper)
         return Differentiator(function, self.s0 if self.period is None else -np.inf, self.s_end, width)
 
     @cached_property

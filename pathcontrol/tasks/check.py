@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol._expect import described, expect
+from pathcontrol._expect import describe, expect
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.regularity import check_moves
@@ -28,7 +28,7 @@ def check_task(task: PathTask, n: int) -> None:
         _check_each(task, n)
         return
     if isinstance(task, list | tuple):
-        raise TaskError(f"task {described(task)}, expected a PathTask, or TaskBatch([...]) of one for each rollout")
+        raise TaskError(f"task {describe(task)}, expected a PathTask, or TaskBatch([...]) of one for each rollout")
     expect("task", task, PathTask, error=TaskError)
     name = type(task).__name__
     _check_domain(task, name)

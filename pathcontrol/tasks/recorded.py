@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
-from pathcontrol.geometry.hermite import piecewise, sampled
+from pathcontrol.geometry.hermite import hermite_polynomials, sample_adaptively
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, Path, VelocityProfile
 from pathcontrol.tasks.task import PathTask
@@ -36,7 +36,7 @@ class RecordedProfile(VelocityProfile):
     def __init__(self, s: ArrayLike, jets: ArrayLike, period: float | None = None) -> None:
         self.s, self.jets = _checked(s, jets, 2)
         self.period = _checked_period(self.s, period)
-        self._rate = piecewise(self.s, self.jets[..., None])
+        self._rate = hermite_polynomials(self.s, self.jets[..., None])
 
     def theta(self, path: Path, s: Array) -> Array:
         return self._rate(self._within(s))[..., 0]
@@ -71,7 +71,7 @@ def recorded_profile(task: PathTask, upto: float | None = None) -> VelocityProfi
         return ConstantRate(float(theta[0]))
     if np.ptp(speed) <= _CONSTANT * speed.max():
         return ConstantSpeed(float(np.median(speed)))
-    s, jets = sampled(jet, s)
+    s, jets = sample_adaptively(jet, s)
     return RecordedProfile(s, jets[..., 0], task.period)
 
 
@@ -137,7 +137,7 @@ class RecordedPath(PathTask):
             return np.stack([task.q_d(s), task.dq_d(s), task.ddq_d(s)])
 
         endless = task.period is None and not np.isfinite(task.s_end)
-        s, jets = sampled(jet, _first_cells(task, upto, _CELLS if task.knots is None else 1))
+        s, jets = sample_adaptively(jet, _first_cells(task, upto, _CELLS if task.knots is None else 1))
         return cls(
             s,
             jets,
@@ -192,7 +192,7 @@ class RecordedPath(PathTask):
 
     @cached_property
     def _curves(self) -> list[PPoly]:
-        curve = piecewise(self.samples, self.jets)
+        curve = hermite_polynomials(self.samples, self.jets)
         return [curve, curve.derivative(1), curve.derivative(2)]
 
     @cached_property

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError, TaskError
-from pathcontrol.geometry.arc_length import apart, curvature_vector
+from pathcontrol.geometry.arc_length import curvature_vector, drop_coincident
 from pathcontrol.tasks.base import PathPoint, Task, refuse_batch
 from pathcontrol.tasks.lengths import arc_length, curvature, last, length_along
 from pathcontrol.tasks.profile import VelocityProfile
@@ -339,7 +339,7 @@ class ArcLengthPath(DerivedPath):
 
     def _moved(self, knots: Array) -> Array:
         """Knots at their arc lengths, without those that are one place."""
-        return apart(self._length(knots)) if len(knots) else knots
+        return drop_coincident(self._length(knots)) if len(knots) else knots
 
     def _parameter(self, s: Array) -> Array:
         """The parameter u of the path underneath."""

@@ -187,7 +187,7 @@ template <int N> static inline Nearest follow(const Gamma &gamma, const double *
   return {INFINITY, NAN};
 }
 // Distances of states, (rows, 2 joints) each [q; w q̇], to Γ, and the parameters there; NaN where squares are not finite.
-constexpr double FARTHEST = 1e150;  // as in geometry/closest_point/everywhere.py
+constexpr double FARTHEST = 1e150;  // as in geometry/closest_point/global_search.py
 template <int N>
 static void distances_to_gamma(const Gamma &gamma, integer rows, const double *states, double *distance, double *parameter) {
   const Path &path = *gamma.path;

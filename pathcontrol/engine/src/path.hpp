@@ -145,7 +145,7 @@ static NOINLINE double downhill_point(const Path &path, const double *q, double 
   return NAN;
 }
 // The local minimum downhill from `near`, the previous nearest point; the global minimum only where `near` cannot have been a
-// nearest point. As PathTask.sigma_bar(q, near): see geometry/closest_point/downhill.py for the bounds on a step.
+// nearest point. As PathTask.sigma_bar(q, near): see geometry/closest_point/local_search.py for the bounds on a step.
 static NOINLINE double followed_point(const Path &path, const double *q, double near) {
   constexpr double TURN = 0.5, WINDOW = 0.125, CONVERGED = 1e-9;
   const double length = path.s_end - path.s0;

@@ -1,4 +1,4 @@
-"""The point of a curve nearest to a given point: all over the curve, or downhill from where one was."""
+"""The closest point of a curve to a given point: the global minimum, or the local one downhill from a start."""
 
 from pathcontrol.geometry.closest_point.curve import Curve
 from pathcontrol.geometry.closest_point.search import ClosestPoint

@@ -1,4 +1,4 @@
-"""A curve cut into cells, over each of which its tangent turns little.
+"""A subdivision of a curve into cells, over each of which its tangent turns little.
 
 Each cell is looked at once more inside, at an irregular place, and is cut there where the tangent turns too much on
 the way from end to end. A curve that says where its pieces meet begins with these pieces, each of which is simple. Any
@@ -51,16 +51,16 @@ class Cells(NamedTuple):
 
     @classmethod
     def cut(cls, curve: Curve, interval: Interval, knots: Array | None = None, kinks: Array | None = None) -> Cells:
-        """The cells of ``curve``, whose pieces meet at ``knots`` and whose tangent jumps at ``kinks``, if it has any.
+        """Cut ``curve`` into cells; its pieces meet at ``knots`` and its tangent jumps at ``kinks``, if it has any.
 
         Raises:
             TaskError: the curve is not finite somewhere, or too far away for its square to be.
         """
         ends = _first_ends(interval, knots)
         if kinks is not None:
-            ends = np.union1d(ends, _around(kinks, interval))
-        s, turn = _resolved(curve, ends, 0 if knots is not None else _NEIGHBOURS)
-        p, middle = _points(curve, s), _points(curve, (s[:-1] + s[1:]) / 2)
+            ends = np.union1d(ends, _kink_ends(kinks, interval))
+        s, turn = _refine(curve, ends, 0 if knots is not None else _NEIGHBOURS)
+        p, middle = _evaluate_points(curve, s), _evaluate_points(curve, (s[:-1] + s[1:]) / 2)
         # an arc whose tangent stays within ±φ/2 of a direction is no longer than its chord over cos φ/2
         stretch = 1 / np.cos(np.minimum(turn, 2.0) / 2)
         before, after = (np.linalg.norm(middle - end, axis=-1) * stretch for end in (p[:-1], p[1:]))
@@ -68,14 +68,14 @@ class Cells(NamedTuple):
         return cls(s, p, middle, np.maximum(before, after), sag, turn)
 
     def place(self, s: Array, interval: Interval) -> Array:
-        """Where ``s`` (*batch,) is, counted in cells: i + u at the share u of cell i, laps counted."""
+        """Return the position of ``s`` (*batch,) counted in cells, laps included: i + u at the share u of cell i."""
         lap = interval.lap(s)
         s = s - lap * interval.length
         i = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.sag) - 1)
         return lap * len(self.sag) + i + (s - self.s[i]) / (self.s[i + 1] - self.s[i])
 
     def parameter(self, place: Array, interval: Interval) -> Array:
-        """The parameter at a place (*batch,): the inverse of :meth:`place`; ends of an open curve hold it."""
+        """Return the parameter at a place (*batch,): the inverse of :meth:`place`, clipped to an open curve."""
         count = len(self.sag)
         lap = np.floor(place / count) if interval.closed else np.zeros_like(place)
         place = np.clip(place - lap * count, 0, count)
@@ -84,31 +84,32 @@ class Cells(NamedTuple):
 
 
 def _first_ends(interval: Interval, knots: Array | None) -> Array:
+    """Return the ends of the first cells: the knots, or else equidistant parameters."""
     if knots is None:
         return np.linspace(interval.lower, interval.upper, _FIRST_CELLS + 1)
     inside = knots[(knots > interval.lower) & (knots < interval.upper)]
     return np.unique(np.concatenate([[interval.lower], inside, [interval.upper]]))
 
 
-def _around(kinks: Array, interval: Interval) -> Array:
-    """The ends of the cells that lie across ``kinks``, as far as they are inside the interval."""
+def _kink_ends(kinks: Array, interval: Interval) -> Array:
+    """Return the ends of the narrow cells across ``kinks``, as far as they are inside the interval."""
     margin = _KINK * interval.length
     ends = np.concatenate([kinks - margin, kinks + margin])
     return ends[(ends > interval.lower) & (ends < interval.upper)]
 
 
-def _resolved(curve: Curve, s: Array, neighbours: int) -> tuple[Array, Array]:
-    """The ends of the cells, cut until the tangent turns little over each, and its turn [rad] there."""
-    tangent, turn = _tangents(curve, s), np.zeros(len(s) - 1)
+def _refine(curve: Curve, s: Array, neighbours: int) -> tuple[Array, Array]:
+    """Halve cells until the tangent turns little over each; return their ends and the turn [rad] in each."""
+    tangent, turn = _unit_tangents(curve, s), np.zeros(len(s) - 1)
     narrowest, cells = _NARROWEST * (s[-1] - s[0]), np.arange(len(s) - 1)
     while cells.size:
         share = 0.3 + 0.4 * np.modf(_GOLDEN * np.arange(1, len(cells) + 1))[0]
         middle = s[cells] + share * (s[cells + 1] - s[cells])
-        between = _tangents(curve, middle)
+        between = _unit_tangents(curve, middle)
         turn[cells] = _angle(tangent[cells], between) + _angle(between, tangent[cells + 1])
         wide = s[cells + 1] - s[cells] > narrowest
-        chosen = _widened((turn[cells] > _MAX_TURN) & wide, neighbours) & wide
-        chosen = _worst(chosen, turn[cells], _MAX_CELLS - len(turn))
+        chosen = _widen((turn[cells] > _MAX_TURN) & wide, neighbours) & wide
+        chosen = _select_worst(chosen, turn[cells], _MAX_CELLS - len(turn))
         cut = cells[chosen]
         s, tangent = np.insert(s, cut + 1, middle[chosen]), np.insert(tangent, cut + 1, between[chosen], axis=0)
         turn = np.insert(turn, cut + 1, turn[cut])
@@ -117,19 +118,20 @@ def _resolved(curve: Curve, s: Array, neighbours: int) -> tuple[Array, Array]:
     return s, turn
 
 
-def _widened(chosen: Array, neighbours: int) -> Array:
-    """``chosen`` and so many to either side of it."""
+def _widen(chosen: Array, neighbours: int) -> Array:
+    """Return the mask ``chosen`` extended by ``neighbours`` to either side."""
     return np.convolve(chosen, np.ones(2 * neighbours + 1), "same")[: len(chosen)] > 0.5 if neighbours else chosen
 
 
-def _worst(chosen: Array, turn: Array, room: int) -> Array:
-    """``chosen``, or those of it that turn most where there is no ``room`` for all."""
+def _select_worst(chosen: Array, turn: Array, room: int) -> Array:
+    """Return the indices of ``chosen``, or of those that turn most where there is no ``room`` for all."""
     index = np.flatnonzero(chosen)
     return np.sort(index[np.argsort(-turn[index], kind="stable")[: max(room, 0)]])
 
 
-def _points(curve: Curve, s: Array) -> Array:
-    p = _by_blocks(curve.p, s)
+def _evaluate_points(curve: Curve, s: Array) -> Array:
+    """Evaluate the curve, and check that it is finite."""
+    p = _evaluate_by_blocks(curve.p, s)
     if not (known := (np.abs(p) < FARTHEST).all(-1)).all():
         i = int(np.argmin(known))
         raise TaskError(
@@ -138,8 +140,9 @@ def _points(curve: Curve, s: Array) -> Array:
     return p
 
 
-def _tangents(curve: Curve, s: Array) -> Array:
-    dp = _by_blocks(curve.dp, s)
+def _unit_tangents(curve: Curve, s: Array) -> Array:
+    """Return the unit tangents."""
+    dp = _evaluate_by_blocks(curve.dp, s)
     huge = ~(np.abs(dp) < FARTHEST).all(-1)
     if huge.any():  # their squares are not finite
         dp = np.nan_to_num(dp)
@@ -147,10 +150,11 @@ def _tangents(curve: Curve, s: Array) -> Array:
     return dp / np.maximum(np.linalg.norm(dp, axis=-1, keepdims=True), np.finfo(float).tiny)
 
 
-def _by_blocks(function: Callable[[Array], Array], s: Array) -> Array:
+def _evaluate_by_blocks(function: Callable[[Array], Array], s: Array) -> Array:
+    """Evaluate a function of s block by block, to bound the memory."""
     return np.concatenate([function(s[i : i + _BLOCK]) for i in range(0, len(s), _BLOCK)])
 
 
 def _angle(a: Array, b: Array) -> Array:
-    """Angle between unit vectors [rad], (*batch,)."""
+    """Return the angle between unit vectors [rad], (*batch,)."""
     return 2 * np.arcsin(np.minimum(np.linalg.norm(a - b, axis=-1) / 2, 1.0))

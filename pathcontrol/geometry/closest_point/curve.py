@@ -1,4 +1,4 @@
-"""A curve, the interval it is searched on, and the slope of the squared distance along it."""
+"""A curve, the interval of its parameter, and the slope of the squared distance along it."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ class Curve(NamedTuple):
     ddp: Callable[[Array], Array] | None = None
 
     def slope(self, s: Array, x: Array) -> Array:
-        """g(s) = (p(s) − x)ᵀp'(s), the derivative of ½‖p(s) − x‖², (*batch,), for points x (*batch, m)."""
+        """Return g(s) = (p(s) − x)ᵀp'(s), the derivative of ½‖p(s) − x‖², (*batch,), for points x (*batch, m)."""
         return ((self.p(s) - x) * self.dp(s)).sum(-1)
 
     def root(self, x: Array, first: Array, second: Array) -> Array:
-        """A root of g for each row of x (N, m) between two parameters (N,) where it has different signs."""
-        return _root_between(lambda s, rows: self.slope(s, x[rows]), first, second)
+        """Return a root of g for each row of x (N, m), between two parameters (N,) where g has different signs."""
+        return _find_root(lambda s, rows: self.slope(s, x[rows]), first, second)
 
 
-def _root_between(g: Callable[[Array, NDArray[np.intp]], Array], a: Array, b: Array) -> Array:
-    """A root of g(s, row) for each row between a (N,) and b (N,), where g has different signs, to the last digits.
+def _find_root(g: Callable[[Array, NDArray[np.intp]], Array], a: Array, b: Array) -> Array:
+    """Return a root of g(s, row) for each row between a (N,) and b (N,), where g has different signs.
 
     Inverse quadratic interpolation where that is safe, else halving (T. R. Chandrupatla, Advances in Engineering
     Software 28, 1997), as SciPy's ``find_root``, which takes five times as long for a few rows.
@@ -53,12 +53,12 @@ def _root_between(g: Callable[[Array, NDArray[np.intp]], Array], a: Array, b: Ar
         rows, a, b, c, g_a, g_b, g_c, least = (part[going] for part in (rows, a, b, c, g_a, g_b, g_c, least))
         if not rows.size:
             break
-        t = np.clip(_interpolated(a, b, c, g_a, g_b, g_c), least, 1 - least)
+        t = np.clip(_interpolate(a, b, c, g_a, g_b, g_c), least, 1 - least)
     return root
 
 
-def _interpolated(a: Array, b: Array, c: Array, g_a: Array, g_b: Array, g_c: Array) -> Array:
-    """Where from a to b the next point is: by the inverse parabola through three points where that is monotonic."""
+def _interpolate(a: Array, b: Array, c: Array, g_a: Array, g_b: Array, g_c: Array) -> Array:
+    """Return the share t of the way from a to b: inverse quadratic where that is monotonic, else 1/2."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         xi, phi = (a - b) / (c - b), (g_a - g_b) / (g_c - g_b)
         t = g_a / (g_b - g_a) * g_c / (g_b - g_c) + (c - a) / (b - a) * g_a / (g_c - g_a) * g_b / (g_c - g_b)
@@ -66,7 +66,7 @@ def _interpolated(a: Array, b: Array, c: Array, g_a: Array, g_b: Array, g_c: Arr
 
 
 class Interval(NamedTuple):
-    """Where the parameter of a curve lives; a closed curve repeats with the period upper − lower."""
+    """The interval of the parameter of a curve; a closed curve repeats with the period upper − lower."""
 
     lower: float
     upper: float
@@ -74,25 +74,25 @@ class Interval(NamedTuple):
 
     @property
     def length(self) -> float:
-        """Upper − lower: the period of a closed curve."""
+        """The length upper − lower: the period of a closed curve."""
         return self.upper - self.lower
 
     def inside(self, s: Array) -> Array:
-        """``s`` itself, or the end of an open curve that it is beyond."""
+        """Clip ``s`` to the interval of an open curve; leave that of a closed one as it is."""
         return s if self.closed else np.minimum(np.maximum(s, self.lower), self.upper)
 
     def at_lower(self, s: Array) -> Array:
-        """Where ``s`` is the beginning of an open curve, or before it."""
+        """Return the mask of the ``s`` at or before the beginning of an open curve."""
         return (s <= self.lower) & (not self.closed)
 
     def at_upper(self, s: Array) -> Array:
-        """Where ``s`` is the end of an open curve, or beyond it."""
+        """Return the mask of the ``s`` at or beyond the end of an open curve."""
         return (s >= self.upper) & (not self.closed)
 
     def lap(self, s: Array) -> Array:
-        """How many whole periods ``s`` is beyond the interval."""
+        """Return the number of whole periods by which ``s`` is beyond the interval."""
         return np.floor((s - self.lower) / self.length) if self.closed else np.zeros_like(s)
 
     def unwrap(self, s: Array, near: Array) -> Array:
-        """``s`` shifted by whole periods to lie nearest to ``near``."""
+        """Return ``s`` shifted by whole periods to lie nearest to ``near``."""
         return s + self.length * np.round((near - s) / self.length) if self.closed else s

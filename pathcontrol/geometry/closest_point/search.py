@@ -1,4 +1,4 @@
-"""The closest point of a curve: the global minimum, or the local one that continues where one was.
+"""The closest point of a curve: the global minimum, or the local one that continues from an earlier one.
 
 The squared distance ½‖p(s) − x‖² has the derivative g(s) = (p(s) − x)ᵀp'(s). Its minima are the roots at which g rises:
 bracketed between samples close enough to follow the curve's turns, and refined by a bracketing root finder.
@@ -15,8 +15,13 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, as_array
 from pathcontrol.geometry.closest_point.cells import Cells
 from pathcontrol.geometry.closest_point.curve import Curve, Interval
-from pathcontrol.geometry.closest_point.downhill import WINDOW, newton, steady, stepwise
-from pathcontrol.geometry.closest_point.everywhere import Everywhere
+from pathcontrol.geometry.closest_point.global_search import GlobalSearch
+from pathcontrol.geometry.closest_point.local_search import (
+    WINDOW,
+    descend_by_cells,
+    descend_by_newton,
+    is_nearly_normal,
+)
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ class ClosestPoint:
     kinks: Array | None = None
 
     def __call__(self, x: ArrayLike, near: ArrayLike | None = None) -> Array:
-        """Parameter (*batch,) of the point nearest to x (*batch, m); see :meth:`PathTask.sigma_bar`."""
+        """Return the parameter (*batch,) of the point nearest to x (*batch, m); see :meth:`PathTask.sigma_bar`."""
         x = as_array("x", x)
         flat = x.reshape(-1, x.shape[-1])
         if near is None:
@@ -55,24 +60,24 @@ class ClosestPoint:
         return self.along(flat, start).reshape(x.shape[:-1])
 
     def anywhere(self, x: Array) -> Array:
-        """Global minimum for each row of x (N, m), in [lower, upper], or [lower, upper) when closed."""
+        """Return the global minimum for each row of x (N, m), in [lower, upper], or [lower, upper) when closed."""
         s = self._everywhere(x)
         return s - self._interval.lap(s) * self._interval.length
 
     def along(self, x: Array, near: Array) -> Array:
-        """The local minimum downhill from ``near`` (N,), by Newton's method and where that fails cell by cell.
+        """Return the local minimum downhill from ``near`` (N,), by Newton's method or, where that fails, cell by cell.
 
         Only where it is not close by, and ``near`` cannot be the nearest point of a moment ago, it is the global one.
         """
-        s, found = newton(self.curve, self._interval, x, near)
+        s, found = descend_by_newton(self.curve, self._interval, x, near)
         if found.all():
             return s
         lost = np.flatnonzero(~found)
         x, near = x[lost], self._interval.inside(near[lost])
-        downhill = stepwise(self.curve, self._interval, self._cells, x, near)
+        downhill = descend_by_cells(self.curve, self._interval, self._cells, x, near)
         close = np.abs(downhill - near) <= WINDOW * self._interval.length
         s[lost] = downhill
-        jump = ~close & ~(steady(self.curve, x, near) & np.isfinite(downhill))
+        jump = ~close & ~(is_nearly_normal(self.curve, x, near) & np.isfinite(downhill))
         s[lost[jump]] = self._interval.unwrap(self.anywhere(x[jump]), near[jump])
         return s
 
@@ -85,5 +90,5 @@ class ClosestPoint:
         return Cells.cut(self.curve, self._interval, self.knots, self.kinks)
 
     @cached_property
-    def _everywhere(self) -> Everywhere:
-        return Everywhere(self.curve, self._cells)
+    def _everywhere(self) -> GlobalSearch:
+        return GlobalSearch(self.curve, self._cells)

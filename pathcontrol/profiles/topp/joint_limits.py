@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, scalar, unlabelled
+from pathcontrol._arrays import Array, as_array, scalar, strip_labels
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
@@ -91,7 +91,9 @@ def joint_values(kind: str, choice: LimitChoice, own: Array | None, robot: Robot
     """
     if choice is None or choice is False:
         return np.full(robot.n, np.inf)
-    values = own if own is not None and choice is True else as_array(kind, unlabelled(kind, choice, robot.joint_names))
+    values = (
+        own if own is not None and choice is True else as_array(kind, strip_labels(kind, choice, robot.joint_names))
+    )
     if values.shape not in ((), (robot.n,)):
         raise InputError(f"{kind} has shape {values.shape}, expected one limit for each of the {robot.n} joints")
     values = np.broadcast_to(values, robot.n)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pathcontrol._arrays import Array, as_array, in_common
+from pathcontrol._arrays import Array, as_array, merge_rows
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathPoint, refuse_batch
 from pathcontrol.tasks.batch.checks import by_identity, check_alike, in_common_or_range, listed
@@ -190,5 +190,5 @@ def of_each(task: PathTask, function: Callable[[PathTask], Any]) -> Any:
 
 def _number(values: Sequence[Any]) -> Any:
     """What all have, or (N,)."""
-    rows = in_common([np.asarray(value, dtype=np.float64) for value in values])
+    rows = merge_rows([np.asarray(value, dtype=np.float64) for value in values])
     return float(rows) if rows.ndim == 0 else rows

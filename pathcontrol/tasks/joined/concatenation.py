@@ -10,7 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
-from pathcontrol.geometry.arc_length import apart
+from pathcontrol.geometry.arc_length import drop_coincident
 from pathcontrol.tasks.base import PathPoint, refuse_batch
 from pathcontrol.tasks.joined.blend import Blend
 from pathcontrol.tasks.joined.junction import gap, why_apart, why_not_smooth
@@ -103,7 +103,7 @@ class ConcatenatedPath(PathTask):
             if knots is not None:
                 within = knots[(knots > piece.first) & (knots < piece.last)]
                 ends.append(piece.start + (within - piece.first) / piece.rate)
-        return apart(np.unique(np.concatenate(ends)))
+        return drop_coincident(np.unique(np.concatenate(ends)))
 
     def describe(self) -> dict[str, Any]:
         return super().describe() | {"paths": [path.describe() for path in self.paths]}

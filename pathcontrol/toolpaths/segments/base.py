@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol.errors import InputError
-from pathcontrol.geometry.boxes import Boxes
+from pathcontrol.geometry.box_hierarchy import BoxHierarchy
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.toolpaths.lengths import ArcLength
 
@@ -165,9 +165,9 @@ class Polyline(Segment):
         return cKDTree(self.points)
 
     @cached_property
-    def _boxes(self) -> Boxes:
+    def _boxes(self) -> BoxHierarchy:
         start, end = self.points[:-1], self.points[1:]
-        return Boxes(np.minimum(start, end), np.maximum(start, end))
+        return BoxHierarchy(np.minimum(start, end), np.maximum(start, end))
 
     def _to_edges(self, x: Array, edge: Array) -> Array:
         """Distance from each x (N, 3) to the edge of the index ``edge`` (N,) [m]."""

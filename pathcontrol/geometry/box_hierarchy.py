@@ -1,4 +1,4 @@
-"""Which of many things in a row may be nearer to a point than a bound: a hierarchy of their bounding boxes."""
+"""A bounding-volume hierarchy over consecutive items, to find those that may lie closer than a given distance."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ _BRANCHES = 8
 _PAIRS = 1 << 19  # of points and boxes, looked at at once
 
 
-class Boxes:
-    """Boxes around things, around each eight neighbours of these, and so on to a few around all.
+class BoxHierarchy:
+    """A hierarchy of bounding boxes: of the items, of eight consecutive boxes each, and so on up to a few at the top.
 
     Args:
         lower: lower corners of the boxes of the things [m], (k, 3).
@@ -28,13 +28,13 @@ class Boxes:
             self._levels.append((lower, upper))
 
     def nearer(self, x: Array, bound: Array) -> Iterator[tuple[Array, Array]]:
-        """Pairs of a row of x (N, 3) and a thing whose box is nearer to it than ``bound`` (N,) [m], some at a time.
+        """Yield pairs of a row of x (N, 3) and an item whose box is nearer to it than ``bound`` (N,) [m], in blocks.
 
         The bound may be lowered between them.
         """
         rows = np.flatnonzero(bound > 0)
         count = len(self._levels[-1][0])
-        stack = [(len(self._levels) - 1, part, np.zeros(len(part), dtype=int)) for part in _parts(rows, count)]
+        stack = [(len(self._levels) - 1, part, np.zeros(len(part), dtype=int)) for part in _split(rows, count)]
         while stack:
             level, row, group = stack.pop()
             lower, upper = self._levels[level]
@@ -47,9 +47,9 @@ class Boxes:
             if level == 0:
                 yield row, box
             else:
-                stack += [(level - 1, row[part], box[part]) for part in _parts(np.arange(len(row)), _BRANCHES)]
+                stack += [(level - 1, row[part], box[part]) for part in _split(np.arange(len(row)), _BRANCHES)]
 
 
-def _parts(index: Array, count: int) -> list[Array]:
-    """``index`` in parts that make so many pairs each."""
+def _split(index: Array, count: int) -> list[Array]:
+    """Split ``index`` into parts that make a bounded number of pairs each."""
     return np.array_split(index, len(index) * count // _PAIRS + 1)

@@ -1,4 +1,4 @@
-"""The global minimum: cells that can hold it by a bound on their distance, and the roots of the slope in them."""
+"""The global minimum of the distance: cells that can hold it by a bound, and the roots of the slope in them."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ _BLOCK = 1 << 18  # pairs of a point and a cell held at once
 _TIE = 1e-12  # by how much a sample must be nearer than a root: not by rounding alone
 
 
-class Everywhere:
-    """The nearest point of all on a curve that is cut into cells.
+class GlobalSearch:
+    """A search for the globally nearest point of a curve that is cut into cells.
 
     The nearest point is in a cell whose middle is no farther than the nearest of all middles plus the radius of the
     cell. Cells of a size have a tree of their own, so that a few large ones do not widen the look at many small ones.
@@ -30,21 +30,21 @@ class Everywhere:
 
     def __init__(self, curve: Curve, cells: Cells) -> None:
         self._curve, self._cells = curve, cells
-        self._groups = list(_groups(cells))
+        self._groups = list(_group_by_size(cells))
         self._pieces = np.maximum(np.ceil(cells.turn / _TURN), 1).astype(int)
         self._rounding = 1e-13 * float(np.abs(cells.p).max())
 
     def __call__(self, x: Array) -> Array:
-        """Parameter (N,) of the point nearest to each row of x (N, m); NaN where x, or its square, is not finite."""
+        """Return the parameter (N,) of the point nearest to each row of x (N, m); NaN where ‖x‖² overflows."""
         nearest, known = np.full(len(x), np.nan), np.flatnonzero((np.abs(x) < FARTHEST).all(-1))
         x = x[known]
         bound = np.min([group.tree.query(x)[0] for group in self._groups], axis=0) * (1 + _TIE) + self._rounding
-        for rows in self._blocks(x, bound):
+        for rows in self._split_rows(x, bound):
             nearest[known[rows]] = self._search(x[rows], bound[rows])
         return nearest
 
-    def _blocks(self, x: Array, bound: Array) -> Iterator[slice]:
-        """Runs of rows with so many candidates that they fit into memory together."""
+    def _split_rows(self, x: Array, bound: Array) -> Iterator[slice]:
+        """Yield slices of rows whose candidate cells fit into memory together."""
         if len(x) < 2:
             yield slice(0, len(x))
             return
@@ -53,7 +53,8 @@ class Everywhere:
         yield from map(slice, edges[:-1], edges[1:])
 
     def _search(self, x: Array, bound: Array) -> Array:
-        row, lower, upper = self._divided(*self._nearest_cells(x, *self._touched(x, bound)))
+        """Return the parameter (N,) of the nearest point among the candidate cells of each row."""
+        row, lower, upper = self._divide(*self._narrow_candidates(x, *self._candidates(x, bound)))
         s = np.stack([lower, upper])
         difference = self._curve.p(s) - x[row]
         slope, distance = np.vecdot(difference, self._curve.dp(s)), np.linalg.norm(difference, axis=-1)
@@ -61,30 +62,30 @@ class Everywhere:
         root = self._curve.root(x[row[i]], lower[i], upper[i]) if i.size else np.empty(0)
         # the ends of an open curve, and ends of pieces that are roots themselves
         every, best = np.arange(len(row)), distance.argmin(0)
-        return _first_of_each(
+        return _select_nearest(
             np.concatenate([row[i], row]),
             np.concatenate([np.linalg.norm(self._curve.p(root) - x[row[i]], axis=-1), distance[best, every]]),
             np.concatenate([root, s[best, every]]),
             len(root),
         )
 
-    def _divided(self, row: Array, cell: Array) -> tuple[Array, Array, Array]:
-        """The pieces of the cells, as (row, lower end, upper end)."""
+    def _divide(self, row: Array, cell: Array) -> tuple[Array, Array, Array]:
+        """Divide the cells into pieces; return (row, lower end, upper end) of each piece."""
         count, s = self._pieces[cell], self._cells.s
         number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         row, cell, count = (np.repeat(a, count) for a in (row, cell, count))
         lower, length = s[cell], s[cell + 1] - s[cell]
         return row, lower + number / count * length, lower + (number + 1) / count * length
 
-    def _touched(self, x: Array, bound: Array) -> tuple[Array, Array]:
-        """Cells that may come within ``bound`` (N,) of x, as pairs (row, cell), sorted by row."""
+    def _candidates(self, x: Array, bound: Array) -> tuple[Array, Array]:
+        """Return the cells that may come within ``bound`` (N,) of x, as pairs (row, cell), sorted by row."""
         found = [group.within(x, bound) for group in self._groups]
         row, cell = (np.concatenate(part) for part in zip(*found, strict=True))
         order = np.argsort(row, kind="stable")
         return row[order], cell[order]
 
-    def _nearest_cells(self, x: Array, row: Array, cell: Array) -> tuple[Array, Array]:
-        """Those that may be nearest: their chord, less the sag, is no farther than that of any other, plus its sag."""
+    def _narrow_candidates(self, x: Array, row: Array, cell: Array) -> tuple[Array, Array]:
+        """Return the pairs whose chord, less the sag, is no farther than any other chord plus its sag."""
         cells = self._cells
         start, chord = cells.p[cell] - x[row], cells.p[cell + 1] - cells.p[cell]
         square = np.maximum((chord * chord).sum(-1), np.finfo(float).tiny)
@@ -97,21 +98,22 @@ class Everywhere:
 
 
 class _Group(NamedTuple):
-    """Cells of about a size: their numbers, the largest radius, and a tree of their middles."""
+    """Cells of similar size: their numbers, the largest radius, and a k-d tree of their middles."""
 
     cell: Array
     radius: float
     tree: cKDTree
 
     def within(self, x: Array, bound: Array) -> tuple[Array, Array]:
-        """Pairs (row, cell), sorted by row, of cells that may come within ``bound`` (N,) of x (N, m)."""
+        """Return the pairs (row, cell), sorted by row, of cells that may come within ``bound`` (N,) of x (N, m)."""
         found = self.tree.query_ball_point(x, bound + self.radius)
         count = np.fromiter(map(len, found), int, len(x))
         index = np.fromiter(chain.from_iterable(found), int, count.sum())
         return np.repeat(np.arange(len(x)), count), self.cell[index]
 
 
-def _groups(cells: Cells) -> Iterator[_Group]:
+def _group_by_size(cells: Cells) -> Iterator[_Group]:
+    """Group the cells by size."""
     from scipy.spatial import cKDTree  # loads all of scipy.spatial, which few runs need
 
     largest = cells.radius.max()
@@ -122,8 +124,8 @@ def _groups(cells: Cells) -> Iterator[_Group]:
         yield _Group(cell, float(cells.radius[cell].max()), cKDTree(cells.middle[cell], balanced_tree=False))
 
 
-def _first_of_each(row: Array, distance: Array, s: Array, roots: int) -> Array:
-    """The ``s`` of least distance for each row; samples beat the first so many, the roots, by more than rounding."""
+def _select_nearest(row: Array, distance: Array, s: Array, roots: int) -> Array:
+    """Return the ``s`` of least distance for each row; a sample beats a root only by more than rounding."""
     distance[roots:] *= 1 + _TIE
     order = np.lexsort((distance, row))
     return s[order[np.unique(row[order], return_index=True)[1]]]

@@ -1,4 +1,4 @@
-"""The local minimum downhill from where one was: Newton's method, or cell by cell."""
+"""The local minimum of the distance downhill from a start: by Newton's method, or cell by cell."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FIRST_SAMPLES = 16
 
 
 class Slope(NamedTuple):
-    """The squared distance about s: g = (p − x)ᵀp', g' = ‖p'‖² + (p − x)ᵀp'', ‖p'‖², ‖p''‖ and ‖p − x‖."""
+    """Derivatives of the squared distance at s: g = (p − x)ᵀp', g' = ‖p'‖² + (p − x)ᵀp'', ‖p'‖², ‖p''‖ and ‖p − x‖."""
 
     slope: Array
     curvature: Array
@@ -29,7 +29,7 @@ class Slope(NamedTuple):
 
     @classmethod
     def of(cls, curve: Curve, s: Array, x: Array) -> Slope:
-        """At s (N,), for the rows of x (N, m)."""
+        """Evaluate the derivatives at s (N,), for the rows of x (N, m)."""
         difference, dp = curve.p(s) - x, curve.dp(s)
         # without p'' this is the Gauss–Newton method
         ddp = np.zeros_like(dp) if curve.ddp is None else curve.ddp(s)
@@ -39,18 +39,18 @@ class Slope(NamedTuple):
         return cls(_dot(difference, dp), curvature, gradient, np.sqrt(_dot(ddp, ddp)), np.sqrt(square))
 
     def step(self, reach: Array) -> Array:
-        """The step of Newton's method, damped where the distance is flat, and bounded."""
+        """Return the step of Newton's method, damped where the distance is flat, and bounded."""
         longest = np.minimum(reach, _TURN * np.sqrt(self.gradient) / np.maximum(self.bend, np.finfo(float).tiny))
         step = -self.slope / np.maximum(self.curvature, 0.1 * self.gradient)
         return np.minimum(np.maximum(step, -longest), longest)
 
     def minimum(self) -> Array:
-        """Whether this is a local minimum inside the curve."""
+        """Return the mask of the rows that are at a local minimum inside the curve."""
         return (np.abs(self.slope) <= _CONVERGED * np.sqrt(self.gradient)) & (self.curvature > 0)
 
 
-def newton(curve: Curve, interval: Interval, x: Array, near: Array) -> tuple[Array, Array]:
-    """Newton's method on g from ``near`` (N,): where it ends, and whether that is a local minimum downhill from there.
+def descend_by_newton(curve: Curve, interval: Interval, x: Array, near: Array) -> tuple[Array, Array]:
+    """Run Newton's method on g from ``near`` (N,); return its end, and whether that is the local minimum downhill.
 
     A step turns the tangent by half a radian at most, so that it does not leave the branch. Newton's method has lost
     its way where g' < 0, on a hill that may hide a minimum nearer by, and beyond an arc of πD: from a point at the
@@ -72,14 +72,14 @@ def newton(curve: Curve, interval: Interval, x: Array, near: Array) -> tuple[Arr
     return s, (here.minimum() | held) & convex & (np.abs(s - near) <= reach)
 
 
-def steady(curve: Curve, x: Array, near: Array) -> Array:
-    """Whether ``near`` (N,) can have been the nearest point a moment ago: x − p is normal to the curve within 30°."""
+def is_nearly_normal(curve: Curve, x: Array, near: Array) -> Array:
+    """Return whether ``near`` (N,) can have been the nearest point a moment ago: x − p is normal within 30°."""
     difference, dp = curve.p(near) - x, curve.dp(near)
     return np.abs(_dot(difference, dp)) <= 0.5 * np.sqrt(_dot(difference, difference) * _dot(dp, dp))
 
 
-def stepwise(curve: Curve, interval: Interval, cells: Cells, x: Array, near: Array) -> Array:
-    """The first local minimum downhill from ``near`` (N,), found cell by cell; NaN if there is none in a lap.
+def descend_by_cells(curve: Curve, interval: Interval, cells: Cells, x: Array, near: Array) -> Array:
+    """Find the first local minimum downhill from ``near`` (N,), cell by cell; NaN if there is none in a lap.
 
     All of it is one branch: the distance falls all the way.
     """
@@ -103,7 +103,7 @@ def stepwise(curve: Curve, interval: Interval, cells: Cells, x: Array, near: Arr
 
 
 def _first_root(curve: Curve, x: Array, s: Array, rising: Array) -> Array:
-    """The root of g before the first of the samples s (N, K + 1) at which the distance is ``rising`` (N, K) again."""
+    """Return the root of g before the first of the samples s (N, K + 1) where the distance is ``rising`` (N, K)."""
     row, first = np.arange(len(x)), rising.argmax(1)
     return curve.root(x, s[row, first], s[row, first + 1])
 
