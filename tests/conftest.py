@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+
+# matrices here are small: threads of BLAS would wait for each other, busily, on cores that other tests need
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
