@@ -7,7 +7,7 @@ import pytest
 
 import pathcontrol as pc
 from pathcontrol.analysis.deviation import tool_positions
-from pathcontrol.simulation.storage.array_store import Shelf
+from pathcontrol.simulation.storage.array_store import ArrayStore
 from pathcontrol.simulation.storage.task_recipes import task_of, task_recipe
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.view.animation.recorded_runs import cast_takes
@@ -60,8 +60,8 @@ def test_what_is_made_of_a_path_is_made_for_its_frame(arm, path):
 
 def test_files_keep_it(path):
     for name, made in made_of(path).items():
-        shelf = Shelf()
-        again = task_of(task_recipe(made, shelf), Shelf(shelf.numbers))
+        store = ArrayStore()
+        again = task_of(task_recipe(made, store), ArrayStore(store.numbers))
         assert again.frame == "pen", name
         assert (again.tool_pose is None) == (path.tool_pose is None), name
         assert path.tool_pose is None or np.array_equal(again.tool_pose, path.tool_pose), name

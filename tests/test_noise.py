@@ -43,14 +43,14 @@ def test_how_many_numbers_are_drawn_in_advance_does_not_matter(rollouts, first):
     many = NoiseSource(noise, zero.shape, 0)
     some = NoiseSource(noise, (1, 2), first)
     for _ in range(600):
-        for whole, part in zip(many.disturbed(zero, zero), some.disturbed(zero[:1], zero[:1]), strict=True):
+        for whole, part in zip(many.add_noise(zero, zero), some.add_noise(zero[:1], zero[:1]), strict=True):
             assert_array_equal(whole[first], part[0])
 
 
 def test_it_has_the_deviation_that_was_said_and_no_correlation():
     noise = SensorNoise([[1.0, 2.0], [3.0, 4.0]], 0.5, 7)
     source, zero = NoiseSource(noise, (2, 2), 0), np.zeros((2, 2))
-    samples = np.array([np.stack(source.disturbed(zero, zero)) for _ in range(20_000)]).reshape(20_000, 8)
+    samples = np.array([np.stack(source.add_noise(zero, zero)) for _ in range(20_000)]).reshape(20_000, 8)
     # 20 000 samples know a deviation to 0.5 %, a mean and a correlation to 0.7 %: five of these at most
     assert np.allclose(samples.std(0), [1, 2, 3, 4, 0.5, 0.5, 0.5, 0.5], rtol=0.025)
     assert (np.abs(samples.mean(0)) < 0.035 * samples.std(0)).all()

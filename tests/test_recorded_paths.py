@@ -37,7 +37,7 @@ from pathcontrol import (
     time_optimal,
 )
 from pathcontrol.geometry.hermite import hermite_polynomials, sample_adaptively
-from pathcontrol.simulation.storage.array_store import Shelf
+from pathcontrol.simulation.storage.array_store import ArrayStore
 from pathcontrol.simulation.storage.task_recipes import task_of, task_recipe
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.recorded import RecordedPath, RecordedProfile
@@ -49,9 +49,9 @@ RATE = {"theta": 4e-9, "dtheta": 2e-5}
 
 def again(task, upto=None):
     """The task of its recipe, through the text of a file."""
-    shelf = Shelf()
-    text = json.dumps(task_recipe(task, shelf, upto))
-    return task_of(json.loads(text), Shelf(shelf.numbers))
+    store = ArrayStore()
+    text = json.dumps(task_recipe(task, store, upto))
+    return task_of(json.loads(text), ArrayStore(store.numbers))
 
 
 def places(task, count=2001):
@@ -355,7 +355,7 @@ def test_the_samples_are_values_of_the_function(task):
 )
 def test_what_is_no_recipe_says_so(recipe, message):
     with pytest.raises(InputError, match=message):
-        task_of(recipe, Shelf(np.zeros(3)))
+        task_of(recipe, ArrayStore(np.zeros(3)))
 
 
 def test_a_recipe_without_end_is_refused():
@@ -363,7 +363,7 @@ def test_a_recipe_without_end_is_refused():
     for _ in range(100_000):
         recipe = {"class": "ReversedPath", "path": recipe}
     with pytest.raises(InputError, match="no recipe of a task"):
-        task_of(recipe, Shelf(np.zeros(0)))
+        task_of(recipe, ArrayStore(np.zeros(0)))
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ import pathcontrol as pc
 from pathcontrol import Circle, InputError, RobotModel, Run, metrics
 from pathcontrol.analysis.readable import reading
 from pathcontrol.analysis.run_metrics import LABELS, UNITS
-from pathcontrol.simulation.context import Origin
+from pathcontrol.simulation.context import RunContext
 from pathcontrol.view.report.pictures import pictures
 from pathcontrol.view.report.report import report
 from pathcontrol.view.report.sections import _section
@@ -266,7 +266,7 @@ def hostile_run(run: Run, name: str) -> Run:
     """The run with a name where names can be: joints, and texts of the configuration."""
     data = run.data.assign_coords(joint=[f"1 {name}", f"2 {name}"])
     config = run.config | {name: {name: name}, "controller": {"controller": name}, "experiment": name}
-    return Run(data, config | {"versions": {name: name}}, Origin.of(run.robot, run.task))
+    return Run(data, config | {"versions": {name: name}}, RunContext.of(run.robot, run.task))
 
 
 def skeleton(file: Path) -> list[tuple[str, tuple[str, ...]]]:

@@ -12,7 +12,7 @@ from lxml import html
 
 import pathcontrol as pc
 from pathcontrol import Circle, RobotModel, Run
-from pathcontrol.simulation.context import Origin
+from pathcontrol.simulation.context import RunContext
 from pathcontrol.view.report.code import call
 from pathcontrol.view.report.report import report
 from pathcontrol.view.report.reproduction import recipe
@@ -84,7 +84,7 @@ def test_names_that_are_no_arguments_get_into_no_script(arm, circle):
     run = pc.simulate(LAWS["plan"](arm, circle), [0.9, 0.1], duration=0.01)
     for part in ("controller", "loop"):
         config = run.config | {part: run.config[part] | {"k=print('!')": 1}}
-        assert recipe("mine", Run(run.data, config, Origin.of(arm, circle))).kind == "none"
+        assert recipe("mine", Run(run.data, config, RunContext.of(arm, circle))).kind == "none"
 
 
 @given(st.text(), st.lists(st.one_of(st.floats(allow_nan=False), st.none(), st.text(), st.booleans()), max_size=3))

@@ -40,7 +40,7 @@ from pathcontrol.analysis.deviation import tool_positions
 from pathcontrol.experiments.runner import run_experiment
 from pathcontrol.experiments.template import example_text
 from pathcontrol.robot.recipe import recipe_of
-from pathcontrol.simulation.storage.array_store import Shelf
+from pathcontrol.simulation.storage.array_store import ArrayStore
 from pathcontrol.simulation.storage.netcdf import read_run, write_run
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.toolpaths.contour import Contour
@@ -380,11 +380,11 @@ def test_a_file_that_knows_its_path_is_not_much_larger(milled, tmp_path):
 
 
 def test_normals_and_segments_of_the_user_are_kept():
-    shelf = Shelf()
+    store = ArrayStore()
     normals = np.array([[0, 0, 1.0], [0, 0.6, 0.8]])
     given = Contour((Polyline([[0, 0, 0], [1, 0, 0]]),), rapid=True, normals=normals)
-    recipes = [contour_recipe(given, shelf), contour_recipe(Contour((Parabola(),)), shelf)]
-    kept, parabola = (contour_of(recipe, Shelf(shelf.numbers)) for recipe in recipes)
+    recipes = [contour_recipe(given, store), contour_recipe(Contour((Parabola(),)), store)]
+    kept, parabola = (contour_of(recipe, ArrayStore(store.numbers)) for recipe in recipes)
     assert np.array_equal(kept.normals, normals)
     assert kept.rapid
     points = Parabola().point(np.linspace(0, 1, 1001))

@@ -15,7 +15,7 @@ from pathcontrol.engine.library import load_library
 from pathcontrol.errors import EngineError, InputError, TaskError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.robot.recipe import recipe_of, robot_of
-from pathcontrol.simulation.context import Stored
+from pathcontrol.simulation.context import StoredContext
 from pathcontrol.simulation.storage.netcdf import read_run, write_run
 from pathcontrol.tasks.recorded import RecordedPath
 
@@ -43,7 +43,7 @@ def rewritten(file, folder, change, data_too=lambda data: data):
     data, config, stored = read_run(file)
     recipe = json.loads(stored.text)
     change(recipe)
-    write_run(folder / "wild.nc", data_too(data), config, Stored(json.dumps(recipe), stored.numbers))
+    write_run(folder / "wild.nc", data_too(data), config, StoredContext(json.dumps(recipe), stored.numbers))
     return pc.Run.load(folder / "wild.nc")
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import InputError
-from pathcontrol.simulation.finish import seen_finished
+from pathcontrol.simulation.finish import detection_times
 from pathcontrol.simulation.run import Run
 
 Choice = Literal["second half", "all"]
@@ -65,7 +65,7 @@ def own_samples(run: Run) -> NDArray[np.intp]:
     while others go on, which says nothing of it.
     """
     closed = "laps" in run
-    ended = np.where(run.status == "finished", seen_finished(run.finish_time, not closed), np.inf)
+    ended = np.where(run.status == "finished", detection_times(run.finish_time, not closed), np.inf)
     ended = np.where(run.status == "diverged", run.diverged_time, ended)
     return np.minimum(np.searchsorted(run.time, ended - _slack(run)) + 1, len(run.time))
 

@@ -1,1 +1,1 @@
-"""The simulated arm, the loop around it, and what comes out."""
+"""The simulated arm, the loop around it, and the record of a run."""

@@ -1,4 +1,4 @@
-"""What a simulation is made of, checked before it starts."""
+"""The arguments of a simulation: checks and conversions before it starts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.loops import Arm, ContinuousTime, SampledLoop
-from pathcontrol.simulation.summaries import in_short
+from pathcontrol.simulation.summaries import summarize
 from pathcontrol.simulation.variables import bytes_of_sample
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.task import PathTask
@@ -27,16 +27,16 @@ from pathcontrol.tasks.task import PathTask
 Loop = SampledLoop | ContinuousTime
 
 
-def checked_loop(loop: Loop | None) -> Loop:
-    """How the loop is closed, a ``SampledLoop()`` unless given."""
+def check_loop(loop: Loop | None) -> Loop:
+    """Check the kind of loop; return it, or ``SampledLoop()`` if it is None."""
     loop = SampledLoop() if loop is None else loop
     if not isinstance(loop, SampledLoop | ContinuousTime):
         raise InputError(f"loop = {loop!r}, expected SampledLoop(...) or ContinuousTime(...)")
     return loop
 
 
-def period_of(loop: Loop, duration: float) -> float:
-    """Time between samples [s], of which ``duration`` [s] holds one at least."""
+def sample_period(loop: Loop, duration: float) -> float:
+    """Return the time between samples [s]; ``duration`` [s] must hold at least one."""
     period = loop.period if isinstance(loop, SampledLoop) else loop.output_period
     if duration < period:
         raise InputError(f"duration = {duration:g} s is less than one period of {period:g} s; both are in seconds")
@@ -44,7 +44,7 @@ def period_of(loop: Loop, duration: float) -> float:
 
 
 def check_length(duration: float, loop: Loop, rollouts: int, joints: int, ends: bool) -> None:
-    """Check that what is recorded fits into memory, before room is made for it.
+    """Check that the record fits into memory, before room is made for it.
 
     A run that ``ends`` by itself in a sampled loop may be given any time that can be counted in periods.
 
@@ -66,12 +66,12 @@ def check_length(duration: float, loop: Loop, rollouts: int, joints: int, ends: 
 
 
 def _memory() -> int:
-    """Bytes of memory of this machine."""
+    """Return the bytes of memory of this machine."""
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
-def plant_of(plant: RobotModel | Sequence[RobotModel] | None, controller: Controller) -> Arm:
-    """The simulated arm: the given one or the controller's own, or where they differ one for each rollout."""
+def make_plant(plant: RobotModel | Sequence[RobotModel] | None, controller: Controller) -> Arm:
+    """Return the simulated arm: the given one, the controller's own, or a batch with one for each rollout."""
     plants = [controller.robot] if plant is None else [plant] if isinstance(plant, RobotModel) else list(plant)
     for i, robot in enumerate(plants):
         if not isinstance(robot, RobotModel):
@@ -79,21 +79,21 @@ def plant_of(plant: RobotModel | Sequence[RobotModel] | None, controller: Contro
     if not plants:
         raise InputError("plant is an empty list, expected a RobotModel, or one for each rollout")
     first = plants[0]
-    rows = _rows_of_friction(first) if len(plants) == 1 else None
+    rows = _count_friction_rows(first) if len(plants) == 1 else None
     if rows is not None:
         return RobotBatch([first] * rows, first.friction)
     return first if len(plants) == 1 else RobotBatch(plants)
 
 
-def _rows_of_friction(robot: RobotModel) -> int | None:
-    """For how many rollouts the friction of a robot has coefficients, ``None`` where all have the same."""
+def _count_friction_rows(robot: RobotModel) -> int | None:
+    """Return the number of rollouts for which a robot has friction coefficients; ``None`` if all have the same."""
     law = robot.friction
     arrays = np.broadcast_arrays(law.viscous, *law.levels(np.zeros(robot.n)))
     return len(arrays[0]) if arrays[0].ndim > 1 else None
 
 
 def check_joints(controller: Controller, robot: Arm) -> None:
-    """The controller is for the joints of the plant."""
+    """Check that the controller has the joints of the plant."""
     if robot.joint_names != controller.robot.joint_names:
         raise InputError(
             f"the plant has the joints {robot.joint_names}, the controller's model {controller.robot.joint_names}"
@@ -103,7 +103,7 @@ def check_joints(controller: Controller, robot: Arm) -> None:
 def initial_state(
     q: ArrayLike, qd: ArrayLike | None, joints: Sequence[str], rollouts: int | None = None
 ) -> tuple[Array, Array]:
-    """q and q̇ as (N, n) each, of any batch shape and broadcast against each other, and one state to all rollouts."""
+    """Return q and q̇ as (N, n) each, broadcast against each other; one state serves all ``rollouts``."""
     n = len(joints)
     position = finite("q", joint_array("q", q, n, joints))
     velocity = np.zeros(n) if qd is None else finite("qd", joint_array("qd", qd, n, joints))
@@ -117,8 +117,8 @@ def initial_state(
     return q0, qd0
 
 
-def states_of_each(q: ArrayLike, qd: ArrayLike | None, robot: Arm, task: PathTask) -> tuple[Array, Array]:
-    """q and q̇ as (N, n) each, one state to all rollouts; where arms or tasks are one for each, they are N too.
+def broadcast_states(q: ArrayLike, qd: ArrayLike | None, robot: Arm, task: PathTask) -> tuple[Array, Array]:
+    """Return q and q̇ as (N, n) each, one state serving all rollouts; N is also that of arms and tasks.
 
     Raises:
         InputError: there are not as many of each.
@@ -133,32 +133,35 @@ def states_of_each(q: ArrayLike, qd: ArrayLike | None, robot: Arm, task: PathTas
 
 
 def _check_equal(counts: Mapping[str, int]) -> None:
+    """Check that all counts are the same."""
     if len(set(counts.values())) > 1:
         raise InputError(", ".join(said.format(count) for said, count in counts.items()) + "; expected as many")
 
 
-def start_of_each(
+def start_law(
     controller: Controller, q: Array, qd: Array, disturbance: Disturbance | None
 ) -> tuple[Array, Array, Array]:
-    """q, q̇ and the law's state z at the start, (N, …) each; of one state one for each row of gains or disturbance.
+    """Return q, q̇ and the law's state z at the start, (N, …) each.
+
+    One initial state is repeated for each row of gains or of the disturbance.
 
     Raises:
         InputError: the law fails there, or does not give what :class:`ControlOutput` says.
     """
-    z = _asked(controller, q, controller.start, q, qd)
+    z = _call_law(controller, q, controller.start, q, qd)
     if len(q) == 1:
         asked = [lambda: controller.law(0.0, q, qd, z).tau]
         if isinstance(disturbance, Disturbance):
             asked.append(lambda: disturbance.torque(0.0, q, qd))
-        rows = max(map(_rows, asked))
+        rows = max(map(_count_rows, asked))
         q, qd = q.repeat(rows, axis=0), qd.repeat(rows, axis=0)
         z = z if len(z) == rows else np.repeat(z, rows, axis=0)
     check_law(controller, q, qd, z)
     return q, qd, z
 
 
-def _rows(torque: Callable[[], Any]) -> int:
-    """How many rows a torque (N, n) has; what fails is told by the checks that follow."""
+def _count_rows(torque: Callable[[], Any]) -> int:
+    """Return the number of rows of a torque (N, n), or 1 where it fails; later checks report the failure."""
     try:
         shape = np.shape(torque())
     except Exception:  # code of the user
@@ -166,16 +169,16 @@ def _rows(torque: Callable[[], Any]) -> int:
     return max(1, shape[0]) if len(shape) == 2 else 1
 
 
-def rollout_number(first: Any) -> int:
-    """The number of the first rollout, a whole number from 0."""
+def check_rollout_number(first: Any) -> int:
+    """Check that the number of the first rollout is a whole number from 0; return it."""
     if isinstance(first, bool) or not isinstance(first, int | np.integer) or first < 0:
         raise InputError(f"first_rollout = {first!r}, expected a whole number from 0")
     return int(first)
 
 
 def check_law(controller: Controller, q: Array, qd: Array, z: Array) -> None:
-    """The law, asked once, gives what :class:`ControlOutput` says: shapes that fit the initial states, and numbers."""
-    name, out = type(controller).__name__, _asked(controller, q, controller.law, 0.0, q, qd, z)
+    """Check that the law returns a :class:`ControlOutput` whose shapes fit the initial states, with finite numbers."""
+    name, out = type(controller).__name__, _call_law(controller, q, controller.law, 0.0, q, qd, z)
     if not isinstance(out, ControlOutput):
         raise InputError(f"{name}.law returns {type(out).__name__}, expected a ControlOutput")
     wanted = {"tau": q.shape, "e_p": q.shape, "e_v": q.shape, "zdot": np.shape(z)}
@@ -191,8 +194,8 @@ def check_law(controller: Controller, q: Array, qd: Array, z: Array) -> None:
             raise InputError(f"{name}.law gives {field} = {np.asarray(value).tolist()} at the start, expected numbers")
 
 
-def _asked(controller: Controller, q: Array, function: Callable[..., Any], *arguments: Any) -> Any:
-    """What a method of the law gives at the initial states."""
+def _call_law(controller: Controller, q: Array, function: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a method of the law at the initial states; turn its failure into an InputError."""
     try:
         return function(*arguments)
     except (ValueError, IndexError, TypeError) as error:
@@ -202,19 +205,19 @@ def _asked(controller: Controller, q: Array, function: Callable[..., Any], *argu
         raise InputError(f"{name} fails at the initial states, of shape {q.shape}: {error}") from error
 
 
-def record_of(
+def make_config(
     controller: Mapping[str, Any], robot: Arm, loop: Loop, disturbance: Disturbance | None, **settings: Any
 ) -> dict[str, Any]:
-    """Everything that a run is made with; of large arrays, their shape and range."""
-    plant = {"robot": robot.name, "friction": in_short(robot.friction.describe())}
+    """Return the configuration of a run; large arrays are given by shape and range."""
+    plant = {"robot": robot.name, "friction": summarize(robot.friction.describe())}
     if isinstance(robot, RobotBatch):
         plant |= {"arms": len(robot), "rigid_bodies": len(robot.bodies)}
     whole = ("task", "sequence")
     return {
-        "controller": {name: value if name in whole else in_short(value) for name, value in controller.items()},
+        "controller": {name: value if name in whole else summarize(value) for name, value in controller.items()},
         "plant": plant,
-        "loop": in_short(loop.describe()),
-        **({} if disturbance is None else {"disturbance": in_short(disturbance.describe())}),
+        "loop": summarize(loop.describe()),
+        **({} if disturbance is None else {"disturbance": summarize(disturbance.describe())}),
         **settings,
         "versions": dict(_versions()),
     }
@@ -222,11 +225,11 @@ def record_of(
 
 @cache
 def _versions() -> dict[str, str]:
-    """Of Python and of what results depend on; reading them takes milliseconds."""
+    """Return the versions of Python and of the packages that results depend on; reading them takes milliseconds."""
     packages = ("pathcontrol", "pin", "numpy", "scipy")
     return {"python": platform.python_version()} | {name: version(name) for name in packages}
 
 
-def joints_of(robot: Arm) -> dict[str, str]:
-    """The unit of each joint's position by its name."""
+def map_position_units(robot: Arm) -> dict[str, str]:
+    """Return the unit of each joint's position by the joint's name."""
     return dict(zip(robot.joint_names, robot.position_units, strict=True))

@@ -1,4 +1,4 @@
-"""The sampled loop by the compiled engine: :class:`SampledArm` at the speed of the machine."""
+"""The sampled loop in the compiled engine: it does the same as :class:`SampledArm`, faster."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ from pathcontrol.engine.structs import (
 from pathcontrol.engine.structs import Disturbance as DisturbanceStruct
 from pathcontrol.errors import EngineError
 from pathcontrol.robot.constants import frame_carrier
-from pathcontrol.simulation.arm.disturbance import Disturbance, FrameForce, Harmonic, Push, terms_of
+from pathcontrol.simulation.arm.disturbance import Disturbance, FrameForce, Harmonic, Push, list_terms
 from pathcontrol.simulation.arm.noise import NoiseSource
 from pathcontrol.simulation.arm.plant import has_strong_friction
 from pathcontrol.simulation.divergence import BEYOND, NO_NUMBERS, Divergence
-from pathcontrol.simulation.finish import AfterLaps, AtEnd, Finish, known_finished
+from pathcontrol.simulation.finish import AfterLaps, AtEnd, Finish, detection_ticks
 from pathcontrol.simulation.loops import Arm as SimulatedArm
 from pathcontrol.simulation.loops import Outside, SampledLoop, check_rows
 from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sampled import Actuator
 
-_BLOCK = 1 << 16  # ticks of all rollouts together between looks at Ctrl-C and the progress bar
+_BLOCK = 1 << 16  # ticks of all rollouts together between checks of Ctrl-C and the progress bar
 _REASONS = {1: BEYOND, 2: NO_NUMBERS}
 
 
 class CompiledPlant:
-    """The plant by the engine, a step at a time, for laws and disturbances that are asked in Python.
+    """The plant by the engine, a step at a time, for laws and disturbances that are evaluated in Python.
 
     Args:
         robot: the arm, or one for each rollout, with its friction.
@@ -67,14 +67,14 @@ class CompiledPlant:
 
 
 class CompiledArm:
-    """The arm behind its sensors and actuators, run by the engine; what it does is what :class:`SampledArm` does.
+    """The arm behind its sensors and actuators, run by the engine; it does the same as :class:`SampledArm`.
 
     Args:
         loop: the control computer.
         robot: the arm, or one for each rollout.
         q: joint positions it starts at [rad], (N, n).
         qd: joint velocities it starts with [rad/s], (N, n).
-        outside: what disturbs it, and the number of the first rollout, for its noise.
+        outside: its disturbance, and the number of the first rollout, for its noise.
         controllers: the laws that are to drive it.
 
     Raises:
@@ -99,9 +99,9 @@ class CompiledArm:
         self._add_loop(sensors.resolution, actuator)
         add_plant(self._setup, robot, has_strong_friction(robot), self._memory)
         _add_disturbances(self._setup, outside.disturbance, self._memory)
-        self._laws = {controller: self._with_law(controller) for controller in controllers}
-        reading = sensors.start(*self._seen(q, qd))
-        reading = sensors.read(*self._seen(q, qd), reading)
+        self._laws = {controller: self._add_law(controller) for controller in controllers}
+        reading = sensors.start(*self._add_noise(q, qd))
+        reading = sensors.read(*self._add_noise(q, qd), reading)
         self._state = {"q": q, "qd": qd, "q_read": reading.q, "qd_read": reading.qd}
         self._state = {name: np.array(value, dtype=np.float64, order="C") for name, value in self._state.items()}
         self._state["queue"] = np.zeros((actuator.waiting, *q.shape))
@@ -110,7 +110,7 @@ class CompiledArm:
     def run(
         self, controller: Controller, duration: float, finish: Finish | None, progress: bool, z: Array | None = None
     ) -> dict[str, Array]:
-        """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most.
+        """Return the record, (rollout, time, …), from here until ``finish`` ends it, ``duration`` [s] at most.
 
         ``z`` is the state that the law starts with, where that is known already.
         """
@@ -125,14 +125,14 @@ class CompiledArm:
             while not over:
                 count = min(block, ticks - done)
                 last = done + count == ticks
-                samples = self._block(setup, recorder, done, count, last)
+                samples = self._run_block(setup, recorder, done, count, last)
                 done += count
                 update(min(done, ticks))
-                over = last or samples < count or self._all_over(finish, setup)
-        return self._finished(recorder, finish, setup)
+                over = last or samples < count or self._is_over(finish, setup)
+        return self._close_record(recorder, finish, setup)
 
-    def _with_law(self, controller: Controller) -> Setup:
-        """The settings with those of a law."""
+    def _add_law(self, controller: Controller) -> Setup:
+        """Return the settings with those of a law."""
         setup = Setup.from_buffer_copy(self._setup)
         add_law(setup, controller, self._memory)
         return setup
@@ -148,12 +148,12 @@ class CompiledArm:
             state[name] = np.full(rollouts, np.nan)
         self.divergence = Divergence(state["home_q"], state["home_qd"])
 
-    def _block(self, setup: Setup, recorder: Recorder, done: int, count: int, last: bool) -> int:
-        """Run so many ticks and return how many samples were recorded."""
+    def _run_block(self, setup: Setup, recorder: Recorder, done: int, count: int, last: bool) -> int:
+        """Run ``count`` ticks and return the number of samples recorded."""
         rollouts = self._shape[0]
         width = lanes(self._library)
         noise = None if self._noise is None else self._noise.samples(count)
-        arrays = recorder.room_for(count + last)
+        arrays = recorder.reserve(count + last)
         record = Record(**{name: arrays[name].ctypes.data for name in RECORDED})
         state = State(**{name: self._state[name].ctypes.data for name in STATE + STATE_NUMBERS})
         span = Span(done, self._ticks, count, rollouts, last, rollouts <= width)
@@ -174,19 +174,19 @@ class CompiledArm:
         recorder.add(samples)
         return samples
 
-    def _all_over(self, finish: Finish | None, setup: Setup) -> bool:
-        """Whether no rollout goes on."""
+    def _is_over(self, finish: Finish | None, setup: Setup) -> bool:
+        """Return whether all rollouts are finished or lost."""
         lost = np.isfinite(self._state["diverged_time"])
         if lost.all():
             return True
         return bool(setup.ends_run and finish is not None and (lost | np.isfinite(self._state["finish_time"])).all())
 
-    def _finished(self, recorder: Recorder, finish: Finish | None, setup: Setup) -> dict[str, Array]:
-        """Cut what was recorded where the run ended, and say of each rollout how it went."""
+    def _close_record(self, recorder: Recorder, finish: Finish | None, setup: Setup) -> dict[str, Array]:
+        """Cut the record where the run ended, mark diverged rollouts, and return the arrays."""
         period, state = self._loop.period, self._state
         lost_time, finish_time = state["diverged_time"], state["finish_time"]
-        if self._all_over(finish, setup):
-            known = np.where(np.isfinite(finish_time), known_finished(finish, finish_time, period), 0)
+        if self._is_over(finish, setup):
+            known = np.where(np.isfinite(finish_time), detection_ticks(finish, finish_time, period), 0)
             lost = np.where(np.isfinite(lost_time) & ~np.isfinite(finish_time), np.round(lost_time / period), 0)
             recorder.cut(int(max(known.max(), lost.max())) + 1)
             end = period * (recorder.samples - 1)
@@ -200,10 +200,12 @@ class CompiledArm:
         self.divergence.erase(arrays, period * np.arange(arrays["s"].shape[1]))
         return arrays
 
-    def _seen(self, q: Array, qd: Array) -> tuple[Array, Array]:
-        return (q, qd) if self._noise is None else self._noise.disturbed(q, qd)
+    def _add_noise(self, q: Array, qd: Array) -> tuple[Array, Array]:
+        """Return positions and velocities (N, n) with noise, as the sensors get them."""
+        return (q, qd) if self._noise is None else self._noise.add_noise(q, qd)
 
     def _add_loop(self, resolution: Array | None, actuator: Actuator) -> None:
+        """Set the sensors, torque limits and delay of the loop."""
         loop, setup, n = self._loop, self._setup, self._shape[1]
         setup.period, setup.substeps, setup.delayed = loop.period, loop.substeps, actuator.waiting
         setup.parts = len(actuator.parts)
@@ -218,12 +220,12 @@ class CompiledArm:
 
 
 def _threads(robot: SimulatedArm) -> int:
-    """How many threads a robot, or the first of several, allows."""
+    """Return the number of threads that a robot, or the first of several, allows."""
     return getattr(robot, "threads", None) or robot.robots[0].threads  # type: ignore[union-attr]
 
 
 def _add_finish(setup: Setup, finish: Finish | None) -> None:
-    """Set what to look for.
+    """Set the rule by which rollouts finish.
 
     Raises:
         EngineError: a rule that the engine does not know.
@@ -245,13 +247,14 @@ def _add_disturbances(setup: Setup, disturbance: Disturbance | None, memory: Mem
     Raises:
         EngineError: one of them is the user's own.
     """
-    structs = [_disturbance_struct(term, setup.joints, memory) for term in terms_of(disturbance)]
+    structs = [_disturbance_struct(term, setup.joints, memory) for term in list_terms(disturbance)]
     setup.disturbances = len(structs)
     if structs:
         setup.disturbance = addressof(memory.keep((DisturbanceStruct * len(structs))(*structs)))
 
 
 def _disturbance_struct(term: Disturbance, n: int, memory: Memory) -> DisturbanceStruct:
+    """Return a disturbance as struct of the engine."""
     kinds = (Push, Harmonic, FrameForce)
     if type(term) not in kinds:
         raise EngineError(f"the disturbance {type(term).__name__} is not one of the library")
@@ -269,7 +272,7 @@ def _disturbance_struct(term: Disturbance, n: int, memory: Memory) -> Disturbanc
 
 
 def _set_frame(struct: DisturbanceStruct, term: FrameForce, memory: Memory) -> None:
-    """Set where a force acts, and through which arm."""
+    """Set the place where a force acts, and the arm whose kinematics it acts through."""
     body, offset = frame_carrier(term.robot, term.frame)
     struct.magnitude, struct.body = memory.rows(term.force, 3), body
     struct.offset[:] = offset.tolist()

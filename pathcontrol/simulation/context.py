@@ -1,4 +1,4 @@
-"""What a run is about: the simulated arm, and the path it was asked to follow."""
+"""The context of a run: the simulated arm, and the path that it was to follow."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError, PathControlWarning
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.storage.array_store import Shelf
+from pathcontrol.simulation.storage.array_store import ArrayStore
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.laps import Laps
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class Stored(NamedTuple):
-    """Robot and task as a file holds them: JSON, and the numbers (k,) that it refers to."""
+class StoredContext(NamedTuple):
+    """Robot and task as a file holds them: JSON text, and the numbers (k,) that it refers to."""
 
     text: str
     numbers: Array
 
 
 def check_sequence(data: xr.Dataset, task: PathTask | None) -> None:
-    """Check that data which say on which path of a sequence the arm was, and a ``task`` that is one, fit together.
+    """Check that data with the path indices of a sequence fit a ``task`` that is one.
 
     Raises:
         InputError: the data are of paths that the task does not have, or are no numbers of paths.
@@ -48,23 +48,23 @@ def check_sequence(data: xr.Dataset, task: PathTask | None) -> None:
         raise InputError(f"the data are of other paths than the {len(task)} of the task; expected data and task of one")
 
 
-class Origin:
-    """The robot and the task of a run, each made when it is first asked for; ``None`` where it is not known.
+class RunContext:
+    """The robot and the task of a run, each made at the first request; ``None`` where it is unknown.
 
     Args:
-        robot: gives the simulated arm.
-        task: gives the path and its velocity profile.
-        stored: what both are made from, if they come from a file.
+        robot: returns the simulated arm.
+        task: returns the path and its velocity profile.
+        stored: the recipes of both, if they come from a file.
         robots: the arm of each rollout by its number, where they differ.
-        first: gives the number of the first rollout that a :class:`TaskBatch` has a task for.
-        model: gives the arm that the law computes with, where it is not the simulated one.
+        first: returns the number of the first rollout that a :class:`TaskBatch` has a task for.
+        model: returns the arm that the law computes with, where it is not the simulated one.
     """
 
     def __init__(
         self,
         robot: Callable[[], RobotModel | None],
         task: Callable[[], PathTask | None],
-        stored: Stored | None = None,
+        stored: StoredContext | None = None,
         robots: Mapping[int, RobotModel] | None = None,
         first: Callable[[], int] = lambda: 0,
         model: Callable[[], RobotModel | None] = lambda: None,
@@ -79,8 +79,8 @@ class Origin:
         task: PathTask | None,
         first: int = 0,
         model: RobotModel | None = None,
-    ) -> Origin:
-        """That of a run whose robot, task and model are at hand; rollouts are numbered from ``first``."""
+    ) -> RunContext:
+        """Return the context of a run whose robot, task and model are at hand; rollouts are numbered from ``first``."""
         numbered = {"first": lambda: first, "model": lambda: model}
         if isinstance(robot, RobotBatch):
             robots = dict(enumerate(robot.robots, first))
@@ -88,8 +88,8 @@ class Origin:
         return cls(lambda: robot, lambda: task, **numbered)  # type: ignore[arg-type]
 
     @classmethod
-    def load(cls, stored: Stored) -> Origin:
-        """What was stored; it is looked at when it is asked for."""
+    def load(cls, stored: StoredContext) -> RunContext:
+        """Return the stored context; it is read at the first request."""
         return cls(
             lambda: _robot(stored),
             lambda: _task(stored),
@@ -115,7 +115,7 @@ class Origin:
         return self._task()
 
     def task_of(self, rollouts: Array) -> PathTask | None:
-        """The task of ``rollouts`` by their numbers, of one among several its own."""
+        """Return the task of ``rollouts`` by their numbers, from a batch the tasks of these."""
         task = self.task
         if not isinstance(task, TaskBatch):
             return task
@@ -124,39 +124,39 @@ class Origin:
             raise InputError(f"the data have rollouts {rollouts.tolist()}, of which the run does not know all tasks")
         return task.rows(rows)
 
-    def rollout(self, number: int) -> Origin:
-        """That of one rollout."""
+    def rollout(self, number: int) -> RunContext:
+        """Return the context of one rollout."""
         if self._stored is not None or (self._robots is None and not isinstance(self.task, TaskBatch)):
             return self
         robot, task = self.robot if self._robots is None else self._robots[number], self.task_of(np.array([number]))
-        return Origin(lambda: robot, lambda: task, model=self._model)
+        return RunContext(lambda: robot, lambda: task, model=self._model)
 
-    def with_robot(self, robot: RobotModel) -> Origin:
-        """The same with another robot."""
-        return Origin(lambda: robot, lambda: self.task, first=self._first, model=self._model)
+    def with_robot(self, robot: RobotModel) -> RunContext:
+        """Return the same context with another robot."""
+        return RunContext(lambda: robot, lambda: self.task, first=self._first, model=self._model)
 
-    def path(self, index: int) -> Origin:
-        """That of one path of a sequence."""
-        return Origin(lambda: self.robot, lambda: _path(self.task, index), model=self._model)
+    def path(self, index: int) -> RunContext:
+        """Return the context of one path of a sequence."""
+        return RunContext(lambda: self.robot, lambda: _path(self.task, index), model=self._model)
 
-    def stored(self, upto: float) -> Stored:
-        """Robot and task for a file; of an endless path what is needed ``upto`` this s."""
+    def stored(self, upto: float) -> StoredContext:
+        """Return robot and task for a file; an endless path is kept ``upto`` this s."""
         if self._stored is not None:
             return self._stored
         from pathcontrol.robot.recipe import recipe_of
 
-        shelf, robot = Shelf(), self.robot
+        store, robot = ArrayStore(), self.robot
         recipes: dict[str, Any] = {"robot": None if robot is None else recipe_of(robot)}
         if self.model is not None and self.model is not robot:
             recipes["model"] = recipe_of(self.model)
-        recipes["task"] = _recipe(self.task, shelf, upto)
+        recipes["task"] = _recipe(self.task, store, upto)
         if isinstance(self.task, TaskBatch):
             recipes["first_rollout"] = self._first()
-        return Stored(json.dumps(recipes), shelf.numbers)
+        return StoredContext(json.dumps(recipes), store.numbers)
 
 
-def _recipe(task: PathTask | None, shelf: Shelf, upto: float) -> dict[str, Any] | None:
-    """That of the task, or a warning: no run is lost because its path is odd."""
+def _recipe(task: PathTask | None, store: ArrayStore, upto: float) -> dict[str, Any] | None:
+    """Return the recipe of the task, or warn: no run is lost because its path cannot be kept."""
     from pathcontrol.simulation.storage.task_recipes import (
         task_recipe,  # knows every kind of task: only files need that
     )
@@ -164,42 +164,46 @@ def _recipe(task: PathTask | None, shelf: Shelf, upto: float) -> dict[str, Any] 
     if task is None:
         return None
     try:
-        return task_recipe(task, shelf, upto)
+        return task_recipe(task, store, upto)
     except Exception as error:  # whatever the user's own code raises
         warnings.warn(f"the {type(task).__name__} is not kept with its run: {error}", PathControlWarning, stacklevel=3)
         return None
 
 
-def _robot(stored: Stored) -> RobotModel | None:
+def _robot(stored: StoredContext) -> RobotModel | None:
+    """Return the stored arm."""
     from pathcontrol.robot.recipe import robot_of
 
     recipe = _part_of(stored, "robot")
     return None if recipe is None else robot_of(recipe)
 
 
-def _model(stored: Stored) -> RobotModel | None:
+def _model(stored: StoredContext) -> RobotModel | None:
+    """Return the stored arm that the law computes with."""
     from pathcontrol.robot.recipe import robot_of
 
     recipe = _part_of(stored, "model", missing=None)
     return None if recipe is None else robot_of(recipe)
 
 
-def _task(stored: Stored) -> PathTask | None:
+def _task(stored: StoredContext) -> PathTask | None:
+    """Return the stored task."""
     from pathcontrol.simulation.storage.task_recipes import task_of
 
     recipe = _part_of(stored, "task")
-    return None if recipe is None else task_of(recipe, Shelf(stored.numbers))
+    return None if recipe is None else task_of(recipe, ArrayStore(stored.numbers))
 
 
-def _first(stored: Stored) -> int:
+def _first(stored: StoredContext) -> int:
+    """Return the stored number of the first rollout."""
     first = _part_of(stored, "first_rollout")
     if not isinstance(first, int):
         raise InputError(f"the tasks of the run are said to begin with rollout {first!r}, expected a number")
     return first
 
 
-def _part_of(stored: Stored, name: str, **otherwise: Any) -> Any:
-    """One of the recipes; ``missing=`` says what is given where there is none, which else is an error."""
+def _part_of(stored: StoredContext, name: str, **otherwise: Any) -> Any:
+    """Return one of the recipes; a missing one is an error unless ``missing=`` gives a default."""
     try:
         recipes = json.loads(stored.text)
         return recipes.get(name, otherwise["missing"]) if otherwise else recipes[name]
@@ -208,6 +212,7 @@ def _part_of(stored: Stored, name: str, **otherwise: Any) -> Any:
 
 
 def _path(task: PathTask | None, index: int) -> PathTask | None:
+    """Return one path of a sequence, ``None`` if the task is none."""
     if not isinstance(task, PathSequence):
         return None
     path = task.paths[index]

@@ -13,7 +13,7 @@ from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.arm.sensors import Reading
-from pathcontrol.simulation.divergence import CRAWLED, NO_NUMBERS, STOPPED, Divergence, sound
+from pathcontrol.simulation.divergence import CRAWLED, NO_NUMBERS, STOPPED, Divergence, is_bounded
 from pathcontrol.simulation.finish import Finish
 from pathcontrol.simulation.loops import Arm, ContinuousTime, Outside, check_rows, torque_limits
 from pathcontrol.simulation.recorder import Recorder
@@ -21,7 +21,7 @@ from pathcontrol.simulation.recorder import Recorder
 if TYPE_CHECKING:
     from scipy.integrate import LSODA
 
-_WATCHED = 2000  # steps of the integrator
+_WATCHED = 2000  # steps of the integrator over which its progress is measured
 _SHORTEST = 1e-6  # s, the mean step of so many below which a run is given up: a second of it would take minutes
 _MOST_WORK = 400_000  # evaluations of the closed loop that a simulated second may take, half a minute or more
 
@@ -30,24 +30,24 @@ class ClosedLoop:
     """The vector field of arm and controller; a state is (q, q̇, z), flat, one rollout after the other."""
 
     def __init__(
-        self, controller: Controller, plant_robot: Arm, mode: ContinuousTime, push: _Push | None = None
+        self, controller: Controller, plant_robot: Arm, mode: ContinuousTime, push: _SteadyDisturbance | None = None
     ) -> None:
         self._push = push
         self.controller, self.robot, self.mode = controller, plant_robot, mode
         self._limits = torque_limits(mode, plant_robot)
 
     def split(self, y: Array) -> tuple[Array, Array, Array]:
-        """q, q̇ and z of states (…, 2n + m)."""
+        """Return q, q̇ and z of states (…, 2n + m)."""
         n = self.robot.n
         return y[..., :n], y[..., n : 2 * n], y[..., 2 * n :]
 
     def control(self, t: float, y: Array) -> tuple[ControlOutput, Array]:
-        """What the law says, and the torque within its limits."""
+        """Return the output of the law, and the torque within its limits."""
         out = self.controller.law(t, *self.split(y))
         return out, out.tau if self._limits is None else np.clip(out.tau, -self._limits, self._limits)
 
     def rate(self, t: float, y: Array) -> Array:
-        """dy/dt of states (N, 2n + m)."""
+        """Return dy/dt of states (N, 2n + m)."""
         q, qd, _ = self.split(y)
         out, tau = self.control(t, y)
         friction = self.robot.friction.smoothed(qd, self.mode.friction_width)
@@ -60,11 +60,11 @@ class ContinuousArm:
     """The arm as a differential equation; controllers may take it over one after the other.
 
     Args:
-        mode: how it is integrated.
+        mode: settings of the integrator.
         robot: the arm, or one for each rollout.
         q: joint positions it starts at [rad], (N, n).
         qd: joint velocities it starts with [rad/s], (N, n).
-        outside: what disturbs it.
+        outside: its disturbance.
 
     Attributes:
         divergence: which rollouts have diverged, at the time since the present controller took over.
@@ -80,11 +80,11 @@ class ContinuousArm:
     def run(
         self, controller: Controller, duration: float, finish: Finish | None, progress: bool, z: Array | None = None
     ) -> dict[str, Array]:
-        """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most.
+        """Return the record, (rollout, time, …), from here until ``finish`` ends it, ``duration`` [s] at most.
 
         ``z`` is the state that the law starts with, where that is known already.
         """
-        push = None if self._disturbance is None else _Push(self._disturbance, self._began)
+        push = None if self._disturbance is None else _SteadyDisturbance(self._disturbance, self._began)
         time = self._period * np.arange(max(1, round(duration / self._period)) + 1)
         loop = ClosedLoop(controller, self._robot, self._mode, push)
         recorder = Recorder(len(self.q), self._robot.n, len(time))
@@ -96,7 +96,7 @@ class ContinuousArm:
                 self.q, self.qd, _ = loop.split(y)
                 out, tau = loop.control(t, y)
                 recorder.write(self.q, self.qd, Reading(self.q, self.qd), out, tau)
-                lost.look_at_torque(t, out.tau)
+                lost.check_torque(t, out.tau)
                 if lost.all or (finish is not None and finish(t, out.s, self.qd, lost.lost)):
                     break
         arrays = recorder.arrays()
@@ -105,8 +105,8 @@ class ContinuousArm:
         return arrays
 
 
-class _Push:
-    """A disturbance in the time since a controller took over, and without its jumps: it keeps its value up to one."""
+class _SteadyDisturbance:
+    """A disturbance in the time since a controller took over; up to a jump it keeps its value from before it."""
 
     def __init__(self, disturbance: Disturbance, began: float) -> None:
         self._disturbance, self._began, self._before = disturbance, began, np.inf
@@ -115,7 +115,7 @@ class _Push:
         return self._disturbance.torque(self._began + min(t, self._before), q, qd)
 
     def until_next_jump(self, t: float, end: float) -> float:
-        """The time of the next jump after t [s], or the ``end``; from now on only what is before it counts."""
+        """Return the time of the next jump after t [s], or ``end``; until then the value before the jump counts."""
         after = self._disturbance.jumps - self._began
         after = after[(after > t) & (after < end)]
         self._before = float(np.nextafter(after.min(), -np.inf)) if after.size else np.inf
@@ -123,28 +123,28 @@ class _Push:
 
 
 class _Solution:
-    """The states of a batch over time; rollouts that diverge are taken out of it, and the others go on from there.
+    """The states of a batch over time; diverged rollouts are taken out, and the others continue from there.
 
     Args:
         loop: the vector field.
         start: the state it starts from, (N, 2n + m).
         lost: which rollouts have diverged.
-        push: what disturbs it.
+        push: its disturbance.
     """
 
-    def __init__(self, loop: ClosedLoop, start: Array, lost: Divergence, push: _Push | None) -> None:
+    def __init__(self, loop: ClosedLoop, start: Array, lost: Divergence, push: _SteadyDisturbance | None) -> None:
         self._push = push
         self._loop, self._start, self._lost = loop, start, lost
-        self._steps, self._since = 0, 0.0  # since when it is watched whether the integrator crawls
-        self._work, self._second = 0, 0.0  # evaluations, and when the second began in which they are counted
-        self._odd = lost.lost  # rows whose rate was no number in the last step
+        self._steps, self._since = 0, 0.0  # when the present count of steps began
+        self._work, self._second = 0, 0.0  # evaluations, and the begin of the second in which they are counted
+        self._odd = lost.lost  # rows whose rate was not finite in the last step
         # the integrator's norm averages over rollouts: tighten it so that each one alone keeps the tolerance
         share, band = np.sqrt(max(1, len(start))), start.shape[1] - 1
         rtol, atol = max(loop.mode.rtol / share, 1e-13), loop.mode.atol / share
         self._settings = {"rtol": rtol, "atol": atol, "lband": band, "uband": band}
 
     def at(self, time: Array, update: Callable[[float], None]) -> Iterator[Array]:
-        """States (N, 2n + m) at each of ``time``, no further integrated than they are asked for."""
+        """Yield states (N, 2n + m) at each of ``time``; integrate no further than they are requested."""
         from scipy.integrate import LSODA  # which sampled loops do without
 
         t, y, given = 0.0, self._start, 1
@@ -155,11 +155,11 @@ class _Solution:
             while given < len(time) and solver.status == "running":
                 t, y, self._odd = solver.t, solver.y.copy(), self._lost.lost
                 solver.step()
-                crawls = self._crawls(solver.t)
-                if crawls or self._in_trouble(solver):
+                crawls = self._is_crawling(solver.t)
+                if crawls or self._has_failed(solver):
                     self._work = 0  # the others have a budget of their own
-                    self._take_out(t, solver.y, y, CRAWLED if crawls else STOPPED)
-                    y = self._lost.replaced(y.reshape(self._start.shape), self._start)
+                    self._remove_culprits(t, solver.y, y, CRAWLED if crawls else STOPPED)
+                    y = self._lost.replace_lost(y.reshape(self._start.shape), self._start)
                     break
                 known = int(np.searchsorted(time, solver.t, side="right"))
                 if known > given:
@@ -168,15 +168,16 @@ class _Solution:
                 t, y = solver.t, solver.y
 
     def _rate(self, t: float, y: Array, update: Callable[[float], None]) -> Array:
+        """Return the flat rate of all rollouts, 0 for lost ones."""
         update(t)
         self._work += 1
         rate = self._loop.rate(t, y.reshape(self._start.shape))
         if not np.isfinite(np.vdot(rate, rate)):
             self._odd = self._odd | ~np.isfinite(rate).all(-1)
-        return (self._lost.replaced(rate, 0.0) if self._lost.any else rate).reshape(-1)
+        return (self._lost.replace_lost(rate, 0.0) if self._lost.any else rate).reshape(-1)
 
-    def _crawls(self, t: float) -> bool:
-        """Whether the last steps, now that t [s] is reached, took the integrator hardly anywhere for the work done."""
+    def _is_crawling(self, t: float) -> bool:
+        """Return whether the last steps, up to t [s], made hardly any progress for the work done."""
         if self._work > _MOST_WORK:
             return True
         if t - self._second >= 1.0:
@@ -188,20 +189,21 @@ class _Solution:
         self._steps, self._since = 0, t
         return crawls
 
-    def _in_trouble(self, solver: LSODA) -> bool:
-        return solver.status == "failed" or not np.isfinite(solver.t) or bool(self._beyond(solver.y).any())
+    def _has_failed(self, solver: LSODA) -> bool:
+        """Return whether the integrator failed or a state left all bounds."""
+        return solver.status == "failed" or not np.isfinite(solver.t) or bool(self._find_unbounded(solver.y).any())
 
-    def _beyond(self, y: Array) -> NDArray[np.bool_]:
-        """Rows whose state is lost."""
+    def _find_unbounded(self, y: Array) -> NDArray[np.bool_]:
+        """Return the rows whose state is lost, (N,)."""
         q, qd, z = self._loop.split(y.reshape(self._start.shape))
-        return ~(sound(q, qd) & np.isfinite(z).all(-1))
+        return ~(is_bounded(q, qd) & np.isfinite(z).all(-1))
 
-    def _take_out(self, t: float, reached: Array, y: Array, reason: str) -> None:
-        """Mark whoever is to blame that the integrator did not get from y at t [s] to a state that can be.
+    def _remove_culprits(self, t: float, reached: Array, y: Array, reason: str) -> None:
+        """Mark the rollouts that kept the integrator from getting from y at t [s] to a possible state.
 
-        ``reason`` is that of a rollout which is to blame for its speed alone.
+        ``reason`` is given to a rollout whose only fault is its speed.
         """
-        odd, beyond = self._odd & ~self._lost.lost, self._beyond(reached) & ~self._lost.lost
+        odd, beyond = self._odd & ~self._lost.lost, self._find_unbounded(reached) & ~self._lost.lost
         if odd.any():
             self._lost.mark(t, odd, NO_NUMBERS)
         elif beyond.any():

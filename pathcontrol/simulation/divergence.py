@@ -1,4 +1,4 @@
-"""Rollouts that diverge: found at once, marked, and kept where they disturb no other."""
+"""The detection of rollouts that diverge: they are marked and held where they disturb no other."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import SimulationError
 from pathcontrol.simulation.arm.sensors import Reading
 
-_ABSURD = 1e6  # rad and rad/s, beyond any arm
+_ABSURD = 1e6  # rad and rad/s, beyond the reach of any arm
 BEYOND = (
     "its state left all bounds; if it does so with more substeps of the loop too, shorten the period, lower the gains, "
     "or start nearer to the path"
@@ -26,7 +26,7 @@ STOPPED = "the integrator gave up; lower the gains, or widen friction_width"
 
 
 class Divergence:
-    """Which rollouts have diverged, when and why.
+    """The record of diverged rollouts: which, when and why.
 
     A state is lost when a position or velocity is no number or beyond 10⁶ rad or rad/s, a law when one of its torques
     is no number. A lost rollout is put back to where it started and held there, where its law is known to work, until
@@ -36,7 +36,7 @@ class Divergence:
         time: when each rollout diverged [s], NaN where it has not, (N,).
         reason: why, and what to try, (N,); empty where it has not.
         lost: which have diverged, (N,).
-        any: whether one has.
+        any: True if one has.
     """
 
     def __init__(self, q: Array, qd: Array) -> None:
@@ -46,61 +46,61 @@ class Divergence:
 
     @property
     def all(self) -> bool:
-        """Whether no rollout is left."""
+        """True if no rollout is left."""
         return self.any and bool(self.lost.all())
 
-    def look_at_state(self, t: float, q: Array, qd: Array) -> None:
+    def check_state(self, t: float, q: Array, qd: Array) -> None:
         """Mark the rollouts whose state is lost at t [s]; q and q̇ are (N, n)."""
-        # one number says that all is well, as it nearly always is
+        # one comparison serves the common case that all is well
         if not np.vdot(q, q) + np.vdot(qd, qd) < _ABSURD**2:
-            self.mark(t, ~sound(q, qd))
+            self.mark(t, ~is_bounded(q, qd))
 
-    def look_at_torque(self, t: float, tau: Array) -> None:
+    def check_torque(self, t: float, tau: Array) -> None:
         """Mark the rollouts whose law asks for torques (N, n) that are no numbers at t [s]."""
         if not isfinite(np.vdot(tau, tau)):
             self.mark(t, np.asarray(~np.isfinite(tau).all(-1)), NO_NUMBERS)
 
     def mark(self, t: float, rows: Array, reason: str = BEYOND) -> None:
-        """``rows`` (N,) have diverged at t [s], unless they had before."""
+        """Mark the ``rows`` (N,) as diverged at t [s], unless they were marked before."""
         news = rows & ~self.lost
         self.time[news], self.reason[news] = t, reason
         self.lost = self.lost | rows
         self.any = bool(self.lost.any())
 
     def explain(self, *causes: str) -> None:
-        """Say in the error of :meth:`check` why states left all bounds, where ``causes`` are known, which may be empty.
+        """Set the likely ``causes``, which may be empty texts, for the error of :meth:`check`.
 
         ``reason`` stays what it is: the causes are those of a batch, and a rollout has the same reason alone.
         """
         self._why = "; ".join(filter(None, causes))
 
-    def _told(self, row: int) -> str:
-        """The reason of a rollout with what is known of its cause."""
+    def _explain_rollout(self, row: int) -> str:
+        """Return the reason of a rollout with its likely cause."""
         if not self._why or self.reason[row] == NO_NUMBERS:
             return str(self.reason[row])
         return f"its state left all bounds: {self._why}"
 
-    def home(self, q: Array, qd: Array) -> tuple[Array, Array]:
-        """(q, q̇), each (N, n), with lost rollouts where they started."""
-        return self.replaced(q, self._home.q), self.replaced(qd, self._home.qd)
+    def reset_lost(self, q: Array, qd: Array) -> tuple[Array, Array]:
+        """Return (q, q̇), each (N, n), with lost rollouts at their initial states."""
+        return self.replace_lost(q, self._home.q), self.replace_lost(qd, self._home.qd)
 
-    def replaced(self, values: Array, by: Array | float) -> Array:
-        """``values`` (N, …), for lost rollouts those given."""
+    def replace_lost(self, values: Array, by: Array | float) -> Array:
+        """Return ``values`` (N, …), those of lost rollouts replaced."""
         return np.where(self.lost.reshape(-1, *[1] * (values.ndim - 1)), by, values)
 
     def erase(self, arrays: Mapping[str, Array], time: Array) -> None:
-        """Make what is recorded (N, time, …) of a lost rollout NaN from when it diverged on; False for truth values."""
+        """Set the record (N, time, …) of lost rollouts to NaN from their divergence on; truth values to False."""
         for row in np.flatnonzero(self.lost):
             first = int(np.searchsorted(time, self.time[row]))
             for array in arrays.values():
                 array[row, first:] = False if array.dtype == bool else np.nan
 
     def outcome(self) -> dict[str, Array]:
-        """What a run says of it."""
+        """Return times and reasons, for the outcome of a run."""
         return {"diverged_time": self.time, "reason": self.reason.astype(str)}
 
     def check(self, run: Any) -> None:
-        """Nobody is served by a ``run`` of nothing but rollouts that have diverged.
+        """Check that some rollout of ``run`` has not diverged.
 
         Raises:
             SimulationError: all have.
@@ -108,16 +108,16 @@ class Divergence:
         if not self.all:
             return
         if len(self.time) == 1:
-            message = f"rollout 0 diverged at t = {self.time[0]:.4g} s: {self._told(0)}"
+            message = f"rollout 0 diverged at t = {self.time[0]:.4g} s: {self._explain_rollout(0)}"
         else:
             last = int(np.argmax(self.time))
             message = (
                 f"all {len(self.time)} rollouts diverged, the last one, {last}, at t = {self.time[last]:.4g} s: "
-                f"{self._told(last)}"
+                f"{self._explain_rollout(last)}"
             )
         raise SimulationError(message, run, time=float(self.time.max()))
 
 
-def sound(q: Array, qd: Array) -> Array:
-    """Which of the states q and q̇ (N, n) an arm can be in, (N,)."""
+def is_bounded(q: Array, qd: Array) -> Array:
+    """Return for which states q and q̇ (N, n) an arm is within bounds, (N,)."""
     return np.maximum(np.abs(q), np.abs(qd)).max(-1) < _ABSURD

@@ -1,4 +1,4 @@
-"""Which engine runs a simulation: the compiled one where it can, else the reference on NumPy and Pinocchio."""
+"""The choice of the engine of a simulation: the compiled one if possible, else the reference on NumPy and Pinocchio."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Engine = Literal["auto", "compiled", "pinocchio"]
 
 
 class Choice(NamedTuple):
-    """The arm that runs, and what ``run.config`` says of it.
+    """The chosen arm, and the entries about it in ``run.config``.
 
     Attributes:
         arm: the simulated arm behind its sensors and actuators.
-        config: ``engine``, and where that is not the compiled one ``engine_reason``.
+        config: ``engine``, and ``engine_reason`` where it is not the compiled one.
     """
 
     arm: SampledArm | CompiledArm | ContinuousArm
@@ -42,9 +42,9 @@ def check_engine(engine: str) -> None:
 
 
 def settle_engine(engine: Engine) -> Engine:
-    """Return which engine a study of many simulations asks for: not ``"auto"`` where there is no compiled one.
+    """Return the engine for a study of many simulations: never ``"auto"`` where there is no compiled one.
 
-    What is resumed elsewhere is then seen to be on another engine.
+    A study that is resumed elsewhere can then tell that the engine has changed.
     """
     check_engine(engine)
     if engine != "auto":
@@ -75,7 +75,7 @@ def choose_engine(
     reason = "asked for"
     if engine != "pinocchio":
         try:
-            return _compiled(controllers, loop, robot, q, qd, outside)
+            return _compile(controllers, loop, robot, q, qd, outside)
         except EngineError as error:
             if engine == "compiled":
                 raise
@@ -88,7 +88,7 @@ def choose_engine(
     return Choice(arm, {"engine": "pinocchio", "engine_reason": reason})
 
 
-def _compiled(
+def _compile(
     controllers: Sequence[Controller],
     loop: SampledLoop | ContinuousTime,
     robot: Arm,
@@ -96,7 +96,7 @@ def _compiled(
     qd: Array,
     outside: Outside,
 ) -> Choice:
-    """All of the loop compiled, or where a law or a disturbance is in Python only the plant."""
+    """Compile the whole loop, or only the plant where a law or a disturbance is in Python."""
     if not isinstance(loop, SampledLoop):
         raise EngineError("continuous time is integrated by SciPy")
     try:
@@ -113,4 +113,5 @@ def _compiled(
 
 @cache
 def _warn_once(message: str) -> None:
+    """Warn with ``message``, once in a process."""
     warnings.warn(message, PathControlWarning, stacklevel=6)

@@ -1,4 +1,4 @@
-"""When a run has come to its end: at rest on the end of an open path, or after so many laps of a closed one."""
+"""The end of a run: at rest at the end of an open path, or after a number of laps of a closed one."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _REST = 0.05  # s at rest; a shorter one may be the turning point of an oscillat
 
 
 class Finish(ABC):
-    """Looks at one sample after the other, and keeps when each rollout was finished.
+    """A rule by which rollouts finish, applied sample after sample; it records when each one did.
 
     Attributes:
         time: when each rollout was finished [s], NaN while it is not, (N,).
-        ends_run: whether the run ends when all rollouts are finished.
+        ends_run: True if the run ends when all rollouts are finished.
     """
 
     def __init__(self, rollouts: int, ends_run: bool = True) -> None:
@@ -33,12 +33,12 @@ class Finish(ABC):
 
     @abstractmethod
     def finished(self, t: float, s: Array, qd: Array) -> Array | None:
-        """The times at which rollouts were finished, as known at t [s], NaN for others, (N,); None for no news."""
+        """Return the times at which rollouts finished, as known at t [s], NaN for others, (N,); None for no news."""
 
     def __call__(self, t: float, s: Array, qd: Array, lost: NDArray[np.bool_]) -> bool:
-        """Whether the run ends at t [s]: all rollouts are finished, or ``lost`` (N,), as those that diverged.
+        """Return whether the run ends at t [s]: all rollouts are finished, or ``lost`` (N,), having diverged.
 
-        With the path parameters s (N,) and the joint velocities q̇ [rad/s], (N, n).
+        It takes the path parameters s (N,) and the joint velocities q̇ [rad/s], (N, n).
         """
         news = self.finished(t, s, qd)
         if news is None:
@@ -48,10 +48,10 @@ class Finish(ABC):
 
 
 class AtEnd(Finish):
-    """An open path is finished when its plan has 0.1 mrad of the path left at most and the arm has come to rest.
+    """The rule for open paths: at most 0.1 mrad of the path are left to the plan and the arm has come to rest.
 
-    At rest is an arm of ‖q̇‖ ≤ 0.01 rad/s for 50 ms; it is finished at the beginning of them. How far from the end of
-    the path it rests is another matter: friction that is not compensated holds it where K_p M(q) e_p is less.
+    At rest is an arm of ‖q̇‖ ≤ 0.01 rad/s for 50 ms; it is finished at the beginning of them. The arm may
+    rest away from the end of the path: uncompensated friction holds it where K_p M(q) e_p is less.
     """
 
     def __init__(self, task: PathTask, rollouts: int, ends_run: bool = True) -> None:
@@ -69,7 +69,7 @@ class AtEnd(Finish):
 
 
 class AfterLaps(Finish):
-    """A closed path is finished when s has grown by so many periods since the start; the arm goes on moving."""
+    """The rule for closed paths: s has grown by ``laps`` periods since the start; the arm goes on moving."""
 
     def __init__(self, task: PathTask, laps: int, rollouts: int, ends_run: bool = True) -> None:
         super().__init__(rollouts, ends_run)
@@ -78,33 +78,33 @@ class AfterLaps(Finish):
 
     def finished(self, t: float, s: Array, qd: Array) -> Array | None:
         self._start = s if self._start is None else self._start
-        done = whole_laps(self._task, self._start, s) >= self.laps
+        done = count_laps(self._task, self._start, s) >= self.laps
         return np.where(done, t, np.nan) if done.any() else None
 
 
-def whole_laps(task: PathTask, start: Array, s: Array) -> Array:
-    """How many times the path was gone round from ``start`` to ``s``, negative backwards, integers (*batch,)."""
+def count_laps(task: PathTask, start: Array, s: Array) -> Array:
+    """Return how many laps lie between ``start`` and ``s``, negative backwards, integers (*batch,)."""
     return np.trunc((s - start) / task.period).astype(np.int64)
 
 
 def first_and_last(s: Array) -> tuple[Array, Array]:
-    """The first and the last s that is a number of each rollout, (N,) each, of (N, time); 0 where there is none."""
+    """Return the first and the last finite s of each rollout, (N,) each, from (N, time); 0 where there is none."""
     known = np.isfinite(s)
     last = s.shape[1] - 1 - np.argmax(known[:, ::-1], axis=1)
     rows, some = np.arange(len(s)), known.any(1)
     return np.where(some, s[:, 0], 0.0), np.where(some, s[rows, last], 0.0)
 
 
-def seen_finished(finish_time: Array, at_rest: bool) -> Array:
-    """The times [s] at which it is known that rollouts were finished at ``finish_time`` [s], (N,) each.
+def detection_times(finish_time: Array, at_rest: bool) -> Array:
+    """Return the times [s] at which it is known that rollouts finished at ``finish_time`` [s], (N,) each.
 
-    That is later where they are finished when they have come to rest, ``at_rest``, as on open paths.
+    They are later where the rule waits for rest, ``at_rest``, as on open paths.
     """
     return finish_time + (_REST * (1 - 1e-9) if at_rest else 0.0)
 
 
-def finish_of(task: PathTask, laps: int | None, until: Until, rollouts: int) -> Finish | None:
-    """What to look for in ``rollouts`` of ``task``; None where nothing ends.
+def make_finish(task: PathTask, laps: int | None, until: Until, rollouts: int) -> Finish | None:
+    """Return the rule by which ``rollouts`` of ``task`` finish; None where nothing ends.
 
     Raises:
         InputError: ``laps`` is no whole number from 1, or the path is not closed.
@@ -119,13 +119,14 @@ def finish_of(task: PathTask, laps: int | None, until: Until, rollouts: int) -> 
 
 
 def _check_laps(task: PathTask, laps: Any) -> None:
+    """Check that ``laps`` is a whole number from 1 and the path is closed."""
     if isinstance(laps, bool) or not isinstance(laps, int | np.integer) or laps < 1:
         raise InputError(f"laps = {laps!r}, expected a whole number from 1")
     if not task.closed:
         raise InputError(f"laps = {laps}, but {type(task).__name__} is no closed path; leave laps out")
 
 
-def known_finished(finish: Finish | None, finish_time: Array, period: float) -> NDArray[np.int64]:
+def detection_ticks(finish: Finish | None, finish_time: Array, period: float) -> NDArray[np.int64]:
     """Return the ticks, of ``period`` [s], at which it is known that rollouts finished at ``finish_time`` [s], (N,)."""
     wait = _REST * (1 - 1e-9) if isinstance(finish, AtEnd) else 0.0
     tick = np.floor((np.nan_to_num(finish_time) + wait) / period) - 1

@@ -24,10 +24,10 @@ TorqueLimits = bool | Annotated[ArrayLike, Form.LIMITS, Unit("N m", "N")]
 
 
 class Outside(NamedTuple):
-    """What is neither arm nor loop.
+    """The surroundings of a simulation: the disturbance and the number of the first rollout.
 
     Attributes:
-        disturbance: what pushes the arm, or None.
+        disturbance: the disturbance of the arm, or None.
         first: number of the first rollout.
     """
 
@@ -41,11 +41,11 @@ Arm = RobotModel | RobotBatch
 
 @dataclass(frozen=True, eq=False)
 class SampledLoop:
-    """A control computer: torques held over a period, and what else of reality is switched on.
+    """A control computer: torques held over a period, and optional imperfections of real hardware.
 
     Attributes:
         period: control period [s].
-        substeps: steps of the plant in a period; one does unless the motion is fast, see :class:`Plant`.
+        substeps: steps of the plant in a period; one suffices unless the motion is fast, see :class:`Plant`.
         encoders: False for exact positions, True for the resolution of the robot, or counts per
             revolution, (n,), or for each rollout, (N, n).
         velocity: ``"exact"``, or ``"difference"`` of two measured positions over the period.
@@ -83,10 +83,11 @@ class SampledLoop:
             )
 
     def sensors(self, robot: Arm) -> Sensors:
-        """The measuring chain for ``robot``."""
+        """Return the measuring chain for ``robot``."""
         return Sensors(self.period, self._resolution(robot), self.velocity == "difference", self.filter_hz)
 
     def _resolution(self, robot: Arm) -> Array | None:
+        """Return the angle of an encoder count [rad], (1, n) or (N, n), or None for exact positions."""
         counts = _per_joint("encoders", self.encoders, robot.actuation.encoder_counts, robot)
         if counts is None:
             return None
@@ -98,10 +99,10 @@ class SampledLoop:
         return 2 * np.pi / np.atleast_2d(counts)
 
     def describe(self) -> dict[str, Any]:
-        """All settings, for the record of a run."""
+        """Return all settings, for the configuration of a run."""
         settings = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "noise"}
         noise = {} if self.noise is None else {"noise": self.noise.describe()}
-        return {"loop": "sampled"} | _plain(settings) | noise
+        return {"loop": "sampled"} | _to_plain(settings) | noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,12 +128,12 @@ class ContinuousTime:
             scalar(name, getattr(self, name), positive=True)
 
     def describe(self) -> dict[str, Any]:
-        """All settings, for the record of a run."""
-        return {"loop": "continuous"} | _plain(asdict(self))
+        """Return all settings, for the configuration of a run."""
+        return {"loop": "continuous"} | _to_plain(asdict(self))
 
 
 def torque_limits(mode: SampledLoop | ContinuousTime, robot: Arm) -> Array | None:
-    """The limits [N m], (n,) or (N, n), that ``mode`` clamps torques to, or None."""
+    """Return the limits [N m], (n,) or (N, n), that ``mode`` clamps torques to, or None."""
     limits = _per_joint("torque_limits", mode.torque_limits, robot.limits.effort, robot, infinite=True)
     if limits is not None and (limits <= 0).any():
         dead = [name for name, limit in zip(robot.joint_names, limits.T, strict=True) if (limit <= 0).any()]
@@ -143,7 +144,7 @@ def torque_limits(mode: SampledLoop | ContinuousTime, robot: Arm) -> Array | Non
 
 
 def check_rows(values: Array | None, name: str, rollouts: int) -> None:
-    """What a loop says of each rollout fits their number."""
+    """Check that the values of a loop for each rollout fit the number of rollouts."""
     if values is not None and values.ndim == 2 and len(values) not in (1, rollouts):
         raise InputError(f"{name} has rows for {len(values)} rollouts, expected 1 or {rollouts}")
 
@@ -151,7 +152,7 @@ def check_rows(values: Array | None, name: str, rollouts: int) -> None:
 def _per_joint(
     name: str, value: bool | ArrayLike, own: Array | None, robot: Arm, infinite: bool = False
 ) -> Array | None:
-    """False: None; True: the robot's own values; else one value for each joint."""
+    """Return one value for each joint: None for False, the robot's own values for True, else those given."""
     if isinstance(value, bool | np.bool_) and not value:
         return None
     if isinstance(value, bool | np.bool_):
@@ -169,5 +170,6 @@ def _per_joint(
     return finite(name, array)
 
 
-def _plain(settings: dict[str, Any]) -> dict[str, Any]:
+def _to_plain(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return settings as plain values."""
     return {name: value if value is None else np.asarray(value).tolist() for name, value in settings.items()}

@@ -53,7 +53,7 @@ def prepare(
         outside: the disturbance and the number of the first rollout; of a later part of a larger batch warnings of
             steps have been given with the first.
         duration: the whole time [s].
-        engine: the one that is asked for.
+        engine: the requested engine.
 
     Raises:
         EngineError: the engine is to be the compiled one, and something of the simulation is beyond it.

@@ -1,4 +1,4 @@
-"""Where a simulation writes what it sees, a sample at a time."""
+"""The recorder of a simulation, which stores a sample at a time."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from pathcontrol.control.base import ControlOutput
 from pathcontrol.simulation.arm.sensors import Reading
 from pathcontrol.simulation.variables import VARIABLES
 
-_ROOM = 1 << 30  # bytes at first; what is not written to takes no memory
+_ROOM = 1 << 30  # bytes reserved at first; pages that are not written take no memory
 
 
 class Recorder:
-    """Arrays (time, rollout, …) that grow a sample at a time, handed out as (rollout, time, …).
+    """Arrays (time, rollout, …) that grow a sample at a time, returned as (rollout, time, …).
 
     Args:
-        rollouts: how many rollouts.
-        joints: how many joints.
-        samples: how many samples there will be at most.
+        rollouts: number of rollouts.
+        joints: number of joints.
+        samples: largest number of samples.
     """
 
     def __init__(self, rollouts: int, joints: int, samples: int) -> None:
@@ -35,7 +35,7 @@ class Recorder:
         }
 
     def write(self, q: Array, qd: Array, reading: Reading, out: ControlOutput, tau: Array) -> None:
-        """Store one more sample: the true state, what was measured, what the law said and the torque that acts."""
+        """Store one more sample: true state, measurement, output of the law and the torque that acts."""
         if self._samples == self._room:
             self._grow()
         i = self._samples
@@ -46,10 +46,10 @@ class Recorder:
 
     @property
     def samples(self) -> int:
-        """How many samples are stored."""
+        """The number of samples stored."""
         return self._samples
 
-    def room_for(self, samples: int) -> dict[str, Array]:
+    def reserve(self, samples: int) -> dict[str, Array]:
         """Return views of the room for the next ``samples``, (samples, rollout, …), to be written and then added."""
         while self._samples + samples > self._room:
             self._grow()
@@ -64,14 +64,14 @@ class Recorder:
         self._samples = min(self._samples, samples)
 
     def arrays(self) -> dict[str, Array]:
-        """Everything stored, rollouts first; the room that was not needed is given back."""
+        """Return all samples, rollouts first, and release the room that was not needed."""
         self._room = self._samples
         for array in self._arrays.values():
             array.resize((self._samples, *array.shape[1:]), refcheck=False)
         return {name: np.moveaxis(array, 0, 1) for name, array in self._arrays.items()}
 
     def _grow(self) -> None:
-        """Twice the room; a run may end long before the time it was given."""
+        """Double the room; a run may end long before its duration."""
         self._room = min(2 * self._room, self._most)
         for name, array in self._arrays.items():
             larger = np.empty((self._room, *array.shape[1:]), dtype=array.dtype)

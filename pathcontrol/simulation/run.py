@@ -1,4 +1,4 @@
-"""The one result type: labelled arrays with their units and the full configuration."""
+"""The result of a simulation: labelled arrays with their units and the full configuration."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.config import laws, table
-from pathcontrol.simulation.context import Origin, Stored, check_sequence
+from pathcontrol.simulation.context import RunContext, StoredContext, check_sequence
 from pathcontrol.simulation.samples import Samples, complete_outcome, label_outcome
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 from pathcontrol.tasks.task import PathTask
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 
 class Run:
-    """What happened in a simulation, one or many rollouts.
+    """The record of a simulation with one or many rollouts.
 
     Attributes:
-        config: everything the run was made with: robot, task, controller, plant, loop, versions.
+        config: the whole configuration: robot, task, controller, plant, loop, versions.
     """
 
-    def __init__(self, data: xr.Dataset | Samples, config: Mapping[str, Any], origin: Origin | None = None) -> None:
+    def __init__(self, data: xr.Dataset | Samples, config: Mapping[str, Any], origin: RunContext | None = None) -> None:
         self._samples = data if isinstance(data, Samples) else None
         if not isinstance(data, Samples):
             if missing := [name for name in ("rollout", "time", "joint") if not data.sizes.get(name)]:
@@ -39,7 +39,7 @@ class Run:
                 raise InputError(f"the data of the run have no {lacks}; expected at least one of each")
             self._data = data
         self.config = dict(config)
-        self._origin = Origin.of(None, None) if origin is None else origin
+        self._origin = RunContext.of(None, None) if origin is None else origin
 
     @classmethod
     def from_arrays(
@@ -55,20 +55,20 @@ class Run:
         model: RobotModel | None = None,
         first_rollout: int = 0,
     ) -> Run:
-        """A run from arrays laid out as :data:`VARIABLES` says, and the position unit of each joint by its name.
+        """Make a run from arrays laid out as in :data:`VARIABLES`, and the position unit of each joint by its name.
 
         ``outcome`` is laid out as :data:`OUTCOMES`; a rollout with a time in ``diverged_time`` has diverged, one with
-        a time in ``finish_time`` is finished, and any other is running. ``robot`` and ``task`` are what the run is
-        about, where they are known, and ``model`` the arm that the law computes with, where it is another one. Rollouts
-        are numbered from ``first_rollout``.
+        a time in ``finish_time`` is finished, and any other is running. ``robot`` and ``task`` are those of
+        the run, where they are known, and ``model`` is the arm that the law computes with, where it is another one.
+        Rollouts are numbered from ``first_rollout``.
         """
         rollout = first_rollout + np.arange(len(arrays["q"]))
         samples = Samples(time, joints, arrays, complete_outcome(len(rollout), outcome or {}), rollout)
-        return cls(samples, config, Origin.of(robot, task, first_rollout, model))
+        return cls(samples, config, RunContext.of(robot, task, first_rollout, model))
 
     @property
     def data(self) -> xr.Dataset:
-        """An ``xarray.Dataset`` with the dimensions rollout, time and joint, labelled when it is first asked for.
+        """An ``xarray.Dataset`` with the dimensions rollout, time and joint, labelled at the first request.
 
         Its variables are :data:`VARIABLES`, its coordinates :data:`OUTCOMES`.
         """
@@ -77,7 +77,7 @@ class Run:
         return self._data
 
     def __getitem__(self, name: str) -> xr.DataArray:
-        """One variable by its name.
+        """Return one variable by its name.
 
         Raises:
             UnknownNameError: the run has no such variable.
@@ -94,14 +94,15 @@ class Run:
         return found
 
     def __contains__(self, name: str) -> bool:
-        """Whether the run has a variable or a coordinate of this name."""
+        """Return whether the run has a variable or a coordinate of this name."""
         return name in self.data.variables if self._samples is None else self._samples.plain(name) is not None
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{name}: {size}" for name, size in self.data.sizes.items())
-        return f"Run({table(self.config, 'controller').get('controller', '?')}; {sizes}{self._ended()})"
+        return f"Run({table(self.config, 'controller').get('controller', '?')}; {sizes}{self._describe_ends()})"
 
-    def _ended(self) -> str:
+    def _describe_ends(self) -> str:
+        """Return how many rollouts ended, and how, in words."""
         finished, diverged = self.status == "finished", self.status == "diverged"
         if finished.all():
             return f"; finished after {self.finish_time.max():.4g} s"
@@ -111,10 +112,10 @@ class Run:
 
     @property
     def robot(self) -> RobotModel:
-        """The simulated arm: the one that was given, or the same one rebuilt from the file.
+        """The simulated arm: the given one, or the same one rebuilt from the file.
 
-        Of rollouts with an arm each, the first one; ``run.rollout(i).robot`` is that of rollout i, which a file keeps
-        of rollouts that are saved as runs of their own only.
+        If each rollout has an arm of its own, this is the first one; ``run.rollout(i).robot`` is that of rollout i,
+        which a file keeps only for rollouts that are saved as runs of their own.
 
         Raises:
             InputError: the run does not know its robot.
@@ -136,7 +137,7 @@ class Run:
 
     @property
     def robots(self) -> list[RobotModel]:
-        """The simulated arm of each rollout; of a loaded run, which keeps one arm, that one for all.
+        """The simulated arm of each rollout; in a loaded run, which keeps one arm, the same for all.
 
         Raises:
             InputError: the run does not know its robot.
@@ -148,7 +149,7 @@ class Run:
     def task(self) -> PathTask | None:
         """The path and its velocity profile, or ``None`` where the run does not know them.
 
-        Of several rollouts with a task each, a :class:`TaskBatch`; of one of them, as in ``run.rollout(i)``, its own.
+        It is a :class:`TaskBatch` if each rollout has a task of its own, in ``run.rollout(i)`` the one of rollout i.
 
         Raises:
             InputError: what the file says of them is no path, or not that of the data.
@@ -165,40 +166,43 @@ class Run:
 
     @property
     def joints(self) -> list[str]:
-        """Names of the joints."""
+        """The names of the joints."""
         return [str(name) for name in self.array("joint")]
 
     @property
     def rollouts(self) -> int:
-        """Number of rollouts."""
+        """The number of rollouts."""
         return len(self.array("rollout"))
 
     @property
     def status(self) -> NDArray[np.str_]:
-        """``"finished"``, ``"diverged"``, or ``"running"`` when the time was up, (rollout,)."""
+        """``"finished"``, ``"diverged"``, or ``"running"`` at the end of the run, (rollout,)."""
         return self.array("status")
 
     @property
     def finish_time(self) -> Array:
-        """When each rollout was finished [s], NaN where it was not, (rollout,)."""
+        """The times [s] at which rollouts finished, NaN where they did not, (rollout,)."""
         return self.array("finish_time")
 
     @property
     def diverged_time(self) -> Array:
-        """When each rollout diverged [s], NaN where it did not, (rollout,); from then on it is NaN in all variables."""
-        known = "diverged_time" in self  # not in a file from elsewhere
+        """The times [s] at which rollouts diverged, NaN where they did not, (rollout,).
+
+        All variables are NaN from then on.
+        """
+        known = "diverged_time" in self  # absent in a file from elsewhere
         return self.array("diverged_time") if known else np.full(self.rollouts, np.nan)
 
     @property
     def reason(self) -> NDArray[np.str_]:
-        """Why each rollout diverged and what to try, empty where it did not, (rollout,)."""
+        """The reasons why rollouts diverged and what to try, empty where they did not, (rollout,)."""
         return self.array("reason") if "reason" in self else np.full(self.rollouts, "")
 
     @property
     def laps(self) -> NDArray[np.int64]:
-        """Whole laps of a closed path from the first sample to the last, (rollout,); backwards they are negative.
+        """The whole laps of a closed path from the first sample to the last, (rollout,); backwards they are negative.
 
-        Of a rollout that diverged, to the last sample before.
+        For a rollout that diverged they end at the last sample before.
 
         Raises:
             InputError: the path is not closed.
@@ -208,7 +212,7 @@ class Run:
         return self.array("laps")
 
     def array(self, name: str) -> Array:
-        """One variable as a plain array, (rollout, time, …).
+        """Return one variable as a plain array, (rollout, time, …).
 
         Raises:
             UnknownNameError: the run has no such variable.
@@ -217,7 +221,9 @@ class Run:
         return self[name].to_numpy() if plain is None else plain
 
     def unit(self, name: str) -> str:
-        """The unit of one variable, ``"1"`` where it has none; ``"rad or m"`` of turning and sliding joints together.
+        """Return the unit of a variable, ``"1"`` where it has none.
+
+        It is ``"rad or m"`` for turning and sliding joints together.
 
         Raises:
             UnknownNameError: the run has no such variable.
@@ -227,7 +233,9 @@ class Run:
         return self._samples.unit(name)
 
     def norm(self, name: str) -> Array:
-        """Euclidean norm over the joints, (rollout, time), as ‖e_p‖ of ``run.norm("e_p")``; inf beyond 1e154.
+        """Return the Euclidean norm over the joints, (rollout, time), as ‖e_p‖ for ``run.norm("e_p")``.
+
+        It is inf beyond 1e154.
 
         Raises:
             UnknownNameError: the run has no such variable.
@@ -235,7 +243,7 @@ class Run:
         return norms(self.array(name))
 
     def rollout(self, index: int) -> Run:
-        """One of the rollouts as a run of its own."""
+        """Return one of the rollouts as a run of its own."""
         if not -self.rollouts <= index < self.rollouts:
             raise InputError(f"rollout {index} does not exist: the run has {self.rollouts}, counted from 0")
         if self._samples is not None:
@@ -245,7 +253,7 @@ class Run:
         return Run(part, self.config, self._origin.rollout(int(part["rollout"][0])))
 
     def path(self, index: int) -> Run:
-        """One path of a sequence as a run of its own, that begins at 0 s and where the path before was finished."""
+        """Return one path of a sequence as a run of its own, which begins at 0 s, where the path before finished."""
         if "path_status" not in self:
             raise InputError("the run is no sequence of paths; make one with simulate_sequence")
         status, among, ends = (self.array(f"path_{name}") for name in ("status", "index", "finish_time"))
@@ -277,11 +285,11 @@ class Run:
         return self.with_data(data.assign(flat))
 
     def with_data(self, data: xr.Dataset) -> Run:
-        """Other ``data`` of the same robot, task and configuration, such as a part of the time."""
+        """Return a run with other ``data`` of the same robot, task and configuration, such as a part of the time."""
         return Run(data, self.config, self._origin)
 
     def with_robot(self, robot: RobotModel) -> Run:
-        """The same run with the ``robot`` given, where it does not know its own."""
+        """Return the same run with the given ``robot``, for runs that do not know their own."""
         return Run(self._held, self.config, self._origin.with_robot(robot))
 
     def save(self, path: str | Path) -> Path:
@@ -311,19 +319,20 @@ class Run:
         from pathcontrol.simulation.storage.netcdf import read_run  # loads xarray and HDF5
 
         data, config, stored = read_run(Path(path))
-        return cls(data, config, None if stored is None else Origin.load(stored))
+        return cls(data, config, None if stored is None else RunContext.load(stored))
 
     @property
     def _held(self) -> xr.Dataset | Samples:
-        """What there is: the data, or the samples that nobody has asked the labels of."""
+        """The data, or the samples if nobody has asked for their labels."""
         return self._data if self._samples is None else self._samples
 
-    def _stored(self) -> Stored:
+    def _stored(self) -> StoredContext:
+        """Return robot and task for a file."""
         return self._origin.stored(float(np.fmax.reduce(self.array("s"), axis=None)) if "s" in self else 0.0)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # a task may hold functions that cannot be pickled, what a file holds of it always can
-        return _unpickled, (self.data, self.config, self._stored())
+        # a task may hold functions that cannot be pickled; its recipe for a file always can
+        return _unpickle, (self.data, self.config, self._stored())
 
 
 def norms(vectors: Array) -> Array:
@@ -332,5 +341,6 @@ def norms(vectors: Array) -> Array:
         return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
 
 
-def _unpickled(data: xr.Dataset, config: Mapping[str, Any], stored: Stored) -> Run:
-    return Run(data, config, Origin.load(stored))
+def _unpickle(data: xr.Dataset, config: Mapping[str, Any], stored: StoredContext) -> Run:
+    """Return a run from its pickled parts."""
+    return Run(data, config, RunContext.load(stored))

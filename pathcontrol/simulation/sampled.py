@@ -23,7 +23,7 @@ _UPDATE_EVERY = 64  # ticks between updates of the progress bar
 
 
 class Stepper(Protocol):
-    """The simulated arm, a step at a time."""
+    """The interface of a simulated arm that advances a step at a time."""
 
     step: float
 
@@ -36,7 +36,7 @@ class Actuator:
 
     Attributes:
         limits: torque limits [N m], (1, n) or (N, n), or None.
-        waiting: how many torques are computed but do not act yet.
+        waiting: number of torques that are computed but do not act yet.
     """
 
     def __init__(self, loop: SampledLoop, robot: Arm, shape: tuple[int, int]) -> None:
@@ -44,7 +44,7 @@ class Actuator:
         check_rows(limits, "torque_limits", shape[0])
         self.limits = None if limits is None else np.atleast_2d(limits)
         self._limits = None if self.limits is None else (-self.limits, self.limits)
-        whole, late = _periods_and_rest(loop.delay, loop.period)
+        whole, late = _split_delay(loop.delay, loop.period)
         self.waiting = whole + (late > 0)
         self._queue = deque([np.zeros(shape)] * self.waiting)
         self._parts = [late, loop.period - late] if late else [loop.period]
@@ -54,19 +54,19 @@ class Actuator:
         """The parts of a period [s] during which the torque is constant."""
         return self._parts
 
-    def limited(self, tau: Array) -> Array:
-        """``tau`` within the limits."""
+    def clip(self, tau: Array) -> Array:
+        """Return ``tau`` within the limits."""
         if self._limits is None:
             return tau
         least, most = self._limits
         return np.minimum(np.maximum(tau, least), most)
 
     def torques(self, tau: Array) -> list[Array]:
-        """The torque in each part of a period at whose begin ``tau`` is computed."""
+        """Return the torque in each part of the period that begins with ``tau``."""
         return [*self._queue, tau][: len(self._parts)]
 
     def hold(self, tau: Array) -> None:
-        """The period is over at whose begin ``tau`` was computed."""
+        """End the period that began with ``tau``."""
         self._queue.append(tau)
         self._queue.popleft()
 
@@ -79,8 +79,8 @@ class SampledArm:
         robot: the arm, or one for each rollout.
         q: joint positions it starts at [rad], (N, n).
         qd: joint velocities it starts with [rad/s], (N, n).
-        outside: what disturbs it, and the number of the first rollout, for its noise.
-        plant: what steps the arm, made of the robot and a step [s].
+        outside: its disturbance, and the number of the first rollout, for its noise.
+        plant: makes the stepper of a robot for a step [s].
 
     Attributes:
         divergence: which rollouts have diverged, at the time since the present controller took over.
@@ -100,15 +100,15 @@ class SampledArm:
         check_rows(self._sensors.resolution, "encoders", len(q))
         self._plants = [plant(robot, part / loop.substeps) for part in self._actuator.parts]
         self._noise = None if loop.noise is None else NoiseSource(loop.noise, q.shape, outside.first)
-        self._reading = self._sensors.start(*self._seen())
-        self._reading = self._sensors.read(*self._seen(), self._reading)
+        self._reading = self._sensors.start(*self._add_noise())
+        self._reading = self._sensors.read(*self._add_noise(), self._reading)
         self._disturbance, self._ticks = outside.disturbance, 0
         self.divergence = Divergence(q, qd)
 
     def run(
         self, controller: Controller, duration: float, finish: Finish | None, progress: bool, z: Array | None = None
     ) -> dict[str, Array]:
-        """What was recorded, (rollout, time, …), from here until ``finish`` says so, ``duration`` [s] at most.
+        """Return the record, (rollout, time, …), from here until ``finish`` ends it, ``duration`` [s] at most.
 
         ``z`` is the state that the law starts with, where that is known already.
         """
@@ -120,16 +120,16 @@ class SampledArm:
         with progress_bar("simulating", ticks, progress) as update, np.errstate(over="ignore", invalid="ignore"):
             for tick in range(ticks + 1):
                 t = tick * self._period
-                lost.look_at_state(t, self.q, self.qd)
+                lost.check_state(t, self.q, self.qd)
                 if lost.any:
                     self._hold_lost(lost)
-                    z = lost.replaced(z, first)
+                    z = lost.replace_lost(z, first)
                 reading = self._reading
                 out = controller.law(t, reading.q, reading.qd, z)
-                lost.look_at_torque(t, out.tau)
-                tau = self._actuator.limited(out.tau)
+                lost.check_torque(t, out.tau)
+                tau = self._actuator.clip(out.tau)
                 if lost.any:
-                    tau = lost.replaced(tau, 0.0)
+                    tau = lost.replace_lost(tau, 0.0)
                 torques = self._actuator.torques(tau)
                 recorder.write(self.q, self.qd, reading, out, torques[0])
                 if tick % _UPDATE_EVERY == 0:
@@ -146,12 +146,12 @@ class SampledArm:
         return arrays
 
     def _hold_lost(self, lost: Divergence) -> None:
-        """Lost rollouts where they started, and seen there."""
-        self.q, self.qd = lost.home(self.q, self.qd)
-        self._reading = Reading(*lost.home(*self._reading))
+        """Put lost rollouts, and their readings, back to their initial states."""
+        self.q, self.qd = lost.reset_lost(self.q, self.qd)
+        self._reading = Reading(*lost.reset_lost(*self._reading))
 
     def _advance(self, torques: Sequence[Array]) -> None:
-        """One period on, with the torque of each part of it."""
+        """Advance by one period, with the torque of each part of it."""
         t = self._ticks * self._period
         for plant, acting in zip(self._plants, torques, strict=True):
             for _ in range(self._substeps):
@@ -161,15 +161,15 @@ class SampledArm:
                 self.q, self.qd = plant.advance(self.q, self.qd, pushed)
                 t += plant.step
         self._ticks += 1
-        self._reading = self._sensors.read(*self._seen(), self._reading)
+        self._reading = self._sensors.read(*self._add_noise(), self._reading)
 
-    def _seen(self) -> tuple[Array, Array]:
-        """Positions and velocities (N, n) as they come to the sensors."""
-        return (self.q, self.qd) if self._noise is None else self._noise.disturbed(self.q, self.qd)
+    def _add_noise(self) -> tuple[Array, Array]:
+        """Return positions and velocities (N, n) with noise, as the sensors get them."""
+        return (self.q, self.qd) if self._noise is None else self._noise.add_noise(self.q, self.qd)
 
 
-def _periods_and_rest(delay: float, period: float) -> tuple[int, float]:
-    """``delay`` as whole periods and a rest below one; rounding makes no rest."""
+def _split_delay(delay: float, period: float) -> tuple[int, float]:
+    """Split ``delay`` into whole periods and a rest below one, ignoring rounding."""
     whole = round(delay / period)
     if abs(delay / period - whole) < 1e-9:
         return whole, 0.0

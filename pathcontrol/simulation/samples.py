@@ -1,4 +1,4 @@
-"""What a simulation hands over: arrays and how each rollout went, labelled when somebody asks for the labels."""
+"""The unlabelled result of a simulation: arrays and outcomes, labelled when somebody asks for the labels."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Samples(NamedTuple):
     Attributes:
         time: [s], (time,).
         joints: the unit of each joint's position by its name.
-        arrays: laid out as :data:`VARIABLES` says.
-        outcome: laid out as :data:`OUTCOMES` says, as :func:`complete_outcome` gives it.
+        arrays: the variables, laid out as in :data:`VARIABLES`.
+        outcome: the outcomes, laid out as in :data:`OUTCOMES`, from :func:`complete_outcome`.
         rollout: the numbers of the rollouts, (rollout,).
     """
 
@@ -35,7 +35,7 @@ class Samples(NamedTuple):
     rollout: NDArray[np.intp]
 
     def plain(self, name: str) -> Array | None:
-        """Return one of the arrays by its name, ``None`` for what is none of them."""
+        """Return one of the arrays by its name, or ``None`` if there is none."""
         if name == "joint":
             return np.array(list(self.joints))
         if name in ("time", "rollout"):
@@ -56,7 +56,7 @@ class Samples(NamedTuple):
         return Samples(self.time.copy(), self.joints, arrays, outcome, self.rollout[[row]])
 
     def unit(self, name: str) -> str:
-        """Return the unit of a variable, of an arm with turning and sliding joints all that occur: ``rad or m``."""
+        """Return the unit of a variable; for an arm with turning and sliding joints all that occur: ``rad or m``."""
         if name not in VARIABLES:
             return "s" if name == "time" else OUTCOMES.get(name, ("", "", ""))[1] or "1"
         _, unit, _ = VARIABLES[name]
@@ -65,7 +65,7 @@ class Samples(NamedTuple):
         return " or ".join(dict.fromkeys(units))
 
     def labelled(self) -> tuple[dict[str, Labelled], dict[str, Labelled]]:
-        """Return variables and coordinates by their names, with dimensions and what there is to say of them."""
+        """Return variables and coordinates by their names, with their dimensions and attributes."""
         variables = {}
         for name, array in self.arrays.items():
             dims, _, meaning = VARIABLES[name]
@@ -78,14 +78,14 @@ class Samples(NamedTuple):
         return variables, axes | label_outcome(self.outcome)
 
     def dataset(self) -> xr.Dataset:
-        """Return all of it with names and units, as the ``data`` of a run."""
+        """Return all arrays with names and units, as the ``data`` of a run."""
         import xarray as xr  # it takes a third of a second to load
 
         return xr.Dataset(*self.labelled())
 
 
 class _Cut(Mapping[str, Array]):
-    """Parts of arrays, each copied when it is first asked for: metrics need few of them."""
+    """Parts of arrays, each copied at the first request: metrics need few of them."""
 
     def __init__(self, whole: Mapping[str, Array], rows: slice | NDArray[np.intp], moments: slice) -> None:
         self._whole, self._rows, self._moments = whole, rows, moments
@@ -107,13 +107,13 @@ class _Cut(Mapping[str, Array]):
 
 
 def _as_slice(rows: NDArray[np.intp]) -> slice | NDArray[np.intp]:
-    """``rows`` that follow one another as a slice, which copies nothing."""
+    """Return consecutive ``rows`` as a slice, which copies nothing; others as they are."""
     first, last = int(rows[0]), int(rows[-1])
     return slice(first, last + 1) if last - first + 1 == len(rows) and (np.diff(rows) == 1).all() else rows
 
 
 def complete_outcome(rollouts: int, outcome: Mapping[str, Array]) -> dict[str, Array]:
-    """Return what is said of each rollout with its status: one with a ``diverged_time`` has diverged, and so on."""
+    """Return the outcome of each rollout with its status, which follows from its times."""
     never = np.full(rollouts, np.nan)
     values = {"finish_time": never, "diverged_time": never, "reason": np.full(rollouts, "")} | dict(outcome)
     status = np.where(np.isnan(values["finish_time"]), "running", "finished")
@@ -121,7 +121,7 @@ def complete_outcome(rollouts: int, outcome: Mapping[str, Array]) -> dict[str, A
 
 
 def label_outcome(outcome: Mapping[str, Array]) -> dict[str, Labelled]:
-    """Return coordinates that say how each rollout went."""
+    """Return the outcomes as labelled coordinates."""
     labels = {}
     for name, value in outcome.items():
         dims, unit, meaning = OUTCOMES[name]

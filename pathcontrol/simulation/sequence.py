@@ -1,4 +1,4 @@
-"""Several paths of one arm, one after another, as one :class:`Run`."""
+"""The simulation of several paths of one arm, one after another, as one :class:`Run`."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from pathcontrol.simulation.arguments import (
     check_joints,
     check_law,
     check_length,
-    checked_loop,
+    check_loop,
     initial_state,
-    joints_of,
-    period_of,
-    plant_of,
-    record_of,
+    make_config,
+    make_plant,
+    map_position_units,
+    sample_period,
 )
 from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.divergence import Divergence
 from pathcontrol.simulation.engines import Engine, check_engine
-from pathcontrol.simulation.finish import Finish, finish_of
+from pathcontrol.simulation.finish import Finish, make_finish
 from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.prepare import prepare
 from pathcontrol.simulation.run import Run
@@ -37,8 +37,8 @@ from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.task import PathTask
 
 
-class _Leg(NamedTuple):
-    """What was recorded on one path, when it was finished [s] since its begin, its first s, and by how much s grows."""
+class _PathRecord(NamedTuple):
+    """The record of one path, the time [s] after its begin at which it finished, its first s, and the growth of s."""
 
     arrays: dict[str, Array]
     finish_time: float
@@ -82,9 +82,9 @@ def simulate_sequence(
             law does from any start; without it such paths are refused.
         task: the whole that the controllers' tasks are the paths of, such as a :class:`ToolpathTask`: the run knows it
             then, with all that it says beside the paths; default a :class:`PathSequence` of these tasks.
-        plant: the arm that is really there; default the model of the first controller.
+        plant: the simulated arm; default the model of the first controller.
         loop: how the loop is closed, as for :func:`simulate`.
-        disturbance: what else pushes the arm, such as :class:`Push`, or a sum; its time counts from the start.
+        disturbance: a disturbance of the arm, such as :class:`Push`, or a sum; its time counts from the start.
         engine: as for :func:`simulate`, one for all paths.
         progress: show a bar on standard error when it takes longer than two seconds.
 
@@ -95,15 +95,15 @@ def simulate_sequence(
         SimulationError: the arm diverged; ``run`` of the error holds what happened until then.
     """
     check_engine(engine)
-    laws = _checked_controllers(controllers)
-    robot = plant_of(plant, laws[0])
+    laws = _check_controllers(controllers)
+    robot = make_plant(plant, laws[0])
     if not isinstance(robot, RobotModel):
         raise InputError("plant is one arm for each rollout, expected one: a sequence has a single rollout")
-    durations, loop = _durations(duration, len(laws)), checked_loop(loop)
-    q0, qd0 = _one_state(q, qd, robot.joint_names)
-    period, ends = period_of(loop, durations.min()), [_finish(law, laps) for law in laws]
+    durations, loop = _check_durations(duration, len(laws)), check_loop(loop)
+    q0, qd0 = _check_state(q, qd, robot.joint_names)
+    period, ends = sample_period(loop, durations.min()), [_make_finish(law, laps) for law in laws]
     check_length(float(durations.sum()), loop, 1, robot.n, ends=True)
-    whole = _whole(laws, laps, gaps) if task is None else _checked_whole(task, laws, laps)
+    whole = _make_sequence(laws, laps, gaps) if task is None else _check_sequence(task, laws, laps)
     for law in laws:
         check_joints(law, robot)
         check_law(law, q0, qd0, law.start(q0, qd0))
@@ -111,25 +111,27 @@ def simulate_sequence(
     arm, legs = ready.arm, []
     for law, longest, finish in zip(laws, durations, ends, strict=True):
         arrays = arm.run(law, longest, finish, progress)
-        legs.append(_Leg(arrays, float(finish.time[0]), law.task.s0, _length(law.task, laps)))
+        legs.append(_PathRecord(arrays, float(finish.time[0]), law.task.s0, _length(law.task, laps)))
         if arm.divergence.any or np.isnan(legs[-1].finish_time):
             break
     arm.divergence.explain(ready.advice)
-    arrays, outcome = _joined(legs, len(laws), period, arm.divergence)
+    arrays, outcome = _join(legs, len(laws), period, arm.divergence)
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws))
     paths = f"{len(laws)} path{'s' if len(laws) > 1 else ''}"
     described = {"controller": f"{paths} with {names}", "sequence": [law.describe() for law in laws]}
-    config = record_of(described, robot, loop, disturbance, duration=durations.tolist(), laps=laps, **ready.engine)
+    config = make_config(described, robot, loop, disturbance, duration=durations.tolist(), laps=laps, **ready.engine)
     time = period * np.arange(arrays["s"].shape[1])
-    run = Run.from_arrays(time, joints_of(robot), arrays, config, outcome, robot=robot, task=whole, model=laws[0].robot)
+    run = Run.from_arrays(
+        time, map_position_units(robot), arrays, config, outcome, robot=robot, task=whole, model=laws[0].robot
+    )
     arm.divergence.check(run)
     return run
 
 
-def _joined(
-    legs: Sequence[_Leg], paths: int, period: float, lost: Divergence
+def _join(
+    legs: Sequence[_PathRecord], paths: int, period: float, lost: Divergence
 ) -> tuple[dict[str, Array], dict[str, Array]]:
-    """One series of samples, (1, time, …), and what happened when; the last of a path is the first of the next one."""
+    """Join the paths to one series of samples, (1, time, …), and its outcome."""
     kept = [leg.arrays["s"].shape[1] - 1 for leg in legs]
     kept[-1] += 1
     arrays = {
@@ -155,11 +157,12 @@ def _joined(
 
 
 def _length(task: PathTask, laps: int) -> float:
-    """By how much s grows on a path."""
+    """Return by how much s grows on a path."""
     return task.s_end - task.s0 if task.period is None else laps * task.period
 
 
-def _checked_controllers(controllers: Iterable[Controller]) -> list[Controller]:
+def _check_controllers(controllers: Iterable[Controller]) -> list[Controller]:
+    """Check that there is at least one controller, each with a single task; return them as a list."""
     laws = list(controllers) if isinstance(controllers, Iterable) else []
     if not laws or isinstance(controllers, str | PathTask):
         raise InputError(f"controllers {describe(controllers)}, expected a list with one controller for each path")
@@ -169,12 +172,13 @@ def _checked_controllers(controllers: Iterable[Controller]) -> list[Controller]:
     return laws
 
 
-def _whole(laws: Sequence[Controller], laps: int, gaps: bool) -> PathSequence:
-    """The tasks one after another as the run strings them."""
+def _make_sequence(laws: Sequence[Controller], laps: int, gaps: bool) -> PathSequence:
+    """Return the tasks in a sequence, as the run joins them."""
     return PathSequence([Laps(law.task, laps) if law.task.closed else law.task for law in laws], gaps=gaps)
 
 
-def _checked_whole(task: PathSequence, laws: Sequence[Controller], laps: int) -> PathSequence:
+def _check_sequence(task: PathSequence, laws: Sequence[Controller], laps: int) -> PathSequence:
+    """Check that the paths of the given sequence are the tasks of the laws; return it."""
     if not isinstance(task, PathSequence) or len(task) != len(laws):
         raise InputError(f"task = {task!r}, expected a PathSequence, such as a ToolpathTask, of {len(laws)} paths")
     for i, (path, law) in enumerate(zip(task, laws, strict=True)):
@@ -187,14 +191,16 @@ def _checked_whole(task: PathSequence, laws: Sequence[Controller], laps: int) ->
     return task
 
 
-def _finish(law: Controller, laps: int) -> Finish:
-    finish = finish_of(law.task, laps if law.task.closed else None, "end", 1)
+def _make_finish(law: Controller, laps: int) -> Finish:
+    """Return the rule by which the path of a law finishes."""
+    finish = make_finish(law.task, laps if law.task.closed else None, "end", 1)
     if finish is None:
         raise InputError(f"{law.task!r} neither ends nor repeats, so no path can follow it; give it an s_end")
     return finish
 
 
-def _durations(duration: ArrayLike, paths: int) -> Array:
+def _check_durations(duration: ArrayLike, paths: int) -> Array:
+    """Check the durations; return one for each path, (paths,)."""
     durations = finite("duration", as_array("duration", duration))
     if durations.shape not in ((), (paths,)):
         raise InputError(f"duration has shape {durations.shape}, expected one number or one for each of {paths} paths")
@@ -203,7 +209,8 @@ def _durations(duration: ArrayLike, paths: int) -> Array:
     return np.broadcast_to(durations, (paths,))
 
 
-def _one_state(q: ArrayLike, qd: ArrayLike | None, joints: Sequence[str]) -> tuple[Array, Array]:
+def _check_state(q: ArrayLike, qd: ArrayLike | None, joints: Sequence[str]) -> tuple[Array, Array]:
+    """Check that there is one initial state; return it as (1, n) each."""
     q0, qd0 = initial_state(q, qd, joints)
     if len(q0) != 1:
         raise InputError(

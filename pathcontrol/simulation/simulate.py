@@ -1,4 +1,4 @@
-"""One call from a controller and an initial state to a :class:`Run`."""
+"""The simulation of a control law: one call from a controller and an initial state to a :class:`Run`."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arguments import (
+    broadcast_states,
     check_joints,
     check_length,
-    checked_loop,
-    joints_of,
-    period_of,
-    plant_of,
-    record_of,
-    rollout_number,
-    start_of_each,
-    states_of_each,
+    check_loop,
+    check_rollout_number,
+    make_config,
+    make_plant,
+    map_position_units,
+    sample_period,
+    start_law,
 )
 from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.checks.slips import warn_if_still
 from pathcontrol.simulation.engines import Engine, check_engine
-from pathcontrol.simulation.finish import Until, finish_of, first_and_last, whole_laps
+from pathcontrol.simulation.finish import Until, count_laps, first_and_last, make_finish
 from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.prepare import prepare
 from pathcontrol.simulation.run import Run
@@ -66,11 +66,11 @@ def simulate(
         duration: longest simulated time [s], rounded to whole periods of the loop, one at least.
         laps: how many times a closed path is gone round, counted from where its plan starts.
         until: ``"end"`` as said above, or ``"duration"`` to go on to the end of ``duration`` in any case.
-        plant: the arm that is really there, with its friction; default the controller's own model. Or one for each
+        plant: the simulated arm with its friction; default the controller's own model. Or one for each
             rollout, in the order of ``q``, with the same joints: see :class:`RobotBatch`. An arm whose friction has
             coefficients (N, n) is one for each rollout too.
         loop: how the loop is closed; default ``SampledLoop()``, a 2.5 ms hold and nothing else.
-        disturbance: what else pushes the arm, such as :class:`Push`, or a sum; its time counts from the start.
+        disturbance: a disturbance of the arm, such as :class:`Push`, or a sum; its time counts from the start.
         first_rollout: number of the first rollout, where this is a part of a larger batch: rollouts are numbered from
             it, and their random numbers depend on their numbers.
         engine: ``"pinocchio"`` (NumPy and Pinocchio, the reference), ``"compiled"``, or ``"auto"``: compiled where that
@@ -89,25 +89,25 @@ def simulate(
     expect("controller", controller, Controller)
     check_engine(engine)
     duration = scalar("duration", duration, positive=True)
-    robot, first = plant_of(plant, controller), rollout_number(first_rollout)
+    robot, first = make_plant(plant, controller), check_rollout_number(first_rollout)
     check_joints(controller, robot)
-    loop = checked_loop(loop)
-    q0, qd0, z0 = start_of_each(controller, *states_of_each(q, qd, robot, controller.task), disturbance)
-    period, finish = period_of(loop, duration), finish_of(controller.task, laps, until, len(q0))
+    loop = check_loop(loop)
+    q0, qd0, z0 = start_law(controller, *broadcast_states(q, qd, robot, controller.task), disturbance)
+    period, finish = sample_period(loop, duration), make_finish(controller.task, laps, until, len(q0))
     check_length(duration, loop, len(q0), robot.n, finish is not None and finish.ends_run)
     settings = {"duration": duration, "laps": laps, "until": until, "first_rollout": first}
     ready = prepare([controller], controller.task, robot, loop, q0, qd0, Outside(disturbance, first), duration, engine)
-    config = record_of(controller.describe(), robot, loop, disturbance, **settings, **ready.engine)
+    config = make_config(controller.describe(), robot, loop, disturbance, **settings, **ready.engine)
     arm = ready.arm
     arrays = arm.run(controller, duration, finish, progress, z0)
     arm.divergence.explain(ready.advice)
     outcome = arm.divergence.outcome() | ({} if finish is None else {"finish_time": finish.time})
     if controller.task.closed:
-        outcome["laps"] = whole_laps(controller.task, *first_and_last(arrays["s"]))
+        outcome["laps"] = count_laps(controller.task, *first_and_last(arrays["s"]))
     time = period * np.arange(arrays["s"].shape[1])
     run = Run.from_arrays(
         time,
-        joints_of(robot),
+        map_position_units(robot),
         arrays,
         config,
         outcome,

@@ -1,4 +1,4 @@
-"""What a run records: its variables and its outcomes, with their units."""
+"""The variables and outcomes of a run, with their units."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
 
 
 def bytes_of_sample(joints: int) -> int:
-    """Return how much memory one sample of one rollout of an arm with ``joints`` takes."""
+    """Return the memory of one sample of one rollout of an arm with ``joints``."""
     return sum(8 * (joints if "joint" in dims else 1) for dims, _, _ in VARIABLES.values())
 
 
-#: what a run says about how it went: (dimensions, unit, meaning); coordinates of its data
+#: every outcome of a run: (dimensions, unit, meaning); coordinates of its data
 OUTCOMES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "status": (("rollout",), "", "finished, diverged, or running when the time was up"),
     "finish_time": (("rollout",), "s", "when the rollout was finished, NaN while it is running"),

@@ -1,1 +1,1 @@
-"""The simulated arm: its dynamics with friction, its sensors, and what disturbs it."""
+"""The simulated arm: its dynamics with friction, its sensors and its disturbances."""

@@ -1,4 +1,4 @@
-"""Viscous friction over one step, condensed into an inertia matrix: third order where it is weak, damped where stiff.
+"""Viscous friction over one step, condensed into an inertia matrix: of third order, and damped where it is stiff.
 
 Under a constant r the velocity of M v̇ = r − B(v − v₀), B = diag(b), changes in h by
 
@@ -10,8 +10,8 @@ Padé's (1, 2) of e⁻ˣ: its E is the first of these, and twice the step is the
 
     E(x) ≈ 1 + (x/2)²/(3 + x/2),        E(2x) = E(x) + (x/2)²/E(x).
 
-The effect of B on v, 1 − e⁻ˣ, is met to 0.09 % for all x ≥ 0, and what is stiff is damped: the share R(x) of a velocity
-that is left after a step is between 0 and 1, and tends to 0 as x⁻⁴.
+The effect of B on v, 1 − e⁻ˣ, is reproduced to 0.09 % for all x ≥ 0, and stiff modes are damped: the share R(x) of a
+velocity that is left after a step is between 0 and 1, and tends to 0 as x⁻⁴.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from pathcontrol._arrays import Array
 
 
 class Damping:
-    """The viscous friction of a step.
+    """The viscous friction of one step.
 
     Args:
         viscous: b [N m s/rad], (N, n) or (1, n).
@@ -55,5 +55,5 @@ class Damping:
         E = alone + self._pairs * first
         second = np.linalg.inv(E)
         third = np.linalg.inv(E + self._pairs * second)
-        X = first + second + 4.0 * third  # of h/8, not of 1
+        X = first + second + 4.0 * third  # X of h/8 rather than of 1
         return M + self._half + self._pairs * X, self._travel * X

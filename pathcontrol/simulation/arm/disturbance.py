@@ -1,4 +1,4 @@
-"""What else pushes the arm: torques on its joints, and forces on its frames, over time."""
+"""Disturbances: torques on the joints and forces on the frames of the arm, over time."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ class Disturbance(ABC):
 
     The sampled loop holds a disturbance over each step of the plant, at its value in the middle of the step; so a push
     is as long as the steps whose middle it covers. Torque limits are those of the motors and do not limit it. Before a
-    run it is tried at some times and states, to see whether it fits and how long a step it bears.
+    run it is evaluated at some times and states, to check its shape and the length of the step.
     """
 
     @abstractmethod
     def torque(self, t: float, q: Array, qd: Array) -> Array:
-        """Torques [N m] on the joints at t [s], with the arms at (q, q̇), (N, n) each; broadcasts to (N, n)."""
+        """Return the torques [N m] on the joints at t [s], with the arms at (q, q̇), (N, n); broadcasts to (N, n)."""
 
     @property
     def jumps(self) -> Array:
-        """Times [s] at which it jumps, (k,); continuous time is integrated from one to the next."""
+        """The times [s] at which it jumps, (k,); continuous time is integrated from one to the next."""
         return np.empty(0)
 
     def __add__(self, other: Disturbance) -> Disturbance:
         return _Sum((self, other))
 
     def describe(self) -> dict[str, Any]:
-        """Name and public parameters, for the record of a run."""
+        """Return name and public parameters, for the configuration of a run."""
         return {"disturbance": type(self).__name__} | plain_attributes(self)
 
 
@@ -65,16 +65,16 @@ class _Sum(Disturbance):
 
 
 class _Timed(Disturbance):
-    """What begins and ends: from ``start`` for ``duration`` [s], each a number or one for each rollout, (N,)."""
+    """A disturbance from ``start`` for ``duration`` [s], each a number or one for each rollout, (N,)."""
 
     def __init__(self, start: ArrayLike, duration: ArrayLike) -> None:
-        self.start, length = _each("start", start), as_array("duration", duration)
+        self.start, length = _check_each("start", start), as_array("duration", duration)
         if length.ndim > 1 or not (length > 0).all():
             raise InputError(f"duration = {length.tolist()}, expected times greater than 0 [s], one or (N,)")
         self.duration = readonly(length)
 
     def share(self, t: float) -> Array:
-        """1 while it acts and 0 else, (), or (N, 1)."""
+        """Return 1 while it acts and 0 else, (), or (N, 1)."""
         since = t - self.start
         acting = ((since >= 0) & (since < self.duration)).astype(np.float64)
         return acting[..., None] if acting.ndim else acting
@@ -113,7 +113,7 @@ class Harmonic(Disturbance):
 
     def __init__(self, amplitude: Torques, frequency: Frequency, phase: Phase = 0.0) -> None:
         self.amplitude = readonly(finite("amplitude", as_array("amplitude", amplitude)))
-        self.frequency, self.phase = _each("frequency", frequency), _each("phase", phase)
+        self.frequency, self.phase = _check_each("frequency", frequency), _check_each("phase", phase)
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
         wave = np.sin(2 * np.pi * self.frequency * t + self.phase)
@@ -143,7 +143,7 @@ class FrameForce(_Timed):
     ) -> None:
         super().__init__(start, duration)
         expect("robot", robot, RobotModel)
-        robot.frame_pose(np.zeros(robot.n), frame)  # there is such a frame
+        robot.frame_pose(np.zeros(robot.n), frame)  # raises where there is no such frame
         self._robot, self.frame = robot, frame
         self.force = readonly(finite("force", as_array("force", force)))
         if self.force.shape[-1:] != (3,):
@@ -162,16 +162,16 @@ class FrameForce(_Timed):
         return (jacobian * (share * self.force)[..., None]).sum(-2)
 
     def describe(self) -> dict[str, Any]:
-        """Name and public parameters, and the name of the arm."""
+        """Return name and public parameters, and the name of the arm."""
         return super().describe() | {"robot": self._robot.name}
 
 
-def terms_of(disturbance: Disturbance | None) -> tuple[Disturbance, ...]:
-    """Return the disturbances that a sum is made of, or the one there is."""
+def list_terms(disturbance: Disturbance | None) -> tuple[Disturbance, ...]:
+    """Return the terms of a sum of disturbances, or the single one."""
     if disturbance is None:
         return ()
     if isinstance(disturbance, _Sum):
-        return tuple(part for term in disturbance.terms for part in terms_of(term))
+        return tuple(part for term in disturbance.terms for part in list_terms(term))
     return (disturbance,)
 
 
@@ -196,7 +196,8 @@ def check_disturbance(disturbance: Any, q: Array, qd: Array) -> None:
         raise InputError(f"{name}.torque has shape {torque.shape}, expected {q.shape}: rollouts and joints")
 
 
-def _each(name: str, value: ArrayLike) -> Array:
+def _check_each(name: str, value: ArrayLike) -> Array:
+    """Check a number, or one for each rollout, (N,); return it read-only."""
     array = readonly(finite(name, as_array(name, value)))
     if array.ndim > 1:
         raise InputError(f"{name} has shape {array.shape}, expected a number, or one for each rollout, (N,)")

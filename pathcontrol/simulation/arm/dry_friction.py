@@ -52,22 +52,22 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array, guess: Array | None 
     v, rows = np.empty_like(p), np.arange(len(p))
     for _ in range(_MAX_EXCHANGES):
         if not len(rows):
-            return v + 0.0  # which makes 0 of −0
-        some = problem.some(rows)
+            return v + 0.0  # turns −0 into 0
+        some = problem.select(rows)
         v[rows] = some.velocities(states[rows])
-        wanted = some.wanted(v[rows], states[rows])
+        wanted = some.required_states(v[rows], states[rows])
         wrong = wanted != states[rows]
         count = wrong.sum(-1)
         patience[rows] = np.where(count < fewest[rows], _PATIENCE, patience[rows] - 1)
         fewest[rows] = np.minimum(fewest[rows], count)
-        changed = np.where(patience[rows, None] < 0, _last_only(wrong), wrong)
+        changed = np.where(patience[rows, None] < 0, _keep_last(wrong), wrong)
         states[rows] = np.where(changed, wanted, states[rows])
         rows = rows[count > 0]
     raise SimulationError("the friction of some rollouts did not settle; is the mass matrix positive definite?")
 
 
 class _Problem(NamedTuple):
-    """The M (N, n, n), and p, low and high (N, n), of some mechanisms."""
+    """The problems M (N, n, n), p, low and high (N, n) of some mechanisms."""
 
     M: Array
     p: Array
@@ -76,11 +76,11 @@ class _Problem(NamedTuple):
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Which joints have no dry friction, and so never stick, (N, n)."""
+        """True for joints without dry friction, which never stick, (N, n)."""
         return (self.low == 0) & (self.high == 0)
 
-    def some(self, rows: NDArray[np.intp]) -> _Problem:
-        """The problems of some ``rows`` only."""
+    def select(self, rows: NDArray[np.intp]) -> _Problem:
+        """Return the problems of some ``rows`` only."""
         return _Problem(*(values[rows] for values in self))
 
     def velocities(self, states: _States) -> Array:
@@ -92,23 +92,23 @@ class _Problem(NamedTuple):
         momentum = np.where(slips, self.p - np.where(states > 0, self.high, self.low), 0.0)
         return np.where(slips, np.linalg.solve(M, momentum[..., None])[..., 0], 0.0)
 
-    def wanted(self, v: Array, states: _States) -> _States:
-        """The states that the velocities, and the impulses where joints stick, call for, (N, n)."""
+    def required_states(self, v: Array, states: _States) -> _States:
+        """Return the states that the velocities, and the impulses where joints stick, require, (N, n)."""
         # p − Mv may be a small difference of large terms: allow for their rounding, and not for more
-        terms = _times(np.abs(self.M), np.abs(v)).max(-1)
+        terms = _multiply(np.abs(self.M), np.abs(v)).max(-1)
         margin = (_ROUNDING * np.abs(self.p).max(-1) + 8 * v.shape[-1] * _EPSILON * terms)[:, None]
-        needed = self.p - _times(self.M, v)
+        needed = self.p - _multiply(self.M, v)
         released = np.where(needed > self.high + margin, 1, np.where(needed < self.low - margin, -1, 0))
         wanted = np.where(states == 0, released, np.where(v * states < 0, 0, states))
         return np.where(self.free, states, wanted)
 
 
-def _last_only(wrong: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _keep_last(wrong: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Mark in each row only the last of the joints that are ``wrong``, (N, n)."""
     later = np.cumsum(wrong[:, ::-1], axis=-1)[:, ::-1]
     return wrong & (later == 1)
 
 
-def _times(M: Array, x: Array) -> Array:
-    """M x for each of N rows, (N, n)."""
+def _multiply(M: Array, x: Array) -> Array:
+    """Return M x for each of N rows, (N, n)."""
     return np.einsum("kij,kj->ki", M, x)

@@ -1,4 +1,4 @@
-"""Noise of the sensors, from generators that are told where to begin."""
+"""Sensor noise from seeded random generators."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from pathcontrol._arrays import Array, finite
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError
 
-_DRAWN = 1 << 20  # numbers drawn in advance, of all rollouts together
-_LONGEST = 256  # samples drawn in advance
+_DRAWN = 1 << 20  # count of numbers drawn in advance, for all rollouts together
+_LONGEST = 256  # limit of samples drawn in advance
 
 
 @dataclass(frozen=True, eq=False)
 class SensorNoise:
-    """White Gaussian noise on what is measured, independent from joint to joint and from sample to sample.
+    """White Gaussian noise on the measurements, independent from joint to joint and from sample to sample.
 
     On the position it is added before the encoder rounds, and so comes through a difference of positions; on the
     velocity before the filter. The numbers of a rollout depend on ``seed`` and on its own number only, and so not on
@@ -28,7 +28,7 @@ class SensorNoise:
     Attributes:
         position: standard deviation [rad], a number, (n,), or for each rollout, (N, n) or (N, 1).
         velocity: standard deviation of a velocity that is measured [rad/s], likewise.
-        seed: where the generators begin, a whole number from 0.
+        seed: seed of the generators, a whole number from 0.
     """
 
     position: Annotated[ArrayLike, Form.DEVIATIONS, Unit("rad")] = 0.0
@@ -45,11 +45,11 @@ class SensorNoise:
 
     @property
     def on_velocity(self) -> bool:
-        """Whether there is any on the velocity."""
+        """True if there is noise on the velocity."""
         return bool(np.any(np.asarray(self.velocity) > 0))
 
     def describe(self) -> dict[str, Any]:
-        """All settings, for the record of a run."""
+        """Return all settings, for the configuration of a run."""
         return {name: np.asarray(value).tolist() for name, value in asdict(self).items()}
 
 
@@ -57,21 +57,21 @@ class NoiseSource:
     """The noise of N rollouts, sample by sample.
 
     Args:
-        noise: how much.
+        noise: the standard deviations and the seed.
         shape: (N, n).
         first: number of the first rollout.
     """
 
     def __init__(self, noise: SensorNoise, shape: tuple[int, int], first: int) -> None:
-        self._deviation = np.stack([_for_each(name, getattr(noise, name), shape) for name in ("position", "velocity")])
+        self._deviation = np.stack([_broadcast(name, getattr(noise, name), shape) for name in ("position", "velocity")])
         self._generators = [
             default_rng(SeedSequence(int(noise.seed), spawn_key=(i,))) for i in range(first, first + shape[0])
         ]
         self._ahead = np.empty((max(1, min(_LONGEST, _DRAWN // (2 * shape[0] * shape[1]))), 2, *shape))
         self._left = 0
 
-    def disturbed(self, q: Array, qd: Array) -> tuple[Array, Array]:
-        """Positions and velocities (N, n) with the next sample of noise."""
+    def add_noise(self, q: Array, qd: Array) -> tuple[Array, Array]:
+        """Return positions and velocities (N, n) with the next sample of noise added."""
         sample = self.sample()
         return q + sample[0], qd + sample[1]
 
@@ -83,14 +83,14 @@ class NoiseSource:
         return ahead
 
     def sample(self) -> Array:
-        """Return the next sample of the noise of positions and velocities, (2, N, n), until it is asked again."""
+        """Return the next sample of the noise of positions and velocities, (2, N, n), valid until the next call."""
         if self._left == 0:
             self._draw()
         self._left -= 1
         return self._ahead[len(self._ahead) - self._left - 1]
 
     def _draw(self) -> None:
-        """More samples; a generator gives the same ones one by one or many at once."""
+        """Draw more samples; a generator gives the same ones singly or many at once."""
         samples, kinds, _, joints = self._ahead.shape
         for i, generator in enumerate(self._generators):
             self._ahead[:, :, i] = generator.standard_normal((samples, kinds, joints))
@@ -98,7 +98,8 @@ class NoiseSource:
         self._left = samples
 
 
-def _for_each(name: str, deviation: ArrayLike, shape: tuple[int, int]) -> Array:
+def _broadcast(name: str, deviation: ArrayLike, shape: tuple[int, int]) -> Array:
+    """Broadcast a standard deviation to ``shape``, rollouts and joints."""
     array = np.asarray(deviation, dtype=np.float64)
     try:
         return np.broadcast_to(array, shape)

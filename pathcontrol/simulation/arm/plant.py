@@ -1,4 +1,4 @@
-"""The simulated arm: rigid-body dynamics with friction that really sticks, at a fixed step."""
+"""The simulated arm: rigid-body dynamics with exact stiction, at a fixed step."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathcontrol.simulation.arm.damping import Damping
 from pathcontrol.simulation.arm.dry_friction import stick_slip
 from pathcontrol.simulation.checks.mobility import mobility
 
-#: rate of viscous friction [1/s] up to which the trapezoidal rule does: that is off by (h × rate)²/12, 1e-5 in 2.5 ms
+#: rate of viscous friction [1/s] up to which the trapezoidal rule suffices: its error is (h × rate)²/12, 1e-5 in 2.5 ms
 _WEAK = 4.0
 
 _Rows = NDArray[np.intp]
@@ -21,7 +21,7 @@ _Dry = tuple[Array, Array, Array]  # friction of forward and of backward motion,
 
 
 class Plant:
-    """M(q)q̈ + C(q,q̇)q̇ + g(q) + b q̇ + F(q̇) ∋ τ over steps of ``step`` seconds, F the set-valued dry friction.
+    """The arm M(q)q̈ + C(q,q̇)q̇ + g(q) + b q̇ + F(q̇) ∋ τ, in steps of ``step`` [s], F the set-valued dry friction.
 
     With B = diag(b), let P(v; h, M̃, q, u) be the only velocity v⁺ with
 
@@ -32,8 +32,8 @@ class Plant:
         v_m = P(v; h/2, M(q) + h/2 B, q, v),   q_m = q + h/4 (v + v_m),
         v⁺ = P(v; h, M̃(q_m), q_m, v_m),        q⁺ = q + h/2 (v + v⁺) + XB(v⁺ − v),
 
-    where M̃ = M + h/2 B + BXB condenses what viscous friction does in h while all else is constant, as
-    :class:`Damping` says: under a constant torque a joint alone gets to v⁺ = v∞ + R(x)(v − v∞) with x = h b/M and
+    where M̃ = M + h/2 B + BXB condenses the effect of viscous friction in h while all else is constant, see
+    :class:`Damping`: under a constant torque a joint alone gets to v⁺ = v∞ + R(x)(v − v∞) with x = h b/M and
     |R(x) − e⁻ˣ| < 0.0009. So nothing rings, for any b: 0 ≤ R < 1, and R → 0 for b → ∞. The step is of second order
     where no joint changes between sticking and slipping, and a joint that sticks does not creep at all.
 
@@ -53,49 +53,52 @@ class Plant:
         self._damps = bool(self._strong.any())
 
     def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
-        """(q, q̇) one step later under the constant torque ``tau``; all (N, n)."""
-        h, drive, dry = self.step, tau - self._viscous * qd, self._dry(qd)
-        middle_qd = self._free(q, qd, qd, drive, dry, 0.5 * h)
-        self._hinder(middle_qd, q, qd, dry, 0.5 * h)
-        dry = self._dry(middle_qd)
+        """Return (q, q̇) one step later under the constant torque ``tau``; all (N, n)."""
+        h, drive, dry = self.step, tau - self._viscous * qd, self._dry_friction(qd)
+        middle_qd = self._advance_freely(q, qd, qd, drive, dry, 0.5 * h)
+        self._apply_stiction(middle_qd, q, qd, dry, 0.5 * h)
+        dry = self._dry_friction(middle_qd)
         middle_q = q + 0.25 * h * (qd + middle_qd)
-        next_qd = self._free(middle_q, middle_qd, qd, drive, dry, h)
+        next_qd = self._advance_freely(middle_q, middle_qd, qd, drive, dry, h)
         if not self._damps:
-            self._hinder(next_qd, middle_q, middle_qd, dry, h)
+            self._apply_stiction(next_qd, middle_q, middle_qd, dry, h)
             return q + 0.5 * h * (qd + next_qd), next_qd
         damped = np.flatnonzero(np.broadcast_to(self._strong, len(q)))
         inertia, travel = self._condense(damped, middle_q, qd, next_qd, dry, middle_qd)
-        self._hinder(next_qd, middle_q, middle_qd, dry, h, (damped, inertia))
+        self._apply_stiction(next_qd, middle_q, middle_qd, dry, h, (damped, inertia))
         next_q = q + 0.5 * h * (qd + next_qd)
-        next_q[damped] += h * _times(travel, (next_qd - qd)[damped])
+        next_q[damped] += h * _multiply(travel, (next_qd - qd)[damped])
         return next_q, next_qd
 
-    def _dry(self, qd: Array) -> _Dry:
-        """Dry friction of forward and of backward motion, and in the direction of q̇, or any where that is 0.
+    def _dry_friction(self, qd: Array) -> _Dry:
+        """Return the dry friction of forward and of backward motion, and that in the direction of q̇, (N, n).
 
-        The first two broadcast against q̇ (N, n).
+        The first two broadcast against q̇ (N, n); where q̇ is 0 the third is either of them.
         """
         forward, minus = self.robot.friction.levels(qd)
         backward = np.subtract(0.0, minus)
         return forward, backward, np.where(qd > 0, forward, backward)
 
-    def _free(self, q: Array, u: Array, start: Array, drive: Array, dry: _Dry, duration: float) -> Array:
-        """The velocity a ``duration`` after ``start`` if no joint turns or stops, by the trapezoidal rule, (N, n)."""
+    def _advance_freely(self, q: Array, u: Array, start: Array, drive: Array, dry: _Dry, duration: float) -> Array:
+        """Return the velocity a ``duration`` after ``start`` if no joint turns or stops, (N, n).
+
+        It takes the trapezoidal rule.
+        """
         return start + duration * self._inertia.forward_dynamics(q, u, drive - dry[2])
 
     def _condense(self, rows: _Rows, q: Array, qd: Array, v: Array, dry: _Dry, middle_qd: Array) -> tuple[Array, Array]:
-        """M̃(q) and XB/h, (k, n, n), of ``rows`` (k,) of strong friction, whose ``v`` becomes what it ought to be."""
+        """Return M̃(q) and XB/h, (k, n, n), of ``rows`` (k,) with strong friction; correct their ``v`` in place."""
         viscous = np.broadcast_to(self._viscous, q.shape)[rows]
         M = _mass_matrix(self.robot, q[rows], rows)
         inertia, travel = Damping(viscous, self.step).condense(
             M, ((qd != 0) | (middle_qd != 0) | (dry[0] <= dry[1]))[rows]
         )
         change = (v - qd)[rows]
-        momentum = _times(M, change) + 0.5 * self.step * viscous * change
+        momentum = _multiply(M, change) + 0.5 * self.step * viscous * change
         v[rows] = qd[rows] + np.linalg.solve(inertia, momentum[..., None])[..., 0]
         return inertia, travel
 
-    def _hinder(
+    def _apply_stiction(
         self, v: Array, q: Array, u: Array, dry: _Dry, duration: float, damped: tuple[_Rows, Array] | None = None
     ) -> None:
         """Stop joints of ``v`` that dry friction does not let turn since ``u``.
@@ -103,10 +106,10 @@ class Plant:
         The inertia is M + h/2 B, and M̃ (k, n, n) for the rows (k,) that are ``damped``.
         """
         turned = v * u <= 0
-        if not turned.any():  # as nearly always
+        if not turned.any():  # the common case
             return
         forward, backward, friction = np.broadcast_arrays(*dry)
-        # a diverged arm must not be taken for one that sticks
+        # a diverged arm must not count as one that sticks
         turned &= np.isfinite(v) & (forward > backward)
         rows = np.flatnonzero(turned.any(-1))
         if not len(rows):
@@ -115,14 +118,14 @@ class Plant:
         if damped is not None:
             _, here, there = np.intersect1d(rows, damped[0], assume_unique=True, return_indices=True)
             M[here] = damped[1][there]
-        # whatever friction a joint at rest got, it is taken back here
-        momentum = _times(M, v[rows]) + duration * friction[rows]
+        # undo the friction that a joint at rest was given
+        momentum = _multiply(M, v[rows]) + duration * friction[rows]
         low, high = duration * backward[rows], duration * forward[rows]
         v[rows] = stick_slip(M, momentum, low, high, guess=np.where(turned[rows], 0.0, u[rows]))
 
 
 def has_strong_friction(robot: RobotModel | RobotBatch) -> NDArray[np.bool_]:
-    """Return for which arms the trapezoidal rule of viscous friction does not do, (N,), or (1,) for the arm of all."""
+    """Return for which arms the trapezoidal rule of viscous friction does not suffice, (N,), or (1,) for one arm."""
     viscous = np.atleast_2d(robot.friction.viscous)
     if not viscous.any():
         return np.zeros(1, dtype=bool)
@@ -130,10 +133,10 @@ def has_strong_friction(robot: RobotModel | RobotBatch) -> NDArray[np.bool_]:
 
 
 def _mass_matrix(robot: RobotModel | RobotBatch, q: Array, rows: NDArray[np.intp]) -> Array:
-    """M of the arms of some ``rows`` (k,), at q (k, n)."""
+    """Return M of the arms of some ``rows`` (k,), at q (k, n)."""
     return robot.mass_matrix(q, rows) if isinstance(robot, RobotBatch) else robot.mass_matrix(q)
 
 
-def _times(M: Array, x: Array) -> Array:
-    """M x for each of k rows, (k, n)."""
+def _multiply(M: Array, x: Array) -> Array:
+    """Return M x for each of k rows, (k, n)."""
     return np.einsum("kij,kj->ki", M, x)

@@ -1,4 +1,4 @@
-"""How the loop sees the arm: encoders of finite resolution, velocity by differentiation."""
+"""The sensors of the arm: encoders of finite resolution, velocity by differentiation."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class Sensors(NamedTuple):
     cutoff: float | None
 
     def start(self, q: Array, qd: Array) -> Reading:
-        """What was read one period before the run, had the arm moved steadily at q̇."""
+        """Return the reading one period before the run, had the arm moved steadily at q̇."""
         return Reading(self._position(q - self.period * qd), qd)
 
     def read(self, q: Array, qd: Array, last: Reading) -> Reading:
-        """The next reading of an arm at (q, q̇), after ``last``."""
+        """Return the next reading of an arm at (q, q̇), after ``last``."""
         position = self._position(q)
         velocity = (position - last.q) / self.period if self.differentiate else qd
         if self.cutoff is not None:
@@ -46,4 +46,5 @@ class Sensors(NamedTuple):
         return Reading(position, velocity)
 
     def _position(self, q: Array) -> Array:
+        """Return positions rounded to encoder counts."""
         return q if self.resolution is None else np.rint(q / self.resolution) * self.resolution

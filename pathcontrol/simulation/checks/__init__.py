@@ -1,1 +1,1 @@
-"""What is told before a simulation begins: likely slips, periods and steps that are too long."""
+"""Warnings before a simulation begins: likely slips, periods and steps that are too long."""

@@ -1,4 +1,4 @@
-"""Of a batch with an arm for each rollout those that feel a step of the plant most."""
+"""The arms of a batch that are most sensitive to the length of a step of the plant."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ def arm_of(robot: Arm, rollout: int) -> RobotModel:
     return robot.robots[rollout].with_friction(of_rollout(robot.friction, rollout))
 
 
-def most_mobile(robot: Arm, q: Array) -> list[int]:
-    """Return the rollouts whose arms have a joint that moves most easily at q (1, n), or is damped least or most.
+def find_extreme_arms(robot: Arm, q: Array) -> list[int]:
+    """Return the rollouts whose arms have the extreme mobility or damping of a joint at q (1, n).
 
-    Also those in which dry friction that falls with speed accelerates a joint most; of one arm for all rollout 0.
+    The mobility is the acceleration for a unit torque. Also those in which dry friction that falls with speed
+    accelerates a joint most; rollout 0 if all have one arm.
     """
     if not isinstance(robot, RobotBatch):
         return [0]
@@ -35,7 +36,7 @@ def most_mobile(robot: Arm, q: Array) -> list[int]:
 
 
 def _mobility(robot: RobotBatch, q: Array) -> Array:
-    """The diagonals of M⁻¹ of all arms at q, (N, n)."""
+    """Return the diagonals of M⁻¹ of all arms at q, (N, n)."""
     of_body: dict[int, Array] = {}
     rows = []
     for arm in robot.robots:

@@ -1,4 +1,4 @@
-"""What is fast in the arm and in its disturbance, and is not resolved by the explicit part of a step of the plant.
+"""The fastest modes of the arm and of its disturbance that the explicit part of a step of the plant must resolve.
 
 Viscous friction is exact in a step of any length (:class:`Damping`). Gravity, Coriolis forces and the slope of dry
 friction are taken by the midpoint rule, and a disturbance is held over a step.
@@ -15,14 +15,14 @@ from pathcontrol.robot.friction import FrictionLaw, levels_vary
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
 
-_NUDGE = 1e-5  # rad and rad/s
-_TRIED_SPEED, _TRIED_ANGLE = 0.1, 1e-3  # rad/s and rad, by which a disturbance is tried
+_NUDGE = 1e-5  # rad and rad/s, the step of finite differences
+_TRIED_SPEED, _TRIED_ANGLE = 0.1, 1e-3  # rad/s and rad, the differences at which a disturbance is evaluated
 _TIMES = 65
-_SPEEDS = np.geomspace(1e-4, 10.0, 41)  # rad/s, at which the slope of friction is looked for
+_SPEEDS = np.geomspace(1e-4, 10.0, 41)  # rad/s, between which the slope of friction is taken
 
 
-def with_damping(robot: RobotModel, step: float) -> RobotModel:
-    """Return the arm with M̂ = M + hB/2, the inertia that a ``step`` of h [s] feels at least."""
+def add_damping(robot: RobotModel, step: float) -> RobotModel:
+    """Return the arm with M̂ = M + hB/2, a lower bound of the inertia in a ``step`` of h [s]."""
     return robot.with_armature(0.5 * step * np.atleast_2d(robot.friction.viscous)[0])
 
 
@@ -42,7 +42,7 @@ def rate_of_arm(arm: RobotModel, q: Array, qd: Array) -> float:
 
 
 def rate_of_friction(robot: RobotModel, q: Array) -> tuple[float, int]:
-    """Return how fast [1/s] falling dry friction (Stribeck) accelerates a joint at most, −F'(q̇)/M̂, and which joint."""
+    """Return the fastest acceleration −F'(q̇)/M̂ [1/s] of a joint by falling dry friction (Stribeck), and the joint."""
     if not levels_vary(robot.friction):
         return 0.0, 0
     mobility = np.diagonal(np.linalg.inv(robot.mass_matrix(q)), axis1=-2, axis2=-1).max(0)
@@ -52,7 +52,7 @@ def rate_of_friction(robot: RobotModel, q: Array) -> tuple[float, int]:
 
 
 def steepest_fall(friction: FrictionLaw) -> Array:
-    """Return −F'(q̇) [N m s/rad] where dry friction falls fastest with speed, (n,), or (N, n) of a law of N rollouts."""
+    """Return −F'(q̇) [N m s/rad] at the steepest fall of dry friction with speed, (n,), or (N, n) for N rollouts."""
     falls = []
     for side, sign in enumerate((1.0, -1.0)):
         level = np.array([friction.levels(np.full((1, friction.n), sign * v))[side] for v in _SPEEDS])
@@ -67,23 +67,23 @@ def rates_of_disturbance(
 ) -> tuple[float, float]:
     """Return the fastest damping and the fastest oscillation [1/s] that a disturbance gives the arm.
 
-    They are the largest |λ| of M̂⁻¹ ∂d/∂q̇, and the root of that of M̂⁻¹ ∂d/∂q. The torques d are tried at some times,
-    at velocities and positions beside those of the start, (N, n).
+    They are the largest |λ| of M̂⁻¹ ∂d/∂q̇, and the square root of that of M̂⁻¹ ∂d/∂q. The torques d are evaluated at
+    some times, at velocities and positions beside those of the start, (N, n).
     """
     inverse = np.linalg.inv(robot.mass_matrix(q))
     damping = stiffness = 0.0
-    for t in _times(disturbance, duration):
+    for t in _sample_times(disturbance, duration):
         slopes = _slopes(disturbance, t, q, qd)
         if slopes is None:
             continue
         by_speed, by_angle = slopes
-        damping = max(damping, _largest(inverse @ by_speed))
-        stiffness = max(stiffness, _largest(inverse @ by_angle))
+        damping = max(damping, _spectral_radius(inverse @ by_speed))
+        stiffness = max(stiffness, _spectral_radius(inverse @ by_angle))
     return damping, float(np.sqrt(stiffness))
 
 
-def _times(disturbance: Disturbance, duration: float) -> Iterator[float]:
-    """Times [s] at which a disturbance is looked at: evenly spread, and between its jumps."""
+def _sample_times(disturbance: Disturbance, duration: float) -> Iterator[float]:
+    """Yield times [s] at which a disturbance is evaluated: evenly spread, and between its jumps."""
     jumps = disturbance.jumps
     ends = np.concatenate([[0.0], jumps[(jumps > 0) & (jumps < duration)], [duration]])
     between = 0.5 * (ends[1:] + ends[:-1])
@@ -91,7 +91,7 @@ def _times(disturbance: Disturbance, duration: float) -> Iterator[float]:
 
 
 def _slopes(disturbance: Disturbance, t: float, q: Array, qd: Array) -> tuple[Array, Array] | None:
-    """∂d/∂q̇ and ∂d/∂q at t [s], (N, n, n) each; ``None`` where there is none, or it cannot be told, as of noise."""
+    """Return ∂d/∂q̇ and ∂d/∂q at t [s], (N, n, n); ``None`` where they vanish or cannot be measured, as for noise."""
 
     def torque(q: Array, qd: Array) -> Array:
         return np.broadcast_to(np.asarray(disturbance.torque(t, q, qd), dtype=np.float64), q.shape)
@@ -108,6 +108,7 @@ def _slopes(disturbance: Disturbance, t: float, q: Array, qd: Array) -> tuple[Ar
     return by_speed, by_angle
 
 
-def _largest(matrices: Array) -> float:
+def _spectral_radius(matrices: Array) -> float:
+    """Return the largest |λ| of finite matrices (…, n, n)."""
     finite = matrices[np.isfinite(matrices).all((-2, -1))]
     return float(np.abs(np.linalg.eigvals(finite)).max(initial=0.0)) if finite.any() else 0.0

@@ -1,4 +1,4 @@
-"""The gains of a law whose torque is held over a period: how long the period may be."""
+"""The longest period for the gains of a law whose torque is held over a period."""
 
 from __future__ import annotations
 
@@ -18,40 +18,41 @@ from pathcontrol.simulation.arm.damping import Damping
 from pathcontrol.tasks.task import PathTask
 
 _HALVINGS = 30
-_SHORTEST = 1e-6  # of the period that is tried
+_SHORTEST = 1e-6  # share of the period at which the search ends
 
 
 class Feedback(NamedTuple):
-    """A law near its path in a rollout, at k postures: τ = G_p e_p + G_v e_v, (k, n, n) [N m/rad, N m s/rad] each."""
+    """A linearised law near its path in a rollout, at k postures: τ = G_p e_p + G_v e_v, (k, n, n) each."""
 
     G_p: Array
     G_v: Array
     rollout: int
 
 
-def feedbacks(controller: Controller, q: Array, rollouts: Sequence[int] = ()) -> list[Feedback]:
-    """Return the feedback of a law of the library at q (k, n): of one gain, or of those gains of a batch that matter.
+def linearize_law(controller: Controller, q: Array, rollouts: Sequence[int] = ()) -> list[Feedback]:
+    """Return the feedback of a law of the library at q (k, n), for the extreme gains of a batch and some ``rollouts``.
 
-    Those are the extreme ones, and those of some ``rollouts``.
-
-    Of a law of one's own nothing is known, and none is returned.
+    For a law of the user's own none is returned.
     """
     M = controller.robot.mass_matrix(q)
     if isinstance(controller, SlotineLi):
-        pairs = _extremes(controller.Lambda, controller.K_d, controller.robot.n, rollouts)
-        return [Feedback(_on(K_d * Lambda, M), _on(K_d, M) + M * Lambda, row) for Lambda, K_d, row in pairs]
+        pairs = _select_extremes(controller.Lambda, controller.K_d, controller.robot.n, rollouts)
+        return [
+            Feedback(_repeat_diagonal(K_d * Lambda, M), _repeat_diagonal(K_d, M) + M * Lambda, row)
+            for Lambda, K_d, row in pairs
+        ]
     if isinstance(controller, PDPlus):
-        pairs = _extremes(controller.K_p, controller.K_v, controller.robot.n, rollouts)
-        return [Feedback(_on(K_p, M), _on(K_v, M), row) for K_p, K_v, row in pairs]
+        pairs = _select_extremes(controller.K_p, controller.K_v, controller.robot.n, rollouts)
+        return [Feedback(_repeat_diagonal(K_p, M), _repeat_diagonal(K_v, M), row) for K_p, K_v, row in pairs]
     if isinstance(controller, ComputedTorque | ExtendedMotionPlan | Projection):
         position = controller.k_p if isinstance(controller, Projection) else controller.K_p
-        pairs = _extremes(position, controller.K_v, controller.robot.n, rollouts)
+        pairs = _select_extremes(position, controller.K_v, controller.robot.n, rollouts)
         return [Feedback(M * K_p, M * K_v, row) for K_p, K_v, row in pairs]
     return []
 
 
 def longest_period(feedback: Feedback, robot: RobotModel, uncompensated: Array, q: Array, period: float) -> float:
-    """Return how long a period [s] may be at most for a stable loop, or infinity if ``period`` is short enough.
+    """Return the longest period [s] for a stable loop, or infinity if ``period`` is short enough.
 
     With M̃ and X of :class:`Damping` for a step of h, an arm near its path obeys
 
@@ -62,14 +63,14 @@ def longest_period(feedback: Feedback, robot: RobotModel, uncompensated: Array, 
 
     Args:
         feedback: the law, at q.
-        robot: the arm that is really there.
+        robot: the simulated arm.
         uncompensated: b − b̂ [N m s/rad], the viscous friction that the law leaves, (n,).
         q: postures [rad], (k, n).
         period: h [s].
     """
     M = robot.mass_matrix(q)
     damping = np.broadcast_to(np.atleast_2d(robot.friction.viscous)[0], (len(q), robot.n))
-    G_v = feedback.G_v + _on(uncompensated, M)
+    G_v = feedback.G_v + _repeat_diagonal(uncompensated, M)
 
     def stable(h: float) -> bool:
         inertia, travel = Damping(damping, h).condense(M, np.ones(q.shape, dtype=bool))
@@ -88,10 +89,10 @@ def longest_period(feedback: Feedback, robot: RobotModel, uncompensated: Array, 
     return low
 
 
-def plan_kick(task: PathTask, s: Array) -> Array:
+def plan_gain_bound(task: PathTask, s: Array) -> Array:
     """Return the largest ‖q_d'‖‖r'‖ at s (m,), a number, or at s (m, N) of N tasks, (N,).
 
-    Times k h²/2 it is what one period's acceleration does to the next.
+    Times k h²/2 it is the effect of one period's acceleration on the next.
 
     A tangential acceleration a leaves the extended motion plan, which knows the velocity at a tick only, h²a/2 behind;
     that changes σ̇ by k‖q_d'‖h²a/2, and the acceleration r'σ̇ that the law asks for by ‖r'‖ times as much. Where that
@@ -102,10 +103,10 @@ def plan_kick(task: PathTask, s: Array) -> Array:
     return slope.max(0)
 
 
-def _extremes(
+def _select_extremes(
     position: ArrayLike, velocity: ArrayLike, n: int, rollouts: Sequence[int]
 ) -> list[tuple[Array, Array, int]]:
-    """Pairs of gains, (n,) each, and whose they are: of a batch those with the largest gain or ratio, and some more."""
+    """Return pairs of gains, (n,) each, with their rollout: those with the largest gain or ratio, and some more."""
     p, v = np.broadcast_arrays(np.atleast_2d(position), np.atleast_2d(velocity), np.empty((1, n)))[:2]
     if len(p) == 1:
         return [(p[0], v[0], row) for row in rollouts or (0,)]
@@ -113,6 +114,6 @@ def _extremes(
     return [(p[row], v[row], int(row)) for row in rows]
 
 
-def _on(diagonal: Array, M: Array) -> Array:
-    """A diagonal matrix as often as there are matrices M."""
+def _repeat_diagonal(diagonal: Array, M: Array) -> Array:
+    """Repeat a diagonal matrix for each of the matrices M."""
     return np.broadcast_to(np.diag(diagonal), M.shape)

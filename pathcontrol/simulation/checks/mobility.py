@@ -1,4 +1,4 @@
-"""How easily the joints of an arm are moved, over many postures."""
+"""The mobility of the joints of an arm, over many postures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _KNOWN: WeakKeyDictionary[RobotModel, Array] = WeakKeyDictionary()
 
 
 def mobility(robot: RobotModel | RobotBatch) -> Array:
-    """Return the diagonal of M(q)⁻¹ [1/(kg m²)] at some postures q spread over the joint ranges, (postures, N or 1, n).
+    """Return the diagonal of M(q)⁻¹ [1/(kg m²)] at postures q spread over the joint ranges, (postures, N or 1, n).
 
     Its entries are the accelerations of each joint for a torque of its own, with the other joints free.
     """
@@ -27,11 +27,11 @@ def mobility(robot: RobotModel | RobotBatch) -> Array:
 
 
 def _mobility(robot: RobotModel) -> Array:
-    """The mobility of one arm, (postures, 1, n)."""
+    """Return the mobility of one arm, (postures, 1, n)."""
     lower, upper = robot.limits.lower, robot.limits.upper
     span = np.random.default_rng(0).uniform(-np.pi, np.pi, (_POSTURES, robot.n))
     try:
         inverse = np.linalg.inv(robot.mass_matrix(np.clip(span, lower, upper)))
-    except np.linalg.LinAlgError:  # an arm without masses, which no step can move: nothing is known
+    except np.linalg.LinAlgError:  # an arm without masses, whose mobility is unknown
         return np.zeros((_POSTURES, 1, robot.n))
     return np.diagonal(inverse, axis1=-2, axis2=-1)[:, None]

@@ -1,4 +1,4 @@
-"""What is likely a slip, told before a simulation begins: degrees for radians, limits passed, arms too weak."""
+"""Warnings of likely slips before a simulation: degrees for radians, limits passed, arms that are too weak."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import PathControlWarning
 from pathcontrol.robot.batch import RobotBatch
-from pathcontrol.simulation.checks.weight import Along, weight_slip
+from pathcontrol.simulation.checks.weight import PathPostures, check_weight
 from pathcontrol.simulation.loops import Arm
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.task import PathTask
 
-_TURNS = 4 * np.pi  # rad, beyond which a joint without limits hardly starts
-_FAR = 10.0  # rad, beyond which an angle outside its limits is rather one in degrees
-_MOVED, _LONG = 1e-9, 0.25  # rad, s: an arm that has not moved so much in so long
+_TURNS = 4 * np.pi  # rad, beyond which the start of a joint without limits is unlikely
+_FAR = 10.0  # rad, beyond which an angle outside its limits is probably in degrees
+_MOVED, _LONG = 1e-9, 0.25  # rad, s: an arm is still if it moves by less in a longer time
 
 
 def warn_of_slips(robot: Arm, task: PathTask, q: Array, first: int = 0) -> str:
     """Warn of a start (N, n) or a path outside position limits, and of an arm that cannot hold its own weight on it.
 
-    All arms and tasks of a batch are looked at; the worst is told. Of a larger batch the
-    part with the ``first`` rollout 0 speaks for all.
+    All arms and tasks of a batch are checked, and the worst is reported; of a larger batch only the part with the
+    ``first`` rollout 0.
 
     Returns:
-        What is wrong with the start, in words, or nothing: if the arm diverges, that is why.
+        What is wrong with the start, in words, or an empty text; if the arm diverges, this is the likely cause.
     """
     if first:
         return ""
-    start, along = _of_start(robot, q), Along.of(task)
-    for sentence in (start, _of_path(robot, along), weight_slip(robot, along, q)):
+    start, along = _check_start(robot, q), PathPostures.of(task)
+    for sentence in (start, _check_path(robot, along), check_weight(robot, along, q)):
         if sentence:
             warnings.warn(sentence, PathControlWarning, stacklevel=3)
     return start
@@ -52,11 +52,12 @@ def warn_if_still(run: Run, robot: Arm, friction: str) -> None:
         )
 
 
-def _of_start(robot: Arm, q: Array) -> str:
-    beyond = _beyond(robot, q)
+def _check_start(robot: Arm, q: Array) -> str:
+    """Return the sentence about the worst joint at the start, or an empty text."""
+    beyond = _excess(robot, q)
     row, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
     if beyond[row, joint] > 0:
-        return _outside("the start has", robot, int(row), int(joint), q[min(int(row), len(q) - 1)], "")
+        return _describe_excess("the start has", robot, int(row), int(joint), q[min(int(row), len(q) - 1)], "")
     turns = np.where(np.array(robot.position_units) == "rad", np.abs(q), 0.0)
     row, joint = np.unravel_index(int(turns.argmax()), turns.shape)
     if turns[row, joint] <= _TURNS:
@@ -65,43 +66,45 @@ def _of_start(robot: Arm, q: Array) -> str:
     return f"the start has {name} at {value:.4g} rad, which is {abs(value) / 2 / np.pi:.3g} turns{_DEGREES}"
 
 
-def _of_path(robot: Arm, along: Along) -> str:
-    beyond = _beyond(robot, along.q)
+def _check_path(robot: Arm, along: PathPostures) -> str:
+    """Return the sentence about the worst joint along the path, or an empty text."""
+    beyond = _excess(robot, along.q)
     sample, row, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
     if beyond[sample, row, joint] <= 0:
         return ""
     path = min(int(row), along.q.shape[1] - 1)
     of = f" of rollout {row}" if beyond.shape[1] > 1 else ""
     where = f" at s = {along.s[sample, path]:.4g}"
-    return _outside(f"the path{of} has", robot, int(row), int(joint), along.q[sample, path], where)
+    return _describe_excess(f"the path{of} has", robot, int(row), int(joint), along.q[sample, path], where)
 
 
 _DEGREES = "; did you mean degrees? Then give np.deg2rad(…)"
 
 
-def _outside(begin: str, robot: Arm, row: int, joint: int, q: Array, where: str) -> str:
+def _describe_excess(begin: str, robot: Arm, row: int, joint: int, q: Array, where: str) -> str:
+    """Return the sentence about a position outside its limits."""
     lower, upper = ((ends if ends.ndim == 1 else ends[row])[joint] for ends in _range(robot))
     unit = robot.position_units[joint]
     return (
         f"{begin} {robot.joint_names[joint]} at {q[joint]:.4g} {unit}{where}, outside its limits of {lower:.4g} to "
-        f"{upper:.4g} {unit}{_DEGREES if _as_degrees(robot, q) else ''}"
+        f"{upper:.4g} {unit}{_DEGREES if _is_in_degrees(robot, q) else ''}"
     )
 
 
 def _range(robot: Arm) -> tuple[Array, Array]:
-    """The lower and the upper limits of the joints [rad], (n,), or (N, n) of arms that differ."""
+    """Return the lower and the upper limits of the joints [rad], (n,), or (N, n) for arms that differ."""
     return robot.limits.lower, robot.limits.upper
 
 
-def _beyond(robot: Arm, q: Array) -> Array:
-    """By how much positions (*batch, N, n) are outside their limits [rad]; not above 0 inside, or without limits."""
+def _excess(robot: Arm, q: Array) -> Array:
+    """Return the distance of positions (*batch, N, n) outside their limits [rad]; ≤ 0 inside, or without limits."""
     lower, upper = _range(robot)
     limited = lower < upper
     return np.where(limited, np.maximum(lower - q, q - upper), 0.0) - 1e-9
 
 
-def _as_degrees(robot: Arm, q: Array) -> bool:
-    """Whether a posture (n,) would be within all limits if its angles were in degrees, and is far from it so."""
+def _is_in_degrees(robot: Arm, q: Array) -> bool:
+    """Return whether a posture (n,) far outside its limits would be within all of them if it were in degrees."""
     turning = np.array(robot.position_units) == "rad"
     meant = np.where(turning, np.deg2rad(q), q)
-    return bool(np.abs(q[turning]).max(initial=0.0) > _FAR and (_beyond(robot, meant[None]) <= 0).all())
+    return bool(np.abs(q[turning]).max(initial=0.0) > _FAR and (_excess(robot, meant[None]) <= 0).all())

@@ -1,4 +1,4 @@
-"""Periods that are too long for the gains of a law, and steps that are too long for the arm: told before a run."""
+"""Warnings of periods that are too long for the gains of a law, and of steps that are too long for the arm."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from pathcontrol.errors import PathControlWarning
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
-from pathcontrol.simulation.checks.extreme_arms import arm_of, most_mobile
-from pathcontrol.simulation.checks.fast_modes import rate_of_arm, rate_of_friction, rates_of_disturbance, with_damping
-from pathcontrol.simulation.checks.held_gains import feedbacks, longest_period, plan_kick
+from pathcontrol.simulation.checks.extreme_arms import arm_of, find_extreme_arms
+from pathcontrol.simulation.checks.fast_modes import add_damping, rate_of_arm, rate_of_friction, rates_of_disturbance
+from pathcontrol.simulation.checks.held_gains import linearize_law, longest_period, plan_gain_bound
 from pathcontrol.simulation.loops import MOST_SUBSTEPS, Arm, ContinuousTime, SampledLoop
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.task import PathTask
 
-_SAMPLES, _FINE = 9, 65  # of a path, where the arm and where the plan is looked at
+_SAMPLES, _FINE = 9, 65  # samples of a path for the arm and for the plan
 _MOST, _FEWEST = 1 << 16, 3  # samples of all tasks of a batch together, and of each at least
 _SLOW = 1.0  # h times a rate of growth or decay up to which a step resolves it
 _OSCILLATION = 0.3  # h ω up to which the midpoint rule resolves an oscillation, to 1.5 % of ω
-_SPRING = 0.05  # h ω that is advised for a spring that is held over a step, which feeds it with energy at hω²/4
+_SPRING = 0.05  # h ω advised for a spring that is held over a step: holding it adds energy at the rate hω²/4
 
 
 class StepWarning(PathControlWarning):
-    """A period or a step is too long for what it simulates."""
+    """The warning of a period or a step that is too long."""
 
 
 def warn_of_steps(
@@ -44,36 +44,36 @@ def warn_of_steps(
     disturbance: Disturbance | None,
     duration: float,
 ) -> str:
-    """Warn of a period that is too long for the gains, and of steps of the plant that are too long for what is fast.
+    """Warn of a period that is too long for the gains, and of steps too long for the fast modes of the plant.
 
     It is an estimate of linear systems at some postures, for exact sensors without a delay and no limits of torque.
 
     Args:
         controllers: the laws, one after the other.
         loop: how the loop is closed; continuous time finds its steps itself.
-        robot: the arm, or one for each rollout, of which those are looked at that feel a step most.
+        robot: the arm, or one for each rollout, of which those most sensitive to a step are checked.
         q: joint positions at the start [rad], (N, n).
         qd: joint velocities at the start [rad/s], (N, n).
-        disturbance: what else pushes the arm.
-        duration: how long [s].
+        disturbance: the disturbance of the arm.
+        duration: simulated time [s].
 
     Returns:
-        What was told, or nothing: if the arm diverges, that is why.
+        The warnings in one text, or an empty text; if the arm diverges, they are the likely cause.
     """
     if not isinstance(loop, SampledLoop):
         return ""
     if not (robot.robots[0] if isinstance(robot, RobotBatch) else robot).has_mass:
         return ""
     try:
-        told = list(dict.fromkeys(_all(controllers, loop, robot, q, qd, disturbance, duration)))
-    except np.linalg.LinAlgError:  # M is singular but for rounding, and no estimate can be made
+        told = list(dict.fromkeys(_find_warnings(controllers, loop, robot, q, qd, disturbance, duration)))
+    except np.linalg.LinAlgError:  # M is singular up to rounding, so that no estimate can be made
         return ""
     for sentence in told:
         warnings.warn(sentence, StepWarning, stacklevel=3)
     return "; ".join(told)
 
 
-def _all(
+def _find_warnings(
     controllers: Sequence[Controller],
     loop: SampledLoop,
     robot: Arm,
@@ -82,40 +82,41 @@ def _all(
     disturbance: Disturbance | None,
     duration: float,
 ) -> Iterator[str]:
-    rows = most_mobile(robot, q[:1])
-    felt = {row: with_damping(arm_of(robot, row), loop.period / loop.substeps) for row in rows}
+    """Yield the warnings of all laws, of the arm and of the disturbance."""
+    rows = find_extreme_arms(robot, q[:1])
+    felt = {row: add_damping(arm_of(robot, row), loop.period / loop.substeps) for row in rows}
     for law in controllers:
-        postures, speeds = _states(law.task, q, qd)
-        yield from _of_gains(law, loop.period, robot, rows, postures)
-        yield from _of_plan(law, loop.period)
-        yield from _worst(list(_of_arm(loop, arm, postures, speeds)) for arm in felt.values())
+        postures, speeds = _sample_states(law.task, q, qd)
+        yield from _check_gains(law, loop.period, robot, rows, postures)
+        yield from _check_plan(law, loop.period)
+        yield from _select_worst(list(_check_arm(loop, arm, postures, speeds)) for arm in felt.values())
     if disturbance is not None:
-        yield from _worst(list(_of_disturbance(disturbance, loop, a, q, qd, duration)) for a in felt.values())
+        yield from _select_worst(list(_check_disturbance(disturbance, loop, a, q, qd, duration)) for a in felt.values())
 
 
-def _states(task: PathTask, q: Array, qd: Array) -> tuple[Array, Array]:
-    """The first start and some states on the path, of a batch on those that are fastest in a joint, (k, n) each."""
+def _sample_states(task: PathTask, q: Array, qd: Array) -> tuple[Array, Array]:
+    """Return the first start and states on the path, for a batch on its fastest paths, (k, n) each."""
     n = q.shape[-1]
     if not isinstance(task, TaskBatch):
         point = task.at(np.linspace(*task.sampled_interval, _SAMPLES))
         return np.concatenate([q[:1], point.q_d]), np.concatenate([qd[:1], point.velocity])
-    point = task.at(_along(task, _SAMPLES))
+    point = task.at(_sample_paths(task, _SAMPLES))
     rows = np.unique(np.abs(point.velocity).max(0).argmax(0))
     postures, speeds = (np.reshape(part[:, rows], (-1, n)) for part in (point.q_d, point.velocity))
     return np.concatenate([q[:1], postures]), np.concatenate([qd[:1], speeds])
 
 
-def _along(task: TaskBatch, samples: int) -> Array:
-    """Parameters of all tasks of a batch, (samples, N), fewer of each the more there are."""
+def _sample_paths(task: TaskBatch, samples: int) -> Array:
+    """Return parameters of all tasks of a batch, (samples, N); fewer samples of each, the more tasks there are."""
     lower, upper = (np.broadcast_to(end, len(task)) for end in task.sampled_interval)
     count = int(np.clip(_MOST // len(task), _FEWEST, samples))
     return lower + np.linspace(0.0, 1.0, count)[:, None] * (upper - lower)
 
 
-def _of_gains(law: Controller, period: float, robot: Arm, rows: list[int], q: Array) -> Iterator[str]:
-    """The period is too long for the gains."""
+def _check_gains(law: Controller, period: float, robot: Arm, rows: list[int], q: Array) -> Iterator[str]:
+    """Yield the warning of a period that is too long for the gains."""
     compensated, longest, worst = np.atleast_2d(law.compensated), np.inf, 0
-    for one in feedbacks(law, q, rows if isinstance(robot, RobotBatch) else ()):
+    for one in linearize_law(law, q, rows if isinstance(robot, RobotBatch) else ()):
         arm = arm_of(robot, one.rollout)
         left = np.atleast_2d(arm.friction.viscous)[0] - compensated[one.rollout % len(compensated)]
         if (found := longest_period(one, arm, left, q, period)) < longest:
@@ -134,13 +135,13 @@ def _of_gains(law: Controller, period: float, robot: Arm, rows: list[int], q: Ar
     )
 
 
-def _of_plan(law: Controller, period: float) -> Iterator[str]:
-    """The period is too long for the gain k of the plan."""
+def _check_plan(law: Controller, period: float) -> Iterator[str]:
+    """Yield the warning of a period that is too long for the gain k of the plan."""
     if not isinstance(law, ExtendedMotionPlan):
         return
     task = law.task
-    s = _along(task, _FINE) if isinstance(task, TaskBatch) else np.linspace(*task.sampled_interval, _FINE)
-    slope, every = np.broadcast_arrays(np.ravel(plan_kick(task, s)), np.ravel(law.k))
+    s = _sample_paths(task, _FINE) if isinstance(task, TaskBatch) else np.linspace(*task.sampled_interval, _FINE)
+    slope, every = np.broadcast_arrays(np.ravel(plan_gain_bound(task, s)), np.ravel(law.k))
     row = int((slope * every).argmax())
     kick, k = float(slope[row] * every[row]), float(every[row])
     if kick * period**2 >= 1:
@@ -152,42 +153,42 @@ def _of_plan(law: Controller, period: float) -> Iterator[str]:
         )
 
 
-def _worst(found: Iterable[list[_TooLong]]) -> Iterator[str]:
-    """Of what is said of several arms the worst of each kind."""
+def _select_worst(found: Iterable[list[_TooLong]]) -> Iterator[str]:
+    """Yield the worst warning of each kind among those of several arms."""
     every = [one for each in found for one in each]
     for kind in dict.fromkeys(one.kind for one in every):
         yield max((one for one in every if one.kind == kind), key=lambda one: one.rate).sentence
 
 
 class _TooLong(NamedTuple):
-    """What is too fast for a step [1/s], of what kind it is, and what is said of it."""
+    """A mode that is too fast for a step: its kind, its rate [1/s] and the sentence about it."""
 
     kind: str
     rate: float
     sentence: str
 
 
-def _of_arm(loop: SampledLoop, arm: RobotModel, q: Array, qd: Array) -> Iterator[_TooLong]:
-    """The step is too long for the arm itself."""
+def _check_arm(loop: SampledLoop, arm: RobotModel, q: Array, qd: Array) -> Iterator[_TooLong]:
+    """Yield the warnings of a step that is too long for the arm itself."""
     rate = rate_of_arm(arm, q, qd)
-    yield from _too_long(loop, rate, _OSCILLATION, "the arm under gravity at the speed of the task")
+    yield from _check_rate(loop, rate, _OSCILLATION, "the arm under gravity at the speed of the task")
     rate, joint = rate_of_friction(arm, q)
-    yield from _too_long(loop, rate, _SLOW, f"the Stribeck friction of {arm.joint_names[joint]}, which falls so fast")
+    yield from _check_rate(loop, rate, _SLOW, f"the Stribeck friction of {arm.joint_names[joint]}, which falls so fast")
 
 
-def _of_disturbance(
+def _check_disturbance(
     disturbance: Disturbance, loop: SampledLoop, arm: RobotModel, q: Array, qd: Array, duration: float
 ) -> Iterator[_TooLong]:
-    """The step is too long for a disturbance that depends on the state, and is held over it."""
+    """Yield the warnings of a step too long for a state-dependent disturbance that is held over it."""
     name = f"the disturbance {type(disturbance).__name__}".replace(" _Sum", "")
     damping, oscillation = rates_of_disturbance(disturbance, arm, q, qd, duration)
-    yield from _too_long(loop, damping, _SLOW, f"{name}, which damps the arm but is held over a step and so rings")
+    yield from _check_rate(loop, damping, _SLOW, f"{name}, which damps the arm but is held over a step and so rings")
     if oscillation * loop.period / loop.substeps > _OSCILLATION:
-        yield from _too_long(loop, oscillation, _SPRING, f"{name}, a spring that is held over a step")
+        yield from _check_rate(loop, oscillation, _SPRING, f"{name}, a spring that is held over a step")
 
 
-def _too_long(loop: SampledLoop, rate: float, bound: float, what: str) -> Iterator[_TooLong]:
-    """The sentence that a step is too long for a ``rate`` [1/s], with how many would do."""
+def _check_rate(loop: SampledLoop, rate: float, bound: float, what: str) -> Iterator[_TooLong]:
+    """Yield the warning that a step is too long for a ``rate`` [1/s], with the substeps that would suffice."""
     step = loop.period / loop.substeps
     if rate * step <= bound:
         return

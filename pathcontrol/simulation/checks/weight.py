@@ -1,4 +1,4 @@
-"""Whether arms can hold their own weight, at the start and all along their paths."""
+"""The check that arms can hold their own weight, at the start and all along their paths."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from pathcontrol.simulation.loops import Arm
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.task import PathTask
 
-_SAMPLES = 129  # of a path
+_SAMPLES = 129  # samples of a path
 _FEWEST = 3
-_MOST = 1 << 16  # samples of all paths together
-_NO_LIMIT = 1e6  # N m: files that know no limit say some huge number, or zero
+_MOST = 1 << 16  # limit of samples of all paths together
+_NO_LIMIT = 1e6  # N m: files without a limit give some huge number, or zero
 
 
-class Along(NamedTuple):
-    """Postures along the paths of all rollouts, or along the one path that they have in common.
+class PathPostures(NamedTuple):
+    """Postures along the paths of all rollouts, or along the one path that they share.
 
     Attributes:
         s: path parameters, (samples, N or 1).
@@ -32,8 +32,8 @@ class Along(NamedTuple):
     q: Array
 
     @classmethod
-    def of(cls, task: PathTask) -> Along:
-        """Postures along a task or a batch of tasks; the more tasks there are, the fewer of each."""
+    def of(cls, task: PathTask) -> PathPostures:
+        """Return postures along a task or a batch of tasks; fewer of each, the more tasks there are."""
         tasks = len(task) if isinstance(task, TaskBatch) else 1
         share = np.linspace(0.0, 1.0, int(np.clip(_MOST // tasks, _FEWEST, _SAMPLES)))[:, None]
         lower, upper = (np.broadcast_to(end, tasks) for end in task.sampled_interval)
@@ -41,13 +41,13 @@ class Along(NamedTuple):
         q = task.q_d(s if tasks > 1 or isinstance(task, TaskBatch) else s[:, 0])
         return cls(s, q.reshape(*s.shape, -1))
 
-    def of_rows(self, rows: NDArray[np.intp]) -> Along:
-        """Those of some rollouts."""
-        return self if self.q.shape[1] == 1 else Along(self.s[:, rows], self.q[:, rows])
+    def of_rows(self, rows: NDArray[np.intp]) -> PathPostures:
+        """Return the postures of some rollouts."""
+        return self if self.q.shape[1] == 1 else PathPostures(self.s[:, rows], self.q[:, rows])
 
 
 class _Worst(NamedTuple):
-    """Where the weight is largest beside the limit: its share, the rollout, the joint and the place in words."""
+    """The largest weight relative to its limit: the share, the rollout, the joint and the place in words."""
 
     share: float = 0.0
     rollout: int = 0
@@ -55,10 +55,12 @@ class _Worst(NamedTuple):
     place: str = ""
 
 
-def weight_slip(robot: Arm, along: Along, q: Array) -> str:
-    """Say which joint cannot hold the weight of its arm, at the start (N, n) or on its path; nothing if all can.
+def check_weight(robot: Arm, along: PathPostures, q: Array) -> str:
+    """Return the sentence about a joint that cannot hold the weight of its arm, or an empty text.
 
-    Of several arms or places the one is named where the torque is largest beside its limit.
+    The start (N, n) and the path are checked.
+
+    It names the arm and place where the torque is largest relative to its limit.
     """
     if isinstance(robot, RobotBatch):
         bodies, body = robot.bodies, robot.body
@@ -69,13 +71,15 @@ def weight_slip(robot: Arm, along: Along, q: Array) -> str:
     starts, worst, weak = np.broadcast_to(q, limits.shape), _Worst(), 0
     for k, arm in enumerate(bodies):
         rows = np.flatnonzero(body == k)
-        found, count = _of_body(arm, along.of_rows(rows), starts[rows], limits[rows], rows)
+        found, count = _check_body(arm, along.of_rows(rows), starts[rows], limits[rows], rows)
         worst, weak = max(worst, found, key=lambda one: one.share), weak + count
-    return _told(robot, worst, limits, weak) if weak else ""
+    return _describe_worst(robot, worst, limits, weak) if weak else ""
 
 
-def _of_body(arm: RobotModel, along: Along, starts: Array, limits: Array, rows: NDArray[np.intp]) -> tuple[_Worst, int]:
-    """The worst of the ``rows`` with one rigid body, with their starts and limits (k, n), and how many are too weak."""
+def _check_body(
+    arm: RobotModel, along: PathPostures, starts: Array, limits: Array, rows: NDArray[np.intp]
+) -> tuple[_Worst, int]:
+    """Return the worst of the ``rows`` with one rigid body, starts and limits (k, n), and the number of weak ones."""
     path = np.abs(arm.gravity(along.q))
     shares = np.stack([np.abs(arm.gravity(starts)) / limits, path.max(0) / limits])
     there, row, joint = np.unravel_index(int(shares.argmax()), shares.shape)
@@ -85,7 +89,8 @@ def _of_body(arm: RobotModel, along: Along, starts: Array, limits: Array, rows: 
     return worst, int((shares > 1).any((0, 2)).sum())
 
 
-def _told(robot: Arm, worst: _Worst, limits: Array, weak: int) -> str:
+def _describe_worst(robot: Arm, worst: _Worst, limits: Array, weak: int) -> str:
+    """Return the sentence about the worst joint."""
     unit, limit = "N m" if robot.position_units[worst.joint] == "rad" else "N", limits[worst.rollout, worst.joint]
     of = f" in rollout {worst.rollout}, the worst of {weak}," if len(limits) > 1 else ""
     return (

@@ -1,1 +1,1 @@
-"""How a run is kept in a file: its data, its robot and its path, without pickle."""
+"""The storage of a run in a file: its data, its robot and its path, without pickle."""

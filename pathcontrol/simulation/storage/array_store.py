@@ -1,4 +1,4 @@
-"""Arrays put away one after another in a single one, so that a file holds two variables and not thousands."""
+"""A store of many arrays in a single one, so that a file holds two variables and not thousands."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from pathcontrol._arrays import Array, finite
 from pathcontrol.errors import InputError
 
 _MOST_AXES = 8
-_INLINE = 8  # numbers that are written where they belong
+_INLINE = 8  # an array of so few numbers is written into the recipe itself
 
 
-class Shelf:
-    """Takes arrays of floats and gives what to write in their place, fit for JSON; the same array is kept once.
+class ArrayStore:
+    """A store of arrays of floats, which returns references that fit into JSON; equal arrays are kept once.
 
     Args:
-        numbers: what another shelf held, (k,), to get its arrays from.
+        numbers: the content of another store, (k,), to read its arrays.
     """
 
     def __init__(self, numbers: Array | None = None) -> None:
@@ -31,11 +31,11 @@ class Shelf:
 
     @property
     def numbers(self) -> Array:
-        """All that was put away, (k,)."""
+        """All numbers stored, (k,)."""
         return np.concatenate([np.empty(0), *self._parts])
 
     def put(self, array: Array) -> dict[str, Any]:
-        """Put an array away: ``{"shape": …, "at": …}``, or ``{"values": …}`` for a few numbers."""
+        """Store an array; return ``{"shape": …, "at": …}``, or ``{"values": …}`` for a few numbers."""
         array = np.asarray(array, dtype=np.float64)
         if array.size <= _INLINE:
             return {"values": array.tolist()}
@@ -46,14 +46,14 @@ class Shelf:
             self._size += array.size
         return self._places[key]
 
-    def once(self, key: Hashable, what: Any, recipe: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """The ``recipe`` of an object, called by a ``key`` that has its id: the same one if it is asked for again."""
+    def make_once(self, key: Hashable, what: Any, recipe: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """Return the ``recipe`` of an object, made once for each ``key``, which contains the object's id."""
         if key not in self._known:
             self._known[key] = what, recipe()  # with the object itself, so that no other one gets its id
         return self._known[key][1]
 
     def get(self, place: Mapping[str, Any]) -> Array:
-        """Return the array that :meth:`put` put at a place.
+        """Return the array to which a reference of :meth:`put` refers.
 
         Raises:
             InputError: there is no such place, or its numbers are not finite.

@@ -1,4 +1,4 @@
-"""What a file has to look like before a run is made of it."""
+"""Checks of the form of a file before a run is made of it."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _DEEPEST = 50
-_DENSEST = 1100  # numbers that deflate makes of one byte are fewer than 1032
-_UNWRITTEN = 1 << 20  # bytes that a small variable may have without any of them in the file
+_DENSEST = 1100  # bytes that deflate may expand one byte to, 1032, with a margin
+_UNWRITTEN = 1 << 20  # bytes that a small variable may have without being in the file
 _WORDS, _COUNTS = ("status", "reason", "path_status"), ("laps", "path_index")
 
 
 def check_sizes(file: h5py.File, size: int) -> None:
-    """Check that no variable is larger than what ``size`` bytes of a file can hold, before memory is taken for it.
+    """Check that no variable is larger than ``size`` bytes of a file can hold, before memory is taken for it.
 
     Raises:
         InputError: one is, or its numbers are not in this file.
@@ -41,7 +41,7 @@ def check_sizes(file: h5py.File, size: int) -> None:
 
 
 def _variables(group: h5py.Group) -> Iterator[tuple[str, h5py.Dataset]]:
-    """All datasets but those that only say how long a dimension is."""
+    """Yield all datasets but those that only hold the length of a dimension."""
     for name in group:
         link = group.get(name, getlink=True)
         if not isinstance(link, h5py.HardLink):
@@ -54,19 +54,20 @@ def _variables(group: h5py.Group) -> Iterator[tuple[str, h5py.Dataset]]:
 
 
 def _is_length(item: h5py.Dataset) -> bool:
+    """Return whether a dataset only holds the length of a dimension."""
     name = item.attrs.get("NAME", b"")
     return bytes(name).startswith(b"This is a netCDF dimension but not a netCDF variable")
 
 
 def check_form(data: xr.Dataset, config: Any) -> None:
-    """Check that data and configuration have the form of a run, whatever their numbers are.
+    """Check that data and configuration have the form of a run, regardless of their numbers.
 
     Raises:
         InputError: they have not.
     """
     if not isinstance(config, dict):
         raise InputError(f"its configuration is a {type(config).__name__}, expected names and values")
-    if deeper(config, _DEEPEST):
+    if is_deeper(config, _DEEPEST):
         raise InputError(f"its configuration is nested more than {_DEEPEST} deep")
     if missing := [name for name in ("q", "time", "status") if name not in data.variables]:
         raise InputError(f"it has no {' and no '.join(missing)}")
@@ -84,7 +85,7 @@ def check_form(data: xr.Dataset, config: Any) -> None:
 
 
 def _check_labels(data: xr.Dataset) -> None:
-    """Check the values along which the arrays are laid out: times, names of joints, numbers of rollouts, words."""
+    """Check the values along which the arrays are laid out: times, names of joints, numbers of rollouts, texts."""
     for name in ("rollout", "joint"):
         if name in data.coords and data[name].dims != (name,):
             raise InputError(f"{name} is over {data[name].dims}, expected ({name!r},)")
@@ -105,7 +106,7 @@ def _check_labels(data: xr.Dataset) -> None:
             raise InputError(f"{name} holds something else than words")
 
 
-def deeper(value: Any, levels: int) -> bool:
-    """Return whether tables and lists are nested deeper than so many levels: no reader is to run out of stack."""
+def is_deeper(value: Any, levels: int) -> bool:
+    """Return whether tables and lists are nested deeper than ``levels``: no reader is to run out of stack."""
     inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
-    return levels == 0 or any(deeper(item, levels - 1) for item in inner)
+    return levels == 0 or any(is_deeper(item, levels - 1) for item in inner)

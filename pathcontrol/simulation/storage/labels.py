@@ -1,4 +1,4 @@
-"""Labelled arrays in a netCDF file, as xarray writes and reads them, without loading xarray."""
+"""Labelled arrays in a netCDF file, in the form of xarray, without loading xarray."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ def put_labelled(
         group.dimensions.update({d: n for d, n in zip(dims, np.shape(array), strict=True) if d not in group.dimensions})
     for name, (dims, array, attributes) in everything.items():
         about = dict(attributes)
-        if name in variables and (named := _named(dims, coordinates)):
+        if name in variables and (named := _list_coordinates(dims, coordinates)):
             about["coordinates"] = named
         _put(group, name, (dims, array, about), level if name in variables else None)
-    loose = _loose(variables.values(), coordinates)
+    loose = _list_unused_coordinates(variables.values(), coordinates)
     if loose:
         group.attrs["coordinates"] = loose
 
 
 def _put(group: h5netcdf.Group, name: str, labelled: Labelled, level: int | None) -> None:
-    """Write one array."""
+    """Write one labelled array."""
     dims, array, attributes = labelled
     kind = array.dtype.kind
     packed = {} if level is None else {"compression": "gzip", "compression_opts": level, "shuffle": True}
@@ -45,12 +45,12 @@ def _put(group: h5netcdf.Group, name: str, labelled: Labelled, level: int | None
     variable.attrs.update({**attributes, **({"dtype": "bool"} if kind == "b" else {})})
 
 
-def _named(dims: Iterable[str], coordinates: Mapping[str, Labelled]) -> str:
-    """Return the names of the coordinates of a variable over ``dims``, but for the axes themselves."""
+def _list_coordinates(dims: Iterable[str], coordinates: Mapping[str, Labelled]) -> str:
+    """Return the names of the coordinates of a variable over ``dims``, without the axes themselves."""
     return " ".join(sorted(name for name, (over, *_) in coordinates.items() if over != (name,) and {*over} <= {*dims}))
 
 
-def _loose(variables: Iterable[Labelled], coordinates: Mapping[str, Labelled]) -> str:
-    """Return the names of the coordinates that no variable has."""
-    seen = {name for dims, *_ in variables for name in _named(dims, coordinates).split()}
+def _list_unused_coordinates(variables: Iterable[Labelled], coordinates: Mapping[str, Labelled]) -> str:
+    """Return the names of the coordinates that belong to no variable."""
+    seen = {name for dims, *_ in variables for name in _list_coordinates(dims, coordinates).split()}
     return " ".join(sorted(name for name, (over, *_) in coordinates.items() if over != (name,) and name not in seen))

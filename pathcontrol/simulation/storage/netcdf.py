@@ -15,7 +15,7 @@ import numpy as np
 
 from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError, PathControlWarning
-from pathcontrol.simulation.context import Stored
+from pathcontrol.simulation.context import StoredContext
 from pathcontrol.simulation.samples import Samples
 from pathcontrol.simulation.storage.file_form import check_form, check_sizes
 from pathcontrol.simulation.storage.labels import put_labelled
@@ -25,7 +25,7 @@ from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 if TYPE_CHECKING:
     import xarray as xr
 
-_LEVEL = 1  # of compression: the noise of errors does not become shorter by more
+_LEVEL = 1  # of compression: noisy errors do not shrink further at higher levels
 _CONFIG = "pathcontrol_config"
 _DIGEST = "pathcontrol_sha256"
 _GROUP = "origin"
@@ -34,7 +34,7 @@ _RECIPE = {"long_name": "robot and task of the run, JSON in UTF-8"}
 _NUMBERS = {"long_name": "arrays of the recipe, one after another"}
 
 
-def write_run(path: Path, data: xr.Dataset | Samples, config: Mapping[str, Any], stored: Stored) -> None:
+def write_run(path: Path, data: xr.Dataset | Samples, config: Mapping[str, Any], stored: StoredContext) -> None:
     """Write a run, whole or not at all, with its checksum.
 
     The file is made in memory: HDF5 ends the process by a segmentation fault where it cannot write to a full disk.
@@ -60,7 +60,7 @@ def write_run(path: Path, data: xr.Dataset | Samples, config: Mapping[str, Any],
 _TOOLPATHS = (".csv", ".tsv", ".txt", ".xyz", ".ngc", ".gcode", ".gc", ".tap", ".cnc", ".svg", ".dxf")
 
 
-def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], Stored | None]:
+def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | None]:
     """Read data, configuration, and robot and path if the file has them.
 
     Raises:
@@ -79,10 +79,10 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], Stored | None]:
         config = json.loads(text)
         check_form(data, config)
         _check_digest(digest, lambda: _digest_of_run(data, text))
-        if "rollout" not in data.coords:  # numbered, so that parts of the run are known by their numbers
+        if "rollout" not in data.coords:  # number the rollouts, so that parts of the run keep their numbers
             data = data.assign_coords(rollout=data["rollout"])
         stored = _read_origin(path)
-    except Exception as error:  # a broken file makes those who read it stumble anywhere
+    except Exception as error:  # a broken file may fail anywhere in the readers
         reason = str(error) if "file signature not found" not in str(error) else f"it is no HDF5 file{_remedy(path)}"
         raise InputError(f"{str(path)!r} is not a run saved by Run.save: {reason}") from error
     if digest is None:
@@ -96,14 +96,15 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], Stored | None]:
 
 
 def _remedy(path: Path) -> str:
-    """Advice for files that other functions read."""
+    """Return advice for files that other functions read."""
     suffix = path.suffix.lower()
     if suffix in (".urdf", ".xacro"):
         return "; a URDF is loaded by load_robot"
     return "; a toolpath is read by read_toolpath" if suffix in _TOOLPATHS else ""
 
 
-def _read_origin(path: Path) -> Stored | None:
+def _read_origin(path: Path) -> StoredContext | None:
+    """Read robot and path, or ``None`` from a file without them."""
     import xarray as xr
 
     try:
@@ -113,24 +114,27 @@ def _read_origin(path: Path) -> Stored | None:
     recipe, numbers = origin["recipe"].to_numpy(), origin["numbers"].to_numpy()
     if recipe.dtype != np.uint8 or numbers.dtype != np.float64 or recipe.ndim != 1 or numbers.ndim != 1:
         raise InputError("what it says of its robot and path is no text with numbers")
-    stored = Stored(recipe.tobytes().decode(), numbers)
+    stored = StoredContext(recipe.tobytes().decode(), numbers)
     _check_digest(origin.attrs.get(_DIGEST), lambda: _digest_of_origin(stored))
     return stored
 
 
-def _check_digest(told: Any, digest: Callable[[], str]) -> None:
-    if told is not None and told != digest():
+def _check_digest(stored: Any, digest: Callable[[], str]) -> None:
+    """Check that the stored checksum, if there is one, is that of the content."""
+    if stored is not None and stored != digest():
         raise InputError("it is damaged, or was changed: its checksum is another one; take another copy of it")
 
 
 def _digest_of_run(data: xr.Dataset | Samples, text: str) -> str:
+    """Return the checksum of the data and the configuration of a run."""
     if isinstance(data, Samples):
         found = {name: data.plain(name) for name in _KNOWN}
         return digest_of({name: values for name, values in found.items() if values is not None}, text)
     return digest_of({name: data[name].to_numpy() for name in _KNOWN if name in data.variables}, text)
 
 
-def _digest_of_origin(stored: Stored) -> str:
+def _digest_of_origin(stored: StoredContext) -> str:
+    """Return the checksum of robot and path."""
     return digest_of({"numbers": stored.numbers}, stored.text)
 
 
@@ -139,7 +143,7 @@ def _put(file: h5netcdf.File, data: xr.Dataset | Samples) -> None:
     if isinstance(data, Samples):
         put_labelled(file, *data.labelled(), _LEVEL)
         return
-    from xarray.backends import H5NetCDFStore  # which has been loaded, and knows whatever else was put into the data
+    from xarray.backends import H5NetCDFStore  # loaded already, and it handles any other content of the data
 
     packed = {name: {"zlib": True, "complevel": _LEVEL, "shuffle": True} for name in data.data_vars}
     data.dump_to_store(H5NetCDFStore(file), encoding=packed)

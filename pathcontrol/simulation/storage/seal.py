@@ -1,7 +1,7 @@
-"""The checksums of a saved run: of all its bytes at its end, and inside of its arrays and texts.
+"""The checksums of a saved run: one of all its bytes at its end, and others of its arrays and texts inside.
 
 HDF5 ignores what follows its own end, so that the first one is checked before any other code looks at bytes that may be
-damaged. A program that changes the file cuts it off; then those inside tell whether the numbers are still the same.
+damaged. A program that changes the file cuts it off; then the inner ones tell whether the numbers are still the same.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ _PIECE = 1 << 20
 
 
 def seal(content: bytes | memoryview) -> bytes:
-    """Return what is to follow ``content`` in a file."""
+    """Return the checksum that is to follow ``content`` in a file."""
     return _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
 def check_seal(path: Path) -> None:
-    """Check that the content of a file that ends with a seal is what was written.
+    """Check the content of a file that ends with a checksum.
 
     Raises:
         InputError: it is not.
@@ -50,7 +50,7 @@ def check_seal(path: Path) -> None:
 
 
 def digest_of(arrays: Mapping[str, Array], text: str) -> str:
-    """Return the SHA-256 of named arrays of numbers or words, (...) each, and a text, wherever they are written."""
+    """Return the SHA-256 of named arrays of numbers or texts, (...) each, and a text, independent of their storage."""
     found = hashlib.sha256(text.encode())
     for name in sorted(arrays):
         array = np.asarray(arrays[name])
@@ -58,7 +58,7 @@ def digest_of(arrays: Mapping[str, Array], text: str) -> str:
             found.update(json.dumps([name, array.tolist()]).encode())
             continue
         if array.dtype.kind == "f":
-            array = np.where(np.isnan(array), np.nan, array)  # of which there are many bit patterns
+            array = np.where(np.isnan(array), np.nan, array)  # NaN has many bit patterns
         found.update(json.dumps([name, array.dtype.str, list(array.shape)]).encode())
         found.update(np.ascontiguousarray(array).tobytes())
     return found.hexdigest()

@@ -1,4 +1,4 @@
-"""A task as plain values and arrays, and back.
+"""Recipes of tasks: a task as plain values and arrays, and back.
 
 Curves of the library, what is made from them and tables of ϑ are kept as what they are made of, and are the same again
 to the last bit. Any other path is kept as samples, a :class:`RecordedPath`.
@@ -17,9 +17,9 @@ from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.tabulated import TabulatedProfile
 from pathcontrol.registry import PROFILES, TASKS, load
-from pathcontrol.simulation.storage.array_store import Shelf
+from pathcontrol.simulation.storage.array_store import ArrayStore
 from pathcontrol.simulation.storage.recipe_size import check_extent
-from pathcontrol.simulation.storage.shared_recipes import shared
+from pathcontrol.simulation.storage.shared_recipes import share_parts
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.profile import ConstantRate, VelocityProfile
@@ -55,45 +55,46 @@ _TOOLPATH = (
 )
 
 
-def task_recipe(task: PathTask, shelf: Shelf, upto: float | None = None, rated: bool = True) -> dict[str, Any]:
-    """What :func:`task_of` makes the task of.
+def task_recipe(task: PathTask, store: ArrayStore, upto: float | None = None, rated: bool = True) -> dict[str, Any]:
+    """Return the recipe from which :func:`task_of` makes the task again.
 
     Args:
         task: any task.
-        shelf: where its arrays are put.
+        store: the store of its arrays.
         upto: the largest s that was used of an endless path.
-        rated: whether its ϑ matters.
+        rated: False if its ϑ need not be kept.
     """
-    return shelf.once((id(task), upto, rated), task, lambda: _task_recipe(task, shelf, upto, rated))
+    return store.make_once((id(task), upto, rated), task, lambda: _task_recipe(task, store, upto, rated))
 
 
-def _task_recipe(task: PathTask, shelf: Shelf, upto: float | None, rated: bool) -> dict[str, Any]:
+def _task_recipe(task: PathTask, store: ArrayStore, upto: float | None, rated: bool) -> dict[str, Any]:
+    """Return the recipe of a task of any kind."""
     if isinstance(task, TaskBatch):
-        return {"class": "TaskBatch"} | shared([task_recipe(one, shelf, upto) for one in task])
+        return {"class": "TaskBatch"} | share_parts([task_recipe(one, store, upto) for one in task])
     if (toolpath := as_toolpath(task)) is not None:
-        return _toolpath_recipe(toolpath, shelf)
+        return _toolpath_recipe(toolpath, store)
     if isinstance(task, PathSequence):
-        return _recipe(PathSequence, task, shelf, upto, rated)
+        return _recipe(PathSequence, task, store, upto, rated)
     if isinstance(task, Reprofiled):
-        path = task_recipe(task.path, shelf, upto, rated=False)
+        path = task_recipe(task.path, store, upto, rated=False)
         if not rated:
             return path
-        return {"class": "Reprofiled", "path": path, "profile": _profile_recipe(task, shelf, upto)}
-    if _class_of(type(task).__name__) is type(task) and _unchanged(task):
-        return _recipe(type(task), task, shelf, task.s_end if isinstance(task, PathSection) else upto, rated)
+        return {"class": "Reprofiled", "path": path, "profile": _profile_recipe(task, store, upto)}
+    if _class_of(type(task).__name__) is type(task) and _has_own_domain(task):
+        return _recipe(type(task), task, store, task.s_end if isinstance(task, PathSection) else upto, rated)
     recorded = RecordedPath.of(task, None if rated else ConstantRate(1.0), upto)
-    return _recipe(RecordedPath, recorded, shelf, upto, rated)
+    return _recipe(RecordedPath, recorded, store, upto, rated)
 
 
-def task_of(recipe: Any, shelf: Shelf) -> PathTask:
-    """The task of a recipe, with its arrays from ``shelf``.
+def task_of(recipe: Any, store: ArrayStore) -> PathTask:
+    """Return the task of a recipe, with its arrays from ``store``.
 
     Raises:
         InputError: it is no recipe of a task.
     """
     try:
         check_extent(recipe)
-        task = _made(recipe, shelf)
+        task = _make(recipe, store)
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
         raise InputError(f"this is no recipe of a task ({type(error).__name__}: {error})") from error
     if not isinstance(task, PathTask):
@@ -101,28 +102,30 @@ def task_of(recipe: Any, shelf: Shelf) -> PathTask:
     return task
 
 
-def _recipe(cls: type, made: Any, shelf: Shelf, upto: float | None, rated: bool = True) -> dict[str, Any]:
-    values = {name: _value(getattr(made, name), shelf, upto, rated) for name in parameters_of(cls)}
+def _recipe(cls: type, made: Any, store: ArrayStore, upto: float | None, rated: bool = True) -> dict[str, Any]:
+    """Return the recipe of an object that is made again from its constructor's arguments."""
+    values = {name: _value(getattr(made, name), store, upto, rated) for name in parameters_of(cls)}
     return {"class": cls.__name__} | values
 
 
-def _value(value: Any, shelf: Shelf, upto: float | None, rated: bool) -> Any:
+def _value(value: Any, store: ArrayStore, upto: float | None, rated: bool) -> Any:
+    """Return an argument as plain values."""
     if isinstance(value, PathTask):
-        return task_recipe(value, shelf, upto, rated)
+        return task_recipe(value, store, upto, rated)
     if isinstance(value, VelocityProfile):
-        return _recipe(type(value), value, shelf, upto)
+        return _recipe(type(value), value, store, upto)
     if isinstance(value, tuple):
-        return [_value(item, shelf, upto, rated) for item in value]
-    return shelf.put(value) if isinstance(value, np.ndarray) else value
+        return [_value(item, store, upto, rated) for item in value]
+    return store.put(value) if isinstance(value, np.ndarray) else value
 
 
-def _profile_recipe(task: Reprofiled, shelf: Shelf, upto: float | None) -> dict[str, Any]:
-    """The profile of a task if it is one of the library that needs nothing else, or else samples of ϑ."""
+def _profile_recipe(task: Reprofiled, store: ArrayStore, upto: float | None) -> dict[str, Any]:
+    """Return the profile of a task if it is one of the library that needs nothing else, or else samples of ϑ."""
     profile = task.profile
     if isinstance(profile, TabulatedProfile):  # or one that knows more, as TimeOptimal
-        return _recipe(TabulatedProfile, profile, shelf, upto)
+        return _recipe(TabulatedProfile, profile, store, upto)
     known = profile if _class_of(type(profile).__name__) is type(profile) else recorded_profile(task, upto)
-    return _recipe(type(known), known, shelf, upto)
+    return _recipe(type(known), known, store, upto)
 
 
 def _class_of(name: str) -> Any:
@@ -133,67 +136,68 @@ def _class_of(name: str) -> Any:
     return next((one for one in found if isinstance(one, type) and getattr(one, "kept_by_arguments", False)), None)
 
 
-def _unchanged(task: PathTask) -> bool:
-    """Whether a task has the domain that its constructor gave it."""
+def _has_own_domain(task: PathTask) -> bool:
+    """Return whether a task has the domain that its constructor gave it."""
     twin = type(task)(**{name: getattr(task, name) for name in parameters_of(type(task))})
     return (twin.s0, twin.s_end, twin.period) == (task.s0, task.s_end, task.period)
 
 
-def _toolpath_recipe(task: ToolpathTask, shelf: Shelf) -> dict[str, Any]:
+def _toolpath_recipe(task: ToolpathTask, store: ArrayStore) -> dict[str, Any]:
+    """Return the recipe of a task that follows a toolpath."""
     from pathcontrol.toolpaths.recipes import contour_recipe
 
     placed = list(dict.fromkeys(task.contours))
     rank = {contour: i for i, contour in enumerate(placed)}
     return {
         "class": "RecordedToolpath",
-        "paths": [task_recipe(path, shelf) for path in task.paths],
-        "placed": [contour_recipe(contour, shelf.put) for contour in placed],
+        "paths": [task_recipe(path, store) for path in task.paths],
+        "placed": [contour_recipe(contour, store.put) for contour in placed],
         "followed": [rank[contour] for contour in task.contours],
-        **{name: _value(getattr(task, name), shelf, None, True) for name in _TOOLPATH},
+        **{name: _value(getattr(task, name), store, None, True) for name in _TOOLPATH},
         "source": task.drawing.source,
         "unit": task.drawing.unit,
         "posture": task.posture,
     }
 
 
-def _made(recipe: Any, shelf: Shelf, parts: Sequence[Any] = ()) -> Any:
-    """A value of a recipe: an object, an array, a list, what JSON says, or one of ``parts`` made before."""
+def _make(recipe: Any, store: ArrayStore, parts: Sequence[Any] = ()) -> Any:
+    """Return the value of a recipe: an object, an array, a list, a JSON value, or one of ``parts`` made before."""
     if isinstance(recipe, list):
-        return [_made(item, shelf, parts) for item in recipe]
+        return [_make(item, store, parts) for item in recipe]
     if not isinstance(recipe, Mapping):
         return recipe
     if "part" in recipe:
         return parts[recipe["part"]]
     if "class" not in recipe:
-        return shelf.get(recipe)
+        return store.get(recipe)
     if recipe["class"] == "TaskBatch":
         made: list[Any] = []
         for part in recipe["parts"]:
-            made.append(_made(part, shelf, made))
-        return TaskBatch(_made(recipe["tasks"], shelf, made))
+            made.append(_make(part, store, made))
+        return TaskBatch(_make(recipe["tasks"], store, made))
     values = {name: value for name, value in recipe.items() if name != "class"}
     if recipe["class"] == "RecordedToolpath":
-        return _made_toolpath(values, shelf, parts)
+        return _make_toolpath(values, store, parts)
     cls = _class_of(recipe["class"])
     if cls is None:
         names = [place.rpartition(".")[2] for kind in (TASKS, PROFILES) for place in kind.members.values()]
         known = [*filter(_class_of, names), *_PLACES]
         raise InputError(f"class {recipe['class']!r} of a task, expected one of {', '.join(known)}")
-    return _tried(cls(**{name: _made(value, shelf, parts) for name, value in values.items()}))
+    return _try_out(cls(**{name: _make(value, store, parts) for name, value in values.items()}))
 
 
-def _made_toolpath(values: dict[str, Any], shelf: Shelf, parts: Sequence[Any]) -> PathTask:
-    """The toolpath of a recipe."""
+def _make_toolpath(values: dict[str, Any], store: ArrayStore, parts: Sequence[Any]) -> PathTask:
+    """Return the toolpath of a recipe."""
     from pathcontrol.cartesian.recorded_toolpath import RecordedToolpath
     from pathcontrol.toolpaths.recipes import contour_of
 
-    contours = [contour_of(contour, shelf.get) for contour in values.pop("placed")]
-    arguments = {name: _made(value, shelf, parts) for name, value in values.items()}
+    contours = [contour_of(contour, store.get) for contour in values.pop("placed")]
+    arguments = {name: _make(value, store, parts) for name, value in values.items()}
     return RecordedToolpath(placed=contours, **arguments)
 
 
-def _tried(made: Any) -> Any:
-    """Return what was made; a path has to answer at three places, as many a wrong one cannot."""
+def _try_out(made: Any) -> Any:
+    """Check that a path can be evaluated at three places, which wrong ones often cannot; return it."""
     if isinstance(made, PathTask):
         s = np.linspace(*made.sampled_interval, 3)
         for asked, shape in ((made.q_d, (3, made.n)), (made.dq_d, (3, made.n)), (made.theta, (3,))):

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import cloudpickle
 
 from pathcontrol.errors import InputError, PathControlError
-from pathcontrol.simulation.context import Origin
+from pathcontrol.simulation.context import RunContext
 from pathcontrol.simulation.run import Run
 from pathcontrol.sweeps.chunk import Chunk, Job, Piece
 from pathcontrol.sweeps.cluster.user_code import Luggage
@@ -98,7 +98,7 @@ def _moved(run: Run, here: str, home: str) -> Run:
     """The same run, that looks for the meshes of its robot at ``home``."""
     _, (data, config, stored) = run.__reduce__()
     here, home = (json.dumps(folder)[1:-1] for folder in (here, home))
-    return Run(data, config, Origin.load(stored._replace(text=stored.text.replace(here, home))))
+    return Run(data, config, RunContext.load(stored._replace(text=stored.text.replace(here, home))))
 
 
 @contextmanager
