@@ -383,8 +383,8 @@ def test_normals_and_segments_of_the_user_are_kept():
     store = ArrayStore()
     normals = np.array([[0, 0, 1.0], [0, 0.6, 0.8]])
     given = Contour((Polyline([[0, 0, 0], [1, 0, 0]]),), rapid=True, normals=normals)
-    recipes = [contour_recipe(given, store), contour_recipe(Contour((Parabola(),)), store)]
-    kept, parabola = (contour_of(recipe, ArrayStore(store.numbers)) for recipe in recipes)
+    recipes = [contour_recipe(given, store.put), contour_recipe(Contour((Parabola(),)), store.put)]
+    kept, parabola = (contour_of(recipe, ArrayStore(store.numbers).get) for recipe in recipes)
     assert np.array_equal(kept.normals, normals)
     assert kept.rapid
     points = Parabola().point(np.linspace(0, 1, 1001))
