@@ -38,7 +38,7 @@ dask = pytest.importorskip("workers").dask
 distributed = pytest.importorskip("distributed")
 cloudpickle = pytest.importorskip("cloudpickle")
 pytest.importorskip("pyarrow")
-Parcel = pytest.importorskip("pathcontrol.sweeps.cluster.shipping").Parcel
+ShippedJob = pytest.importorskip("pathcontrol.sweeps.cluster.shipping").ShippedJob
 
 ROBOT = pc.load_robot("cicese_2dof")
 CIRCLE = pc.Circle(1.0, 2.0)
@@ -375,7 +375,7 @@ def test_a_parcel_needs_nothing_of_where_it_comes_from(experiment, tmp_path):
     parameters = {"controller.k_p": np.array([500.0, 700.0]), "task.parameters.table": np.array(["more.txt"] * 2)}
     piece = (parameters, np.arange(2))
     here = job(*piece)
-    parcel = pickle.loads(pickle.dumps(Parcel.of(job, {})))
+    parcel = pickle.loads(pickle.dumps(ShippedJob.of(job, {})))
     shutil.move(tmp_path / "home", tmp_path / "away")
     scratch = tmp_path / "scratch"
     scratch.mkdir()
@@ -400,16 +400,16 @@ def test_whole_paths_are_found_too(experiment, tmp_path):
     text = text.replace('"even_more.txt"', f'"{experiment.parent}/even_more.txt"')
     experiment.write_text(text.replace('"mine.py', f'"{experiment.parent}/mine.py'))
     build = swept_experiment(experiment)
-    luggage = build.luggage()
-    assert luggage.home == tmp_path / "home"
-    assert {"experiments/mine.py", "experiments/tables/numbers.csv", "robots/arm.urdf"} < set(luggage.files)
+    pack = build.pack()
+    assert pack.home == tmp_path / "home"
+    assert {"experiments/mine.py", "experiments/tables/numbers.csv", "robots/arm.urdf"} < set(pack.files)
     assert set(build.describe()["files_sha256"]) >= {f"{experiment.parent}/mine.py:Mine", "more.txt"}
     copy = tmp_path / "copy"
-    for place, inside in luggage.files.items():
+    for place, inside in pack.files.items():
         (copy / place).parent.mkdir(parents=True, exist_ok=True)
         (copy / place).write_bytes(inside)
     shutil.move(tmp_path / "home", tmp_path / "away")
-    unpacked = luggage.unpack(copy)
+    unpacked = pack.unpack(copy)
     varied = {"controller.k_p": [500.0], "task.parameters.table": [f"{experiment.parent}/even_more.txt"]}
     [(_, arguments)] = unpacked({name: np.array(values) for name, values in varied.items()}, np.array([0]))
     assert arguments["controller"].task.radius == 1.2

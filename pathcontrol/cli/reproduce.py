@@ -52,9 +52,9 @@ def _import_all(sensitivity: bool) -> None:
         import pathcontrol.view.page.html  # noqa: F401
 
         if sensitivity:
-            from pathcontrol.sweeps.store import parquet
+            from pathcontrol.sweeps.store import load_parquet
 
-            parquet()
+            load_parquet()
 
 
 def _vary(out: Path, samples: int | None, as_json: bool) -> dict[str, Any]:

@@ -54,13 +54,13 @@ def command(
     """
     with uninterrupted():
         from pathcontrol.experiments.sweep_runner import run_sweep
-        from pathcontrol.sweeps.cluster.connection import security_of
-        from pathcontrol.sweeps.store import parquet
+        from pathcontrol.sweeps.cluster.connection import load_security
+        from pathcontrol.sweeps.store import load_parquet
 
-        parquet()
+        load_parquet()
     folder = Path("results") / file.stem if out is None else out
     try:
-        security = security_of(tls_ca, tls_cert, tls_key)
+        security = load_security(tls_ca, tls_cert, tls_key)
         result = run_sweep(file, folder, chunk=chunk, resume=resume, cluster=cluster, security=security, engine=engine)
     except KeyboardInterrupt:
         click.echo(f"--resume goes on with what is in {folder}", err=True)

@@ -13,7 +13,7 @@ from pathcontrol.experiments.load import invalid, load_experiment, read_toml
 from pathcontrol.experiments.sweep_section import SweepSection
 from pathcontrol.experiments.swept import SweptExperiment
 from pathcontrol.simulation.engines import Engine
-from pathcontrol.sweeps.cluster.connection import connected
+from pathcontrol.sweeps.cluster.connection import connect
 from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.sweeps.space import Space
@@ -54,7 +54,7 @@ def run_sweep(
         MissingExtraError: the extra ``sweep`` or, for a cluster, ``cluster`` is not installed.
     """
     section = load_experiment(path).sweep
-    with connected(cluster, security) as client:
+    with connect(cluster, security) as client:
         try:
             if section is None:
                 raise ExperimentError("sweep: missing; add a section [sweep] with its parameters")

@@ -33,7 +33,7 @@ from pathcontrol.experiments.swept_tasks import SweptTask, joined, refuse_sequen
 from pathcontrol.experiments.values import shown
 from pathcontrol.registry import LAWS
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.sweeps.cluster.user_code import Luggage
+from pathcontrol.sweeps.cluster.user_code import PackedBuilder
 from pathcontrol.tasks.task import PathTask
 
 _GAIN = re.compile(r"controller\.(?:parameters\.)?(\w+)(\[\d+\])*")
@@ -76,13 +76,13 @@ class SweptExperiment:
         files = {name: _digest(path) for name, path in self._files()}
         return {"experiment": self._data, "files_sha256": files}
 
-    def luggage(self) -> Luggage:
+    def pack(self) -> PackedBuilder:
         """Itself and these files, for a machine that has neither."""
         base, *paths = (Path(os.path.abspath(path)) for path in (self._base_dir, *dict(self._files()).values()))
         home = Path(os.path.commonpath([base, *paths]))
         files = {str(path.relative_to(home)): path.read_bytes() for path in paths}
         moved = {name: relative(name, base) for name, _ in self._files() if os.path.isabs(name)}
-        return Luggage(home, files, partial(_unpacked, relative(self._data, base), moved, base.relative_to(home)))
+        return PackedBuilder(home, files, partial(_unpacked, relative(self._data, base), moved, base.relative_to(home)))
 
     def _files(self) -> Iterator[tuple[str, Path]]:
         return named_files([self._data, self._varied], self._base_dir)

@@ -1,1 +1,1 @@
-"""Many simulations over a space of parameters: reduced to numbers on the fly, and kept chunk by chunk on disk."""
+"""Sweeps: many simulations over a space of parameters, reduced to numbers and kept chunk by chunk on disk."""

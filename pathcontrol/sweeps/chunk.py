@@ -1,4 +1,4 @@
-"""One chunk of a sweep: its rollouts simulated together, and reduced to numbers."""
+"""A chunk of a sweep: its rollouts are simulated together and reduced to numbers."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ Parts = Sequence[tuple[NDArray[np.intp], Arguments]]
 Build = Callable[[Mapping[str, Array], NDArray[np.int64]], Arguments | Parts]
 #: numbers of a run, each with one entry for each rollout
 Measure = Callable[[Run], Mapping[str, ArrayLike]]
-#: what a chunk is computed of: its parameters (k,) or (k, d) each, and the numbers of its samples (k,)
+#: the input of a chunk: its parameters (k,) or (k, d) each, and the numbers of its samples (k,)
 Piece = tuple[dict[str, Array], NDArray[np.int64]]
 
-#: what is known of each rollout beside its metrics
+#: the outcome of a rollout, beside its metrics
 OUTCOME = ("status", "finish_time", "diverged_time", "reason")
 _BLOCK = 128  # rollouts that are measured together: it bounds the memory for their distances
 _NOT_YOURS = ("first_rollout", "progress")
 
 
 class Chunk(NamedTuple):
-    """What came of some samples.
+    """The results of some samples.
 
     Attributes:
         columns: their numbers and texts by name, (k,) or (k, d) each.
@@ -47,14 +47,14 @@ class Chunk(NamedTuple):
 
 
 class Job(NamedTuple):
-    """How any chunk is computed.
+    """The computation of any chunk.
 
     Attributes:
-        build: from parameters and samples to the arguments of simulations.
-        measure: from a run to numbers, one for each rollout.
-        keep: which histories are kept.
+        build: maps parameters and samples to the arguments of simulations.
+        measure: maps a run to numbers, one for each rollout.
+        keep: the histories to keep.
         at_random: the samples whose histories are kept by chance.
-        engine: which engine the simulations run on where ``build`` says none.
+        engine: the engine of the simulations where ``build`` names none.
     """
 
     build: Build
@@ -69,11 +69,11 @@ class Job(NamedTuple):
         Raises:
             InputError: the parameters, or what was built of them, are refused; the message says of which samples.
         """
-        return _computed(self, parameters, samples)
+        return _compute(self, parameters, samples)
 
 
-def measure_of(wanted: Sequence[str] | Measure | None) -> Measure:
-    """The function that measures: all the usual metrics, those wanted of them, or one's own.
+def make_measure(wanted: Sequence[str] | Measure | None) -> Measure:
+    """Return the function that measures runs: all usual metrics, the ``wanted`` ones, or a function of the user.
 
     Raises:
         UnknownNameError: there is no such metric.
@@ -85,30 +85,31 @@ def measure_of(wanted: Sequence[str] | Measure | None) -> Measure:
     unknown = [name for name in wanted if name not in UNITS]
     if unknown or isinstance(wanted, str):
         raise UnknownNameError(f"metrics = {wanted!r}, expected a list of {', '.join(UNITS)}, or a function of a Run")
-    return lambda run: _some(metrics(run, only=wanted), wanted)
+    return lambda run: _select_metrics(metrics(run, only=wanted), wanted)
 
 
-def _some(values: Mapping[str, ArrayLike], wanted: Sequence[str]) -> dict[str, ArrayLike]:
+def _select_metrics(values: Mapping[str, ArrayLike], wanted: Sequence[str]) -> dict[str, ArrayLike]:
+    """Return the ``wanted`` metrics; raise if one is missing."""
     missing = [name for name in wanted if name not in values]
     if missing:
         raise UnknownNameError(f"metrics = {missing}: not defined for these runs; leave it out")
     return {name: values[name] for name in wanted}
 
 
-def _computed(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int64]) -> Chunk:
-    """What :class:`Job` gives."""
+def _compute(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int64]) -> Chunk:
+    """Simulate and measure samples, as :class:`Job` does."""
     measured: dict[str, Array] = {}
     runs: dict[int, Run] = {}
     try:
         built = job.build(parameters, samples)
         parts = [(np.arange(len(samples)), built)] if isinstance(built, Mapping) else built
         for rows, arguments in parts:
-            run = _simulated(job.engine, samples[rows], arguments)
-            values = _measured(run, job.measure)
+            run = _simulate(job.engine, samples[rows], arguments)
+            values = _measure(run, job.measure)
             _put(measured, values, rows, len(samples))
             for row in _candidates(values, samples[rows], job.keep, job.at_random):
                 at = rows[row]
-                alone = run if run.rollouts == 1 else _alone(job, parameters, samples, at)
+                alone = run if run.rollouts == 1 else _simulate_alone(job, parameters, samples, at)
                 runs[int(samples[at])] = _history(
                     alone, {name: value[at].tolist() for name, value in parameters.items()}
                 )
@@ -120,7 +121,8 @@ def _computed(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int
     return Chunk({"sample": samples, **parameters, **measured}, runs)
 
 
-def _simulated(engine: Engine, samples: NDArray[np.int64], arguments: Arguments) -> Run:
+def _simulate(engine: Engine, samples: NDArray[np.int64], arguments: Arguments) -> Run:
+    """Simulate samples with the built arguments; check that there is one rollout for each."""
     taken = [name for name in _NOT_YOURS if name in arguments]
     if taken:
         raise InputError(f"build gives {', '.join(taken)}, which the sweep sets itself; leave it out")
@@ -139,8 +141,8 @@ def _simulated(engine: Engine, samples: NDArray[np.int64], arguments: Arguments)
     return run
 
 
-def _measured(run: Run, measure: Measure) -> dict[str, Array]:
-    """The outcome and the metrics of each rollout, as if it had been alone, (k,) each."""
+def _measure(run: Run, measure: Measure) -> dict[str, Array]:
+    """Return the outcome and the metrics of each rollout, as if it had been alone, (k,) each."""
     values: dict[str, Array] = {name: np.array(run.array(name)) for name in OUTCOME}
     values["status"] = np.where(unfinished(run), "unfinished", values["status"])
     sound = values["status"] != "diverged"
@@ -155,8 +157,8 @@ def _measured(run: Run, measure: Measure) -> dict[str, Array]:
 
 
 def _blocks(run: Run, some: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], Run]]:
-    """Some rollouts of a run, a few at a time, that end when all of these would have ended alone."""
-    ends = samples_alone(run)
+    """Yield some rollouts of a run, a few at a time, which end when all of these would have ended alone."""
+    ends = count_samples_alone(run)
     for end in np.unique(ends[some]):
         rows = some[ends[some] == end]
         for first in range(0, len(rows), _BLOCK):
@@ -164,14 +166,14 @@ def _blocks(run: Run, some: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp]
             yield block, run.excerpt(block, int(end))
 
 
-def samples_alone(run: Run) -> NDArray[np.intp]:
-    """How many samples of each rollout say something: until it is finished or has diverged, (k,)."""
+def count_samples_alone(run: Run) -> NDArray[np.intp]:
+    """Return the number of samples that each rollout would have alone: until it finished or diverged, (k,)."""
     ends = (run.status == "diverged") | ((run.status == "finished") & (run.config.get("until") == "end"))
     return np.where(ends, own_samples(run), len(run.time))
 
 
 def _put(into: dict[str, Array], values: Mapping[str, Array], rows: NDArray[np.intp], count: int) -> None:
-    """Values of some ``rows`` of ``count``; others are NaN, or empty texts."""
+    """Put values of some ``rows`` into columns of ``count`` rows; others are NaN, or empty texts."""
     for name, value in values.items():
         if value.dtype.kind == "U":
             value = value.astype(object)
@@ -183,7 +185,7 @@ def _put(into: dict[str, Array], values: Mapping[str, Array], rows: NDArray[np.i
 def _candidates(
     values: Mapping[str, Array], samples: NDArray[np.int64], keep: Keep, at_random: NDArray[np.intp]
 ) -> list[int]:
-    """The rows that may have to be kept, whatever the other samples are."""
+    """Return the rows that may have to be kept, regardless of the other samples."""
     if keep.worst and (keep.by not in values or values[keep.by].dtype.kind not in "fiu"):
         known = [name for name in values if name not in OUTCOME]
         raise UnknownNameError(f"keep.by = {keep.by!r}, expected a metric: {', '.join(known)}")
@@ -192,16 +194,16 @@ def _candidates(
     return [row for row, sample in enumerate(samples.tolist()) if sample in chosen]
 
 
-def _alone(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int64], at: int) -> Run:
-    """One sample simulated alone, which says of itself nothing of the chunk that it is in: its own gains, arm, path."""
+def _simulate_alone(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int64], at: int) -> Run:
+    """Simulate one sample alone, so that its run describes its own gains, arm and path, not those of the chunk."""
     built = job.build({name: value[[at]] for name, value in parameters.items()}, samples[[at]])
     [(_, arguments)] = [(0, built)] if isinstance(built, Mapping) else built
-    return _simulated(job.engine, samples[[at]], arguments)
+    return _simulate(job.engine, samples[[at]], arguments)
 
 
 def _history(alone: Run, parameters: Mapping[str, Any]) -> Run:
-    """The run of one sample as far as it says something, and what its ``parameters`` were."""
-    end, sample = int(samples_alone(alone)[0]), int(alone.data["rollout"][0])
+    """Return the run of one sample up to its end, with its ``parameters``."""
+    end, sample = int(count_samples_alone(alone)[0]), int(alone.data["rollout"][0])
     kept = alone.with_data(alone.data.isel(time=slice(0, end)).copy(deep=True))
     kept.config["sweep"] = {"sample": sample, **parameters}
     return kept

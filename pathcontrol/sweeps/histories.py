@@ -1,4 +1,4 @@
-"""Of which rollouts of a sweep the whole history is kept."""
+"""The choice of the rollouts of a sweep whose whole history is kept."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 
-_STREAM = 0x6B656570  # apart from the streams of the design and of the sensors
+_STREAM = 0x6B656570  # a random stream apart from those of the design and of the sensors
 
 
 @dataclass(frozen=True)
@@ -38,16 +38,16 @@ class Keep:
                 raise InputError(f"keep.{name} = {value!r}, expected a whole number from 0")
 
     def at_random(self, samples: int, seed: int) -> NDArray[np.intp]:
-        """The samples that are chosen at random."""
+        """Return the samples that are chosen at random."""
         rng = default_rng(SeedSequence(seed, spawn_key=(_STREAM,)))
         return np.sort(rng.choice(samples, min(self.random, samples), replace=False))
 
     def chosen(self, sample: NDArray[np.int64], by: Array, diverged: NDArray[np.bool_]) -> set[int]:
-        """The worst of some samples and the first that diverged, by their metric and whether they diverged."""
+        """Return the worst of some samples by their metric, and the first that diverged."""
         order = np.lexsort([sample, -by])
         worst = sample[order][~np.isnan(by[order])][: self.worst]
         return {int(i) for i in (*worst, *np.sort(sample[diverged])[: self.diverged])}
 
     def describe(self) -> dict[str, Any]:
-        """All of it, for the record."""
+        """Return all settings, for the definition of a sweep."""
         return asdict(self)

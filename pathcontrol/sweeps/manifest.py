@@ -1,4 +1,4 @@
-"""What a sweep says of itself: its definition, and which files it has with the SHA-256 of each.
+"""The manifest of a sweep: its definition, and its files with the SHA-256 of each.
 
 The manifest is one JSON file, which is written whole. While a sweep goes on, the files of each chunk are noted by one
 more line of ``files.log`` beside it, so that a chunk costs the same however many there are; the lines go into the
@@ -34,13 +34,13 @@ class Manifest:
     """The manifest of the sweep in a folder.
 
     Args:
-        folder: where it is.
+        folder: the folder of the sweep.
         mending: whether lines of the log that are damaged are left out, as what they note can be made again.
 
     Attributes:
-        samples: how many the sweep has.
-        definition: what its numbers depend on.
-        versions: of the packages that took part, one table after another.
+        samples: number of samples of the sweep.
+        definition: everything that its numbers depend on.
+        versions: versions of the packages that took part, one table after another.
         files: the SHA-256 of each file by its place in the folder; ``None`` where it is not known, as the sweep was
             begun by an earlier version.
         listed: whether the sweep has noted its files from the beginning.
@@ -60,29 +60,29 @@ class Manifest:
         self.definition: dict[str, Any] = content["definition"]
         self.versions: list[dict[str, str]] = content["versions"]
         self.listed = "files" in content
-        self.files: dict[str, str | None] = dict(content["files"]) if self.listed else _unlisted(folder)
+        self.files: dict[str, str | None] = dict(content["files"]) if self.listed else _find_files(folder)
         for line in log:
             self._take(line)
 
     @classmethod
     def begin(cls, folder: Path, samples: int, definition: Mapping[str, Any]) -> Manifest:
-        """Write that of a new sweep."""
+        """Write the manifest of a new sweep."""
         _write(folder, samples, definition, [versions()], {})
         return cls(folder)
 
     def note(self, files: Mapping[str, str | None]) -> None:
-        """Note files by their SHA-256, or by ``None`` that they are to go, all of them or none."""
+        """Note files by their SHA-256, or by ``None`` for those to be removed, all of them or none."""
         content = {"files": dict(files)}
         append_line(self.folder / LOG, json.dumps(content | {"sha256": _digest(content)}, sort_keys=True))
         self._take(files)
 
     def settle(self) -> None:
-        """Write the manifest with all that was noted since."""
+        """Write the manifest with all files noted since."""
         _write(self.folder, self.samples, self.definition, self.versions, self.files)
         (self.folder / LOG).unlink(missing_ok=True)
 
     def resume(self, samples: int, definition: Mapping[str, Any]) -> None:
-        """Check that the sweep has so many samples and this definition, and note with which versions it goes on.
+        """Check number of samples and definition of the sweep, and note the versions with which it goes on.
 
         Raises:
             InputError: it has another definition; the message names what differs.
@@ -97,11 +97,12 @@ class Manifest:
             self.versions.append(versions())
 
     def remove(self) -> None:
-        """Leave no manifest behind."""
+        """Remove the manifest and its log."""
         for name in (MANIFEST, LOG):
             (self.folder / name).unlink(missing_ok=True)
 
     def _take(self, files: Mapping[str, str | None]) -> None:
+        """Take noted files into the table."""
         for place, digest in files.items():
             self.files.pop(place, None)
             if digest is not None:
@@ -109,18 +110,19 @@ class Manifest:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what computes the numbers."""
+    """Return the versions of the packages that compute the numbers."""
     return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
 
 
-def _unlisted(folder: Path) -> dict[str, str | None]:
-    """The files of a sweep that was begun by an earlier version."""
+def _find_files(folder: Path) -> dict[str, str | None]:
+    """Return the files of a sweep that was begun by an earlier version."""
     found = sorted([*folder.glob("chunks/*.parquet"), *folder.glob("runs/*.nc")])
     places = (file.relative_to(folder).as_posix() for file in found)
     return {place: None for place in places if _PLACE.fullmatch(place)}
 
 
 def _write(folder: Path, samples: int, definition: Any, which: list[Any], files: Mapping[str, str | None]) -> None:
+    """Write the manifest with its checksum."""
     known = {place: digest for place, digest in sorted(files.items()) if digest is not None}
     content = {"format": FORMAT, "format_version": FORMAT_VERSION, "samples": samples, "definition": definition}
     content |= {"versions": which, "files": known}
@@ -129,12 +131,13 @@ def _write(folder: Path, samples: int, definition: Any, which: list[Any], files:
 
 
 def _digest(content: Mapping[str, Any]) -> str:
-    """That of all a manifest says but versions, which no number is read by, in one way of writing it."""
+    """Return the checksum of a manifest, in a canonical form, without versions, which no number depends on."""
     counted = {name: value for name, value in content.items() if name not in ("versions", "sha256")}
     return hashlib.sha256(json.dumps(counted, sort_keys=True).encode()).hexdigest()
 
 
 def _read(folder: Path) -> dict[str, Any]:
+    """Read the manifest and check its form."""
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(f"there is no sweep in {str(folder)!r}: it has no {MANIFEST}")
@@ -151,13 +154,13 @@ def _read(folder: Path) -> dict[str, Any]:
             f"the sweep in {str(folder)!r} has the format version {content.get('format_version')}, expected "
             f"{FORMAT_VERSION}; read it with the version of pathcontrol that wrote it"
         )
-    if wrong := next(_wrong(content), None):
+    if wrong := next(_find_faults(content), None):
         raise InputError(f"{str(path)!r} cannot be used: {wrong}; {_DAMAGED}")
     return content
 
 
-def _wrong(content: Mapping[str, Any]) -> Iterator[str]:
-    """What a manifest says that none would."""
+def _find_faults(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what is wrong with the content of a manifest."""
     samples, definition, which = (content.get(name) for name in ("samples", "definition", "versions"))
     if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
         yield f"samples = {samples!r:.80}, expected a whole number from 1 to {MOST_SAMPLES}"
@@ -170,12 +173,13 @@ def _wrong(content: Mapping[str, Any]) -> Iterator[str]:
     if not isinstance(which, list) or not which or not all(isinstance(one, dict) for one in which):
         yield "it has no versions"
     if "files" in content or "sha256" in content:  # an earlier version wrote neither
-        yield from _wrong_files(content.get("files"))
+        yield from _find_file_faults(content.get("files"))
         if content.get("sha256") != _digest(content):
             yield "its checksum is another one"
 
 
-def _wrong_files(files: Any, may_go: bool = False) -> Iterator[str]:
+def _find_file_faults(files: Any, may_go: bool = False) -> Iterator[str]:
+    """Yield what is wrong with a table of files."""
     if not isinstance(files, dict):
         yield f"files = {files!r:.80}, expected a table"
         return
@@ -188,7 +192,7 @@ def _wrong_files(files: Any, may_go: bool = False) -> Iterator[str]:
 
 
 def _read_log(path: Path) -> tuple[list[dict[str, str | None]], str]:
-    """The files in the lines of the log, and which lines are not what was written.
+    """Return the lines of the log; a last one without an end was being written when the process was killed.
 
     The last one without an end was being written when the process was killed.
     """
@@ -214,20 +218,21 @@ def _wrong_line(content: Any) -> Iterator[str]:
     if not isinstance(content, dict) or content.keys() != {"files", "sha256"}:
         yield "expected files and their checksum"
         return
-    yield from _wrong_files(content["files"], may_go=True)
+    yield from _find_file_faults(content["files"], may_go=True)
     if content["sha256"] != _digest(content):
         yield "its checksum is another one"
 
 
 def _differences(then: Any, now: Any, key: str = "") -> Iterator[str]:
-    """Where two definitions differ, each as ``key: then …, now …``."""
+    """Yield where two definitions differ, each as ``key: then …, now …``."""
     if isinstance(then, dict) and isinstance(now, Mapping):
         for name in dict.fromkeys((*then, *now)):
             yield from _differences(then.get(name), now.get(name), f"{key}.{name}" if key else name)
     elif then != now:
-        yield f"{key} was {_short(then)}, is now {_short(now)}"
+        yield f"{key} was {_shorten(then)}, is now {_shorten(now)}"
 
 
-def _short(value: Any) -> str:
+def _shorten(value: Any) -> str:
+    """Return a value as JSON, shortened."""
     text = json.dumps(value, ensure_ascii=False)
     return text if len(text) <= 80 else f"{text[:77]}…"

@@ -1,4 +1,4 @@
-"""What the C library does with the memory of arrays that are no more."""
+"""Make glibc keep freed array memory for reuse (mallopt); Dask starts workers with the opposite setting."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _KEPT, _LARGE = 256 << 20, 32 << 20  # bytes
 
 
 def keep_freed_memory() -> None:
-    """Keep up to 256 MiB of freed memory for the next arrays; those above 32 MiB are still given back at once.
+    """Keep up to 256 MiB of freed memory for the next arrays; arrays above 32 MiB are returned at once.
 
     Dask starts its workers with a ``malloc`` that gives everything back, and fetches the memory of every array anew,
     page by page. Without glibc nothing is changed.

@@ -1,4 +1,4 @@
-"""What is wanted of metrics: objectives that are to be small or large, and limits that are to be kept."""
+"""Objectives, metrics that are to be small or large, and limits that they are to keep."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from pathcontrol._arrays import Array
 from pathcontrol.analysis.pareto import non_dominated
 from pathcontrol.errors import InputError, UnknownNameError
 
-#: one metric, several, or several with ``"min"`` or ``"max"`` for each; small is better unless told
+#: one metric, several, or several with ``"min"`` or ``"max"`` for each; ``"min"`` by default
 Objectives = str | Sequence[str] | Mapping[str, str]
-#: of metrics the largest value allowed, or the smallest and the largest, None where there is none
+#: by metric the largest value allowed, or the smallest and the largest, None where there is none
 Limits = Mapping[str, Any]
 
 #: the statuses of samples that are never the best
@@ -24,7 +24,7 @@ _SIGNS = {"min": 1.0, "max": -1.0}
 
 
 def check_objectives(objectives: Objectives) -> dict[str, str]:
-    """``"min"`` or ``"max"`` by metric.
+    """Check the objectives; return ``"min"`` or ``"max"`` by metric.
 
     Raises:
         InputError: there are none, or one is to be something else.
@@ -37,15 +37,16 @@ def check_objectives(objectives: Objectives) -> dict[str, str]:
 
 
 def check_limits(limits: Limits | None) -> dict[str, tuple[float, float]]:
-    """The smallest and the largest value allowed by metric; infinite where there is none.
+    """Check the limits; return the smallest and the largest value allowed by metric, infinite where there is none.
 
     Raises:
         InputError: one is no number, or allows nothing.
     """
-    return {name: _ends(name, given) for name, given in (limits or {}).items()}
+    return {name: _parse_limit(name, given) for name, given in (limits or {}).items()}
 
 
-def _ends(name: str, given: Any) -> tuple[float, float]:
+def _parse_limit(name: str, given: Any) -> tuple[float, float]:
+    """Return the smallest and the largest value of one limit."""
     listed = given.tolist() if isinstance(given, np.ndarray) else given
     ends = tuple(listed) if isinstance(listed, list | tuple) else (None, listed)
     try:
@@ -63,7 +64,7 @@ def _ends(name: str, given: Any) -> tuple[float, float]:
 
 
 def costs(table: xr.Dataset, objectives: Objectives) -> Array:
-    """What is to be small, (sample, d): metrics, negative where they are to be large; inf where one is not known.
+    """Return costs to minimise, (sample, d): metrics, negative where they are to be large; inf where unknown.
 
     Raises:
         UnknownNameError: there is no such metric.
@@ -74,14 +75,14 @@ def costs(table: xr.Dataset, objectives: Objectives) -> Array:
 
 
 def excess(values: Array, ends: tuple[float, float]) -> Array:
-    """How far values are outside a limit, as a share of it; not above 0 inside, inf where one is not known."""
+    """Return how far values are outside a limit, as a share of it; ≤ 0 inside, inf where unknown."""
     low, high = ends
     over = [sign * (values - end) / (abs(end) or 1.0) for sign, end in ((-1.0, low), (1.0, high)) if np.isfinite(end)]
     return np.where(np.isnan(values), np.inf, np.max(over, axis=0))
 
 
 def within(table: xr.Dataset, limits: Limits | None) -> NDArray[np.bool_]:
-    """Which samples keep all limits, (sample,); none that diverged, or did not get as far as it was to.
+    """Return which samples keep all limits, (sample,); none that diverged or did not finish.
 
     Raises:
         UnknownNameError: there is no such metric.
@@ -95,12 +96,12 @@ def within(table: xr.Dataset, limits: Limits | None) -> NDArray[np.bool_]:
 
 
 def failed(table: xr.Dataset) -> NDArray[np.bool_]:
-    """Which samples diverged or did not get there, (sample,): an arm that stands still has the smallest errors."""
+    """Return which samples diverged or did not finish, (sample,): an arm that stands still has the smallest errors."""
     return np.isin(table["status"].to_numpy().astype(str), FAILED)
 
 
 def front(table: xr.Dataset, objectives: Objectives, limits: Limits | None = None) -> xr.Dataset:
-    """The samples within limits that no other one of these beats in all objectives, in order of the first of them.
+    """Return the samples within limits that no other one dominates, in order of the first objective.
 
     Raises:
         UnknownNameError: there is no such metric.
@@ -111,7 +112,7 @@ def front(table: xr.Dataset, objectives: Objectives, limits: Limits | None = Non
 
 
 def metric(table: xr.Dataset, name: str) -> Array:
-    """A metric, (sample,).
+    """Return a metric, (sample,).
 
     Raises:
         UnknownNameError: there is no such metric.

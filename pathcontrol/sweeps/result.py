@@ -1,4 +1,4 @@
-"""What came of a sweep, as it is on disk."""
+"""The result of a sweep, read from its folder."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class SweepResult:
         folder: the folder of the sweep.
 
     Attributes:
-        samples: how many samples the sweep has.
-        definition: what it was defined by: space, seed, metrics, keep and what builds a chunk.
+        samples: number of samples of the sweep.
+        definition: its definition: space, seed, metrics, keep and the builder of chunks.
 
     Raises:
         InputError: there is no sweep, or its manifest or a chunk is damaged or missing; the message names the files,
@@ -48,7 +48,7 @@ class SweepResult:
 
     @property
     def finished(self) -> int:
-        """How many samples have their numbers."""
+        """The number of samples that have their numbers."""
         return len(self._store.columns(["sample"])["sample"])
 
     @property
@@ -57,7 +57,7 @@ class SweepResult:
         return self._store.kept()
 
     def run(self, sample: int) -> Run:
-        """The history of a sample that is kept, a run of one rollout; ``run.config["sweep"]`` has its parameters.
+        """Return the kept history of a sample, a run of one rollout; ``run.config["sweep"]`` has its parameters.
 
         Raises:
             InputError: it is not kept, or its file is damaged or missing.
@@ -68,11 +68,11 @@ class SweepResult:
         return Run.load(self.history(sample))
 
     def history(self, sample: int) -> Path:
-        """The file of the history of a sample."""
+        """Return the file of the history of a sample."""
         return self._store.run_file(sample)
 
     def histories(self, worst: int | None = None) -> dict[str, Run]:
-        """The kept histories by number and parameters of their samples, the worst first, to be filmed or compared.
+        """Return the kept histories by number and parameters of their samples, the worst first.
 
         What diverged comes first, then the largest values of the metric by which histories were kept. Histories whose
         files are damaged or missing are left out, with a warning.
@@ -92,17 +92,17 @@ class SweepResult:
         if badness.ndim != 1 or badness.dtype.kind not in "biuf":
             raise InputError(f"{self.kept_by}, by which histories are kept, is {badness.dtype}, expected numbers")
         order = np.argsort(np.where(columns["status"][rows] == "diverged", -np.inf, -badness), kind="stable")
-        return self._readable([kept[i] for i in order], worst)
+        return self._load_histories([kept[i] for i in order], worst)
 
-    def _readable(self, samples: Sequence[int], most: int | None) -> dict[str, Run]:
-        """The first histories of ``samples`` that can be read, by their names."""
+    def _load_histories(self, samples: Sequence[int], most: int | None) -> dict[str, Run]:
+        """Return the first histories of ``samples`` that can be read, by their names."""
         found: dict[str, Run] = {}
         lost: list[str] = []
         for sample in samples:
             if len(found) == most:
                 break
             try:
-                name, run = self._named(sample)
+                name, run = self._name_history(sample)
                 found[name] = run
             except InputError as error:
                 lost.append(str(error))
@@ -117,20 +117,23 @@ class SweepResult:
         """The metric whose largest values are the worst ones."""
         return str(self.definition.get("keep", {}).get("by", Keep.by))
 
-    def _named(self, sample: int) -> tuple[str, Run]:
+    def _name_history(self, sample: int) -> tuple[str, Run]:
+        """Return the name and the history of a sample."""
         run = self.run(sample)
         values = {name: value for name, value in run.config["sweep"].items() if name != "sample"}
         return f"{sample}: {readable_parameters(values, 3)}", run
 
     def table(self) -> xr.Dataset:
-        """The numbers of all finished samples, over ``sample``: outcome and metrics, and as coordinates the parameters.
+        """Return the numbers of all finished samples, over ``sample``.
 
-        Of a rollout that diverged all metrics are NaN; its status, ``diverged_time`` and ``reason`` say why.
+        Variables are outcome and metrics, coordinates the parameters.
+
+        For a rollout that diverged all metrics are NaN; its status, ``diverged_time`` and ``reason`` say why.
         """
         return dataset(self._store.columns(), self.definition["space"]["parameters"])
 
     def pareto(self, objectives: Objectives, limits: Limits | None = None) -> xr.Dataset:
-        """The Pareto front: rows of the table that no other row beats in all objectives, in order of the first one.
+        """Return the Pareto front: rows of the table that no other row dominates, in order of the first objective.
 
         Equal rows are all on it; what diverged, or has an objective that is not finite, never is.
 
@@ -152,7 +155,7 @@ class SweepResult:
 
 
 def dataset(columns: Mapping[str, Array], parameters: Collection[str]) -> xr.Dataset:
-    """Columns of numbers and texts, (k,) or (k, d) each, over their column ``sample``: parameters as coordinates."""
+    """Return columns of numbers and texts, (k,) or (k, d) each, over ``sample``, with parameters as coordinates."""
     coords: dict[str, Any] = {"sample": columns["sample"]}
     values: dict[str, Any] = {}
     for name, column in columns.items():
@@ -163,5 +166,6 @@ def dataset(columns: Mapping[str, Array], parameters: Collection[str]) -> xr.Dat
 
 
 def _labels(name: str) -> dict[str, str]:
+    """Return the attributes of a column."""
     _, unit, meaning = OUTCOMES.get(name, ((), UNITS.get(name, ""), LABELS.get(name, "")))
     return ({"long_name": meaning} if meaning else {}) | ({"units": unit} if unit else {})

@@ -1,4 +1,4 @@
-"""Where the samples of a sweep are: grids, random points, Latin hypercubes, Sobol sequences, or those given."""
+"""The samples of a sweep: grids, random points, Latin hypercubes, Sobol sequences, or given ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.random import SeedSequence, default_rng
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 
-MOST_SAMPLES, MOST_NUMBERS = 10**7, 10**8  # that are in memory together
+MOST_SAMPLES, MOST_NUMBERS = 10**7, 10**8  # limits of what is in memory together
 _TOLD = 100  # values that a record lists; of more, their number and a digest
 
 
@@ -24,90 +24,90 @@ class Choice(NamedTuple):
     values: Array
 
     def at(self, u: Array) -> Array:
-        """The values for u (N, 1) in [0, 1), each equally often."""
+        """Return the values for u (N, 1) in [0, 1), each equally often."""
         return self.values[np.minimum((u[:, 0] * len(self.values)).astype(np.intp), len(self.values) - 1)]
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """() of numbers, (1,) of vectors, which are chosen as a whole."""
+        """The shape () for numbers, (1,) for vectors, which are chosen as a whole."""
         return ()
 
     def describe(self) -> dict[str, Any]:
-        """The values, for the record."""
+        """Return the values, for the definition of a sweep."""
         if len(self.values) <= _TOLD:
             return {"values": self.values.tolist()}
         return {"count": len(self.values), "sha256": digest([self.values])}
 
 
 class Distribution(NamedTuple):
-    """A frozen distribution of scipy.stats, of a number or of a vector whose components are independent."""
+    """A frozen distribution of scipy.stats, for a number or for a vector whose components are independent."""
 
     frozen: Any
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """() of a number, (d,) of a vector."""
+        """The shape () of a number, (d,) of a vector."""
         return np.shape(self.frozen.ppf(0.5))
 
     def at(self, u: Array) -> Array:
-        """Its quantiles at u (N, d)."""
+        """Return the quantiles at u (N, d)."""
         return np.asarray(self.frozen.ppf(u if self.shape else u[:, 0]))
 
     def describe(self) -> dict[str, Any]:
-        """Its name and arguments, for the record."""
+        """Return name and arguments, for the definition of a sweep."""
         kwds = {name: np.asarray(value).tolist() for name, value in self.frozen.kwds.items()}
         args = [np.asarray(value).tolist() for value in self.frozen.args]
         return {"distribution": self.frozen.dist.name, "args": args, **kwds}
 
 
 class Space:
-    """Named parameters and how samples of them are drawn; make one with :meth:`grid`, :meth:`random` and so on.
+    """Named parameters with a rule to draw samples; make one with :meth:`grid`, :meth:`random` and so on.
 
     A parameter is a frozen distribution of ``scipy.stats``, such as ``stats.uniform(1, 4)`` or with arrays as its
     arguments that of a vector, or a list of values, of which each is as likely as any other. A value is a number, a
     text or a vector. Distributions are sampled at their quantiles of points in the unit cube.
 
     Attributes:
-        names: of the parameters.
-        method: how the samples are drawn.
-        samples: how many there are.
+        names: names of the parameters.
+        method: the rule by which samples are drawn.
+        samples: number of samples.
     """
 
     def __init__(self, parameters: Mapping[str, Any], method: str, samples: int | None) -> None:
         if not isinstance(parameters, Mapping) or not parameters:
             raise InputError(f"parameters = {parameters!r}, expected a dict with a parameter at least")
-        self._parameters = {str(name): _parameter(name, given) for name, given in parameters.items()}
+        self._parameters = {str(name): _check_parameter(name, given) for name, given in parameters.items()}
         self.names, self.method = tuple(self._parameters), method
-        self.samples = self._count() if samples is None else check_whole("samples", samples)
+        self.samples = self._count_samples() if samples is None else check_whole("samples", samples)
         self._check_size()
 
     @classmethod
     def grid(cls, parameters: Mapping[str, Any]) -> Self:
-        """Every combination of the values of all parameters; the last one changes first."""
+        """Make a space with every combination of the values of all parameters; the last one changes first."""
         return cls(parameters, "grid", None)
 
     @classmethod
     def given(cls, parameters: Mapping[str, Any]) -> Self:
-        """The samples themselves: of each parameter a value for each sample, (N,) or (N, d)."""
+        """Make a space of given samples: for each parameter a value for each sample, (N,) or (N, d)."""
         return cls(parameters, "given", None)
 
     @classmethod
     def random(cls, parameters: Mapping[str, Any], samples: int) -> Self:
-        """Independent random samples; fewer of them are the first ones of more."""
+        """Make a space of independent random samples; fewer of them are the first ones of more."""
         return cls(parameters, "random", samples)
 
     @classmethod
     def latin_hypercube(cls, parameters: Mapping[str, Any], samples: int) -> Self:
-        """A Latin hypercube: of each parameter one sample in each of N equally likely intervals."""
+        """Make a Latin hypercube: one sample of each parameter in each of N equally likely intervals."""
         return cls(parameters, "lhs", samples)
 
     @classmethod
     def sobol(cls, parameters: Mapping[str, Any], samples: int) -> Self:
-        """A scrambled Sobol sequence; best with a power of 2 of samples, fewer are the first ones of more."""
+        """Make a scrambled Sobol sequence; best with a power of 2 of samples, fewer are the first ones of more."""
         return cls(parameters, "sobol", samples)
 
     def design(self, seed: int = 0) -> dict[str, Array]:
-        """All samples: of each parameter its values, (N,) or (N, d). It depends on ``seed`` and on nothing else."""
+        """Return all samples: the values of each parameter, (N,) or (N, d), which depend on ``seed`` alone."""
         if self.method == "grid":
             sizes = [len(values) for values in self._choices()]
             which = np.indices(sizes).reshape(len(sizes), -1)
@@ -118,25 +118,27 @@ class Space:
 
     @property
     def width(self) -> int:
-        """How many numbers make a sample: the components of all parameters."""
+        """The count of numbers in a sample: the components of all parameters."""
         return sum(self._widths())
 
     def at(self, cube: Array) -> dict[str, Array]:
-        """Of each parameter its quantiles at points (N, :attr:`width`) of the unit cube, (N,) or (N, d)."""
+        """Return the quantiles of each parameter at points (N, :attr:`width`) of the unit cube, (N,) or (N, d)."""
         ends = list(itertools.accumulate(self._widths()))
-        inside = np.clip(cube, 2.0**-54, 1 - 2.0**-53)  # where no quantile is infinite
+        inside = np.clip(cube, 2.0**-54, 1 - 2.0**-53)  # so that no quantile is infinite
         parts = np.split(inside, ends[:-1], axis=1)
         return {name: p.at(u) for (name, p), u in zip(self._parameters.items(), parts, strict=True)}
 
     def _widths(self) -> list[int]:
+        """Return the number of components of each parameter."""
         return [math.prod(parameter.shape) for parameter in self._parameters.values()]
 
     def describe(self) -> dict[str, Any]:
-        """Everything that makes the samples, for the record."""
+        """Return everything that determines the samples, for the definition of a sweep."""
         parameters = {name: parameter.describe() for name, parameter in self._parameters.items()}
         return {"method": self.method, "samples": self.samples, "parameters": parameters}
 
     def _choices(self) -> list[Array]:
+        """Return the values of all parameters that are lists."""
         return [parameter.values for parameter in self._parameters.values() if isinstance(parameter, Choice)]
 
     def _check_size(self) -> None:
@@ -145,7 +147,7 @@ class Space:
         Raises:
             InputError: they do not.
         """
-        most = min(MOST_SAMPLES, max(1, MOST_NUMBERS // max(1, self._numbers())))
+        most = min(MOST_SAMPLES, max(1, MOST_NUMBERS // max(1, self._count_numbers())))
         if self.samples > most:
             sizes = " × ".join(str(len(values)) for values in self._choices()) if self.method == "grid" else ""
             raise InputError(
@@ -154,14 +156,15 @@ class Space:
                 + (", as by Space.sobol or a coarser grid" if sizes else ", or several sweeps with a seed each")
             )
 
-    def _numbers(self) -> int:
-        """How many numbers the parameters of a sample are."""
+    def _count_numbers(self) -> int:
+        """Return the count of numbers in the parameters of a sample."""
         return sum(
             int(np.prod(p.values.shape[1:])) if isinstance(p, Choice) else math.prod(p.shape)
             for p in self._parameters.values()
         )
 
-    def _count(self) -> int:
+    def _count_samples(self) -> int:
+        """Return the number of samples of a grid or of given ones."""
         for name, parameter in self._parameters.items():
             if not isinstance(parameter, Choice):
                 kind = parameter.frozen.dist.name
@@ -179,7 +182,7 @@ class Space:
 
 
 def digest(arrays: list[Array]) -> str:
-    """SHA-256 of the values, kinds and shapes of arrays."""
+    """Return the SHA-256 of the values, kinds and shapes of arrays."""
     found = hashlib.sha256()
     for array in arrays:
         found.update(f"{array.dtype.str}{array.shape}".encode())
@@ -188,12 +191,12 @@ def digest(arrays: list[Array]) -> str:
 
 
 def check_seed(seed: Any) -> int:
-    """A whole number from 0."""
+    """Check that a seed is a whole number from 0; return it."""
     return check_whole("seed", seed, 0)
 
 
 def unit_cube(method: str, samples: int, width: int, seed: int) -> Array:
-    """Points (samples, width) of the unit cube."""
+    """Return points (samples, width) of the unit cube."""
     from scipy.stats import qmc
 
     rng = default_rng(SeedSequence(check_seed(seed)))
@@ -204,7 +207,8 @@ def unit_cube(method: str, samples: int, width: int, seed: int) -> Array:
     return qmc.Sobol(width, rng=rng).random_base2((samples - 1).bit_length())[:samples]
 
 
-def _parameter(name: str, given: Any) -> Choice | Distribution:
+def _check_parameter(name: str, given: Any) -> Choice | Distribution:
+    """Check a parameter; return it as choice or distribution."""
     if hasattr(given, "ppf"):
         parameter = Distribution(given)
         median = np.asarray(given.ppf(0.5))
@@ -226,7 +230,7 @@ def _parameter(name: str, given: Any) -> Choice | Distribution:
 
 
 def check_whole(name: str, value: Any, least: int = 1) -> int:
-    """A whole number not below ``least``."""
+    """Check that a value is a whole number not below ``least``; return it."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise InputError(f"{name} = {value!r}, expected a whole number from {least}")
     return int(value)

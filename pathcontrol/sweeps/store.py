@@ -1,4 +1,4 @@
-"""The folder of a sweep: a manifest, one Parquet file a chunk, and the runs that are kept.
+"""The folder of a sweep: a manifest, one Parquet file for each chunk, and the kept runs.
 
 Every file appears whole or not at all, in this order: the histories of a chunk, its table, and their place in the
 manifest, with which they count. What a killed process leaves behind is a chunk that is there or is not, and files that
@@ -32,30 +32,30 @@ _RESUME = "resume the sweep to make it again"
 _TOLD = 5  # damaged files that a message names
 
 
-def parquet() -> ModuleType:
-    """The module that reads and writes Parquet.
+def load_parquet() -> ModuleType:
+    """Return the module that reads and writes Parquet.
 
     Raises:
         MissingExtraError: it is not installed.
     """
     try:
-        import pyarrow.parquet
+        import pyarrow.load_parquet
     except ImportError as error:
         raise MissingExtraError("pyarrow", "sweep", "the table of a sweep") from error
-    return pyarrow.parquet
+    return pyarrow.load_parquet
 
 
 class Store:
-    """What is on disk of a sweep.
+    """The files of a sweep on disk.
 
     Args:
-        folder: where it is; its manifest is there.
+        folder: the folder of the sweep, with its manifest.
         mending: whether it is opened to be made whole, so that damaged files are no error.
 
     Attributes:
         folder: as given.
-        manifest: what the sweep says of itself.
-        samples: how many it has.
+        manifest: the manifest of the sweep.
+        samples: number of its samples.
 
     Raises:
         InputError: there is no sweep, its manifest is damaged, or unless it is mended, a chunk is.
@@ -65,7 +65,7 @@ class Store:
         self.folder = Path(folder)
         self.manifest = Manifest(self.folder, mending)
         self.samples = self.manifest.samples
-        self._parquet = parquet()
+        self._parquet = load_parquet()
         self._known: dict[tuple[str, tuple[str, ...]], dict[str, Array]] = {}
         if not mending:
             self._check()
@@ -94,7 +94,7 @@ class Store:
 
     @classmethod
     def resume(cls, folder: str | Path, samples: int, definition: Mapping[str, Any]) -> Store:
-        """Open the sweep on disk to go on with it; what is damaged or missing is told, and forgotten to be made again.
+        """Open the sweep on disk to continue it; warn of damaged or missing files, and forget them.
 
         Raises:
             InputError: it has another definition; the message names what differs.
@@ -106,7 +106,7 @@ class Store:
         return store
 
     def settle(self) -> None:
-        """Have the manifest note all files; leave no folder behind that holds no number, so that another may begin."""
+        """Have the manifest note all files; remove a folder without any numbers, so that another sweep may begin."""
         if self._chunks():
             self.manifest.settle()
             return
@@ -114,7 +114,7 @@ class Store:
         _remove_empty(self.folder)
 
     def _check(self) -> None:
-        """Tell what has no checksum, and refuse chunks that are not what was written."""
+        """Warn if there are no checksums, and refuse damaged chunks."""
         if not self.manifest.listed:
             warnings.warn(
                 f"the sweep in {str(self.folder)!r} has no checksums, as it was begun by an earlier version: damage "
@@ -122,11 +122,11 @@ class Store:
                 PathControlWarning,
                 stacklevel=4,
             )
-        if bad := self._damaged("chunks"):
-            raise InputError(f"the sweep in {str(self.folder)!r} is damaged: {_listed(bad)}; {_RESUME}")
+        if bad := self._find_damaged("chunks"):
+            raise InputError(f"the sweep in {str(self.folder)!r} is damaged: {_describe_files(bad)}; {_RESUME}")
 
-    def _damaged(self, kind: str) -> dict[str, str]:
-        """What is wrong with the noted files of a kind that are not what was written, by their place."""
+    def _find_damaged(self, kind: str) -> dict[str, str]:
+        """Return what is wrong with the noted files of a kind that are damaged, by their place."""
         found = {}
         for place in self._places(kind):
             try:
@@ -136,7 +136,7 @@ class Store:
         return found
 
     def _content(self, place: str) -> bytes:
-        """The bytes of a noted file.
+        """Return the bytes of a noted file.
 
         Raises:
             InputError: it is missing, or damaged.
@@ -153,9 +153,9 @@ class Store:
         return content
 
     def _forget_damaged(self) -> None:
-        """Forget damaged and missing files, and the chunks of histories that are, so that they are computed again."""
+        """Forget damaged and missing files, and the chunks of such histories, so that they are computed again."""
         self._adopt()
-        bad = self._damaged("chunks") | self._damaged("runs")
+        bad = self._find_damaged("chunks") | self._find_damaged("runs")
         gone = set(bad)
         if self.manifest.broken:
             bad = {LOG: self.manifest.broken} | bad
@@ -166,13 +166,13 @@ class Store:
             self.manifest.files.pop(place, None)
         if bad:
             warnings.warn(
-                f"the sweep in {str(self.folder)!r} is damaged, and is made again there: {_listed(bad)}",
+                f"the sweep in {str(self.folder)!r} is damaged, and is made again there: {_describe_files(bad)}",
                 PathControlWarning,
                 stacklevel=6,
             )
 
     def _adopt(self) -> None:
-        """Give the files of a sweep of an earlier version, which has none, their checksums, if they can be read."""
+        """Give checksums to the readable files of a sweep of an earlier version, which has none."""
         if self.manifest.listed:
             return
         warnings.warn(
@@ -191,7 +191,7 @@ class Store:
         self.manifest.listed = True
 
     def missing(self, chunk: int) -> list[NDArray[np.int64]]:
-        """The samples that have no numbers yet, at most ``chunk`` neighbours together."""
+        """Return the samples without numbers, at most ``chunk`` consecutive ones together."""
         done = np.zeros(self.samples, dtype=bool)
         for place in self._chunks():
             done[self._read(place, ["sample"])["sample"]] = True
@@ -200,12 +200,12 @@ class Store:
         return [s[i : i + chunk].astype(np.int64) for s in stretches for i in range(0, len(s), chunk)]
 
     def write(self, chunk: Chunk, keep: Keep, at_random: NDArray[np.intp]) -> None:
-        """Add a chunk: histories that are to be kept so far, its table, and their checksums, with which it counts.
+        """Add a chunk: the histories to be kept so far, its table, and their checksums, with which it counts.
 
         Raises:
             StorageError: the disk is full, or does not take them; nothing of the chunk is left then.
         """
-        chosen = self._chosen(keep, at_random, chunk.columns) if chunk.runs else set()
+        chosen = self._choose_histories(keep, at_random, chunk.columns) if chunk.runs else set()
         notes: dict[str, str | None] = {}
         try:
             for number, run in chunk.runs.items():
@@ -231,18 +231,18 @@ class Store:
         return {place: hashlib.sha256(memory.getbuffer()).hexdigest()}
 
     def columns(self, names: list[str] | None = None) -> dict[str, Array]:
-        """The finished samples in order, their numbers and texts, (k,) or (k, d) each; NaN or "" where one has none."""
-        return _joined([self._read(place, names) for place in self._chunks()])
+        """Return the columns of the finished samples in order, (k,) or (k, d) each; NaN or "" without a value."""
+        return _join([self._read(place, names) for place in self._chunks()])
 
     def tidy(self, keep: Keep, at_random: NDArray[np.intp]) -> None:
-        """Remove the histories that need not be kept, and what a killed process left behind.
+        """Remove histories that need not be kept, and the remains of a killed process.
 
         Chunks of a complete sweep that lack a history to be kept are told, and forgotten to be made again.
         """
         for unfinished in _UNFINISHED:
             for left in self.folder.glob(unfinished):
                 left.unlink()
-        chosen = self._chosen(keep, at_random)
+        chosen = self._choose_histories(keep, at_random)
         if not self.missing(self.samples):  # else another sample may be chosen instead
             self._forget_without(chosen)
         if needless := [_run_place(other) for other in self.kept() if other not in chosen]:
@@ -265,16 +265,19 @@ class Store:
             )
 
     def _remove(self, places: Iterable[str]) -> None:
+        """Remove files."""
         for place in places:
             (self.folder / place).unlink(missing_ok=True)
 
-    def _chosen(self, keep: Keep, at_random: NDArray[np.intp], more: Mapping[str, Array] | None = None) -> set[int]:
-        """The samples whose history is to be kept, of those that are there and ``more``."""
+    def _choose_histories(
+        self, keep: Keep, at_random: NDArray[np.intp], more: Mapping[str, Array] | None = None
+    ) -> set[int]:
+        """Return the samples whose history is to be kept, among those on disk and ``more``."""
         if not (keep.worst or keep.diverged):
             return set(at_random.tolist())
         names = ["sample", "status"] + ([keep.by] if keep.worst else [])
-        chunks = [self._remembered(place, names) for place in self._chunks()]
-        found = _joined(chunks + ([] if more is None else [{name: more[name] for name in names}]))
+        chunks = [self._read_once(place, names) for place in self._chunks()]
+        found = _join(chunks + ([] if more is None else [{name: more[name] for name in names}]))
         count = len(found["sample"])
         diverged = found["status"] == "diverged" if count else np.zeros(0, dtype=bool)
         by = found.get(keep.by, np.full(count, np.nan))
@@ -282,18 +285,19 @@ class Store:
             raise InputError(f"{keep.by}, by which histories are kept, is {by.dtype}, expected numbers")
         return set(at_random.tolist()) | keep.chosen(found["sample"], by, diverged)
 
-    def _remembered(self, place: str, names: list[str]) -> dict[str, Array]:
+    def _read_once(self, place: str, names: list[str]) -> dict[str, Array]:
+        """Return columns of a chunk, read only once."""
         key = (place, tuple(names))
         if key not in self._known:
             self._known[key] = self._read(place, names)
         return self._known[key]
 
     def kept(self) -> list[int]:
-        """The samples whose history is kept."""
+        """Return the samples whose history is kept."""
         return sorted(_sample(place) for place in self._places("runs"))
 
     def run_file(self, sample: int) -> Path:
-        """Where the history of a sample is, or would be."""
+        """Return the file of the history of a sample, which need not exist."""
         return self.folder / _run_place(sample)
 
     def check_run(self, sample: int) -> None:
@@ -308,13 +312,15 @@ class Store:
             raise InputError(f"{str(self.run_file(sample))!r}: {error}; {_RESUME}") from error
 
     def _chunks(self) -> list[str]:
+        """Return the noted chunks, in order."""
         return self._places("chunks")
 
     def _places(self, kind: str) -> list[str]:
-        """The noted files of a kind, in order."""
+        """Return the noted files of a kind, in order."""
         return sorted(place for place in self.manifest.files if place.startswith(kind))
 
     def _read(self, place: str, names: list[str] | None) -> dict[str, Array]:
+        """Read columns of a chunk and check them."""
         import pyarrow as pa
 
         try:
@@ -348,42 +354,46 @@ def _check_samples(sample: Array | None, samples: int) -> None:
 
 
 def _file_digest(path: Path) -> str:
+    """Return the SHA-256 of a file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _run_place(sample: int) -> str:
+    """Return the place of the history of a sample."""
     return f"runs/{sample:09d}.nc"
 
 
 def _sample(place: str) -> int:
-    """The sample of a history."""
+    """Return the sample of a history."""
     return int(Path(place).stem)
 
 
 def _samples(place: str) -> range:
-    """The samples of a chunk."""
+    """Return the samples of a chunk."""
     first, last = map(int, Path(place).stem.split("-"))
     return range(first, last + 1)
 
 
-def _listed(bad: Mapping[str, str]) -> str:
+def _describe_files(bad: Mapping[str, str]) -> str:
+    """Return the damaged files in words."""
     told = [f"{place} ({what})" for place, what in list(bad.items())[:_TOLD]]
     more = len(bad) - len(told)
     return ", ".join(told) + (f" and {more} more" if more else "")
 
 
-def _joined(chunks: list[dict[str, Array]]) -> dict[str, Array]:
-    """The rows of all chunks in the order of their samples."""
+def _join(chunks: list[dict[str, Array]]) -> dict[str, Array]:
+    """Return the rows of all chunks in the order of their samples."""
     if not chunks:
         return {"sample": np.empty(0, dtype=np.int64)}
     every = dict.fromkeys(name for chunk in chunks for name in chunk)
-    found = {name: np.concatenate([_filled(chunk, name, chunks) for chunk in chunks]) for name in every}
+    found = {name: np.concatenate([_fill_column(chunk, name, chunks) for chunk in chunks]) for name in every}
     _, order = np.unique(found["sample"], return_index=True)
     return {name: values[order] for name, values in found.items()}
 
 
 def _column(values: Array) -> Any:
+    """Return values as a column of Arrow."""
     import pyarrow as pa
 
     if values.ndim == 1:
@@ -395,6 +405,7 @@ def _column(values: Array) -> Any:
 
 
 def _values(column: Any) -> Array:
+    """Return a column of Arrow as an array."""
     import pyarrow as pa
 
     combined = column.combine_chunks()
@@ -406,8 +417,8 @@ def _values(column: Any) -> Array:
     return values.astype(str) if values.dtype == object else values
 
 
-def _filled(chunk: Mapping[str, Array], name: str, chunks: list[dict[str, Array]]) -> Array:
-    """A column of a chunk; where another chunk alone has it, as many without a value."""
+def _fill_column(chunk: Mapping[str, Array], name: str, chunks: list[dict[str, Array]]) -> Array:
+    """Return a column of a chunk, without values where only other chunks have it."""
     if name in chunk:
         return chunk[name]
     like = next(other[name] for other in chunks if name in other)

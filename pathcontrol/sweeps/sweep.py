@@ -1,4 +1,4 @@
-"""One call from a space of parameters to a table of numbers on disk."""
+"""The function :func:`sweep`, from a space of parameters to a table of numbers on disk."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.engines import Engine, settle_engine
-from pathcontrol.sweeps.chunk import Build, Chunk, Job, Measure, Piece, measure_of
-from pathcontrol.sweeps.cluster.connection import connected
-from pathcontrol.sweeps.cluster.dispatch import Desk
+from pathcontrol.sweeps.chunk import Build, Chunk, Job, Measure, Piece, make_measure
+from pathcontrol.sweeps.cluster.connection import connect
+from pathcontrol.sweeps.cluster.dispatch import Dispatcher
 from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.manifest import MANIFEST
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.sweeps.space import Space, check_seed, digest
-from pathcontrol.sweeps.store import Store, parquet
+from pathcontrol.sweeps.store import Store, load_parquet
 
 if TYPE_CHECKING:
     from distributed import Client, Security
@@ -65,16 +65,16 @@ def sweep(
         out: the folder of the sweep, made if need be.
         metrics: names of some of those of :func:`pathcontrol.metrics`, or a function from a :class:`Run` to numbers
             by name, one for each rollout; default all the usual ones.
-        chunk: how many samples are simulated together, and lost if the process is killed.
+        chunk: number of samples that are simulated together, and lost if the process is killed.
         keep: the rollouts whose whole history is kept; default none.
-        seed: where the random numbers of the design and of the choice of histories begin.
+        seed: seed of the random numbers of the design and of the choice of histories.
         resume: go on with the sweep in ``out``, if there is one.
         progress: show a bar with the time left on standard error when it takes longer than two seconds.
         cluster: a Dask cluster whose workers compute the chunks: the address of its scheduler, as
             ``"tcp://host:8786"``, its scheduler file, or a ``distributed.Client``; default this process. The table and
             the histories are the same.
         security: certificates for TLS, a ``distributed.Security``, where the cluster asks for some.
-        engine: which engine runs the simulations, as :func:`simulate` takes it, where ``build`` says none.
+        engine: the engine of the simulations, as for :func:`simulate`, where ``build`` names none.
 
     Raises:
         ClusterError: the cluster does not answer or cannot go on, or a worker has other versions than this process.
@@ -86,16 +86,16 @@ def sweep(
     if isinstance(chunk, bool) or not isinstance(chunk, int) or chunk < 1:
         raise InputError(f"chunk = {chunk!r}, expected a whole number from 1")
     engine = settle_engine(engine)
-    keep, measure, seed = Keep() if keep is None else keep, measure_of(metrics), check_seed(seed)
+    keep, measure, seed = Keep() if keep is None else keep, make_measure(metrics), check_seed(seed)
     if not isinstance(keep, Keep):
         raise InputError(f"keep = {keep!r}, expected a Keep, such as Keep(worst=5), or None")
-    with connected(cluster, security) as client:
+    with connect(cluster, security) as client:
         design = space.design(seed)
         job = Job(build, measure, keep, keep.at_random(space.samples, seed), engine)
-        computed = partial(_computed_here, job) if client is None else Desk(client, job).chunks
+        computed = partial(_compute_here, job) if client is None else Dispatcher(client, job).chunks
         definition = _definition(build, space, design, metrics, keep, seed)
         definition |= {"engine": engine}
-        with opened(Path(out), space.samples, definition, resume) as store:
+        with open_store(Path(out), space.samples, definition, resume) as store:
             store.tidy(keep, job.at_random)
             missing, done = store.missing(chunk), 0
             pieces = (({name: values[samples] for name, values in design.items()}, samples) for samples in missing)
@@ -107,19 +107,20 @@ def sweep(
     return SweepResult(out)
 
 
-def _computed_here(job: Job, pieces: Iterable[Piece]) -> Generator[Chunk]:
+def _compute_here(job: Job, pieces: Iterable[Piece]) -> Generator[Chunk]:
+    """Yield the chunks of all pieces, computed in this process."""
     for parameters, samples in pieces:
         yield job(parameters, samples)
 
 
 @contextmanager
-def opened(folder: Path, samples: int, definition: Mapping[str, Any], resume: bool) -> Iterator[Store]:
-    """Give the folder of a new sweep, or with ``resume`` that of one which was begun; it goes if nothing came of it.
+def open_store(folder: Path, samples: int, definition: Mapping[str, Any], resume: bool) -> Iterator[Store]:
+    """Give the store of a new sweep, or with ``resume`` of one that was begun; remove it if it stays empty.
 
     Raises:
         InputError: something else is there, or another process writes there.
     """
-    parquet()
+    load_parquet()
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{str(folder)!r} is a file, expected a folder for the sweep; name another")
     refuse_suffix(folder, "the folder of a sweep")
@@ -141,20 +142,23 @@ def opened(folder: Path, samples: int, definition: Mapping[str, Any], resume: bo
 def _definition(
     build: Build, space: Space, design: Mapping[str, Array], metrics: Any, keep: Keep, seed: int
 ) -> dict[str, Any]:
-    """All that the numbers depend on, as JSON has it."""
+    """Return all that the numbers depend on, as JSON has it."""
     whole = {
-        "build": told(build),
+        "build": fingerprint(build),
         "space": space.describe(),
         "design_sha256": digest(list(design.values())),
         "seed": seed,
-        "metrics": told(metrics) if callable(metrics) else metrics if metrics is None else list(metrics),
+        "metrics": fingerprint(metrics) if callable(metrics) else metrics if metrics is None else list(metrics),
         "keep": keep.describe(),
     }
     return json.loads(json.dumps(whole))
 
 
-def told(function: Callable[..., Any]) -> dict[str, Any]:
-    """What a function says of itself, or its name and a digest of its source where that is known."""
+def fingerprint(function: Callable[..., Any]) -> dict[str, Any]:
+    """Return the fingerprint of a callable, compared when a sweep is resumed.
+
+    It is what the callable describes itself by, or its name and a digest of its source where that is known.
+    """
     if hasattr(function, "describe"):
         return function.describe()
     name = getattr(function, "__qualname__", type(function).__qualname__)

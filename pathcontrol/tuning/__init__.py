@@ -1,1 +1,1 @@
-"""Gains for stated objectives within limits, and what the limits cost."""
+"""Tuning: gains for stated objectives within limits, and the cost of the limits."""

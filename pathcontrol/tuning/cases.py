@@ -1,4 +1,4 @@
-"""Candidates in every scenario: simulated together, as samples of a sweep."""
+"""The simulation of candidates in every scenario, together, as samples of a sweep."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from pathcontrol.sweeps.store import Store
 
 @dataclass(frozen=True)
 class Cases:
-    """Simulates candidates in scenarios.
+    """The candidates in all scenarios, simulated in chunks.
 
     Attributes:
-        job: how they are computed, as of a sweep, from the parameters of both.
+        job: the computation, as of a sweep, from the parameters of both.
         scenarios: values by name, (m,) or (m, d) each.
-        count: how many scenarios there are, m; without any it is 1.
-        chunk: how many rollouts are simulated together at most.
-        store: where every rollout is noted, or None.
-        known: what was noted before, by column.
+        count: number of scenarios m; without any it is 1.
+        chunk: largest number of rollouts simulated together.
+        store: the folder that records every rollout, or None.
+        known: the rollouts recorded before, by column.
     """
 
     job: Job
@@ -36,7 +36,7 @@ class Cases:
     known: Mapping[str, Array]
 
     def rows(self, candidates: Mapping[str, Array], first: int) -> dict[str, Array]:
-        """A row for each scenario of each candidate, (N · m,), the scenarios of a candidate one after another.
+        """Return a row for each scenario of each candidate, (N · m,), the scenarios of a candidate one after another.
 
         Args:
             candidates: their parameters by name, (N,) or (N, d) each.
@@ -51,19 +51,22 @@ class Cases:
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def _part(self, values: Mapping[str, Array], samples: NDArray[np.int64], rows: slice) -> dict[str, Array]:
+        """Return the rows of some samples, recorded or simulated."""
         known = self._known(samples[rows])
         if known is not None:
             return known
         parameters = {name: each[rows] for name, each in values.items()}
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", StepWarning)  # gains that the period does not bear are tried and found bad
+            warnings.simplefilter(
+                "ignore", StepWarning
+            )  # gains too high for the period are tried on purpose, and get bad metrics
             found = self.job(parameters, samples[rows])
         if self.store is not None:
             self.store.write(found, self.job.keep, self.job.at_random)
         return found.columns
 
     def _known(self, samples: NDArray[np.int64]) -> dict[str, Array] | None:
-        """The rows of samples if all of them were noted before."""
+        """Return the rows of samples if all of them were recorded before."""
         noted = self.known.get("sample", samples[:0])
         if not np.isin(samples, noted).all():
             return None

@@ -13,15 +13,15 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import MissingExtraError
 from pathcontrol.sweeps.space import unit_cube
 
-_STREAM = 0x74756E65  # apart from the streams of designs and of sensors
+_STREAM = 0x74756E65  # a random stream apart from those of designs and of sensors
 
 
-class Told(NamedTuple):
-    """What is said of N points.
+class Evaluation(NamedTuple):
+    """The evaluation of N points.
 
     Attributes:
-        costs: what is to be small, (N, d), finite.
-        violations: how far each limit is exceeded, (N, m), at most 0 within it.
+        costs: values to minimise, (N, d), finite.
+        violations: the excess over each limit, (N, m), at most 0 within it.
     """
 
     costs: Array
@@ -29,7 +29,7 @@ class Told(NamedTuple):
 
 
 class Search:
-    """Points that get better, generation by generation.
+    """A search by generations of points, with evolutionary algorithms.
 
     Several costs are searched by NSGA-II (K. Deb, A. Pratap, S. Agarwal and T. Meyarivan, A fast and elitist
     multiobjective genetic algorithm: NSGA-II, IEEE Trans. Evolutionary Computation 6, 2002), a single one by
@@ -41,7 +41,7 @@ class Search:
         width: dimension of the cube.
         goals: numbers of costs and of limits.
         population: points in a generation.
-        seed: where the random numbers begin.
+        seed: seed of the random numbers.
 
     Raises:
         MissingExtraError: pymoo is not installed.
@@ -63,15 +63,15 @@ class Search:
         self._asked: Any = None
 
     def ask(self) -> NDArray[np.float64]:
-        """The points of the next generation, (N, width)."""
+        """Return the points of the next generation, (N, width)."""
         self._asked = self._algorithm.ask()
         return self._asked.get("X").astype(np.float64)
 
-    def tell(self, told: Told) -> None:
-        """What came of the points that were asked for last."""
+    def tell(self, evaluation: Evaluation) -> None:
+        """Set the evaluation of the points returned last."""
         from pymoo.core.evaluator import Evaluator
         from pymoo.problems.static import StaticProblem
 
-        known = StaticProblem(self._algorithm.problem, F=told.costs, G=told.violations)
+        known = StaticProblem(self._algorithm.problem, F=evaluation.costs, G=evaluation.violations)
         Evaluator().eval(known, self._asked)
         self._algorithm.tell(infills=self._asked)

@@ -1,4 +1,4 @@
-"""What is asked for: objectives, limits, and how several scenarios become one number."""
+"""The tuning problem: objectives, limits, and the reduction of several scenarios to one number."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import xarray as xr
 
 from pathcontrol._arrays import Array
 from pathcontrol.sweeps.objectives import costs, excess, failed, metric
-from pathcontrol.tuning.optimizer import Told
+from pathcontrol.tuning.optimizer import Evaluation
 
-#: how a metric over the scenarios becomes one number
+#: the reduction of a metric over the scenarios to one number
 Reduce = Literal["worst", "mean"]
-_FAR, _FARTHEST = 1e6, 1e9  # of limits that are exceeded by far; of candidates without the numbers asked for
+_FAR, _FARTHEST = 1e6, 1e9  # violation of a limit at most; violation of candidates without the metrics
 
 
 class Terms(NamedTuple):
-    """What is asked for.
+    """The objectives and limits of a tuning.
 
     Attributes:
         goals: ``"min"`` or ``"max"`` by objective.
         bounds: the smallest and the largest value by limited metric.
-        reduce: how several scenarios become one number.
+        reduce: the reduction of several scenarios to one number.
     """
 
     goals: Mapping[str, str]
@@ -32,18 +32,19 @@ class Terms(NamedTuple):
 
     @property
     def metrics(self) -> list[str]:
-        """Those that are asked for."""
+        """The metrics of all objectives and limits."""
         return list(dict.fromkeys((*self.goals, *self.bounds)))
 
     def describe(self) -> dict[str, Any]:
-        """All of it, for the record."""
+        """Return all terms, for the definition of a tuning."""
         limits = {name: list(map(str, ends)) for name, ends in self.bounds.items()}  # JSON knows no infinity
         return {"objectives": dict(self.goals), "limits": limits, "reduce": self.reduce}
 
-    def reduced(self, name: str, values: Array) -> Array:
-        """A metric (N, m) of N candidates in m scenarios as one number for each, (N,).
+    def reduce_scenarios(self, name: str, values: Array) -> Array:
+        """Reduce a metric (N, m) of N candidates in m scenarios to one number for each, (N,).
 
-        The worst is what is farthest beyond a limit; without a limit the largest, of what is to be large the smallest.
+        The worst value is the one farthest beyond a limit; without a limit it is the largest, or the smallest
+        of a metric that is to be large.
         NaN in one scenario is NaN.
         """
         if self.reduce == "mean":
@@ -52,10 +53,10 @@ class Terms(NamedTuple):
             return values.min(1) if self.goals.get(name) == "max" else values.max(1)
         return values[np.arange(len(values)), excess(values, self.bounds[name]).argmax(1)]
 
-    def told(self, table: xr.Dataset) -> Told:
-        """Costs and violations of candidates, as the search is told them: all finite."""
+    def evaluate(self, table: xr.Dataset) -> Evaluation:
+        """Return costs and violations of candidates for the search, all finite."""
         cost = costs(table, self.goals)
         lost = ~np.isfinite(cost).all(1) | failed(table)
         beyond = [excess(metric(table, name), ends) for name, ends in self.bounds.items()]
         violations = np.stack([np.where(lost, _FARTHEST, -1.0), *(np.minimum(one, _FAR) for one in beyond)], axis=1)
-        return Told(np.where(lost[:, None], 0.0, cost), violations)
+        return Evaluation(np.where(lost[:, None], 0.0, cost), violations)

@@ -1,4 +1,4 @@
-"""What a tuning found: every candidate, the best ones, the front, and what the limits cost."""
+"""The result of a tuning: every candidate, the best ones, the front, and the cost of the limits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Candidate(NamedTuple):
     """One choice of the parameters.
 
     Attributes:
-        number: which one it is in the table.
+        number: its number in the table.
         parameters: their values by name, numbers or arrays (d,).
         metrics: by name; over several scenarios as they were reduced.
     """
@@ -31,7 +31,7 @@ class Candidate(NamedTuple):
 
 
 class Activity(NamedTuple):
-    """What a limit means for the best candidate of an objective.
+    """The effect of a limit on the best candidate of an objective.
 
     Attributes:
         value: the metric at the best candidate.
@@ -46,13 +46,13 @@ class Activity(NamedTuple):
 
 
 class Tuning:
-    """What :func:`tune` found; ``print`` it for a summary.
+    """The result of :func:`tune`; ``print`` it for a summary.
 
     Args:
         table: see :meth:`table`.
-        terms: what was asked for.
-        scenarios: how many each candidate was simulated in.
-        generations: how many are whole, and how many were asked for.
+        terms: the objectives and limits.
+        scenarios: number of scenarios of each candidate.
+        generations: number of complete generations, and number requested.
     """
 
     def __init__(self, table: xr.Dataset, terms: Terms, scenarios: int, generations: tuple[int, int]) -> None:
@@ -74,22 +74,22 @@ class Tuning:
         return {name: self._direction(name) for name in self.limits} | self.objectives
 
     def table(self) -> xr.Dataset:
-        """All candidates, over ``sample``: status and metrics, and as coordinates the parameters.
+        """Return all candidates, over ``sample``: status and metrics, and as coordinates the parameters.
 
-        Over several scenarios metrics are as they were reduced, and a candidate that diverged in one has diverged.
+        Over several scenarios metrics are the reduced ones, and a candidate that diverged in one has diverged.
         """
         return self._table
 
     def feasible(self) -> xr.Dataset:
-        """The candidates that keep all limits."""
+        """Return the candidates that keep all limits."""
         return self._table.isel(sample=np.flatnonzero(within(self._table, self.limits)))
 
     def front(self) -> xr.Dataset:
-        """The Pareto front of the objectives, of the candidates that keep all limits."""
+        """Return the Pareto front of the objectives, among the candidates that keep all limits."""
         return front(self._table, self.objectives, self.limits)
 
     def trade(self, limit: str) -> xr.Dataset:
-        """The Pareto front of the objectives and a limited metric, that limit left aside and the others kept.
+        """Return the Pareto front of the objectives and a limited metric, without that limit, within the others.
 
         Raises:
             UnknownNameError: there is no such limit.
@@ -97,7 +97,9 @@ class Tuning:
         return front(self._table, {limit: self._direction(limit)} | self.objectives, self._others(limit))
 
     def best(self, objective: str | None = None) -> Candidate | None:
-        """The candidate within limits with the best value of an objective, by default the first; None without one.
+        """Return the candidate within limits with the best value of an objective, by default the first one.
+
+        It is None if no candidate keeps the limits.
 
         Raises:
             UnknownNameError: it is no objective.
@@ -106,7 +108,7 @@ class Tuning:
         return self.candidate(int(cost.argmin())) if np.isfinite(cost).any() else None
 
     def nearest(self) -> Candidate | None:
-        """The candidate with the least sum of the shares by which it exceeds limits; None if none got there."""
+        """Return the candidate with the least sum of the shares by which it exceeds limits; None if none finished."""
         beyond = np.zeros(self._table.sizes["sample"])
         for name in self.limits:
             beyond += np.maximum(self.beyond(name), 0.0)
@@ -114,7 +116,7 @@ class Tuning:
         return self.candidate(int(np.argmin(beyond))) if np.isfinite(beyond).any() else None
 
     def knee(self) -> Candidate | None:
-        """Where the front of two objectives bends most; None without one.
+        """Return the candidate where the front of two objectives bends most; None without one.
 
         It is the point of the front that is farthest below the line between its ends, both objectives scaled to their
         range on the front. (I. Das, On characterizing the "knee" of the Pareto curve based on normal-boundary
@@ -132,24 +134,25 @@ class Tuning:
         return self.candidate(int(rows["sample"][which])) if below[which] > 0 else None
 
     def activity(self, objective: str | None = None) -> dict[str, Activity]:
-        """How active each limit is at the best candidate of an objective; nothing if no candidate keeps the limits."""
+        """Return the effect of each limit at the best candidate of an objective; empty if none keeps the limits."""
         best = self.best(objective)
         if best is None:
             return {}
         return {name: self._activity(name, best, objective) for name in self.limits}
 
     def beyond(self, limit: str) -> Array:
-        """How far each candidate exceeds a limit, (sample,), as a share of it; not above 0 within it."""
+        """Return how far each candidate exceeds a limit, (sample,), as a share of it; ≤ 0 within it."""
         return excess(metric(self._table, limit), self.limits[self._known(limit)])
 
     def candidate(self, number: int) -> Candidate:
-        """A row of the table."""
+        """Return a row of the table."""
         row = self._table.isel(sample=number)
         parameters = {str(name): v.to_numpy()[()] for name, v in row.coords.items() if name != "sample"}
         metrics = {str(name): float(v) for name, v in row.data_vars.items() if v.dtype.kind in "fiu"}
         return Candidate(number, parameters, metrics)
 
     def _activity(self, limit: str, best: Candidate, objective: str | None) -> Activity:
+        """Return the effect of one limit."""
         over = self.beyond(limit)
         allowed = within(self._table, self._others(limit)) & (over <= 0.1)
         cost = np.where(allowed, self._cost(objective), np.inf)
@@ -158,10 +161,12 @@ class Tuning:
         return Activity(best.metrics[limit], 1 + float(over[best.number]), bought)
 
     def _cost(self, objective: str | None) -> Array:
+        """Return the cost of an objective, (sample,)."""
         name = self._objective(objective)
         return costs(self._table, {name: self.objectives[name]})[:, 0]
 
     def _objective(self, name: str | None) -> str:
+        """Check the name of an objective; return it, or the first one."""
         if name is not None and name not in self.objectives:
             raise UnknownNameError(
                 f"objective {name!r}: expected one of {', '.join(self.objectives)}",
@@ -171,6 +176,7 @@ class Tuning:
         return next(iter(self.objectives)) if name is None else name
 
     def _known(self, limit: str) -> str:
+        """Check the name of a limit; return it."""
         if limit not in self.limits:
             raise UnknownNameError(
                 f"limit {limit!r}: expected one of {', '.join(self.limits) or 'none'}",
@@ -180,9 +186,11 @@ class Tuning:
         return limit
 
     def _others(self, limit: str) -> Mapping[str, tuple[float, float]]:
+        """Return all limits but one."""
         return {name: ends for name, ends in self.limits.items() if name != self._known(limit)}
 
     def _direction(self, limit: str) -> str:
+        """Return ``"min"`` or ``"max"`` for a limited metric."""
         return "min" if np.isfinite(self.limits[self._known(limit)][1]) else "max"
 
     def __repr__(self) -> str:
@@ -192,11 +200,11 @@ class Tuning:
         return f"Tuning({every} candidates, {kept} within limits{stopped})"
 
     def __str__(self) -> str:
-        return _summary(self)
+        return _summarize(self)
 
 
-def _summary(tuning: Tuning) -> str:
-    """Several lines: how many candidates, the best ones, and how active each limit is; or which limits are missed."""
+def _summarize(tuning: Tuning) -> str:
+    """Return lines on the candidates, the best ones and the limits; or on the limits that none keeps."""
     table, (whole, asked) = tuning.table(), tuning.generations
     lost, short = (int((table["status"] == status).sum()) for status in ("diverged", "unfinished"))
     lines = [
@@ -207,43 +215,52 @@ def _summary(tuning: Tuning) -> str:
         + (f", {lost} diverged" if lost else "")
         + (f", {short} did not get to the end in the time" if short else "")
     ]
-    return "\n".join(lines + (_found(tuning) if tuning.feasible().sizes["sample"] else _missed(tuning)))
+    return "\n".join(
+        lines + (_describe_best(tuning) if tuning.feasible().sizes["sample"] else _describe_missed(tuning))
+    )
 
 
-def _found(tuning: Tuning) -> list[str]:
+def _describe_best(tuning: Tuning) -> list[str]:
+    """Return lines on the best candidates, the knee and the front."""
     lines = []
     for objective, goal in tuning.objectives.items():
         best = tuning.best(objective)
         if best is None:
             lines += ["", f"{_label(objective)} is not finite for any candidate within the limits"]
             continue
-        lines += ["", f"{'least' if goal == 'min' else 'largest'} {_label(objective)}", *_candidate(tuning, best)]
-        lines += _limits(tuning, objective, best)
+        lines += [
+            "",
+            f"{'least' if goal == 'min' else 'largest'} {_label(objective)}",
+            *_describe_candidate(tuning, best),
+        ]
+        lines += _describe_limits(tuning, objective, best)
     knee = tuning.knee()
     if knee is not None:
-        lines += ["", "knee of the front", *_candidate(tuning, knee)]
+        lines += ["", "knee of the front", *_describe_candidate(tuning, knee)]
     if len(tuning.objectives) > 1:
         lines += ["", f"front of {tuning.front().sizes['sample']} candidates"]
     return lines
 
 
-def _candidate(tuning: Tuning, one: Candidate) -> list[str]:
-    numbers = ", ".join(f"{_label(name)} {_number(name, one.metrics[name])}" for name in tuning.objectives)
+def _describe_candidate(tuning: Tuning, one: Candidate) -> list[str]:
+    """Return lines on one candidate."""
+    numbers = ", ".join(f"{_label(name)} {_format_number(name, one.metrics[name])}" for name in tuning.objectives)
     return [f"  {numbers}", f"  candidate {one.number}: {readable_parameters(one.parameters)}"]
 
 
-def _limits(tuning: Tuning, objective: str, best: Candidate) -> list[str]:
+def _describe_limits(tuning: Tuning, objective: str, best: Candidate) -> list[str]:
+    """Return lines on the effect of each limit."""
     active, lines = tuning.activity(objective), []
     for name, found in active.items():
         change = found.bought / best.metrics[objective] - 1 if best.metrics[objective] else 0.0
         gain = f"changes it by {100 * change:+.1f} % at least" if change else "was not found to change it"
-        value = f"{_label(name)} {_number(name, found.value)}, limit {_ends(tuning, name)}"
+        value = f"{_label(name)} {_format_number(name, found.value)}, limit {_describe_limit(tuning, name)}"
         lines.append(f"  {value}: {100 * max(found.share, 0.0):.0f} % used; 10 % looser {gain}")
     return lines
 
 
-def _missed(tuning: Tuning) -> list[str]:
-    """How often each limit is kept and how near it was come, the farthest first, and the nearest candidate."""
+def _describe_missed(tuning: Tuning) -> list[str]:
+    """Return lines on how often each limit is kept, the most exceeded first, and on the nearest candidate."""
     nearest, lines = tuning.nearest(), ["no candidate keeps all limits"]
     beyond = {name: tuning.beyond(name) for name in tuning.limits}
     for name in sorted(beyond, key=lambda name: -float(beyond[name].min())):
@@ -251,25 +268,28 @@ def _missed(tuning: Tuning) -> list[str]:
         kept = int((over <= 0).sum())
         value = tuning.candidate(int(over.argmin())).metrics[name]
         said = f"kept by {kept}" if kept else f"kept by none, {100 * over.min():.0f} % beyond at best"
-        lines.append(f"  {_label(name)} {_ends(tuning, name)}: {said}, {_number(name, value)}")
+        lines.append(f"  {_label(name)} {_describe_limit(tuning, name)}: {said}, {_format_number(name, value)}")
     if nearest is not None:
-        lines += ["", "nearest to all of them", *_candidate(tuning, nearest)]
+        lines += ["", "nearest to all of them", *_describe_candidate(tuning, nearest)]
         for name, over in beyond.items():
             share = over[nearest.number]
             said = "kept" if share <= 0 else f"{100 * share:.0f} % beyond"
-            lines.append(f"  {_label(name)} {_number(name, nearest.metrics[name])}: {said}")
+            lines.append(f"  {_label(name)} {_format_number(name, nearest.metrics[name])}: {said}")
     return lines
 
 
 def _label(name: str) -> str:
+    """Return the label of a metric."""
     return LABELS.get(name, name)
 
 
-def _number(name: str, value: float) -> str:
+def _format_number(name: str, value: float) -> str:
+    """Return a metric with its unit."""
     return readable_number(value, UNITS.get(name, ""))
 
 
-def _ends(tuning: Tuning, name: str) -> str:
+def _describe_limit(tuning: Tuning, name: str) -> str:
+    """Return a limit in words."""
     low, high = tuning.limits[name]
-    said = [(f"≥ {_number(name, low)}", low), (f"≤ {_number(name, high)}", high)]
+    said = [(f"≥ {_format_number(name, low)}", low), (f"≤ {_format_number(name, high)}", high)]
     return " and ".join(text for text, end in said if np.isfinite(end))

@@ -1,4 +1,4 @@
-"""One call from a space of gains to the best ones within limits, and to what the limits cost."""
+"""The function :func:`tune`, from a space of gains to the best ones within limits, and to the cost of the limits."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from pathcontrol._expect import expect
 from pathcontrol._progress import progress_bar
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.simulation.engines import Engine, settle_engine
-from pathcontrol.sweeps.chunk import OUTCOME, Build, Job, Measure, measure_of
+from pathcontrol.sweeps.chunk import OUTCOME, Build, Job, Measure, make_measure
 from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.objectives import Limits, Objectives, check_limits, check_objectives
 from pathcontrol.sweeps.result import dataset
 from pathcontrol.sweeps.space import MOST_NUMBERS, MOST_SAMPLES, Space, check_seed, check_whole, digest
 from pathcontrol.sweeps.store import Store
-from pathcontrol.sweeps.sweep import opened, told
+from pathcontrol.sweeps.sweep import fingerprint, open_store
 from pathcontrol.tuning.cases import Cases
 from pathcontrol.tuning.optimizer import Search
 from pathcontrol.tuning.problem import Reduce, Terms
@@ -47,7 +47,7 @@ def tune(
     progress: bool = True,
     engine: Engine = "auto",
 ) -> Tuning:
-    """Search gains, or other parameters, for objectives within limits; all of a generation is one batch of simulations.
+    """Search gains, or other parameters, for objectives within limits; a generation is one batch of simulations.
 
     The result has every candidate that was tried, which of them keep the limits, the best ones, the Pareto front and
     what each limit costs. A candidate that diverges, or has an objective that is not finite, counts as beyond all
@@ -71,25 +71,25 @@ def tune(
         metrics: more metrics for the table, by name, or a function from a :class:`Run` to numbers by name in place of
             the usual ones.
         population: candidates in a generation, from 5.
-        generations: how many.
-        seed: where the random numbers begin.
-        chunk: how many rollouts are simulated together at most.
+        generations: number of generations.
+        seed: seed of the random numbers.
+        chunk: largest number of rollouts simulated together.
         out: a folder that notes every rollout, as that of a sweep does; :class:`SweepResult` reads it.
         resume: go on with the tuning in ``out``, if there is one.
         progress: show a bar with the time left on standard error when it takes longer than two seconds.
-        engine: which engine runs the simulations, as :func:`simulate` takes it, where ``build`` says none.
+        engine: the engine of the simulations, as for :func:`simulate`, where ``build`` names none.
 
     Raises:
         InputError: an argument has the wrong value, or ``out`` holds something else.
         UnknownNameError: there is no such metric.
         MissingExtraError: the extra ``tune`` is not installed.
     """
-    terms = Terms(check_objectives(objectives), check_limits(limits), _reduce(reduce))
+    terms = Terms(check_objectives(objectives), check_limits(limits), _check_reduce(reduce))
     check_whole("population", population, 5)
     check_whole("generations", generations)
     check_whole("chunk", chunk)
     wanted = metrics if callable(metrics) else list(dict.fromkeys((*terms.metrics, *(metrics or ()))))
-    space, several = _space(space, "random"), None if scenarios is None else _space(scenarios, "given")
+    space, several = _make_space(space, "random"), None if scenarios is None else _make_space(scenarios, "given")
     count = 1 if several is None else several.samples
     _check_size(space.width, population, generations, count)
     search = Search(space.width, (len(terms.goals), 1 + len(terms.bounds)), population, check_seed(seed))
@@ -103,14 +103,16 @@ def tune(
         "seed": seed,
         "engine": engine,
     }
-    total, measure = population * generations * count, measure_of(wanted)
-    folder = nullcontext() if out is None else opened(Path(out), total, json.loads(json.dumps(definition)), resume)
+    total, measure = population * generations * count, make_measure(wanted)
+    folder = nullcontext() if out is None else open_store(Path(out), total, json.loads(json.dumps(definition)), resume)
     tables: list[xr.Dataset] = []
     with folder as store, progress_bar("tune", generations, progress) as update:
-        cases = Cases(Job(build, measure, engine=engine), design, count, chunk, store, _noted(store))
+        cases = Cases(Job(build, measure, engine=engine), design, count, chunk, store, _read_recorded(store))
         try:
             for _ in range(generations):
-                tables.append(_generation(search, space, cases, terms, sum(table.sizes["sample"] for table in tables)))
+                tables.append(
+                    _run_generation(search, space, cases, terms, sum(table.sizes["sample"] for table in tables))
+                )
                 update(len(tables))
         except KeyboardInterrupt:
             if not tables:
@@ -134,18 +136,18 @@ def _definition(
     scenarios: str,
     metrics: Sequence[str] | Measure,
 ) -> dict[str, Any]:
-    """What the numbers of a candidate depend on, with the digest of its ``scenarios``."""
+    """Return what the numbers of a candidate depend on, with the digest of its ``scenarios``."""
     described = [space.describe()["parameters"] for space in spaces if space is not None]
     return terms.describe() | {
-        "build": told(build),
+        "build": fingerprint(build),
         "space": {"parameters": {name: value for one in described for name, value in one.items()}},
         "scenarios_sha256": scenarios,
-        "metrics": told(metrics) if callable(metrics) else metrics,
+        "metrics": fingerprint(metrics) if callable(metrics) else metrics,
     }
 
 
-def _noted(store: Store | None) -> Mapping[str, Array]:
-    """What was noted before, by column."""
+def _read_recorded(store: Store | None) -> Mapping[str, Array]:
+    """Return the rollouts recorded before, by column."""
     if store is None:
         return {}
     store.tidy(Keep(), np.zeros(0, dtype=np.intp))
@@ -155,12 +157,12 @@ def _noted(store: Store | None) -> Mapping[str, Array]:
     return known
 
 
-def _generation(search: Search, space: Space, cases: Cases, terms: Terms, first: int) -> xr.Dataset:
-    """The candidates of the next generation, simulated and told to the search."""
+def _run_generation(search: Search, space: Space, cases: Cases, terms: Terms, first: int) -> xr.Dataset:
+    """Simulate the candidates of the next generation and give their evaluation to the search."""
     parameters = space.at(search.ask())
     rows = cases.rows(parameters, first)
     inputs = {"sample", *OUTCOME, *parameters, *cases.scenarios}
-    numbers = {name: _of_cases(name, v, cases.count) for name, v in rows.items() if name not in inputs}
+    numbers = {name: _split_scenarios(name, v, cases.count) for name, v in rows.items() if name not in inputs}
     status = rows["status"].reshape(-1, cases.count)
     every = np.where((status == "finished").all(1), "finished", "running")
     every = np.where((status == "unfinished").any(1), "unfinished", every)
@@ -168,15 +170,15 @@ def _generation(search: Search, space: Space, cases: Cases, terms: Terms, first:
         "sample": first + np.arange(len(status)),
         **parameters,
         "status": np.where((status == "diverged").any(1), "diverged", every),
-        **{name: terms.reduced(name, values) for name, values in numbers.items()},
+        **{name: terms.reduce_scenarios(name, values) for name, values in numbers.items()},
     }
     table = dataset(columns, parameters)
-    search.tell(terms.told(table))
+    search.tell(terms.evaluate(table))
     return table
 
 
-def _of_cases(name: str, values: Array, count: int) -> Array:
-    """Return a metric (N · m,) of N candidates in m scenarios, (N, m).
+def _split_scenarios(name: str, values: Array, count: int) -> Array:
+    """Return a metric (N · m,) of N candidates in m scenarios as (N, m).
 
     Raises:
         InputError: it is no metric, as in a folder that something else has written to.
@@ -186,12 +188,14 @@ def _of_cases(name: str, values: Array, count: int) -> Array:
     return values.reshape(-1, count)
 
 
-def _space(given: Space | Mapping[str, Any], method: str) -> Space:
+def _make_space(given: Space | Mapping[str, Any], method: str) -> Space:
+    """Check the space; return it, or make one of a mapping."""
     expect("space", given, Space, Mapping)
     return given if isinstance(given, Space) else Space(given, method, None if method == "given" else 1)
 
 
-def _reduce(given: Any) -> Reduce:
+def _check_reduce(given: Any) -> Reduce:
+    """Check the choice of the reduction; return it."""
     if given not in get_args(Reduce):
         raise UnknownNameError(
             f"reduce = {given!r}, expected one of {', '.join(map(repr, get_args(Reduce)))}",

@@ -1,4 +1,4 @@
-"""The Dask cluster of a sweep: its client, and whether its workers are fit."""
+"""The connection to the Dask cluster of a sweep: its client, and checks of its workers."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from pathcontrol.sweeps.manifest import PACKAGES, versions
 if TYPE_CHECKING:
     from distributed import Client, Security
 
-_PATIENCE = 5.0  # s, for what answers at once if it is there
-_ANSWER = 30.0  # s, for a worker that may be busy
+_PATIENCE = 5.0  # s, for an answer that is immediate if there is any
+_ANSWER = 30.0  # s, for the answer of a worker that may be busy
 _LOOK = 0.2  # s
 
 
 class NoAnswerError(TimeoutError):
-    """Somebody has not answered in time."""
+    """An answer has not come in time."""
 
 
 class GoneError(Exception):
-    """What was asked for is not there any more."""
+    """The requested result is not there any more."""
 
 
 @contextmanager
-def connected(cluster: Any, security: Security | None = None) -> Iterator[Client | None]:
-    """The client of a cluster whose workers have been seen to be fit; ``None`` for no cluster.
+def connect(cluster: Any, security: Security | None = None) -> Iterator[Client | None]:
+    """Give the client of a cluster after its workers were checked; ``None`` for no cluster.
 
     Args:
         cluster: the address of a scheduler, its scheduler file, a ``distributed.Client`` or what makes one.
@@ -58,13 +58,13 @@ def connected(cluster: Any, security: Security | None = None) -> Iterator[Client
         _check_workers(cluster)
         yield cluster
         return
-    with _client(_address(cluster), security) as client:
+    with _open_client(_address(cluster), security) as client:
         _check_workers(client)
         yield client
 
 
 def _address(cluster: Any) -> Any:
-    """The address in a scheduler file, or else what was given."""
+    """Return the address in a scheduler file, or else the given one."""
     if not isinstance(cluster, str | Path) or not str(cluster).endswith(".json"):
         return cluster
     try:
@@ -75,8 +75,8 @@ def _address(cluster: Any) -> Any:
         ) from error
 
 
-def security_of(ca: str | Path | None, cert: str | Path | None, key: str | Path | None) -> Security | None:
-    """The certificates for TLS, files in PEM: of the authority, one's own, and its key; ``None`` for none of them.
+def load_security(ca: str | Path | None, cert: str | Path | None, key: str | Path | None) -> Security | None:
+    """Return the certificates for TLS from PEM files: the authority, one's own, and its key; ``None`` for none.
 
     Raises:
         InputError: one of the three is left out, or is no file.
@@ -98,7 +98,8 @@ def security_of(ca: str | Path | None, cert: str | Path | None, key: str | Path 
     return Security(require_encryption=True, **files)
 
 
-def _client(address: Any, security: Security | None) -> Client:
+def _open_client(address: Any, security: Security | None) -> Client:
+    """Connect to a scheduler."""
     from distributed import Client
 
     try:
@@ -113,10 +114,10 @@ def _client(address: Any, security: Security | None) -> Client:
 
 
 def _check_scheduler(address: str, security: Security | None) -> None:
-    """Whoever is at the address says that it is a scheduler.
+    """Check that the process at the address says that it is a scheduler.
 
     Raises:
-        Exception: of any kind, for instance as nobody is there.
+        Exception: of any kind, for instance since there is no process.
     """
     from distributed.comm.addressing import parse_address, parse_host_port
     from distributed.core import rpc
@@ -124,19 +125,19 @@ def _check_scheduler(address: str, security: Security | None) -> None:
 
     known = Security() if security is None else security
 
-    async def asked() -> str:
+    async def ask_kind() -> str:
         async with rpc(address, timeout=_PATIENCE, connection_args=known.get_connection_args("client")) as there:
             return (await asyncio.wait_for(there.identity(), _PATIENCE))["type"]
 
     socket.create_connection(parse_host_port(parse_address(address)[1]), timeout=_PATIENCE).close()  # refused at once
     with ThreadPoolExecutor(1) as thread:  # as this one may be in a loop of its own, such as that of a notebook
-        kind = thread.submit(lambda: asyncio.run(asked())).result()
+        kind = thread.submit(lambda: asyncio.run(ask_kind())).result()
     if kind != "Scheduler":
         raise OSError(f"it is a {kind}")
 
 
 def _check_workers(client: Client) -> None:
-    """There are workers, and they have the versions of this process, as do those that unpickle what goes to them."""
+    """Check that there are workers with the versions of this process; the scheduler must have them too."""
     scheduler: Any = client.scheduler
     address = scheduler.address
     try:
@@ -145,8 +146,8 @@ def _check_workers(client: Client) -> None:
         raise ClusterError(
             f"{address} has no workers; start some: `dask worker {address} --nworkers=-1 --nthreads 1`"
         ) from error
-    expected, ask = expected_versions(), _asker()
-    found = {"the scheduler": client.run_on_scheduler(ask), **_answers(client, ask)}
+    expected, ask = expected_versions(), _make_question()
+    found = {"the scheduler": client.run_on_scheduler(ask), **_ask_workers(client, ask)}
     unfit = [f"{name} has {other}" for name, there in found.items() if (other := _differences(expected, there))]
     if unfit:
         raise ClusterError(
@@ -163,8 +164,8 @@ def _check_workers(client: Client) -> None:
         )
 
 
-def _answers(client: Client, ask: Callable[[], dict[str, str]]) -> dict[str, Any]:
-    """What the workers answer; those that do not, as they are frozen, are given up.
+def _ask_workers(client: Client, ask: Callable[[], dict[str, str]]) -> dict[str, Any]:
+    """Return the answers of the workers; frozen ones that do not answer are given up.
 
     Raises:
         ClusterError: none answers.
@@ -187,7 +188,7 @@ def _answers(client: Client, ask: Callable[[], dict[str, str]]) -> dict[str, Any
 
 
 def within(seconds: float, ask: Callable[[], Any], there: Callable[[], bool] = lambda: True) -> Any:
-    """What ``ask`` gives, in a thread that is left alone if it takes longer, or what is asked for is no longer there.
+    """Return the result of ``ask``, run in a thread that is abandoned when time is up or ``there`` becomes False.
 
     Raises:
         NoAnswerError: it takes longer.
@@ -213,7 +214,7 @@ def within(seconds: float, ask: Callable[[], Any], there: Callable[[], bool] = l
 
 
 def drop_silent_workers(client: Client, silence: float) -> list[str]:
-    """Have the scheduler give up workers that have shown no sign of life for so many seconds; others take over.
+    """Have the scheduler give up workers without a sign of life for ``silence`` [s]; others take over.
 
     Returns:
         Their addresses.
@@ -234,7 +235,7 @@ def drop_silent_workers(client: Client, silence: float) -> list[str]:
 
 
 def all_idle(client: Client) -> bool:
-    """Whether there are workers, and none of them computes anything."""
+    """Return whether there are workers, and none of them computes anything."""
 
     def idle(dask_scheduler: Any = None) -> bool:
         workers = list(dask_scheduler.workers.values())
@@ -250,18 +251,21 @@ _ENGINE = "the compiled engine"
 
 
 def expected_versions() -> dict[str, str]:
-    """What every process of the cluster has to have: this one's packages, its Python up to the bugfix, its engine."""
-    here = _asker()()
+    """Return what every process of the cluster must have: this one's packages, Python version and engine."""
+    here = _make_question()()
     return versions() | {name: here[name] for name in ("python", _ENGINE) if here[name]}
 
 
 def other_versions(expected: Mapping[str, str]) -> str:
-    """What this process has otherwise, or nothing."""
-    return _differences(expected, _asker()())
+    """Return the versions of this process that differ, in words, or an empty text."""
+    return _differences(expected, _make_question()())
 
 
-def _asker() -> Callable[[], dict[str, str]]:
-    """A function that tells what is installed; as it is local, it is pickled whole, and needs no package there."""
+def _make_question() -> Callable[[], dict[str, str]]:
+    """Return a function that lists what is installed.
+
+    It is local, so that it is pickled whole, and needs no package there.
+    """
     packages, engine = PACKAGES, _ENGINE
 
     def installed() -> dict[str, str]:
@@ -287,5 +291,6 @@ def _asker() -> Callable[[], dict[str, str]]:
 
 
 def _differences(expected: Mapping[str, str], there: Mapping[str, str]) -> str:
+    """Return the versions that differ, in words."""
     other = [name for name, wanted in expected.items() if there[name] != wanted]
     return ", ".join(f"{name} {there[name] or 'missing'} (here {expected[name]})" for name in other)

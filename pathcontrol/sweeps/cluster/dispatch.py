@@ -1,4 +1,4 @@
-"""Chunks computed by the workers of a Dask cluster, which may come, go and die meanwhile."""
+"""The dispatch of chunks to the workers of a Dask cluster, which may come, go and die meanwhile."""
 
 from __future__ import annotations
 
@@ -31,30 +31,29 @@ from pathcontrol.sweeps.cluster.connection import (
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-    from pathcontrol.sweeps.cluster.shipping import Parcel
+    from pathcontrol.sweeps.cluster.shipping import ShippedJob
 
-_AHEAD = 2  # chunks for each worker: the one that it computes, and the next
+_AHEAD = 2  # chunks submitted for each worker: the one that it computes, and the next
 _PATIENCE = 10.0  # s, for a worker to answer
 _RESTART = 60.0  # s, for workers to be started again when all have died
-_LOSSES = 10  # how often they may all die without a chunk in between
-_KILLS = 3  # how often Dask may give up a chunk after its workers died
-_LOOK = 5.0  # s without news, after which workers are looked at that may be frozen
+_LOSSES = 10  # limit of losses of all workers without a chunk in between
+_KILLS = 3  # limit of how often Dask may give up a chunk after its workers died
+_LOOK = 5.0  # s without news, after which workers are checked that may be frozen
 _SILENCE = 30.0  # s without a sign of life, after which a worker is given up
 _POLL = 0.005  # s
 _KEPT = "finished chunks are kept, resume the sweep"
 _one_at_a_time = threading.Lock()  # neither Pinocchio's data nor what users write is for several threads
 
 
-class Desk:
-    """Gives out pieces, a few for each worker, and takes chunks in.
+class Dispatcher:
+    """The dispatcher of pieces to the workers, a few for each, which collects the chunks.
 
-    What computes them goes once to each worker, and chunks come straight from the workers: neither passes the scheduler
-    where this machine can reach the workers. A piece whose worker dies, or shows no sign of life, is given to another
-    one.
+    The job goes once to each worker, and chunks come straight from the workers: neither passes the scheduler where
+    this machine can reach the workers. A piece whose worker dies, or shows no sign of life, goes to another one.
 
     Args:
-        client: of the cluster.
-        job: what computes a chunk.
+        client: the client of the cluster.
+        job: the computation of a chunk.
 
     Raises:
         InputError: the job cannot be sent.
@@ -63,10 +62,10 @@ class Desk:
     def __init__(self, client: Client, job: Job) -> None:
         from distributed import as_completed
 
-        from pathcontrol.sweeps.cluster.shipping import Parcel
+        from pathcontrol.sweeps.cluster.shipping import ShippedJob
 
-        self._client, self._parcel = client, Parcel.of(job, expected_versions())
-        self._direct = _reachable(client)
+        self._client, self._shipped = client, ShippedJob.of(job, expected_versions())
+        self._direct = _can_reach_workers(client)
         self._there: Future | None = None  # the parcel, on the workers
         self._known: dict[str, None] = {}  # workers by their address, those that have been there longest first
         self._out: dict[Any, tuple[Future, Piece]] = {}  # by key
@@ -75,7 +74,7 @@ class Desk:
         self._pieces: Iterator[Piece] = iter(())
 
     def chunks(self, pieces: Iterable[Piece]) -> Generator[Chunk]:
-        """The chunks of all pieces, each as soon as it is there, in any order.
+        """Yield the chunks of all pieces, each as soon as it is there, in any order.
 
         Raises:
             ClusterError: the cluster cannot go on.
@@ -83,14 +82,15 @@ class Desk:
         """
         self._pieces = iter(pieces)
         try:
-            yield from self._finished()
+            yield from self._collect_all()
         finally:
             self._cancel()
 
-    def _finished(self) -> Iterator[Chunk]:
+    def _collect_all(self) -> Iterator[Chunk]:
+        """Yield chunks while work is pending; give up when all workers were lost too often."""
         losses = 0
-        while self._give_out():
-            chunk = self._taken(self._next())  # no name for the future, whose task would be kept after Ctrl-C
+        while self._submit_work():
+            chunk = self._collect(self._next())  # no name for the future, whose task would be kept after Ctrl-C
             if chunk is not None:
                 losses = 0
                 yield chunk
@@ -103,9 +103,9 @@ class Desk:
                 )
 
     def _next(self) -> Future | None:
-        """The next future that is done, or None if nobody works on any: what they need is with a worker that has gone.
+        """Return the next future that is done, or None if no worker can make any progress.
 
-        Meanwhile workers that show no sign of life are given up.
+        That is so when the data they need were on a worker that has gone. Workers without a sign of life are given up.
         """
         looked, idle = time.monotonic(), 0
         while not self._ready.has_ready():
@@ -119,16 +119,16 @@ class Desk:
         return next(self._ready)
 
     def _cancel(self) -> None:
-        """Nobody waits for what is out, and nobody needs the parcel."""
+        """Cancel all pending work, and release the job on the workers."""
         with suppress(Exception):  # a cluster that has gone has forgotten it too
-            parcel = [] if self._there is None else [self._there]
-            self._client.cancel([*(future for future, _ in self._out.values()), *parcel], force=True)
+            shipped = [] if self._there is None else [self._there]
+            self._client.cancel([*(future for future, _ in self._out.values()), *shipped], force=True)
 
-    def _give_out(self) -> bool:
-        """Whether anything is out, or has to be given out again."""
+    def _submit_work(self) -> bool:
+        """Submit work until each worker has two chunks; return whether any is pending."""
         try:
             while self._there is None:
-                self._there = self._sent()
+                self._there = self._send()
             room = _AHEAD * max(1, len(self._client.nthreads())) - len(self._out)
             for parameters, samples in islice(self._pieces, max(0, room)):
                 self._submit((parameters, samples))
@@ -137,12 +137,13 @@ class Desk:
         return bool(self._out)
 
     def _submit(self, piece: Piece) -> None:
+        """Submit one piece."""
         future = self._client.submit(sweep_chunk, self._there, *piece, pure=False)
         self._out[future.key] = future, piece
         self._ready.add(future)
 
-    def _sent(self) -> Future | None:
-        """The parcel, once it is on all workers that there are; others will get it from these. None to try again.
+    def _send(self) -> Future | None:
+        """Send the job to all present workers, from which later ones get it; return None to try again.
 
         Then it goes to one worker, which has been there longest: others may come and go faster than they can take it.
         """
@@ -157,7 +158,7 @@ class Desk:
         try:
             return within(
                 _RESTART,
-                lambda: self._client.scatter(self._parcel, direct=self._direct, hash=False, timeout=_RESTART, **where),
+                lambda: self._client.scatter(self._shipped, direct=self._direct, hash=False, timeout=_RESTART, **where),
             )
         except (OSError, TimeoutError, KeyError):  # a worker died, or froze, or is gone from the scheduler, meanwhile
             self._check_scheduler()
@@ -177,12 +178,12 @@ class Desk:
         except Exception as error:  # of any kind, as the connection is closed
             raise ClusterError(f"the cluster is lost: {error}; {_KEPT}") from error
 
-    def _taken(self, future: Future | None) -> Chunk | None:
-        """The chunk of a future, or None where it is lost and will be computed again."""
+    def _collect(self, future: Future | None) -> Chunk | None:
+        """Return the chunk of a future, or None where it is lost and will be computed again."""
         from distributed import CancelledError, KilledWorker
 
         if future is None:
-            self._take_back()
+            self._requeue()
             return None
         _, piece = self._out[future.key]
         try:
@@ -195,15 +196,15 @@ class Desk:
             self._ready.add(future)
             return None
         except CancelledError:
-            self._take_back()
+            self._requeue()
             return None
         except KilledWorker as error:
-            self._give_again(future, piece, error)
+            self._retry(future, piece, error)
             return None
         except ModuleNotFoundError as error:
             raise ClusterError(f"a worker lacks the module {error.name!r}; install it there; {_KEPT}") from error
         except (OSError, TimeoutError) as error:
-            if not _of_connection(error):  # the user's own function has failed with it
+            if not _is_connection_error(error):  # the user's own function has failed with it
                 raise
             self._check_scheduler()
             drop_silent_workers(self._client, _SILENCE)
@@ -212,8 +213,8 @@ class Desk:
         del self._out[future.key]
         return chunk
 
-    def _give_again(self, future: Future, piece: Piece, error: Exception) -> None:
-        """Give a piece out again whose workers died: they may die of something else.
+    def _retry(self, future: Future, piece: Piece, error: Exception) -> None:
+        """Submit a piece again whose workers died, perhaps of another cause.
 
         Raises:
             ClusterError: they did too often.
@@ -228,13 +229,14 @@ class Desk:
         self._submit_again(future, piece)
 
     def _submit_again(self, future: Future, piece: Piece) -> None:
+        """Cancel a future and queue its piece again."""
         del self._out[future.key]
         with suppress(Exception):  # a cluster that has gone has forgotten it too
             self._client.cancel([future], force=True)
         self._pieces = chain([piece], self._pieces)
 
-    def _take_back(self) -> None:
-        """The parcel died with the last worker that had it, and all that was to be done with it."""
+    def _requeue(self) -> None:
+        """Queue all pending pieces again, as the job died with the last worker that had it."""
         self._pieces = chain([piece for _, piece in self._out.values()], self._pieces)
         self._cancel()
         self._ready.clear()
@@ -242,15 +244,15 @@ class Desk:
         self._there = None
 
 
-def _of_connection(error: Exception) -> bool:
-    """Whether an error is of the connection to a worker, and none that its function raised."""
+def _is_connection_error(error: Exception) -> bool:
+    """Return whether an error comes from the connection to a worker, not from the user's function."""
     from distributed.comm.core import CommClosedError
 
     return isinstance(error, CommClosedError | NoAnswerError)
 
 
-def sweep_chunk(parcel: Parcel, parameters: dict[str, Array], samples: NDArray[np.int64]) -> Chunk:
-    """What a worker does.
+def sweep_chunk(shipped: ShippedJob, parameters: dict[str, Array], samples: NDArray[np.int64]) -> Chunk:
+    """Compute a chunk; this function runs on a worker.
 
     Raises:
         ClusterError: the worker has joined since, and has other versions.
@@ -258,14 +260,14 @@ def sweep_chunk(parcel: Parcel, parameters: dict[str, Array], samples: NDArray[n
     from distributed import get_worker
 
     worker: Any = get_worker()
-    if other := other_versions(parcel.versions):
+    if other := other_versions(shipped.versions):
         raise ClusterError(f"{worker.address} has joined with other versions: {other}; {_KEPT} without it")
     with _one_at_a_time:
-        return parcel.compute((parameters, samples), worker.local_directory)
+        return shipped.compute((parameters, samples), worker.local_directory)
 
 
-def _reachable(client: Client) -> bool:
-    """Whether this machine can talk to each worker, or else a warning."""
+def _can_reach_workers(client: Client) -> bool:
+    """Return whether this machine can talk to each worker; warn if not."""
 
     async def ask() -> None:
         scheduler: Any = client.scheduler

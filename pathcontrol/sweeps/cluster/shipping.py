@@ -1,4 +1,4 @@
-"""What computes chunks, packed for a machine that has neither the user's modules nor the user's files."""
+"""Jobs packed for machines that have neither the user's modules nor the user's files."""
 
 from __future__ import annotations
 
@@ -20,40 +20,42 @@ from pathcontrol.errors import InputError, PathControlError
 from pathcontrol.simulation.context import RunContext
 from pathcontrol.simulation.run import Run
 from pathcontrol.sweeps.chunk import Chunk, Job, Piece
-from pathcontrol.sweeps.cluster.user_code import Luggage
+from pathcontrol.sweeps.cluster.user_code import PackedBuilder
 from pathcontrol.sweeps.memory import keep_freed_memory
 
 _OURS = __name__.partition(".")[0]
 
 
-class _Opened(NamedTuple):
+class _UnpackedJob(NamedTuple):
+    """An unpacked job, with the folder of its files."""
+
     job: Job
-    here: str  # the folder of the files
-    home: str  # where it is on the machine of the user
+    here: str  # the folder of the files on this machine
+    home: str  # the folder of the files on the machine of the user
 
 
-class Parcel:
-    """A :class:`Job` as bytes, opened once on each worker. The folder of its files goes when the parcel does.
+class ShippedJob:
+    """A :class:`Job` as bytes, unpacked once on each worker; the folder of its files is removed with it.
 
     Args:
         content: the bytes.
-        versions: what a machine has to have installed that opens it.
+        versions: the versions that a machine must have installed to unpack it.
     """
 
     def __init__(self, content: bytes, versions: Mapping[str, str]) -> None:
         self._content, self.versions = content, versions
-        self._opened: _Opened | None = None
+        self._opened: _UnpackedJob | None = None
 
     @classmethod
-    def of(cls, job: Job, versions: Mapping[str, str]) -> Parcel:
-        """The parcel of a job, with its files and with those modules that are no installed packages.
+    def of(cls, job: Job, versions: Mapping[str, str]) -> ShippedJob:
+        """Pack a job with its files and with those modules that are no installed packages.
 
         Raises:
             InputError: it cannot be pickled.
         """
-        build = job.build.luggage() if hasattr(job.build, "luggage") else job.build
+        build = job.build.pack() if hasattr(job.build, "pack") else job.build
         try:
-            with _own_modules_by_value():
+            with _pickle_own_modules():
                 return cls(cloudpickle.dumps((build, *job[1:])), versions)
         except Exception as error:  # whatever a user's object raises
             raise InputError(
@@ -61,11 +63,11 @@ class Parcel:
                 "belong to this machine"
             ) from error
 
-    def __reduce__(self) -> tuple[type[Parcel], tuple[bytes, Mapping[str, str]]]:
-        return Parcel, (self._content, self.versions)
+    def __reduce__(self) -> tuple[type[ShippedJob], tuple[bytes, Mapping[str, str]]]:
+        return ShippedJob, (self._content, self.versions)
 
     def compute(self, piece: Piece, scratch: str) -> Chunk:
-        """The chunk of a piece, as if computed where the parcel comes from.
+        """Return the chunk of a piece, as if computed on the machine that packed the job.
 
         Args:
             piece: parameters and samples.
@@ -80,30 +82,31 @@ class Parcel:
         except PathControlError as error:
             error.args = tuple(text.replace(here, home) for text in error.args)
             raise
-        return chunk._replace(runs={sample: _moved(run, here, home) for sample, run in chunk.runs.items()})
+        return chunk._replace(runs={sample: _relocate(run, here, home) for sample, run in chunk.runs.items()})
 
-    def _open(self, scratch: str) -> _Opened:
+    def _open(self, scratch: str) -> _UnpackedJob:
+        """Unpack the job, with its files in a new folder."""
         build, *rest = cloudpickle.loads(self._content)
-        if not isinstance(build, Luggage):
-            return _Opened(Job(build, *rest), "", "")
+        if not isinstance(build, PackedBuilder):
+            return _UnpackedJob(Job(build, *rest), "", "")
         folder = Path(tempfile.mkdtemp(prefix="pathcontrol-", dir=scratch)).resolve()
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         for place, content in build.files.items():
             (folder / place).parent.mkdir(parents=True, exist_ok=True)
             (folder / place).write_bytes(content)
-        return _Opened(Job(build.unpack(folder), *rest), str(folder), str(build.home).rstrip("/"))
+        return _UnpackedJob(Job(build.unpack(folder), *rest), str(folder), str(build.home).rstrip("/"))
 
 
-def _moved(run: Run, here: str, home: str) -> Run:
-    """The same run, that looks for the meshes of its robot at ``home``."""
+def _relocate(run: Run, here: str, home: str) -> Run:
+    """Return the same run with the mesh files of its robot at ``home``."""
     _, (data, config, stored) = run.__reduce__()
     here, home = (json.dumps(folder)[1:-1] for folder in (here, home))
     return Run(data, config, RunContext.load(stored._replace(text=stored.text.replace(here, home))))
 
 
 @contextmanager
-def _own_modules_by_value() -> Iterator[None]:
-    """Has what is in the user's own modules pickled itself, and not its name."""
+def _pickle_own_modules() -> Iterator[None]:
+    """Have the content of the user's own modules pickled, not just their names."""
     before = cloudpickle.list_registry_pickle_by_value()
     own = [module for module in list(sys.modules.values()) if _is_own(module) and module.__name__ not in before]
     for module in own:
@@ -116,7 +119,7 @@ def _own_modules_by_value() -> Iterator[None]:
 
 
 def _is_own(module: ModuleType) -> bool:
-    """Whether a module is a Python file that is neither of this package, nor of the standard library, nor installed."""
+    """Return whether a module is a Python file outside of this package, the standard library and installed packages."""
     if type(module) is not ModuleType or sys.modules.get(module.__name__) is not module:  # as lazy ones, and __main__
         return False
     file = Path(vars(module).get("__file__") or "")

@@ -1,4 +1,4 @@
-"""What builds a chunk on a machine that does not have the user's files."""
+"""A chunk builder together with the files it reads, ready to be sent to a worker."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import NamedTuple
 from pathcontrol.sweeps.chunk import Build
 
 
-class Luggage(NamedTuple):
-    """What builds a chunk and the files that it reads, as its method ``luggage`` gives them.
+class PackedBuilder(NamedTuple):
+    """A chunk builder and the files that it reads, as its method ``pack`` returns them.
 
     Attributes:
         home: the folder below which the files are.
-        files: what is in them, by their place below ``home``.
-        unpack: what builds a chunk, made from a folder that has the files at the same places.
+        files: the content of the files, by their place below ``home``.
+        unpack: makes the builder from a folder that has the files at the same places.
     """
 
     home: Path
