@@ -39,10 +39,10 @@ def load_parquet() -> ModuleType:
         MissingExtraError: it is not installed.
     """
     try:
-        import pyarrow.load_parquet
+        import pyarrow.parquet
     except ImportError as error:
         raise MissingExtraError("pyarrow", "sweep", "the table of a sweep") from error
-    return pyarrow.load_parquet
+    return pyarrow.parquet
 
 
 class Store:
