@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -13,11 +14,13 @@ from pathcontrol.analysis.progress import unfinished
 from pathcontrol.analysis.run_metrics import UNITS, metrics
 from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError, SimulationError, UnknownNameError
+from pathcontrol.simulation.checks.too_long import StepWarning
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.loops import SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
 from pathcontrol.sweeps.histories import Keep
+from pathcontrol.sweeps.too_fast import too_fast
 
 Arguments = Mapping[str, Any]
 Parts = Sequence[tuple[NDArray[np.intp], Arguments]]
@@ -40,10 +43,12 @@ class Chunk(NamedTuple):
     Attributes:
         columns: their numbers and texts by name, (k,) or (k, d) each.
         runs: the histories that may have to be kept, by sample.
+        told: warnings of a period or of steps that are too long.
     """
 
     columns: dict[str, Array]
     runs: dict[int, Run]
+    told: tuple[str, ...] = ()
 
 
 class Job(NamedTuple):
@@ -100,11 +105,13 @@ def _compute(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int6
     """Simulate and measure samples, as :class:`Job` does."""
     measured: dict[str, Array] = {}
     runs: dict[int, Run] = {}
+    told: list[str] = []
     try:
         built = job.build(parameters, samples)
         parts = [(np.arange(len(samples)), built)] if isinstance(built, Mapping) else built
         for rows, arguments in parts:
             run = _simulate(job.engine, samples[rows], arguments)
+            told += too_fast(arguments, samples[rows])
             values = _measure(run, job.measure)
             _put(measured, values, rows, len(samples))
             for row in _candidates(values, samples[rows], job.keep, job.at_random):
@@ -118,7 +125,7 @@ def _compute(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int6
     clash = set(parameters) & set(measured) | {"sample"} & set(measured)
     if clash:
         raise InputError(f"{', '.join(sorted(clash))}: both a parameter and a metric; call one of them otherwise")
-    return Chunk({"sample": samples, **parameters, **measured}, runs)
+    return Chunk({"sample": samples, **parameters, **measured}, runs, tuple(told))
 
 
 def _simulate(engine: Engine, samples: NDArray[np.int64], arguments: Arguments) -> Run:
@@ -131,7 +138,9 @@ def _simulate(engine: Engine, samples: NDArray[np.int64], arguments: Arguments) 
     if noisy and (np.diff(samples) != 1).any():
         raise InputError("the rows of a part with sensor noise have to follow one another, as noise goes by sample")
     try:
-        run = simulate(**({"engine": engine} | dict(arguments)), first_rollout=int(samples[0]), progress=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StepWarning)  # the sweep warns of each kind once
+            run = simulate(**({"engine": engine} | dict(arguments)), first_rollout=int(samples[0]), progress=False)
     except SimulationError as error:
         if error.run is None:
             raise

@@ -26,6 +26,7 @@ from pathcontrol.sweeps.manifest import MANIFEST
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.sweeps.space import Space, check_seed, digest
 from pathcontrol.sweeps.store import Store, load_parquet
+from pathcontrol.sweeps.too_fast import Teller
 
 if TYPE_CHECKING:
     from distributed import Client, Security
@@ -97,11 +98,12 @@ def sweep(
         definition |= {"engine": engine}
         with open_store(Path(out), space.samples, definition, resume) as store:
             store.tidy(keep, job.at_random)
-            missing, done = store.missing(chunk), 0
+            missing, done, tell = store.missing(chunk), 0, Teller()
             pieces = (({name: values[samples] for name, values in design.items()}, samples) for samples in missing)
             with closing(computed(pieces)) as chunks, progress_bar("sweep", sum(map(len, missing)), progress) as update:
                 for finished in chunks:
                     store.write(finished, keep, job.at_random)
+                    tell(finished.told)
                     done += len(finished.columns["sample"])
                     update(done)
     return SweepResult(out)

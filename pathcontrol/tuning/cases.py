@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -10,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.simulation.checks.too_long import StepWarning
 from pathcontrol.sweeps.chunk import Job
 from pathcontrol.sweeps.store import Store
 
@@ -56,11 +54,7 @@ class Cases:
         if known is not None:
             return known
         parameters = {name: each[rows] for name, each in values.items()}
-        with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore", StepWarning
-            )  # gains too high for the period are tried on purpose, and get bad metrics
-            found = self.job(parameters, samples[rows])
+        found = self.job(parameters, samples[rows])
         if self.store is not None:
             self.store.write(found, self.job.keep, self.job.at_random)
         return found.columns

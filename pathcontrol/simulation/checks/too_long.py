@@ -60,17 +60,30 @@ def warn_of_steps(
     Returns:
         The warnings in one text, or an empty text; if the arm diverges, they are the likely cause.
     """
-    if not isinstance(loop, SampledLoop):
-        return ""
-    if not (robot.robots[0] if isinstance(robot, RobotBatch) else robot).has_mass:
-        return ""
-    try:
-        told = list(dict.fromkeys(_find_warnings(controllers, loop, robot, q, qd, disturbance, duration)))
-    except np.linalg.LinAlgError:  # M is singular up to rounding, so that no estimate can be made
-        return ""
+    told = find_steps_too_long(controllers, loop, robot, q, qd, disturbance, duration)
     for sentence in told:
         warnings.warn(sentence, StepWarning, stacklevel=3)
     return "; ".join(told)
+
+
+def find_steps_too_long(
+    controllers: Sequence[Controller],
+    loop: SampledLoop | ContinuousTime,
+    robot: Arm,
+    q: Array,
+    qd: Array,
+    disturbance: Disturbance | None,
+    duration: float,
+) -> list[str]:
+    """Return the sentences that :func:`warn_of_steps` warns with."""
+    if not isinstance(loop, SampledLoop):
+        return []
+    if not (robot.robots[0] if isinstance(robot, RobotBatch) else robot).has_mass:
+        return []
+    try:
+        return list(dict.fromkeys(_find_warnings(controllers, loop, robot, q, qd, disturbance, duration)))
+    except np.linalg.LinAlgError:  # M is singular up to rounding, so that no estimate can be made
+        return []
 
 
 def _find_warnings(
