@@ -9,7 +9,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from pathcontrol.simulation.arguments import checked_loop, plant_of, start_of_each, states_of_each
+from pathcontrol.simulation.arguments import broadcast_states, check_loop, make_plant, start_law
 from pathcontrol.simulation.checks.too_long import StepWarning, find_steps_too_long
 
 _ROLLOUT = re.compile(r" \(rollout (\d+)\)")
@@ -19,9 +19,9 @@ _NUMBER = re.compile(r"[0-9][0-9.e+-]*")
 def too_fast(arguments: Mapping[str, Any], samples: NDArray[Any]) -> Iterator[str]:
     """Say what a simulation of ``samples`` (k,) would warn of, with the number of a sample and not of a rollout."""
     controller, disturbance = arguments["controller"], arguments.get("disturbance")
-    robot, loop = plant_of(arguments.get("plant"), controller), checked_loop(arguments.get("loop"))
-    states = states_of_each(arguments["q"], arguments.get("qd"), robot, controller.task)
-    q, qd, _ = start_of_each(controller, *states, disturbance)
+    robot, loop = make_plant(arguments.get("plant"), controller), check_loop(arguments.get("loop"))
+    states = broadcast_states(arguments["q"], arguments.get("qd"), robot, controller.task)
+    q, qd, _ = start_law(controller, *states, disturbance)
     for sentence in find_steps_too_long([controller], loop, robot, q, qd, disturbance, arguments["duration"]):
         found = _ROLLOUT.search(sentence)
         number = samples[int(found[1]) if found else 0]
