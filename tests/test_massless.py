@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import pathcontrol as pc
 from pathcontrol.cli import main
 from pathcontrol.errors import ExperimentError, InputError, PathControlWarning, UnknownNameError, UrdfError
-from pathcontrol.robot.lump import ball, combined, rod
+from pathcontrol.robot.lump import ball, combine, rod
 from pathcontrol.robot.recipe import recipe_of, robot_of
 from pathcontrol.robot.urdf import check_urdf, parse_urdf
 
@@ -175,7 +175,7 @@ def test_masses_can_be_given_by_joint():
 def test_bodies_combine_as_pinocchio_adds_them(seed):
     rng = np.random.default_rng(seed)
     parts = [rod(rng.uniform(0.1, 9), rng.normal(size=3)) for _ in range(3)] + [ball(2.0, 0.1)]
-    whole = combined(parts)
+    whole = combine(parts)
     total = sum((pin.Inertia(*part) for part in parts[1:]), pin.Inertia(*parts[0]))
     np.testing.assert_allclose(whole.mass, total.mass)
     np.testing.assert_allclose(whole.com, total.lever)

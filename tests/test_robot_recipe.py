@@ -16,7 +16,7 @@ from strategies import floats
 
 from pathcontrol import Coulomb, FrictionLaw, InputError, Stribeck, UrdfError, Viscous, load_robot
 from pathcontrol.robot.actuation import Actuation, Limits
-from pathcontrol.robot.friction import friction_of, no_friction
+from pathcontrol.robot.friction import no_friction, rebuild_law
 from pathcontrol.robot.model import UrdfSource
 from pathcontrol.robot.recipe import recipe_of, robot_of
 
@@ -167,7 +167,7 @@ def test_every_law_is_what_it_describes(values, speed):
         Stribeck(a, a + b, c + 0.1),
         Viscous(a) + Coulomb(b, c) + Viscous(d),
     ):
-        same = friction_of(json.loads(json.dumps(law.describe())))
+        same = rebuild_law(json.loads(json.dumps(law.describe())))
         assert np.array_equal(same.torque(np.array([speed, 0.5])), law.torque(np.array([speed, 0.5])))
         assert same.describe() == law.describe()
 

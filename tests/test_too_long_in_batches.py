@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 import pathcontrol as pc
-from pathcontrol.robot.friction import of_rollout
+from pathcontrol.robot.friction import select_rollout
 from pathcontrol.simulation.checks.too_long import StepWarning, warn_of_steps
 
 ARM = pc.load_robot("cicese_2dof").with_friction(None)
@@ -43,10 +43,10 @@ def test_the_one_rollout_with_steep_friction_is_found(row):
     static, velocity = np.full((ROWS, 2), 2.0), np.full((ROWS, 2), 0.5)
     velocity[row] = 1e-3
     rows = pc.Stribeck(np.ones((ROWS, 2)), static, velocity)
-    alone = told(pc.Projection(ARM, CIRCLE, 800.0, 45.0), ARM.with_friction(of_rollout(rows, row)), 1)
+    alone = told(pc.Projection(ARM, CIRCLE, 800.0, 45.0), ARM.with_friction(select_rollout(rows, row)), 1)
     assert "Stribeck" in alone
     law = pc.Projection(ARM, CIRCLE, 800.0, 45.0)
-    assert told(law, batch(ARM.with_friction(of_rollout(rows, row)), row)) == alone
+    assert told(law, batch(ARM.with_friction(select_rollout(rows, row)), row)) == alone
     assert told(law, pc.RobotBatch([ARM] * ROWS, rows)) == alone
 
 
@@ -56,7 +56,7 @@ def test_rows_of_stribeck_friction_can_be_simulated():
     law = pc.Projection(ARM, CIRCLE, 800.0, 45.0)
     run = pc.simulate(law, [0.9, 0.1], duration=0.1, plant=ARM.with_friction(rows), progress=False)
     for i in range(3):
-        alone = ARM.with_friction(of_rollout(rows, i))
+        alone = ARM.with_friction(select_rollout(rows, i))
         one = pc.simulate(law, [0.9, 0.1], duration=0.1, plant=alone, progress=False)
         assert np.array_equal(one.array("q")[0], run.array("q")[i])
 

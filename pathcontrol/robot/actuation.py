@@ -1,4 +1,4 @@
-"""What the joints of an arm are driven and measured with."""
+"""The drives and sensors of the joints: limits, friction and encoders."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ class Limits:
     effort: Array
 
     def select(self, joints: Sequence[int]) -> Limits:
-        """The limits of some of the joints."""
+        """Return the limits of some of the joints."""
         return Limits(*(readonly(a[list(joints)]) for a in (self.lower, self.upper, self.velocity, self.effort)))
 
 
 @dataclass(frozen=True, eq=False)
 class Actuation:
-    """What the joints are driven and measured with: limits, friction, encoder resolution [counts/rev] or None."""
+    """The drives and sensors of the joints: limits, friction, encoder resolution [counts/rev] or None."""
 
     limits: Limits
     friction: FrictionLaw
     encoder_counts: Array | None = None
 
     def select(self, joints: Sequence[int]) -> Actuation:
-        """The actuation of some of the joints."""
+        """Return the actuation of some of the joints."""
         counts = None if self.encoder_counts is None else readonly(self.encoder_counts[list(joints)])
         return Actuation(self.limits.select(joints), self.friction.select(joints), counts)

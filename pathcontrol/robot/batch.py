@@ -1,4 +1,4 @@
-"""Arms that differ from rollout to rollout, as the simulated arm of a batch."""
+"""Arms that differ from rollout to rollout, as the simulated plant of a batch."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathcontrol._arrays import Array, merge_rows
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.robot.actuation import Actuation, Limits
-from pathcontrol.robot.friction import FrictionLaw, friction_of_each
+from pathcontrol.robot.friction import FrictionLaw, combine_laws
 from pathcontrol.robot.model import RobotModel
 
 
@@ -49,9 +49,9 @@ class RobotBatch:
                 raise InputError(f"plant[{i}] has the joints {robot.joint_names}, plant[0] {first.joint_names}")
         self.n, self.name, self.joint_names = first.n, first.name, first.joint_names
         self.position_units = first.position_units
-        law = friction_of_each([robot.friction for robot in self.robots]) if friction is None else friction
+        law = combine_laws([robot.friction for robot in self.robots]) if friction is None else friction
         self.actuation = Actuation(_limits(self.robots), law, _encoder_counts(self.robots))
-        self.bodies, self.body = _different(self.robots)
+        self.bodies, self.body = _distinct_bodies(self.robots)
         # the rows of each body
         self._rows = np.split(np.argsort(self.body, kind="stable"), np.cumsum(np.bincount(self.body))[:-1])
 
@@ -69,7 +69,7 @@ class RobotBatch:
         return self.actuation.limits
 
     def with_armature(self, armature: Array) -> RobotBatch:
-        """The same arms with rotor inertia [kg m²], (n,) or (N, n), added to the diagonals of their M."""
+        """Return the same arms with rotor inertia [kg m²], (n,) or (N, n), added to the diagonals of their M."""
         made: dict[tuple[int, bytes], RobotModel] = {}
         arms = []
         for body, added in zip(self.body.tolist(), np.broadcast_to(armature, (len(self), self.n)), strict=True):
@@ -80,20 +80,20 @@ class RobotBatch:
         return RobotBatch(arms, self.friction)
 
     def forward_dynamics(self, q: Array, qd: Array, tau: Array) -> Array:
-        """q̈ [rad/s²], (N, n), of the arms at (q, q̇) under τ, each (N, n); :meth:`RobotModel.forward_dynamics`."""
+        """Return q̈ [rad/s²], (N, n), at (q, q̇) under τ, each (N, n); see :meth:`RobotModel.forward_dynamics`."""
         qdd = np.empty_like(tau)
         for body, rows in zip(self.bodies, self._rows, strict=True):
             qdd[rows] = body.forward_dynamics(q[rows], qd[rows], tau[rows])
         return qdd
 
     def mass_matrix(self, q: Array, rows: NDArray[np.intp]) -> Array:
-        """M(q) [kg m²], (k, n, n), of the arms of some ``rows`` (k,), at q (k, n)."""
+        """Return M(q) [kg m²], (k, n, n), of the arms of the ``rows`` (k,), at q (k, n)."""
         each = [self.bodies[body].mass_matrix(one) for body, one in zip(self.body[rows].tolist(), q, strict=True)]
         return np.reshape(each, (len(rows), self.n, self.n))
 
 
-def _different(robots: Sequence[RobotModel]) -> tuple[list[RobotModel], NDArray[np.intp]]:
-    """The rigid bodies that differ, and which of them each arm has, (N,)."""
+def _distinct_bodies(robots: Sequence[RobotModel]) -> tuple[list[RobotModel], NDArray[np.intp]]:
+    """Return the distinct rigid bodies, and the index of the one that each arm has, (N,)."""
     found: list[RobotModel] = []
     known: dict[int, int] = {}  # by the identity of a model
     alike: dict[Hashable, list[int]] = defaultdict(list)  # by where it comes from
@@ -110,10 +110,12 @@ def _different(robots: Sequence[RobotModel]) -> tuple[list[RobotModel], NDArray[
 
 
 def _limits(robots: Sequence[RobotModel]) -> Limits:
+    """Return the limits of all arms, merged where they are the same."""
     names = ("lower", "upper", "velocity", "effort")
     return Limits(*(merge_rows([getattr(robot.limits, name) for robot in robots]) for name in names))
 
 
 def _encoder_counts(robots: Sequence[RobotModel]) -> Array | None:
+    """Return the encoder resolutions of all arms, ``None`` if an arm has no encoders."""
     counts: list[Any] = [robot.actuation.encoder_counts for robot in robots]
     return None if any(count is None for count in counts) else merge_rows(counts)

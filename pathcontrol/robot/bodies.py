@@ -1,4 +1,4 @@
-"""Bodies of a ``pin.Model``: made of numbers that people give, and made heavier or lighter."""
+"""Rigid bodies of a ``pin.Model``: made from mass, centre and inertia, scaled, and checked."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def scale_bodies(model: Any, names: tuple[str, ...], factors: Mapping[str, float
     for joint, value in (*factors.items(), *masses.items()):
         i, argument = names.index(joint) + 1, "scale" if joint in factors else "kg"
         try:
-            model.inertias[i] = _scaled(model, i, value, argument)
+            model.inertias[i] = _scale_body(model, i, value, argument)
         except InputError as error:
             raise InputError(f"{argument} of {joint} = {value:g}: {error}") from error
     given = [*(f"scale of {joint} = {value:g}" for joint, value in factors.items())]
@@ -71,19 +71,19 @@ def scale_bodies(model: Any, names: tuple[str, ...], factors: Mapping[str, float
     check_spread(model, ", ".join(given))
 
 
-def _scaled(model: Any, i: int, value: float, argument: str) -> Any:
-    """The body ``i`` of a ``pin.Model`` times a factor, ``scale``, or of a mass, ``kg``."""
+def _scale_body(model: Any, i: int, value: float, argument: str) -> Any:
+    """Return the body ``i`` of a ``pin.Model`` times a factor, ``scale``, or brought to a mass, ``kg``."""
     body = model.inertias[i]
     if body.mass > 0:
         factor = value if argument == "scale" else value / body.mass
         return body_of(factor * body.mass, body.lever, factor * body.inertia)
     if argument == "scale":
         raise InputError("it moves no mass; say how many with kg={...}")
-    return body_of(*rod(value, _farthest(model, i)))
+    return body_of(*rod(value, _farthest_point(model, i)))
 
 
 def check_spread(model: Any, given: str) -> None:
-    """Check that the bodies of a ``pin.Model`` do not differ so much that M(q) is singular but for rounding.
+    """Check that the bodies of a ``pin.Model`` are of similar size, so that M(q) is not singular by rounding.
 
     What was ``given`` to make them so begins the message.
 
@@ -91,7 +91,7 @@ def check_spread(model: Any, given: str) -> None:
         InputError: one counts for more than 1e12 times what another does.
     """
     names = list(model.names)
-    felt = {names[i]: _felt(body) for i, body in enumerate(model.inertias) if i and body.mass > 0}
+    felt = {names[i]: _felt_inertia(body) for i, body in enumerate(model.inertias) if i and body.mass > 0}
     most, least = (choose(felt, key=felt.__getitem__, default="") for choose in (max, min))
     if felt and felt[most] > _SPREAD * felt[least]:
         raise InputError(
@@ -100,14 +100,14 @@ def check_spread(model: Any, given: str) -> None:
         )
 
 
-def _felt(body: Any) -> float:
-    """How much joints a metre away feel of a body: m (1 + c²) + tr I."""
+def _felt_inertia(body: Any) -> float:
+    """Return the inertia that a body has for joints a metre away: m (1 + c²) + tr I."""
     lever = np.asarray(body.lever)
     return float(body.mass * (1.0 + lever @ lever) + np.trace(body.inertia))
 
 
 def idle_joints(model: Any) -> list[str]:
-    """Return the names of the joints that have neither a rotor nor, from there to the tips, anything to move."""
+    """Return the names of the joints without a rotor that have, from there to the tips, no mass to move."""
     bodies, rotors = list(model.inertias), np.asarray(model.armature)
     heavy = [bool(body.mass or body.inertia.any()) for body in bodies]
     return [
@@ -117,8 +117,8 @@ def idle_joints(model: Any) -> list[str]:
     ]
 
 
-def _farthest(model: Any, i: int) -> Array:
-    """Of the joints and frames on what joint ``i`` moves, return the place of the farthest [m], (3,)."""
+def _farthest_point(model: Any, i: int) -> Array:
+    """Return the position [m], (3,), of the joint or frame carried by joint ``i`` that is farthest from it."""
     joints = [model.jointPlacements[k].translation for k in range(len(model.parents)) if model.parents[k] == i]
     frames = [frame.placement.translation for frame in model.frames if frame.parentJoint == i]
     return max((np.array(place) for place in (*joints, *frames)), key=lambda x: float(x @ x), default=np.zeros(3))

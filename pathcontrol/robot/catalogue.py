@@ -1,4 +1,4 @@
-"""The text of a URDF, found by the name of a known robot, by a path, or given as it is."""
+"""Look-up of a URDF by the name of a known robot, by a path, or as text."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 from pathcontrol._files import read_bounded
 from pathcontrol.errors import MissingExtraError, UnknownNameError, UrdfError
 from pathcontrol.robot.model import UrdfSource
-from pathcontrol.robot.urdf.xml.encoding import decoded
+from pathcontrol.robot.urdf.xml.encoding import decode
 from pathcontrol.robot.urdf.xml.parse import MAX_BYTES
 
 _OWN_NAME = re.compile(r"<robot\b[^>]*?\sname\s*=\s*[\"']([^\"']*)[\"']")
 
 
 def known_robots() -> dict[str, str]:
-    """Names that :func:`load_robot` takes, each with where it comes from."""
+    """Return the names that :func:`load_robot` takes, each with its source."""
     bundled = {path.stem: "bundled" for path in sorted(_bundled_dir().glob("*.urdf"))}
     try:
         catalogue = _example_robots()
@@ -28,7 +28,7 @@ def known_robots() -> dict[str, str]:
 
 
 def find_urdf(source: str | Path, package_dirs: tuple[Path, ...] = ()) -> UrdfSource:
-    """The text of a URDF given as a name, a path or a string, without looking at what it says.
+    """Find the text of a URDF given as a name, a path or a string, without parsing it.
 
     Raises:
         UrdfError: there is no such regular file, it is larger than 64 MiB, or it is no text.
@@ -37,7 +37,7 @@ def find_urdf(source: str | Path, package_dirs: tuple[Path, ...] = ()) -> UrdfSo
     if isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<"):
         return UrdfSource(source, None, package_dirs)
     if isinstance(source, str) and source.isidentifier():  # a file of that name would have a suffix
-        return _named(source, package_dirs)
+        return _find_by_name(source, package_dirs)
     path = Path(source).expanduser()
     try:
         text = _read(path)
@@ -49,16 +49,18 @@ def find_urdf(source: str | Path, package_dirs: tuple[Path, ...] = ()) -> UrdfSo
 
 
 def _folders_of_link(path: Path) -> list[Path]:
-    """Where a symbolic link to a URDF is, and above: its meshes may be there and not beside the file itself."""
+    """Return the folder of a symbolic link to a URDF and the one above: its meshes may be there."""
     beside = path.absolute().parent
     return [] if beside.resolve() == path.resolve().parent else [beside, beside.parent]
 
 
 def _read(path: Path) -> str:
-    return decoded(read_bounded(path, MAX_BYTES, "a URDF", UrdfError), path.name)
+    """Read a URDF file as text."""
+    return decode(read_bounded(path, MAX_BYTES, "a URDF", UrdfError), path.name)
 
 
-def _named(name: str, package_dirs: tuple[Path, ...]) -> UrdfSource:
+def _find_by_name(name: str, package_dirs: tuple[Path, ...]) -> UrdfSource:
+    """Find the URDF of a robot by its name."""
     bundled = {path.stem: path for path in _bundled_dir().glob("*.urdf")}.get(name)
     if bundled is not None:
         return UrdfSource(_read(bundled), bundled.parent, package_dirs, name)
@@ -77,6 +79,7 @@ def _named(name: str, package_dirs: tuple[Path, ...]) -> UrdfSource:
 
 def _example_urdf(name: str, loader: Any, package_dirs: tuple[Path, ...]) -> UrdfSource:
     # instantiating the loader would read every collision mesh; its class attributes say where the file is
+    """Find the URDF of a robot of example-robot-data."""
     from example_robot_data.robots_loader import getModelPath
 
     relative = Path(loader.path, loader.urdf_subpath, loader.urdf_filename)
@@ -86,7 +89,7 @@ def _example_urdf(name: str, loader: Any, package_dirs: tuple[Path, ...]) -> Urd
 
 
 def own_urdf(name: str, path: Path, known: set[str]) -> tuple[Path, str]:
-    """The file that describes the robot ``name``, and its text: ``path``, or the one beside it that is meant.
+    """Return the file that describes the robot ``name``, and its text: ``path``, or the right one beside it.
 
     A description that calls itself as another ``known`` robot is one of that robot: some releases of
     example-robot-data give the file of a UR5 for ``"ur3"``.
@@ -108,7 +111,7 @@ def own_urdf(name: str, path: Path, known: set[str]) -> tuple[Path, str]:
 
 
 def _own_name(text: str) -> str:
-    """What a URDF calls its robot; empty if it does not say."""
+    """Return the name that a URDF gives its robot, or an empty text."""
     found = _OWN_NAME.search(text)
     return found[1] if found else ""
 
@@ -122,7 +125,7 @@ def _example_robots() -> dict[str, Any]:
 
 
 def _bundled_dir() -> Path:
-    """``urdf/`` inside an installed wheel; beside the package in a checkout."""
+    """Return the folder ``urdf/`` of an installed wheel, or the one beside the package in a checkout."""
     installed = Path(str(resources.files("pathcontrol"))) / "urdf"
     return installed if installed.is_dir() else installed.parent.parent / "urdf"
 

@@ -17,7 +17,7 @@ from pathcontrol.robot.model import RobotModel
 
 
 class ArmConstants(NamedTuple):
-    """A tree of n bodies; body i is carried by joint i and described in a frame whose z axis is the joint's.
+    """Rigid-body constants of a tree of n bodies; joint i carries body i, whose frame has the joint's axis as z.
 
     Attributes:
         parent: the body that carries each joint, −1 for the base, (n,).
@@ -68,7 +68,7 @@ def arm_constants(robot: RobotModel) -> ArmConstants:
 
 
 def frame_carrier(robot: RobotModel, frame: str) -> tuple[int, Array]:
-    """Return which body carries ``frame`` (−1: the base), and the frame's origin in that body's frame [m], (3,)."""
+    """Return the index of the body that carries ``frame`` (−1: the base), and the frame's origin in it [m], (3,)."""
     model = robot.pinocchio_model
     found = model.frames[model.getFrameId(frame)]
     body = int(found.parentJoint) - 1
@@ -77,7 +77,7 @@ def frame_carrier(robot: RobotModel, frame: str) -> tuple[int, Array]:
 
 
 def _joint_axes(model: Any) -> tuple[list[Array], list[int]]:
-    """The axis of each joint in its own frame, and whether the joint slides."""
+    """Return the axis of each joint in its own frame, and 1 for each joint that slides, else 0."""
     axes, slides = [], []
     for joint in list(model.joints)[1:]:
         kind = joint.shortname()  # JointModelRX, JointModelPZ, JointModelRevoluteUnaligned, …
@@ -90,7 +90,7 @@ def _joint_axes(model: Any) -> tuple[list[Array], list[int]]:
 
 
 def _frame_with_z(axis: Array) -> Array:
-    """A rotation whose third column is the unit vector ``axis``; exact for coordinate axes."""
+    """Return a rotation whose third column is the unit vector ``axis``; exact for coordinate axes."""
     z = axis if abs(axis @ axis - 1) <= 1e-15 else axis / np.linalg.norm(axis)
     x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
     x /= np.linalg.norm(x)
@@ -98,7 +98,7 @@ def _frame_with_z(axis: Array) -> Array:
 
 
 def _turned_body(body: pin.Inertia, turn: Array) -> tuple[float, Array, Array]:
-    """Mass, moment and inertia about the origin of a body, in a frame turned by ``turn``."""
+    """Return mass, moment and inertia about the origin of a body, in a frame turned by ``turn``."""
     centre, about_centre = turn.T @ body.lever, turn.T @ body.inertia @ turn
     about_origin = about_centre + body.mass * ((centre @ centre) * np.eye(3) - np.outer(centre, centre))
     return body.mass, body.mass * centre, about_origin[np.triu_indices(3)]

@@ -1,4 +1,4 @@
-"""Masses and inertias of links that have none, from their shapes at a density."""
+"""Estimates of the masses and inertias of links that have none, from their shapes at a density."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from lxml import etree
 
 from pathcontrol._arrays import LARGEST, SMALLEST, Array
 from pathcontrol.errors import PathControlWarning, UrdfError
-from pathcontrol.robot.lump import Lump, ball, combined
+from pathcontrol.robot.lump import Lump, ball, combine
 from pathcontrol.robot.meshes import load_parts
 from pathcontrol.robot.model import UrdfSource
-from pathcontrol.robot.urdf.checks.finding import shown
+from pathcontrol.robot.urdf.checks.finding import quote
 from pathcontrol.robot.urdf.checks.form import check_form
 from pathcontrol.robot.urdf.mesh_files import find_mesh
 from pathcontrol.robot.urdf.model_values import moving_bodies, read_arm
@@ -31,7 +31,7 @@ _BALL = 0.05  # m, radius of a ball in the place of a link that has no shape
 
 
 def with_estimated_inertia(urdf: UrdfSource, density: float = DENSITY) -> UrdfSource:
-    """The same URDF with an ``<inertial>`` for each link that has a shape and no mass.
+    """Return the same URDF with an ``<inertial>`` for each link that has a shape and no mass.
 
     The collision shapes of a link are taken as solid and of one ``density`` [kg/m³], or where there are none its visual
     ones. A mesh that is not closed is taken as its convex hull. A body between two joints that has neither a mass nor a
@@ -43,7 +43,7 @@ def with_estimated_inertia(urdf: UrdfSource, density: float = DENSITY) -> UrdfSo
     arm, links = read_arm(root), {link.get("name", ""): link for link in root.iterfind("link")}
     empty = {name for name in links if not has_mass(arm.links[name].inertial)}
     unread: dict[str, str] = {}
-    lumps = {name: _solid(links[name], urdf, density, unread) for name in links if name in empty}
+    lumps = {name: _estimate_link(links[name], urdf, density, unread) for name in links if name in empty}
     balls = []
     for body in moving_bodies(arm):
         if empty.issuperset(body.poses) and not any(lumps[name] for name in body.poses):
@@ -54,12 +54,12 @@ def with_estimated_inertia(urdf: UrdfSource, density: float = DENSITY) -> UrdfSo
     for name, lump in lumps.items():
         if lump is not None:
             _write(links[name], lump)
-    _tell(balls, unread)
+    _warn_of_guesses(balls, unread)
     return replace(urdf, text=etree.tostring(root, encoding="unicode"))
 
 
-def _tell(balls: list[str], unread: dict[str, str]) -> None:
-    """Warn of links that became balls, and of shapes that are missing from what a link weighs."""
+def _warn_of_guesses(balls: list[str], unread: dict[str, str]) -> None:
+    """Warn of links that became balls, and of shapes that are missing from the estimated masses."""
     light = [name for name in unread if name not in balls]
     if balls:
         because = next((f": {unread[name]}" for name in balls if name in unread), "; give them shapes, or <inertial>")
@@ -69,16 +69,17 @@ def _tell(balls: list[str], unread: dict[str, str]) -> None:
 
 
 def _warn(told: str) -> None:
+    """Warn about an estimate, in the name of the caller of ``load_robot``."""
     warnings.warn(f"estimated_inertia: {told}", PathControlWarning, stacklevel=5)
 
 
 def has_mass(inertial: object) -> bool:
-    """Whether the inertial of a link, if it has one, is that of a body."""
+    """Return whether a link has an inertial with mass or inertia."""
     return inertial is not None and bool(inertial.mass or np.any(inertial.inertia))  # type: ignore[attr-defined]
 
 
-def _solid(link: etree._Element, urdf: UrdfSource, density: float, unread: dict[str, str]) -> Lump | None:
-    """What the shapes of a link weigh, ``None`` if none can be read; why one cannot is added to ``unread``."""
+def _estimate_link(link: etree._Element, urdf: UrdfSource, density: float, unread: dict[str, str]) -> Lump | None:
+    """Return the body of the shapes of a link, ``None`` if none can be read; note in ``unread`` why one cannot."""
     missing: list[str] = []
     for tag in ("collision", "visual"):
         lumps: list[Lump] = []
@@ -93,11 +94,11 @@ def _solid(link: etree._Element, urdf: UrdfSource, density: float, unread: dict[
             break
     if missing:
         unread[link.get("name", "")] = missing[0]
-    return combined(lumps) if lumps else None
+    return combine(lumps) if lumps else None
 
 
 def _shape(holder: etree._Element, urdf: UrdfSource, density: float) -> Lump:
-    """The shape of one ``<visual>`` or ``<collision>`` in the frame of its link."""
+    """Return the body of one ``<visual>`` or ``<collision>`` in the frame of its link."""
     shape = next(holder.iterfind("geometry/*"), None)
     if shape is None:
         raise UrdfError(f"a <{holder.tag}> holds no shape")
@@ -111,7 +112,7 @@ def _shape(holder: etree._Element, urdf: UrdfSource, density: float) -> Lump:
 
 
 def _primitive(shape: etree._Element) -> trimesh.Trimesh:
-    """A box, cylinder or ball: polyhedra of the same volume to 1 % or better."""
+    """Return a box, cylinder or ball as a polyhedron of the same volume to 1 % or better."""
     size, radius, length = (
         read_numbers(shape.get(name, ""), count) for name, count in (("size", 3), ("radius", 1), ("length", 1))
     )
@@ -125,20 +126,21 @@ def _primitive(shape: etree._Element) -> trimesh.Trimesh:
 
 
 def _mesh(shape: etree._Element, urdf: UrdfSource) -> trimesh.Trimesh:
-    """What a mesh encloses, or its convex hull, or where it is flat a box around it."""
+    """Return a mesh if it is closed, else its convex hull, or a box around it if it is flat."""
     name, scale = shape.get("filename", ""), read_numbers(shape.get("scale", "1 1 1"), 3)
     try:
         parts = load_parts(find_mesh(name, urdf.base_dir, urdf.package_dirs))
     except UrdfError as error:
-        raise UrdfError(f"mesh {shown(name)}: {error}") from error
+        raise UrdfError(f"mesh {quote(name)}: {error}") from error
     if scale is None:
-        raise UrdfError(f"mesh {shown(name)}: its scale is {shown(shape.get('scale'))}, expected 3 numbers")
+        raise UrdfError(f"mesh {quote(name)}: its scale is {quote(shape.get('scale'))}, expected 3 numbers")
     whole: Any = trimesh.util.concatenate([trimesh.Trimesh(part.vertices, part.faces) for part in parts])
     whole.apply_scale(scale)
     return whole if whole.is_volume else _hull(whole)
 
 
 def _hull(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return the convex hull of a mesh, or a box around a flat one."""
     try:
         hull = mesh.convex_hull
         if hull.volume > 0:
@@ -152,6 +154,7 @@ def _hull(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def _pose(origin: etree._Element | None) -> Array:
+    """Return the pose (4, 4) of an ``<origin>``."""
     if origin is None:
         return np.eye(4)
     xyz, rpy = (read_numbers(origin.get(name, "0 0 0"), 3) or (0.0, 0.0, 0.0) for name in ("xyz", "rpy"))
@@ -161,7 +164,7 @@ def _pose(origin: etree._Element | None) -> Array:
 
 
 def _write(link: etree._Element, lump: Lump) -> None:
-    """Give a link an ``<inertial>`` in the place of one without mass."""
+    """Replace the massless inertials of a link by an ``<inertial>`` with the values of ``lump``."""
     for old in link.findall("inertial"):
         link.remove(old)
     inertial = etree.Element("inertial")
@@ -173,5 +176,5 @@ def _write(link: etree._Element, lump: Lump) -> None:
 
 
 def _shortest(value: float) -> str:
-    """A number as it is read again to the last bit."""
+    """Write a number with as few digits as identify it to the last bit."""
     return repr(float(value))

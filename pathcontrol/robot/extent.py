@@ -1,4 +1,4 @@
-"""What an arm can do at most with a tool, to question speeds and lengths that are far beyond it."""
+"""The reach and the speed of an arm, to warn of lengths and speeds that are far beyond them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FAR = 3.0  # times the reach
 
 
 class Extent(NamedTuple):
-    """What a frame of an arm can do at most, over random postures.
+    """The reach and the greatest speed of a frame of an arm, over random postures.
 
     Attributes:
         reach: how far its origin is from the base's [m].
@@ -32,7 +32,7 @@ class Extent(NamedTuple):
 
 @lru_cache(maxsize=4)  # of the arm that a toolpath asks about for each of its contours
 def extent(robot: RobotModel, frame: str) -> Extent:
-    """Return how far and how fast a frame of an arm can be."""
+    """Return the reach and the greatest speed of a frame of an arm."""
     limits = robot.limits
     lower, upper = np.maximum(limits.lower, -np.pi), np.minimum(limits.upper, np.pi)
     share = np.random.default_rng(0).random((_POSTURES, robot.n))

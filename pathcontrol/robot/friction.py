@@ -25,7 +25,7 @@ from pathcontrol.registry import FRICTION_LAWS
 
 
 def _coefficients(name: str, value: ArrayLike) -> Array:
-    """Non-negative coefficients, one for each joint."""
+    """Check that coefficients are finite and not negative, one for each joint."""
     array = physical(name, np.atleast_1d(as_array(name, value)))
     if (array < 0).any():
         raise InputError(f"{name} = {array.tolist()}, expected no negative value: friction takes energy out")
@@ -57,38 +57,38 @@ class FrictionLaw(ABC):
         return np.zeros(self.n)
 
     def levels(self, qd: Array) -> tuple[Array, Array]:
-        """Dry friction levels (F⁺, F⁻) ≥ 0 [N m] at joint velocities ``qd`` (*batch, n) [rad/s].
+        """Return the dry friction levels (F⁺, F⁻) ≥ 0 [N m] at joint velocities ``qd`` (*batch, n) [rad/s].
 
         The levels broadcast against ``qd``: a law whose levels are constant returns shape (n,).
         """
         return np.zeros(self.n), np.zeros(self.n)
 
     def torque(self, qd: Array) -> Array:
-        """Friction torque f(q̇) [N m], (*batch, n); where q̇ = 0 the dry part is given as 0."""
+        """Return the friction torque f(q̇) [N m], (*batch, n); where q̇ = 0 the dry part is given as 0."""
         plus, minus = self.levels(qd)
         return self.viscous * qd + np.where(qd > 0, plus, 0.0) - np.where(qd < 0, minus, 0.0)
 
     def smoothed(self, qd: Array, width: float) -> Array:
-        """Friction torque [N m] with the step at zero replaced by tanh(q̇/width); ``width`` in rad/s."""
+        """Return the friction torque [N m] with the step at zero replaced by tanh(q̇/width); ``width`` in rad/s."""
         plus, minus = self.levels(qd)
         blend = np.tanh(qd / width)
         return self.viscous * qd + 0.5 * ((plus + minus) * blend + (plus - minus) * blend**2)
 
     def select(self, joints: Sequence[int]) -> Self:
-        """The same law for some of the joints."""
+        """Return the same law for some of the joints."""
         index = list(joints)
-        return type(self)(*(_of_joints(getattr(self, f.name), index) for f in fields(self)))
+        return type(self)(*(_select_joints(getattr(self, f.name), index) for f in fields(self)))
 
     def __add__(self, other: FrictionLaw) -> FrictionSum:
         return FrictionSum((self, other))
 
     def describe(self) -> dict[str, object]:
-        """The law and its coefficients, for the record of a run."""
+        """Return the name of the law and its coefficients, for the record of a run."""
         return {"law": type(self).__name__} | {f.name: np.asarray(getattr(self, f.name)).tolist() for f in fields(self)}
 
 
-def _of_joints(value: ArrayLike, joints: list[int]) -> Any:
-    """The values of some joints, (…, n); a number is that of all joints."""
+def _select_joints(value: ArrayLike, joints: list[int]) -> Any:
+    """Return the values of some joints, (…, n); a single number holds for all joints."""
     array = np.asarray(value)
     return array[..., joints] if array.ndim else value
 
@@ -206,7 +206,7 @@ class FrictionSum(FrictionLaw):
 
 @dataclass(frozen=True, eq=False)
 class FrictionOfGroups(FrictionLaw):
-    """Laws of different kinds, each for some rows of a batch: ``parts`` of a law and its rows, (k,)."""
+    """Several friction laws, each for some rows of a batch: ``parts`` are pairs of a law and its rows, (k,)."""
 
     parts: tuple[tuple[FrictionLaw, Array], ...]
     rows: int
@@ -235,44 +235,44 @@ class FrictionOfGroups(FrictionLaw):
         return {"law": "FrictionOfGroups", "parts": parts}
 
 
-def friction_of_each(laws: Sequence[FrictionLaw]) -> FrictionLaw:
-    """The laws of many rollouts, each (n,), as one for all of them together; row i is that of ``laws[i]``."""
+def combine_laws(laws: Sequence[FrictionLaw]) -> FrictionLaw:
+    """Combine the laws of many rollouts, each (n,), into one law for the batch; row i follows ``laws[i]``."""
     if all(law is laws[0] for law in laws):
         return laws[0]
     kinds: dict[Any, list[int]] = {}
     for i, law in enumerate(laws):
         kinds.setdefault(_kind(law), []).append(i)
     if len(kinds) == 1:
-        return _stacked(laws)
-    parts = ((_stacked([laws[i] for i in rows]), np.array(rows)) for rows in kinds.values())
+        return _stack(laws)
+    parts = ((_stack([laws[i] for i in rows]), np.array(rows)) for rows in kinds.values())
     return FrictionOfGroups(tuple(parts), len(laws))
 
 
 def _kind(law: FrictionLaw) -> Any:
-    """The same for laws that differ in their coefficients only; of a law of one's own nothing is known."""
+    """Return a key that is equal for laws that differ in their coefficients only; a user's law has a key of its own."""
     if type(law) is FrictionSum:
         return tuple(_kind(term) for term in law.terms)
     return type(law) if type(law) in _LAWS.values() else id(law)
 
 
-def _stacked(laws: Sequence[FrictionLaw]) -> FrictionLaw:
-    """Laws of one kind as one with coefficients (N, n)."""
+def _stack(laws: Sequence[FrictionLaw]) -> FrictionLaw:
+    """Stack laws of one kind into one with coefficients (N, n)."""
     first = laws[0]
     if all(law is first for law in laws):
         return first
     if isinstance(first, FrictionSum):
         terms = zip(*(law.terms for law in laws if isinstance(law, FrictionSum)), strict=True)
-        return FrictionSum(tuple(_stacked(term) for term in terms))
+        return FrictionSum(tuple(_stack(term) for term in terms))
     return type(first)(*(np.stack([getattr(law, f.name) for law in laws]) for f in fields(first)))
 
 
-def of_rollout(law: FrictionLaw, row: int) -> FrictionLaw:
-    """Return the law of one rollout, (n,), of a law with a row of coefficients for each; any other as it is."""
+def select_rollout(law: FrictionLaw, row: int) -> FrictionLaw:
+    """Return the law of one rollout, (n,), from one with a row of coefficients for each; any other as it is."""
     if isinstance(law, FrictionSum):
-        return FrictionSum(tuple(of_rollout(term, row) for term in law.terms))
+        return FrictionSum(tuple(select_rollout(term, row) for term in law.terms))
     if isinstance(law, FrictionOfGroups):
         [(part, at)] = [(part, np.flatnonzero(rows == row)) for part, rows in law.parts if row in rows]
-        return of_rollout(part, int(at[0]))
+        return select_rollout(part, int(at[0]))
     if type(law) not in _LAWS.values():
         return law
     values = (np.asarray(getattr(law, field.name)) for field in fields(law))
@@ -280,14 +280,14 @@ def of_rollout(law: FrictionLaw, row: int) -> FrictionLaw:
 
 
 def levels_vary(law: FrictionLaw) -> bool:
-    """Whether the levels change with velocity, as it turns out at some velocities."""
+    """Return whether the levels change with velocity, as tested at a few velocities."""
     rest = law.levels(np.zeros((1, law.n)))
     tried = [law.levels(np.full((1, law.n), qd)) for qd in (-3.0, -0.1, -1e-3, 1e-3, 0.1, 3.0)]
     return any(not np.array_equal(a, b) for pair in tried for a, b in zip(pair, rest, strict=True))
 
 
 def check_consistent(law: FrictionLaw) -> None:
-    """Check at a few velocities that a law of one's own says one thing in all of its methods.
+    """Check at a few velocities that the methods of a user's law agree with each other.
 
     The simulated arm asks ``levels`` and ``viscous``, continuous time asks ``smoothed``, and ``torque`` is their sum.
 
@@ -304,7 +304,7 @@ def check_consistent(law: FrictionLaw) -> None:
 
 
 def _check_levels(law: FrictionLaw, qd: Array) -> None:
-    """Levels are numbers that are not negative."""
+    """Check that the levels are finite and not negative."""
     for name, level in zip(("F⁺", "F⁻"), law.levels(qd), strict=True):
         if not (np.asarray(level) >= 0).all() or not np.isfinite(level).all():
             raise InputError(
@@ -314,7 +314,7 @@ def _check_levels(law: FrictionLaw, qd: Array) -> None:
 
 
 def _check_torque(law: FrictionLaw, qd: Array) -> None:
-    """``torque`` and, far beyond its width, ``smoothed`` are what ``levels`` and ``viscous`` make."""
+    """Check that ``torque`` and, far beyond its width, ``smoothed`` follow from ``levels`` and ``viscous``."""
     expected = np.asarray(FrictionLaw.torque(law, qd), dtype=np.float64)
     for name, torque in (("torque", law.torque(qd)), ("smoothed", law.smoothed(qd, 1e-6 * float(np.abs(qd[0]))))):
         off = np.abs(torque - expected) > 1e-3 * np.abs(expected) + 1e-9
@@ -329,7 +329,7 @@ def _check_torque(law: FrictionLaw, qd: Array) -> None:
 
 
 def no_friction(n: int) -> FrictionLaw:
-    """The law of ``n`` joints without any friction."""
+    """Return the friction law of ``n`` joints without any friction."""
     return Viscous(np.zeros(n))
 
 
@@ -337,7 +337,7 @@ _TRIED = (-2.0, -0.3, -0.02, 0.02, 0.3, 2.0)  # rad/s
 _LAWS = {law.__name__: law for law in (Viscous, Coulomb, Stribeck)}
 
 
-def friction_of(description: Mapping[str, Any]) -> FrictionLaw:
+def rebuild_law(description: Mapping[str, Any]) -> FrictionLaw:
     """The law that :meth:`FrictionLaw.describe` described, of the library or a class that the user has defined by now.
 
     Raises:
@@ -346,7 +346,7 @@ def friction_of(description: Mapping[str, Any]) -> FrictionLaw:
     values = dict(description)
     name = values.pop("law", None)
     if name == "FrictionSum":
-        return FrictionSum(tuple(friction_of(term) for term in values["terms"]))
+        return FrictionSum(tuple(rebuild_law(term) for term in values["terms"]))
     own = {key: law for key, law in FRICTION_LAWS.defined().items() if law.describe is FrictionLaw.describe}
     if name in (known := own | _LAWS):
         return known[name](**values)

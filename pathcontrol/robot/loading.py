@@ -1,4 +1,4 @@
-"""From a name, a file or a string to a checked :class:`RobotModel`."""
+"""Loading of a :class:`RobotModel` from a name, a file or a string, with all checks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pathcontrol.errors import PathControlWarning, UrdfError
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Viscous
-from pathcontrol.robot.model import RobotModel, UrdfSource, build_model, with_locked
+from pathcontrol.robot.model import RobotModel, UrdfSource, build_model, lock_joints
 from pathcontrol.robot.urdf import UrdfReport, check_urdf, parse_urdf
 from pathcontrol.robot.urdf.checks.extension import extension_values
 from pathcontrol.robot.urdf.locking import locked_angles, locked_beyond_limits
@@ -35,7 +35,7 @@ def load_robot(
     package_dirs: str | Path | Sequence[str | Path] = (),
     threads: int = 1,
 ) -> RobotModel:
-    """The model of an arm.
+    """Load the model of an arm.
 
     Args:
         source: the name of a bundled robot (``"cicese_2dof"``) or of one of example-robot-data (extra ``robots``), the
@@ -57,40 +57,42 @@ def load_robot(
     """
     urdf = find_urdf(source, _folders(package_dirs))
     label = "this URDF" if str(source).lstrip().startswith("<") else repr(str(source))
-    root, mended = _parsed(urdf, label)
+    root, mended = _parse(urdf, label)
     locked = locked_angles(root, lock, keep, tip)
     if estimated_inertia is not False:
         from pathcontrol.robot.estimate import DENSITY, with_estimated_inertia  # reading meshes takes half a second
 
         density = DENSITY if estimated_inertia is True else estimated_inertia
         urdf = with_estimated_inertia(urdf, quantity("estimated_inertia", density))
-    report = _checked(urdf, label, tuple(locked))
+    report = _check(urdf, label, tuple(locked))
     for finding in (*mended, *(finding for finding in report.warnings if finding.code in TOLD)):
         warnings.warn(f"{label}: {finding.where}: {finding.message}", PathControlWarning, stacklevel=2)
     for told in locked_beyond_limits(root, locked, lock or ()):
         warnings.warn(f"{label}: {told}", PathControlWarning, stacklevel=2)
     robot = _build(urdf, threads)
-    return with_locked(robot, locked) if locked else robot
+    return lock_joints(robot, locked) if locked else robot
 
 
-def _parsed(urdf: UrdfSource, label: str) -> Parsed:
+def _parse(urdf: UrdfSource, label: str) -> Parsed:
+    """Parse a URDF; errors name it by its ``label``."""
     try:
         return parse_and_mend(urdf.text)
     except UrdfError as error:
         raise UrdfError(f"{label} cannot be used: {error}", **error.details_with()) from None
 
 
-def checked_model(urdf: UrdfSource, label: str, locked: Sequence[str] = (), threads: int = 1) -> RobotModel:
-    """The model of a URDF, which errors call ``label``; joints that are going to be ``locked`` may mimic others.
+def build_checked_model(urdf: UrdfSource, label: str, locked: Sequence[str] = (), threads: int = 1) -> RobotModel:
+    """Check a URDF and return its model; errors call it ``label``, and joints about to be ``locked`` may mimic.
 
     Raises:
         UrdfError: it cannot be used; the message lists every reason found.
     """
-    _checked(urdf, label, locked)
+    _check(urdf, label, locked)
     return _build(urdf, threads)
 
 
-def _checked(urdf: UrdfSource, label: str, locked: Sequence[str]) -> UrdfReport:
+def _check(urdf: UrdfSource, label: str, locked: Sequence[str]) -> UrdfReport:
+    """Return the report of a URDF that is without errors."""
     report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=tuple(locked))
     if not report.ok:
         message = "\n".join([f"{label} cannot be used:", *(f"  {finding}" for finding in report.errors)])
@@ -99,12 +101,13 @@ def _checked(urdf: UrdfSource, label: str, locked: Sequence[str]) -> UrdfReport:
 
 
 def _folders(given: str | Path | Sequence[str | Path]) -> tuple[Path, ...]:
-    """Folders of packages; one may be given alone."""
+    """Return the folders of packages; a single one may be given without a list."""
     folders = [given] if isinstance(given, str | Path) else given
     return tuple(Path(folder).expanduser() for folder in folders)
 
 
 def _build(urdf: UrdfSource, threads: int) -> RobotModel:
+    """Build the model of a URDF that has passed the checks."""
     root = parse_urdf(urdf.text)
     endless = _make_revolute(root)
     model = build_model(etree.tostring(root, encoding="unicode"))
@@ -128,6 +131,7 @@ def _make_revolute(root: Any) -> set[str]:
 
 
 def _limits(model: Any, names: Sequence[str], endless: set[str]) -> Limits:
+    """Return the limits of the joints, ±inf for unlimited ones."""
     free = np.array([name in endless for name in names])
 
     def magnitude(values: Any) -> Array:
@@ -140,7 +144,7 @@ def _limits(model: Any, names: Sequence[str], endless: set[str]) -> Limits:
 
 
 def _friction(root: Any, names: Sequence[str]) -> FrictionLaw:
-    """Viscous and Coulomb friction of ``<dynamics>``; ``<pathcontrol>`` may give the latter by direction."""
+    """Read viscous and Coulomb friction from ``<dynamics>``; ``<pathcontrol>`` may give the latter by direction."""
     joints = {joint.get("name"): joint for joint in root.iterfind("joint")}
     by_direction = extension_values(root, "coulomb")
     viscous, plus, minus = np.zeros((3, len(names)))
@@ -153,6 +157,6 @@ def _friction(root: Any, names: Sequence[str]) -> FrictionLaw:
 
 
 def _encoders(root: Any, names: Sequence[str]) -> Array | None:
-    """Encoder resolution [counts per revolution] of ``<pathcontrol>``, if every joint has one."""
+    """Read the encoder resolutions [counts per revolution] of ``<pathcontrol>``; None unless every joint has one."""
     counts = extension_values(root, "encoder")
     return readonly(np.array([counts[name][0] for name in names])) if set(names) <= set(counts) else None

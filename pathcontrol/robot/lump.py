@@ -21,8 +21,8 @@ class Lump(NamedTuple):
     inertia: Array
 
 
-def combined(lumps: Iterable[Lump]) -> Lump:
-    """Bodies that are rigidly attached to each other as one, by the parallel axis theorem."""
+def combine(lumps: Iterable[Lump]) -> Lump:
+    """Combine bodies that are rigidly attached to each other into one, by the parallel axis theorem."""
     parts = list(lumps)
     mass = sum(part.mass for part in parts)
     com = np.sum([part.mass * part.com for part in parts], axis=0) / mass
@@ -30,12 +30,12 @@ def combined(lumps: Iterable[Lump]) -> Lump:
 
 
 def ball(mass: float, radius: float) -> Lump:
-    """A solid ball about the origin: I = 2/5 m r²."""
+    """Return a solid ball about the origin: I = 2/5 m r²."""
     return Lump(mass, np.zeros(3), 0.4 * mass * radius**2 * np.eye(3))
 
 
 def rod(mass: float, end: Array) -> Lump:
-    """A solid cylinder from the origin to ``end`` [m], (3,), with the ball of the same radius where that is nearer.
+    """Return a solid cylinder from the origin to ``end`` [m], (3,), or a ball of its radius if the end is nearer.
 
     Along its axis I = m r²/2, across it m (3 r² + l²)/12.
     """

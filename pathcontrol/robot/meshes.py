@@ -1,4 +1,4 @@
-"""Mesh files of a robot, read within bounds: whatever the file is, reading it takes little time and memory."""
+"""Mesh files of a robot, read within bounds of time and memory, whatever the file holds."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _BESIDE = (".mtl", ".bin")  # what else is read of a mesh: materials and buffers
 
 
 class Part(NamedTuple):
-    """Triangles of one material.
+    """The triangles of one material of a mesh.
 
     Attributes:
         vertices: their corners [m], (k, 3).
@@ -37,7 +37,7 @@ class Part(NamedTuple):
 
 
 def load_parts(path: Path) -> list[Part]:
-    """The triangles of an STL, OBJ, PLY, Collada or glTF file, by material.
+    """Read the triangles of an STL, OBJ, PLY, Collada or glTF file, grouped by material.
 
     Raises:
         UrdfError: the file is of another kind, too large, cannot be read, or holds no triangles.
@@ -59,7 +59,7 @@ def load_parts(path: Path) -> list[Part]:
 
 
 def _check_part(part: Part) -> None:
-    """Every triangle has three corners in space, which the file has."""
+    """Check that every triangle has three corners in space that exist in the file."""
     count = len(part.vertices)
     if part.vertices.ndim != 2 or part.vertices.shape[1] != 3 or part.vertices.dtype.kind not in "fiu":
         raise UrdfError(f"its vertices have the shape {part.vertices.shape}, expected three coordinates each")
@@ -70,6 +70,7 @@ def _check_part(part: Part) -> None:
 
 
 def _parts(data: bytes, path: Path) -> list[Part]:
+    """Read the parts of a mesh, checked for their number of triangles."""
     kind = path.suffix.lower().removeprefix(".")
     if kind in ("glb", "gltf"):
         _check_accessors(data, kind)
@@ -80,11 +81,11 @@ def _parts(data: bytes, path: Path) -> list[Part]:
     if triangles > MAX_TRIANGLES:
         raise UrdfError(f"it has {triangles} triangles, expected at most {MAX_TRIANGLES}; thin it out")
     metres = _metres(scene.units)
-    return [_placed(shape, transform, metres) for transform, shape in shapes if len(shape.faces)]
+    return [_place(shape, transform, metres) for transform, shape in shapes if len(shape.faces)]
 
 
-def _placed(shape: trimesh.Trimesh, transform: Array, metres: float) -> Part:
-    """A shape where its file puts it; a mirrored one is turned inside out again."""
+def _place(shape: trimesh.Trimesh, transform: Array, metres: float) -> Part:
+    """Transform a shape to its place in the file; the triangles of a mirrored one are turned outside again."""
     turn, vertices = metres * transform[:3, :3], np.asarray(shape.vertices)
     if not np.array_equal(turn, np.eye(3)) or transform[:3, 3].any():
         vertices = vertices @ turn.T + metres * transform[:3, 3]
@@ -93,11 +94,12 @@ def _placed(shape: trimesh.Trimesh, transform: Array, metres: float) -> Part:
 
 
 def _metres(units: str | None) -> float:
-    """Only Collada says its unit; the files of other formats are in metres by the convention of URDF."""
+    """Return the length of the file's unit [m]; only Collada states one, other formats are in metres (URDF)."""
     return trimesh.units.unit_conversion(units, "meters") if units and units.endswith("* meters") else 1.0
 
 
 def _color(visual: Any) -> tuple[float, float, float, float] | None:
+    """Return the colour of a shape, ``None`` if it has none."""
     if not visual.defined:
         return None
     rgba = np.asarray(getattr(visual, "material", visual).main_color, dtype=np.float64) / 255
@@ -105,7 +107,7 @@ def _color(visual: Any) -> tuple[float, float, float, float] | None:
 
 
 def _check_accessors(data: bytes, kind: str) -> None:
-    """Nothing in a glTF file announces more numbers than a mesh may have: room for them would be made at once."""
+    """Check that a glTF file announces no more numbers than a mesh may have, before room is made for them."""
     if kind == "glb":
         data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
     counts = [accessor.get("count", 0) for accessor in json.loads(data).get("accessors", [])]
@@ -114,7 +116,7 @@ def _check_accessors(data: bytes, kind: str) -> None:
 
 
 class _Beside(trimesh.resolvers.Resolver):
-    """The files that a mesh names, in its own folder: materials and buffers, within the bounds of a mesh."""
+    """A resolver of the files that a mesh refers to: materials and buffers in its own folder, read within bounds."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder.resolve()

@@ -21,7 +21,7 @@ from pathcontrol.errors import InputError, PathControlWarning, UnknownNameError,
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.bodies import check_spread, idle_joints, payload_of, scale_bodies
 from pathcontrol.robot.friction import FrictionLaw, check_consistent, no_friction
-from pathcontrol.robot.rigid_body import RigidBody, together
+from pathcontrol.robot.rigid_body import RigidBody, broadcast
 from pathcontrol.robot.urdf.locking import check_tip, locked_angles, locked_beyond_limits, names_to_keep
 from pathcontrol.robot.urdf.xml.parse import parse_urdf
 
@@ -30,7 +30,7 @@ _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED  # the frame's origin, axes pa
 
 @dataclass(frozen=True)
 class UrdfSource:
-    """Where a model came from: the URDF's text, the folders its mesh files are looked up in, and its known name."""
+    """The origin of a model: the URDF's text, the folders its mesh files are looked up in, and its known name."""
 
     text: str
     base_dir: Path | None = None
@@ -40,7 +40,7 @@ class UrdfSource:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RobotModel:
-    """M(q)q̈ + C(q,q̇)q̇ + g(q) = τ of a fixed-base arm, for one configuration or a batch; see :func:`load_robot`.
+    """The rigid-body model M(q)q̈ + C(q,q̇)q̇ + g(q) = τ of a fixed-base arm; see :func:`load_robot`.
 
     Instances are values: :meth:`with_payload`, :meth:`with_friction` and :meth:`reduced` return new ones. Friction is
     kept beside the rigid-body terms and enters none of them; the simulated plant and the controllers ask for it.
@@ -108,7 +108,7 @@ class RobotModel:
         return self.actuation.friction
 
     def limit(self, joint: str) -> dict[str, float]:
-        """The limits of one joint by its name: lower, upper [rad], velocity [rad/s], effort [N m]."""
+        """Return the limits of one joint by its name: lower, upper [rad], velocity [rad/s], effort [N m]."""
         i = self.joint_index(joint)
         return {key: float(getattr(self.limits, key)[i]) for key in ("lower", "upper", "velocity", "effort")}
 
@@ -119,12 +119,12 @@ class RobotModel:
 
     @property
     def has_mass(self) -> bool:
-        """Whether there is anything for the joints to move; without it the arm has kinematics and no dynamics."""
+        """Whether the joints move any mass; an arm without mass has kinematics and no dynamics."""
         bodies = list(self.pinocchio_model.inertias)[1:]
         return any(body.mass or body.inertia.any() for body in bodies) or bool((self.armature > 0).all())
 
     def joint_index(self, joint: str) -> int:
-        """The position of a joint in ``joint_names``."""
+        """Return the index of a joint in ``joint_names``."""
         if joint not in self.joint_names:
             raise UnknownNameError(
                 f"{self.name} has no movable joint {joint!r}; it has {', '.join(self.joint_names)}",
@@ -137,7 +137,7 @@ class RobotModel:
     # --- dynamics -------------------------------------------------------------------------------------------
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, velocity: ArrayLike | None = None) -> Array:
-        """τ = M(q)q̈ + C(q,q̇)q̇ + g(q) [N m], (*batch, n), by the recursive Newton–Euler algorithm.
+        """Return the torque τ = M(q)q̈ + C(q,q̇)q̇ + g(q) [N m], (*batch, n) (recursive Newton–Euler algorithm).
 
         With ``velocity`` v the Coriolis term is C(q,q̇)v, as passivity-based laws want it; see :meth:`coriolis`.
         """
@@ -148,24 +148,24 @@ class RobotModel:
         return self._body.inverse_dynamics(q, 0.5 * (qd + v), qdd) - surplus
 
     def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
-        """q̈ = M(q)⁻¹(τ − C(q,q̇)q̇ − g(q)) [rad/s²], (*batch, n), by the articulated-body algorithm."""
+        """Return q̈ = M(q)⁻¹(τ − C(q,q̇)q̇ − g(q)) [rad/s²], (*batch, n) (articulated-body algorithm)."""
         return self._body.forward_dynamics(q, qd, tau)
 
     def nonlinear_effects(self, q: ArrayLike, qd: ArrayLike) -> Array:
-        """C(q,q̇)q̇ + g(q) [N m], (*batch, n)."""
+        """Return C(q,q̇)q̇ + g(q) [N m], (*batch, n)."""
         return self.inverse_dynamics(q, qd, np.zeros(self.n))
 
     def gravity(self, q: ArrayLike) -> Array:
-        """g(q) [N m], (*batch, n)."""
+        """Return the gravity torque g(q) [N m], (*batch, n)."""
         zero = np.zeros(self.n)
         return self.inverse_dynamics(q, zero, zero)
 
     def mass_matrix(self, q: ArrayLike) -> Array:
-        """M(q) [kg m²], (*batch, n, n), by the composite rigid body algorithm."""
+        """Return the mass matrix M(q) [kg m²], (*batch, n, n), by the composite rigid body algorithm."""
         return self._body.mass_matrix(q)
 
     def coriolis(self, q: ArrayLike, qd: ArrayLike, v: ArrayLike) -> Array:
-        """C(q,q̇)v [N m], (*batch, n), with the C of Christoffel symbols, for which Ṁ − 2C is skew-symmetric.
+        """Return C(q,q̇)v [N m], (*batch, n), with the C of Christoffel symbols: Ṁ − 2C is skew-symmetric.
 
         That C is symmetric in its two velocities, C(q,x)y = C(q,y)x, so with c(q,x) = C(q,x)x polarisation gives
         C(q,q̇)v = c(q,(q̇+v)/2) − c(q,(q̇−v)/2).
@@ -174,29 +174,29 @@ class RobotModel:
         return self._centripetal(q, 0.5 * (qd + v)) - self._centripetal(q, 0.5 * (qd - v))
 
     def coriolis_matrix(self, q: ArrayLike, qd: ArrayLike) -> Array:
-        """C(q,q̇) [N m s], (*batch, n, n), of Christoffel symbols: Ṁ − 2C is skew-symmetric."""
+        """Return C(q,q̇) [N m s], (*batch, n, n), of Christoffel symbols: Ṁ − 2C is skew-symmetric."""
         q, qd = self._array("q", q)[..., None, :], self._array("qd", qd)[..., None, :]
         return self.coriolis(q, qd, np.eye(self.n)).swapaxes(-1, -2)
 
     def kinetic_energy(self, q: ArrayLike, qd: ArrayLike) -> Array:
-        """½ q̇ᵀM(q)q̇ [J], (*batch,)."""
+        """Return the kinetic energy ½ q̇ᵀM(q)q̇ [J], (*batch,)."""
         qd = self._array("qd", qd)
         momentum = self._weightless.inverse_dynamics(q, np.zeros(self.n), qd)
         return 0.5 * np.asarray((momentum * qd).sum(-1))
 
     def potential_energy(self, q: ArrayLike) -> Array:
-        """Energy in the field of gravity [J], (*batch,), zero where all mass is at the height of the base frame."""
+        """Return the energy in the field of gravity [J], (*batch,), zero with all mass at the base frame's height."""
         data = self._body.data
         return self._each(q, (), lambda qi: pin.computePotentialEnergy(self.pinocchio_model, data, qi))
 
     # --- kinematics -----------------------------------------------------------------------------------------
 
     def frame_pose(self, q: ArrayLike, frame: str) -> Array:
-        """Pose of ``frame`` in the base frame [m], (*batch, 4, 4) homogeneous."""
+        """Return the pose of ``frame`` in the base frame [m], (*batch, 4, 4) homogeneous."""
         return self.frame_poses(q, [frame])[..., 0, :, :]
 
     def frame_poses(self, q: ArrayLike, frames: Sequence[str]) -> Array:
-        """Poses of several frames in the base frame [m], (*batch, len(frames), 4, 4) homogeneous."""
+        """Return the poses of several frames in the base frame [m], (*batch, len(frames), 4, 4) homogeneous."""
         ids = [self._frame_id(frame) for frame in frames]
 
         def poses(qi: Array) -> list[Array]:
@@ -206,14 +206,14 @@ class RobotModel:
         return self._each(q, (len(ids), 4, 4), poses)
 
     def frame_jacobian(self, q: ArrayLike, frame: str) -> Array:
-        """Jacobian of ``frame``, (*batch, 6, n): linear [m], then angular velocity, in axes parallel to the base's."""
+        """Return the Jacobian of ``frame``, (*batch, 6, n): linear [m], then angular velocity, in the base's axes."""
         i = self._frame_id(frame)
         return self._each(
             q, (6, self.n), lambda qi: pin.computeFrameJacobian(self.pinocchio_model, self._data, qi, i, _ALIGNED)
         )
 
     def frame_kinematics(self, q: ArrayLike, frame: str) -> tuple[Array, Array]:
-        """Pose of ``frame`` (*batch, 4, 4) and its Jacobian (*batch, 6, n), as above, for the price of one of them."""
+        """Return the pose of ``frame`` (*batch, 4, 4) and its Jacobian (*batch, 6, n), for the cost of one of them."""
         i, data, array = self._frame_id(frame), self._data, self._array("q", q)
         batch, rows = array.shape[:-1], array.reshape(-1, self.n)
         poses, jacobians = np.empty((len(rows), 4, 4)), np.empty((len(rows), 6, self.n))
@@ -224,7 +224,7 @@ class RobotModel:
         return poses.reshape(*batch, 4, 4), jacobians.reshape(*batch, 6, self.n)
 
     def frame_motion(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, frame: str) -> tuple[Array, Array]:
-        """Velocity Jq̇ and acceleration Jq̈ + J̇q̇ of ``frame``, each (*batch, 6), for joint motion (q, q̇, q̈).
+        """Return velocity Jq̇ and acceleration Jq̈ + J̇q̇ of ``frame``, each (*batch, 6), for joint motion (q, q̇, q̈).
 
         Linear [m/s, m/s²], then angular [rad/s, rad/s²], in axes parallel to the base's, without gravity. The linear
         parts are those of the frame's origin, differentiated in the base frame (the "classical" acceleration).
@@ -258,7 +258,7 @@ class RobotModel:
     def with_payload(
         self, mass: float, frame: str, com: ArrayLike = (0.0, 0.0, 0.0), inertia: ArrayLike | None = None
     ) -> RobotModel:
-        """The same arm carrying a rigid body.
+        """Return the same arm carrying a rigid body.
 
         Args:
             mass: mass [kg].
@@ -275,10 +275,10 @@ class RobotModel:
         check_spread(model, f"mass = {body.mass:g}, com = {body.lever.tolist()}")
         tensor = np.array(body.inertia)
         given = {"mass": body.mass, "frame": frame, "com": body.lever.tolist(), "inertia": tensor.tolist()}
-        return self._changed(model, "with_payload", given)
+        return self._with_model(model, "with_payload", given)
 
     def with_frame(self, name: str, parent: str, pose: ArrayLike) -> RobotModel:
-        """The same arm with one frame more, such as the tip of a tool.
+        """Return the same arm with one additional frame, such as the tip of a tool.
 
         Args:
             name: its name, which no other frame has.
@@ -294,23 +294,23 @@ class RobotModel:
         support = model.frames[self._frame_id(parent)]
         frame = pin.Frame(name, support.parentJoint, support.placement * placement, pin.FrameType.OP_FRAME)
         model.addFrame(frame, False)
-        return self._changed(model, "with_frame", {"name": name, "parent": parent, "pose": given.tolist()})
+        return self._with_model(model, "with_frame", {"name": name, "parent": parent, "pose": given.tolist()})
 
     def with_armature(self, armature: ArrayLike) -> RobotModel:
-        """The same arm with rotor inertia [kg m²], shape (n,), added to the diagonal of M."""
+        """Return the same arm with rotor inertia [kg m²], shape (n,), added to the diagonal of M."""
         added = physical("armature", self._array("armature", armature))
         if added.shape != (self.n,) or (added < 0).any():
             raise InputError(f"armature = {added.tolist()}, expected {self.n} values not below 0")
         model = pin.Model(self.pinocchio_model)
         model.armature = np.asarray(model.armature) + added
-        return self._changed(model, "with_armature", {"armature": added.tolist()})
+        return self._with_model(model, "with_armature", {"armature": added.tolist()})
 
     def with_masses(
         self,
         scale: Mapping[str, float] | Sequence[float] | None = None,
         kg: Mapping[str, float] | Sequence[float] | None = None,
     ) -> RobotModel:
-        """The same arm with heavier or lighter bodies: what moves with a joint, up to the next joint.
+        """Return the same arm with heavier or lighter bodies; a body is all that moves with a joint, up to the next.
 
         Args:
             scale: factors on mass and inertia by the joint's name: ``{"joint_2": 1.1}`` for 10 % more, with the same
@@ -327,10 +327,10 @@ class RobotModel:
         for joint in (*factors, *masses):
             self.joint_index(joint)
         scale_bodies(model, self.joint_names, factors, masses)
-        return self._changed(model, "with_masses", {"scale": factors, "kg": masses})
+        return self._with_model(model, "with_masses", {"scale": factors, "kg": masses})
 
     def _positive(self, name: str, given: Mapping[str, float] | Sequence[float] | None) -> dict[str, float]:
-        """Numbers above 0 by the names of joints, from such, or from one for each joint."""
+        """Return numbers above 0 by the names of joints, given such, or one for each joint."""
         if given is not None and not isinstance(given, Mapping):
             values = as_array(name, given)
             if values.shape != (self.n,):
@@ -342,13 +342,13 @@ class RobotModel:
         return {joint: quantity(f"{name} of {joint}", value) for joint, value in (given or {}).items()}
 
     def with_threads(self, threads: int) -> RobotModel:
-        """The same arm whose batched calls use ``threads`` threads."""
+        """Return the same arm whose batched calls use ``threads`` threads."""
         return replace(self, threads=threads)
 
     def reduced(
         self, lock: Mapping[str, float] | None = None, *, keep: Sequence[str] = (), tip: str | None = None
     ) -> RobotModel:
-        """The arm with some joints locked; the others keep their order.
+        """Return the arm with some joints locked; the others keep their order.
 
         Args:
             lock: joints to lock, ``{"joint name": angle [rad]}``. Those that mimic them are locked with them.
@@ -364,7 +364,7 @@ class RobotModel:
         angles = {j: at for j, at in locked_angles(root, lock, keep, moving).items() if j in self.joint_names}
         for told in locked_beyond_limits(root, angles, lock or ()):
             warnings.warn(told, PathControlWarning, stacklevel=2)
-        return with_locked(self, angles)
+        return lock_joints(self, angles)
 
     # --- inside ---------------------------------------------------------------------------------------------
 
@@ -384,26 +384,26 @@ class RobotModel:
         model.gravity = pin.Motion.Zero()
         return RigidBody(model, self.threads)
 
-    def _changed(self, model: Any, method: str, arguments: dict[str, Any]) -> RobotModel:
-        """The arm that a method makes of this one."""
+    def _with_model(self, model: Any, method: str, arguments: dict[str, Any]) -> RobotModel:
+        """Return this arm with a changed model, and record the method that changed it."""
         return replace(self, pinocchio_model=model, steps=(*self.steps, (method, arguments)))
 
     def _centripetal(self, q: ArrayLike, x: ArrayLike) -> Array:
-        """c(q,x) = C(q,x)x [N m], (*batch, n)."""
+        """Return c(q,x) = C(q,x)x [N m], (*batch, n)."""
         return self._weightless.inverse_dynamics(q, x, np.zeros(self.n))
 
     def _each(self, q: ArrayLike, shape: tuple[int, ...], function: Callable[..., Any], **more: ArrayLike) -> Array:
-        """``function`` of each configuration (and ``more`` beside it), for what Pinocchio has no batched call for."""
-        arrays = together(self.n, {"q": q, **more}, self.joint_names)
+        """Apply a ``function`` without a batched call to each configuration, with a row of each of ``more``."""
+        arrays = broadcast(self.n, {"q": q, **more}, self.joint_names)
         values = [function(*rows) for rows in zip(*(a.reshape(-1, self.n) for a in arrays), strict=True)]
         return np.array(values, dtype=np.float64).reshape(arrays[0].shape[:-1] + shape)
 
     def _array(self, name: str, value: ArrayLike) -> Array:
-        """Values of the joints, (*batch, n), by their names if they are labelled."""
+        """Convert values of the joints to (*batch, n), ordered by name if they are labelled."""
         return joint_array(name, value, self.n, self.joint_names)
 
     def _check_mass(self) -> None:
-        """Refuse to compute with inertia where there is none."""
+        """Refuse to compute dynamics of an arm in which a joint moves no mass."""
         if not self.has_mass:
             raise UrdfError(
                 f"{self.name}: no link has a mass, so there are kinematics and no dynamics; give some with "
@@ -416,7 +416,7 @@ class RobotModel:
             )
 
     def _support(self, frame: str) -> int:
-        """The index of the joint of Pinocchio that moves a frame, which is not 0."""
+        """Return the index of Pinocchio's joint that moves a frame; 0, the base, is refused."""
         i = self.pinocchio_model.frames[self._frame_id(frame)].parentJoint
         if i == 0:
             raise InputError(f"no joint of {self.name} moves the frame {frame!r}; give one farther out as tip")
@@ -436,7 +436,7 @@ class RobotModel:
         return model.getFrameId(frame)
 
 
-def with_locked(robot: RobotModel, angles: Mapping[str, float]) -> RobotModel:
+def lock_joints(robot: RobotModel, angles: Mapping[str, float]) -> RobotModel:
     """Return the arm with joints locked at ``angles`` [rad], by name, and only those: none that mimic them.
 
     Raises:
@@ -455,7 +455,7 @@ def with_locked(robot: RobotModel, angles: Mapping[str, float]) -> RobotModel:
 
 
 def build_model(text: str) -> Any:
-    """The ``pin.Model`` of a URDF that has passed the checks of :mod:`pathcontrol.robot.urdf`."""
+    """Build the ``pin.Model`` of a URDF that has passed the checks of :mod:`pathcontrol.robot.urdf`."""
     try:
         model = pin.buildModelFromXML(text)
     except ValueError as error:  # the checks should have found it; say at least what Pinocchio says

@@ -1,4 +1,4 @@
-"""What a model is made of, as plain values for JSON, and the model made of that again."""
+"""The recipe of a robot model as plain values for JSON, and the model rebuilt from it."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from pathcontrol._arrays import Array, readonly
 from pathcontrol.errors import InputError, MissingExtraError, PathControlError, PathControlWarning, UnknownNameError
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.catalogue import find_urdf
-from pathcontrol.robot.friction import FrictionLaw, friction_of, no_friction
-from pathcontrol.robot.loading import checked_model
-from pathcontrol.robot.model import RobotModel, UrdfSource, with_locked
+from pathcontrol.robot.friction import FrictionLaw, no_friction, rebuild_law
+from pathcontrol.robot.loading import build_checked_model
+from pathcontrol.robot.model import RobotModel, UrdfSource, lock_joints
 
 _METHODS = ("reduced", "with_payload", "with_frame", "with_armature", "with_masses")
 _LIMITS = {"lower": -np.inf, "upper": np.inf, "velocity": np.inf, "effort": np.inf}  # null stands for these
 
 
 def recipe_of(robot: RobotModel) -> dict[str, Any]:
-    """The URDF's text, where its meshes are, what was done to its model, limits, friction and encoders.
+    """Return the recipe of a robot: URDF text, mesh folders, changes to the model, limits, friction and encoders.
 
     Numbers are kept to the last bit. The text is that of the robot, not of its meshes; a robot with a name that
     :func:`load_robot` knows is found again by it, and so are its meshes.
@@ -43,7 +43,7 @@ def recipe_of(robot: RobotModel) -> dict[str, Any]:
 
 
 def robot_of(recipe: Mapping[str, Any]) -> RobotModel:
-    """The model of a :func:`recipe_of`, with the same kinematics and dynamics; its meshes may be missing.
+    """Rebuild the model of a :func:`recipe_of`, with the same kinematics and dynamics; meshes may be missing.
 
     A friction law that is not of the library is left out with a warning.
 
@@ -52,21 +52,22 @@ def robot_of(recipe: Mapping[str, Any]) -> RobotModel:
         UrdfError: the URDF cannot be used.
     """
     try:
-        return _made(recipe)
+        return _rebuild(recipe)
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError) as error:
         if isinstance(error, PathControlError):
             raise
         raise InputError(f"this is no recipe of a robot ({type(error).__name__}: {error})") from error
 
 
-def _made(recipe: Mapping[str, Any]) -> RobotModel:
+def _rebuild(recipe: Mapping[str, Any]) -> RobotModel:
+    """Rebuild the model; errors are those of Python."""
     steps = [(method, arguments) for method, arguments in recipe["steps"]]
     locked = [joint for method, arguments in steps if method == "reduced" for joint in arguments["lock"]]
-    robot = checked_model(_source(recipe), "the recorded URDF", locked)
+    robot = build_checked_model(_source(recipe), "the recorded URDF", locked)
     for method, arguments in steps:
         if method not in _METHODS:
             raise InputError(f"step {method!r} of the robot, expected one of {', '.join(_METHODS)}")
-        robot = with_locked(robot, arguments["lock"]) if method == "reduced" else getattr(robot, method)(**arguments)
+        robot = lock_joints(robot, arguments["lock"]) if method == "reduced" else getattr(robot, method)(**arguments)
     limits = Limits(*(_array(recipe["limits"][name], robot.n, missing) for name, missing in _LIMITS.items()))
     counts = recipe["encoder_counts"]
     encoders = None if counts is None else _array(counts, robot.n, np.nan)
@@ -74,7 +75,7 @@ def _made(recipe: Mapping[str, Any]) -> RobotModel:
 
 
 def _source(recipe: Mapping[str, Any]) -> UrdfSource:
-    """The recorded text; meshes of a known robot are where this machine has them."""
+    """Return the recorded text with mesh folders; those of a known robot are looked up on this machine."""
     text, name = str(recipe["urdf"]), recipe["name"]
     base_dir = None if recipe["base_dir"] is None else Path(recipe["base_dir"])
     folders = tuple(Path(folder) for folder in recipe["package_dirs"])
@@ -88,8 +89,9 @@ def _source(recipe: Mapping[str, Any]) -> UrdfSource:
 
 
 def _friction(description: Mapping[str, Any], n: int) -> FrictionLaw:
+    """Rebuild the friction law; one that is unknown is left out with a warning."""
     try:
-        law = friction_of(description)
+        law = rebuild_law(description)
     except UnknownNameError as error:
         warnings.warn(f"the robot is rebuilt without its friction: {error}", PathControlWarning, stacklevel=2)
         return no_friction(n)
@@ -99,11 +101,12 @@ def _friction(description: Mapping[str, Any], n: int) -> FrictionLaw:
 
 
 def _values(array: Array) -> list[float | None]:
-    """Numbers as JSON has them: none for what is not finite."""
+    """Convert numbers for JSON: those that are not finite become null."""
     return [float(value) if np.isfinite(value) else None for value in array]
 
 
 def _array(values: Sequence[float | None], n: int, missing: float) -> Array:
+    """Convert values of JSON to an array (n,): null becomes ``missing``."""
     array = readonly(np.array([missing if value is None else value for value in values], dtype=np.float64))
     if array.shape != (n,):
         raise InputError(f"{array.shape} values are recorded of the joints, expected ({n},)")

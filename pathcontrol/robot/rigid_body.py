@@ -1,4 +1,4 @@
-"""Pinocchio's algorithms on one configuration or on many at once, with room to compute in."""
+"""Pinocchio's algorithms for one configuration or a batch, with their work space."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ class RigidBody:
         self._threads = threads
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
-        """τ [N m] of (q, q̇, q̈), (*batch, n), by the recursive Newton–Euler algorithm."""
+        """Return τ [N m] of (q, q̇, q̈), (*batch, n), by the recursive Newton–Euler algorithm."""
         return self._of(pin.rnea, pin.rneaInParallel, {"q": q, "qd": qd, "qdd": qdd})
 
     def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
-        """q̈ [rad/s²] of (q, q̇, τ), (*batch, n), by the articulated-body algorithm."""
+        """Return q̈ [rad/s²] of (q, q̇, τ), (*batch, n), by the articulated-body algorithm."""
         return self._of(_aba, pin.abaInParallel, {"q": q, "qd": qd, "tau": tau})
 
     def mass_matrix(self, q: ArrayLike) -> Array:
-        """M(q) [kg m²], (*batch, n, n), by the composite rigid body algorithm."""
+        """Return M(q) [kg m²], (*batch, n, n), by the composite rigid body algorithm."""
         array = joint_array("q", q, self.n, self._joints)
         M = np.empty((array.size // self.n, self.n, self.n))
         for k, qi in enumerate(array.reshape(-1, self.n)):
@@ -47,8 +47,8 @@ class RigidBody:
         return M.reshape(*array.shape, self.n)
 
     def _of(self, one: Callable[..., Any], many: Callable[..., Any], arguments: Mapping[str, ArrayLike]) -> Array:
-        """An algorithm for one configuration, and for many, of three (*batch, n) arguments that broadcast."""
-        arrays = together(self.n, arguments, self._joints)
+        """Apply an algorithm, given for one configuration and for many, to (*batch, n) arguments that broadcast."""
+        arrays = broadcast(self.n, arguments, self._joints)
         out: Array = np.empty(arrays[0].shape)
         if out.size == self.n:  # one configuration is not worth the threads' overhead
             out[...] = one(self.model, self.data, *(a.reshape(-1) for a in arrays))
@@ -61,8 +61,8 @@ class RigidBody:
         return pin.ModelPool(self.model, self._threads)
 
 
-def together(n: int, arguments: Mapping[str, ArrayLike], joints: Sequence[str] | None = None) -> list[Array]:
-    """Arguments (*batch, n) broadcast to one shape, each in the order of the ``joints``.
+def broadcast(n: int, arguments: Mapping[str, ArrayLike], joints: Sequence[str] | None = None) -> list[Array]:
+    """Broadcast arguments (*batch, n) to one shape, each in the order of the ``joints``.
 
     Raises:
         InputError: one of them has another last axis than n, or their batch axes do not fit together.
@@ -80,5 +80,5 @@ def together(n: int, arguments: Mapping[str, ArrayLike], joints: Sequence[str] |
 
 
 def _aba(*arguments: Any) -> Array:
-    """As :func:`pin.abaInParallel` does it: bit for bit the same, which the other convention is not."""
+    """Compute forward dynamics in the convention of :func:`pin.abaInParallel`, to get the same bits."""
     return pin.aba(*arguments, pin.Convention.WORLD)

@@ -1,4 +1,4 @@
-"""What is wrong, doubtful or worth knowing in a URDF, found before Pinocchio reads it.
+"""The check of a URDF for errors and doubtful values, before Pinocchio reads it.
 
 A check of values is a function from an arm to findings; to add one, write it and list it in `VALUE_CHECKS`.
 """
@@ -11,7 +11,7 @@ from pathlib import Path
 from pathcontrol._files import read_bounded
 from pathcontrol.errors import InputError, UrdfError
 from pathcontrol.robot.urdf.checks.extension import check_extension
-from pathcontrol.robot.urdf.checks.finding import Finding, Level, UrdfReport, shown
+from pathcontrol.robot.urdf.checks.finding import Finding, Level, UrdfReport, quote
 from pathcontrol.robot.urdf.checks.form import check_form
 from pathcontrol.robot.urdf.checks.inertia import check_inertials, check_inertias, check_mass_matrix, check_masses
 from pathcontrol.robot.urdf.checks.joints import (
@@ -26,7 +26,7 @@ from pathcontrol.robot.urdf.checks.visuals import check_meshes, check_shapes
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES, names_of
 from pathcontrol.robot.urdf.locking import locked_angles
 from pathcontrol.robot.urdf.model_values import read_arm
-from pathcontrol.robot.urdf.xml.encoding import decoded
+from pathcontrol.robot.urdf.xml.encoding import decode
 from pathcontrol.robot.urdf.xml.parse import MAX_BYTES, parse_and_mend
 
 _ORDER: tuple[Level, ...] = ("error", "warning", "note")
@@ -72,11 +72,11 @@ def check_urdf(
         InputError: ``text`` is neither.
     """
     if not isinstance(text, str | Path):
-        raise InputError(f"text = {shown(repr(text))}, expected the XML of a robot as a string, or the Path of a file")
+        raise InputError(f"text = {quote(repr(text))}, expected the XML of a robot as a string, or the Path of a file")
     if isinstance(text, Path) and base_dir is None:
         base_dir = text.resolve().parent
     try:
-        root, mended = parse_and_mend(_text_of(text))
+        root, mended = parse_and_mend(_read_source(text))
     except UrdfError as error:
         return UrdfReport("", (), (), (Finding("error", "unreadable", "file", str(error)),))
     findings = [*mended, *check_form(root)]
@@ -92,10 +92,10 @@ def check_urdf(
     return UrdfReport(root.get("name", ""), links, joints, tuple(findings))
 
 
-def _text_of(source: str | Path) -> str:
-    """The XML itself; a string that begins like a name is asked whether it is one."""
+def _read_source(source: str | Path) -> str:
+    """Return the XML text; a string that looks like a file name is refused with advice."""
     if isinstance(source, Path):
-        return decoded(read_bounded(source, MAX_BYTES, "a URDF", UrdfError), source.name)
+        return decode(read_bounded(source, MAX_BYTES, "a URDF", UrdfError), source.name)
     if "<" not in source and source.strip().lower().endswith((".urdf", ".xml")):
-        raise UrdfError(f"{shown(source)} is a name and not XML; give Path({shown(source)}) to have the file read")
+        raise UrdfError(f"{quote(source)} is a name and not XML; give Path({quote(source)}) to have the file read")
     return source

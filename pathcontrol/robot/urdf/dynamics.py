@@ -1,4 +1,4 @@
-"""Mass matrix and gravity torque of an arm from the values of its URDF, for the checks that look at them.
+"""Mass matrix and gravity torque of an arm from the values of its URDF, for the checks.
 
 The model itself is Pinocchio's; these are for a few hundred postures of an arm that may not become one.
 """
@@ -20,7 +20,7 @@ _ANY_TURN = np.pi  # rad: where a joint has no limits, or wider ones
 
 
 class _Placed(NamedTuple):
-    """A body at N postures: pose of its joint (N, 4, 4), axis (N, 3), and the joints that move it, each with both."""
+    """A body at N postures: its joint's pose (N, 4, 4), and the joints that move it with origin and axis, (N, 3)."""
 
     body: Body
     pose: np.ndarray
@@ -28,31 +28,31 @@ class _Placed(NamedTuple):
 
 
 def postures(arm: Arm, count: int = POSTURES) -> np.ndarray:
-    """Postures within the limits of the free joints, (count, n): the one at zero first, the others at random."""
+    """Return postures within the limits of the free joints, (count, n): the zero posture first, then random ones."""
     bodies = moving_bodies(arm)
-    low, high = np.array([_range(body) for body in bodies]).T
+    low, high = np.array([_position_range(body) for body in bodies]).T
     drawn = np.random.default_rng(0).uniform(low, high, (count, len(bodies)))
     drawn[0] = np.clip(0.0, low, high)
     return drawn
 
 
 def dynamics(arm: Arm, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mass matrix [kg m^2], (N, n, n), and gravity torque [N m], (N, n), at postures q (N, n).
+    """Return mass matrix [kg m^2], (N, n, n), and gravity torque [N m], (N, n), at postures q (N, n).
 
     The joints are in the order of :func:`moving_bodies`. With J_v and J_w the Jacobians of the centre of mass of a
     link and of its rotation, M is the sum of m J_v' J_v + J_w' R I R' J_w and g that of m J_v' (0, 0, 9.81).
     """
     count, n = q.shape
     M, g = np.zeros((count, n, n)), np.zeros((count, n))
-    for placed in _placed(arm, q):
+    for placed in _place_bodies(arm, q):
         for link, pose in placed.body.poses.items():
             if (inertial := arm.links[link].inertial) is not None:
-                _add(M, g, inertial, placed, placed.pose @ pose)
+                _add_link(M, g, inertial, placed, placed.pose @ pose)
     return M, g
 
 
-def _add(M: np.ndarray, g: np.ndarray, inertial: Inertial, placed: _Placed, link: np.ndarray) -> None:
-    """Add what one link does to M and g."""
+def _add_link(M: np.ndarray, g: np.ndarray, inertial: Inertial, placed: _Placed, link: np.ndarray) -> None:
+    """Add the contribution of one link to M and g."""
     centre = link if inertial.origin is None else link @ inertial.origin
     count, n = g.shape
     J_v, J_w = np.zeros((count, 3, n)), np.zeros((count, 3, n))
@@ -67,8 +67,8 @@ def _add(M: np.ndarray, g: np.ndarray, inertial: Inertial, placed: _Placed, link
     g += inertial.mass * GRAVITY * J_v[:, 2]
 
 
-def _placed(arm: Arm, q: np.ndarray) -> Iterator[_Placed]:
-    """The bodies at postures q (N, n), from the root outwards."""
+def _place_bodies(arm: Arm, q: np.ndarray) -> Iterator[_Placed]:
+    """Yield the bodies at postures q (N, n), from the root outwards."""
     holder: dict[str, _Placed] = {}
     for i, body in enumerate(moving_bodies(arm)):
         joint, inner = body.joint, holder.get(body.joint.parent)
@@ -83,7 +83,7 @@ def _placed(arm: Arm, q: np.ndarray) -> Iterator[_Placed]:
 
 
 def _motion(body: Body, position: np.ndarray) -> np.ndarray:
-    """What a joint does at N positions, (N, 4, 4); Rodrigues' formula for one that turns."""
+    """Return the transform of a joint at N positions, (N, 4, 4); Rodrigues' formula for one that turns."""
     motion, axis = np.tile(np.eye(4), (len(position), 1, 1)), _unit(body)
     if body.joint.type == "prismatic":
         motion[:, :3, 3] = position[:, None] * axis
@@ -95,12 +95,13 @@ def _motion(body: Body, position: np.ndarray) -> np.ndarray:
 
 
 def _unit(body: Body) -> np.ndarray:
+    """Return the unit vector along the axis of a joint, or zero."""
     length = float(np.linalg.norm(body.joint.axis))
     return np.asarray(body.joint.axis) / length if length else np.zeros(3)
 
 
-def _range(body: Body) -> tuple[float, float]:
-    """Between which positions a joint moves; a length of 1 m or half a turn each way where nothing limits it."""
+def _position_range(body: Body) -> tuple[float, float]:
+    """Return the range of positions of a joint; where it has no limits, 1 m or half a turn either way."""
     limit, most = body.joint.limit, 1.0 if body.joint.type == "prismatic" else _ANY_TURN
     if limit is None or body.joint.type == "continuous":
         return -most, most

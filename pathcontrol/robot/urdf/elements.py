@@ -1,4 +1,4 @@
-"""Finding one's way among the elements of a URDF."""
+"""Helpers to navigate the elements of a URDF."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def place_of(element: etree._Element) -> str:
-    """Say which link or joint an element is."""
+    """Name the link or joint that an element is, for a message."""
     return place(element.tag, element.get("name"))
 
 

@@ -1,4 +1,4 @@
-"""Links and joints of a robot whose form is sound, by their values.
+"""The values of links and joints of a robot whose form is sound.
 
 yourdfpy reads the same, but brings along a library of meshes, which takes most of a second to load.
 """
@@ -13,7 +13,7 @@ from lxml import etree
 
 @dataclass(frozen=True, eq=False)
 class Inertial:
-    """Mass [kg], inertia about the centre of mass (3, 3) [kg m²], and the pose of that (4, 4), None for the link's."""
+    """Mass [kg], inertia about the centre of mass (3, 3) [kg m²], and the pose of its frame (4, 4) or None."""
 
     mass: float
     inertia: np.ndarray
@@ -30,7 +30,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Limit:
-    """Limits of effort [N m or N], velocity and position [rad or m]; None where one of position is not given."""
+    """Limits of effort [N m or N], velocity and position [rad or m]; None for a position limit that is not given."""
 
     effort: float
     velocity: float
@@ -40,7 +40,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class Dynamics:
-    """Viscous and dry friction of a joint, None where it is not given."""
+    """Viscous and dry friction of a joint, None for one that is not given."""
 
     damping: float | None
     friction: float | None
@@ -48,7 +48,7 @@ class Dynamics:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint from its parent link to its child, with its pose (4, 4) in the parent, None for that itself."""
+    """A joint from a parent to a child link, with its pose (4, 4) in the parent, None for the identity."""
 
     name: str
     type: str
@@ -82,6 +82,7 @@ def read_joint(element: etree._Element) -> Joint:
 
 
 def _inertial(element: etree._Element) -> Inertial:
+    """Read an ``<inertial>``."""
     mass, inertia = element.find("mass"), element.find("inertia")
     ixx, ixy, ixz, iyy, iyz, izz = (float(inertia.get(f"i{axes}")) for axes in ("xx", "xy", "xz", "yy", "yz", "zz"))
     tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
@@ -89,13 +90,13 @@ def _inertial(element: etree._Element) -> Inertial:
 
 
 def _numbers(element: etree._Element, *names: str) -> dict[str, float | None]:
-    """The values of attributes by name, None where one is not given."""
+    """Return the values of attributes by name, None for one that is not given."""
     given = {name: element.get(name) for name in names}
     return {name: None if text is None else float(text) for name, text in given.items()}
 
 
 def _vector(element: etree._Element | None, name: str, default: str) -> np.ndarray:
-    """The three numbers of an attribute, (3,)."""
+    """Return the three numbers of an attribute, (3,)."""
     text = default if element is None else element.get(name, default)
     return np.array([float(word) for word in text.split()])
 

@@ -1,4 +1,4 @@
-"""Which joints of a URDF are locked, and where: those that are named, those that follow them, and all but some."""
+"""The joints of a URDF that are locked, with their positions: named ones, their mimics, or all but some."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def locked_angles(
     keep: Sequence[str] = (),
     tip: str | None = None,
 ) -> dict[str, float]:
-    """The position [rad or m] of each joint that is locked, those that mimic a locked one included.
+    """Return the position [rad or m] of each joint that is locked, including those that mimic a locked one.
 
     A joint that mimics another is at multiplier × position + offset of that one. Where ``keep`` or ``tip`` says what
     stays free, all others are locked: where ``lock`` says, else at 0, or at the limit that is nearest to 0.
@@ -38,7 +38,10 @@ def locked_angles(
     joints = {joint.get("name", ""): joint for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES}
     given, keep = _positions(lock, joints), names_to_keep(keep)
     check_tip(tip)
-    kept = {*(_known("keep", name, joints) for name in keep), *(() if tip is None else _carrying(root, tip, joints))}
+    kept = {
+        *(_check_known("keep", name, joints) for name in keep),
+        *(() if tip is None else _supporting_joints(root, tip, joints)),
+    }
     if both := sorted(kept & given.keys()):
         raise InputError(f"{', '.join(both)}: to be locked and kept; take it out of lock, keep or tip")
     if following := sorted(name for name in kept if _leaders(name, joints)):
@@ -52,7 +55,7 @@ def locked_angles(
 def locked_beyond_limits(
     root: etree._Element, angles: Mapping[str, float], given: Collection[str] = ()
 ) -> Iterator[str]:
-    """Say of each joint that is to be locked outside its limits where it would be, and why.
+    """Yield a warning for each joint that is to be locked outside its limits, with the cause.
 
     Args:
         root: the ``<robot>``.
@@ -74,11 +77,11 @@ def locked_beyond_limits(
             by = f"{leader} = {float(angles[leader]):g} {_unit(joints[leader])}"
             yield f"lock: {by} puts {name}, which follows it, at {at:g} {_unit(joint)}, {beyond}"
         else:
-            yield f"lock: {name} = {at:g} {_unit(joint)} is {beyond}{_question(joint, at, lower, upper)}"
+            yield f"lock: {name} = {at:g} {_unit(joint)} is {beyond}{_ask_unit(joint, at, lower, upper)}"
 
 
 def _range(joint: etree._Element) -> tuple[float, float] | None:
-    """The limits of a joint, ``None`` where there are none."""
+    """Return the limits of a joint, ``None`` where there are none."""
     limit = joint.find("limit")
     if limit is None or joint.get("type") == "continuous":
         return None
@@ -87,11 +90,12 @@ def _range(joint: etree._Element) -> tuple[float, float] | None:
 
 
 def _unit(joint: etree._Element) -> str:
+    """Return the unit of a joint's position."""
     return "m" if joint.get("type") == "prismatic" else "rad"
 
 
-def _question(joint: etree._Element, at: float, lower: float, upper: float) -> str:
-    """Ask for degrees or millimetres where the number would be within the limits as such."""
+def _ask_unit(joint: etree._Element, at: float, lower: float, upper: float) -> str:
+    """Ask whether degrees or millimetres were meant, if the number would be within the limits as such."""
     slides = _unit(joint) == "m"
     scaled = at / 1000 if slides else math.radians(at)
     if abs(at) < 1 or not lower <= scaled <= upper:
@@ -100,11 +104,12 @@ def _question(joint: etree._Element, at: float, lower: float, upper: float) -> s
 
 
 def _positions(lock: Mapping[str, float] | None, joints: Collection[str]) -> dict[str, float]:
+    """Check the joints to lock and their positions."""
     if lock is None:
         return {}
     if not isinstance(lock, Mapping):
         raise InputError(f"lock = {lock!r}, expected angles by joint, as {{'joint name': 0.0}}")
-    return {_known("lock", name, joints): scalar(f"angle of {name}", angle) for name, angle in lock.items()}
+    return {_check_known("lock", name, joints): scalar(f"angle of {name}", angle) for name, angle in lock.items()}
 
 
 def names_to_keep(keep: str | Sequence[str] | None) -> list[str]:
@@ -129,7 +134,8 @@ def check_tip(tip: str | None) -> None:
         raise InputError(f"tip = {tip!r}, expected the name of one frame; keep=[...] takes several joints")
 
 
-def _known(argument: str, name: str, joints: Collection[str]) -> str:
+def _check_known(argument: str, name: str, joints: Collection[str]) -> str:
+    """Check that a joint exists and moves."""
     if name not in joints:
         raise UnknownNameError(
             f"{argument}: the robot has no movable joint {name!r}; it has {', '.join(joints)}",
@@ -141,8 +147,8 @@ def _known(argument: str, name: str, joints: Collection[str]) -> str:
     return name
 
 
-def _carrying(root: etree._Element, tip: str, joints: Collection[str]) -> Iterator[str]:
-    """The movable joints between the base and a link, or a joint and what it moves."""
+def _supporting_joints(root: etree._Element, tip: str, joints: Collection[str]) -> Iterator[str]:
+    """Yield the movable joints between the base and a link, or a joint and those that carry it."""
     over = {_end(joint, "child"): joint for joint in root.iterfind("joint")}
     links = [link.get("name", "") for link in root.iterfind("link")]
     by_name = {joint.get("name", ""): joint for joint in root.iterfind("joint")}
@@ -164,7 +170,7 @@ def _carrying(root: etree._Element, tip: str, joints: Collection[str]) -> Iterat
 def _position(
     name: str, joints: Mapping[str, etree._Element], given: Mapping[str, float], passed: frozenset[str]
 ) -> float:
-    """Where a locked joint is: as it is said, as the one it follows says, or as near to 0 as it can be."""
+    """Return the position of a locked joint: as given, as its mimic formula gives, or as near to 0 as possible."""
     if name in given:
         return given[name]
     mimic = joints[name].find("mimic")
@@ -176,7 +182,7 @@ def _position(
 
 
 def _leaders(name: str, joints: Mapping[str, etree._Element]) -> list[str]:
-    """The joint that a joint follows, the one that that one follows, and so on."""
+    """Return the chain of joints that a joint mimics, the nearest first."""
     found: list[str] = []
     while (mimic := joints[name].find("mimic")) is not None and (name := mimic.get("joint", "")) in joints:
         if name in found:
@@ -186,6 +192,7 @@ def _leaders(name: str, joints: Mapping[str, etree._Element]) -> list[str]:
 
 
 def _nearest_to_zero(joint: etree._Element) -> float:
+    """Return the position within the limits of a joint that is nearest to 0."""
     limit = joint.find("limit")
     if limit is None or joint.get("type") == "continuous":
         return 0.0
@@ -193,11 +200,12 @@ def _nearest_to_zero(joint: etree._Element) -> float:
 
 
 def _number(element: etree._Element, name: str, default: float) -> float:
-    """An attribute; one that is no number is told by the checks."""
+    """Return an attribute as a number, or the default; text that is no number is left to the checks."""
     values = read_numbers(element.get(name, ""), 1)
     return default if values is None else values[0]
 
 
 def _end(joint: etree._Element, end: str) -> str | None:
+    """Return the name of the link at an end of a joint."""
     element = joint.find(end)
     return None if element is None else element.get("link")

@@ -1,4 +1,4 @@
-"""Where the mesh files that a URDF names may be, and why one cannot be read."""
+"""Look-up of the mesh files that a URDF names, with the reasons why one cannot be read."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import islice
 from pathlib import Path, PurePosixPath
 
 from pathcontrol.errors import UrdfError
-from pathcontrol.robot.urdf.mesh_names import MeshName, at_home, in_package, is_local, readings
+from pathcontrol.robot.urdf.mesh_names import MeshName, expand_home, is_in_package, is_local, readings
 
 #: the kinds of mesh files that are read
 FORMATS = (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf")
@@ -22,7 +22,7 @@ _PREFIXES = ("AMENT_PREFIX_PATH", "COLCON_PREFIX_PATH")
 
 
 def find_mesh(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Path:
-    """Return the file that a mesh name of a URDF means; nothing is fetched.
+    """Find the file that a mesh name of a URDF means; nothing is fetched.
 
     Args:
         name: a relative or absolute path, ``file:…``, ``package://…`` or ``model://…``. What no file has as it is
@@ -37,9 +37,9 @@ def find_mesh(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) ->
     """
     if not is_local(name):
         raise UrdfError("it is not fetched; expected package://, file:// or a relative path")
-    path = _first(name, base_dir, package_dirs)
+    path = _find_first(name, base_dir, package_dirs)
     if path is None:
-        raise UrdfError(f"it is not found; {_what_to_do(name)}")
+        raise UrdfError(f"it is not found; {_advise(name)}")
     check_format(path)
     try:
         with path.open("rb") as file:
@@ -50,31 +50,33 @@ def find_mesh(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) ->
 
 
 def check_format(path: Path) -> None:
-    """Refuse a file whose name ends like that of no mesh, with a :class:`UrdfError`."""
+    """Refuse a file whose suffix is of no known mesh format, with a :class:`UrdfError`."""
     if path.suffix.lower() not in FORMATS:
         raise UrdfError(f"it ends in {path.suffix or 'nothing'!r}, expected one of {', '.join(FORMATS)}")
 
 
 def check_content(start: bytes) -> None:
-    """Refuse what is no mesh by its first bytes, with a :class:`UrdfError`."""
+    """Refuse a file whose first bytes are of no mesh, with a :class:`UrdfError`."""
     if start.startswith(_POINTER):
         raise UrdfError("it is a pointer of Git LFS and not the mesh itself; run `git lfs pull` where it came from")
     if not start:
         raise UrdfError("it is an empty file")
 
 
-def may_be_found(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> bool:
-    """Whether there is any folder to look for a mesh in, as there is not for a robot that is given as text."""
+def has_candidates(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> bool:
+    """Return whether there is any folder to look for a mesh in; a robot given as text may have none."""
     return next(_candidates(name, base_dir, package_dirs), None) is not None
 
 
-def _what_to_do(name: str) -> str:
-    if in_package(name):
+def _advise(name: str) -> str:
+    """Return advice about a mesh that is not found."""
+    if is_in_package(name):
         return f"give the folder that holds its package: {_OPTIONS}, or ROS_PACKAGE_PATH"
     return f"put it there, or give the folder that its path begins in: {_OPTIONS}"
 
 
-def _first(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Path | None:
+def _find_first(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Path | None:
+    """Return the first candidate that is a file."""
     for path in _candidates(name, base_dir, package_dirs):
         try:
             if path.is_file():
@@ -85,36 +87,36 @@ def _first(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Pa
 
 
 def _candidates(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Path]:
-    """The files that a mesh name may mean, in the order to try; see :func:`find_mesh`."""
+    """Yield the files that a mesh name may mean, in the order to try; see :func:`find_mesh`."""
     names = list(readings(name))
     for reading in names:
-        inside = _in_packages if reading.scheme == "package" else _paths
+        inside = _read_in_packages if reading.scheme == "package" else _read_as_path
         yield from inside(reading, base_dir, package_dirs)
     near = (*package_dirs, *(() if base_dir is None else (base_dir.absolute(), base_dir.absolute().parent)))
     for reading in names:  # a package or a folder that was copied or renamed keeps what is in it
         yield from (folder / tail for tail in reading.tails for folder in near)
     for reading in names:
         whole = PurePosixPath(reading.path.lstrip("/"))
-        yield from (path for end in (whole, *reading.tails) for folder in near for path in _in_any_case(folder, end))
+        yield from (path for end in (whole, *reading.tails) for folder in near for path in _match_any_case(folder, end))
 
 
-def _paths(reading: MeshName, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Path]:
-    """What a path may mean: as it is, or from the folder of the URDF and those given."""
+def _read_as_path(reading: MeshName, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Path]:
+    """Yield the files that a path may mean: as it is, or from the folder of the URDF and those given."""
     relative = reading.path
     if reading.scheme and relative.startswith("//"):  # file://HOST/path, where most mean file:///path
         relative = relative[1:]
         relative = relative.removeprefix("/localhost") if relative.startswith("/localhost/") else relative
         yield Path(relative)
         relative = relative.lstrip("/")
-    path = at_home(relative)
+    path = expand_home(relative)
     for folder in (*package_dirs, *(() if base_dir is None else (base_dir.absolute(),))):
         yield folder / path  # which is the path itself if it is absolute
     if path.is_absolute():
         yield path
 
 
-def _in_packages(reading: MeshName, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Path]:
-    """What a path that begins with the name of a package may mean."""
+def _read_in_packages(reading: MeshName, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Path]:
+    """Yield the files that a path may mean that begins with the name of a package."""
     relative = reading.path.lstrip("/")
     package, _, inside = relative.partition("/")
     above = () if base_dir is None else (base_dir.absolute(), *base_dir.absolute().parents)
@@ -128,14 +130,14 @@ def _in_packages(reading: MeshName, base_dir: Path | None, package_dirs: Sequenc
 
 
 def _package_folders() -> list[Path]:
-    """The folders of packages that the environment names."""
+    """Return the folders of packages that the environment names."""
     folders = [Path(entry) for name in _ENVIRONMENT for entry in os.environ.get(name, "").split(os.pathsep) if entry]
     prefixes = [Path(entry) for name in _PREFIXES for entry in os.environ.get(name, "").split(os.pathsep) if entry]
     return [*folders, *(prefix / "share" for prefix in prefixes)]
 
 
-def _in_any_case(folder: Path, relative: PurePosixPath) -> list[Path]:
-    """The files below ``folder`` whose path is ``relative`` but for upper and lower case."""
+def _match_any_case(folder: Path, relative: PurePosixPath) -> list[Path]:
+    """Return the files below ``folder`` whose path is ``relative`` up to upper and lower case."""
     found = [folder]
     for part in relative.parts:
         if part in ("..", "."):

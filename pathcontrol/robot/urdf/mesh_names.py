@@ -1,4 +1,4 @@
-"""What the names of mesh files in a URDF mean: paths, and places in packages."""
+"""Interpretation of the names of mesh files in a URDF: paths, and places in packages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _DRIVE = re.compile(r"[A-Za-z]:/+")
 
 
 class MeshName(NamedTuple):
-    """One way to read the name of a mesh.
+    """One reading of the name of a mesh.
 
     Attributes:
         scheme: ``"package"``, also for ``model://``; ``"file"``; empty for a path; else what would have to be fetched.
@@ -27,14 +27,14 @@ class MeshName(NamedTuple):
 
     @property
     def tails(self) -> list[PurePosixPath]:
-        """Its ends, the longest first: a folder that was moved or copied keeps what is in it."""
+        """The ends of the path, the longest first: a folder that was moved or copied keeps its content."""
         whole = PurePosixPath(_DRIVE.sub("/", self.path, count=1))
         parts = [part for part in whole.parts if part.strip("/") not in ("", "..")][-_DEEPEST:]
         return [PurePosixPath(*parts[i:]) for i in range(len(parts))]
 
 
 def readings(name: str) -> Iterator[MeshName]:
-    """Read a name as it is written, then with slashes for backslashes, then with a space for ``%20`` and so on."""
+    """Yield the readings of a name: as written, with slashes for backslashes, and with ``%20`` and the like decoded."""
     name = _FIND.sub(r"package://\1/", name.strip(), count=1)
     forward = name.replace("\\", "/")
     for spelling in dict.fromkeys((name, forward, unquote(forward))):
@@ -43,17 +43,17 @@ def readings(name: str) -> Iterator[MeshName]:
 
 
 def is_local(name: str) -> bool:
-    """Whether a mesh name means a file of this machine; nothing is fetched."""
+    """Return whether a mesh name means a file of this machine; nothing is fetched."""
     return next(readings(name)).scheme in ("", _FILE, "package")
 
 
-def in_package(name: str) -> bool:
-    """Whether a mesh name means a file in a package."""
+def is_in_package(name: str) -> bool:
+    """Return whether a mesh name means a file in a package."""
     return next(readings(name)).scheme == "package"
 
 
-def at_home(name: str) -> Path:
-    """Return a path, with the home folder in the place of ``~``."""
+def expand_home(name: str) -> Path:
+    """Return a path with ``~`` replaced by the home folder."""
     try:
         return Path(name).expanduser()
     except RuntimeError:  # the home of a user who does not exist

@@ -16,7 +16,7 @@ NO_AXIS = 1e-12
 
 @dataclass(frozen=True)
 class Arm:
-    """A robot whose form is sound: what the checks of values look at.
+    """The values of a robot whose form is sound, as the checks of values need them.
 
     Attributes:
         links: The links by name.
@@ -74,7 +74,7 @@ def read_arm(root: etree._Element, locked: Iterable[str] = ()) -> Arm:
     drawn = [link for link in root.iterfind("link") if {"visual", "collision"} & {part.tag for part in link}]
     return Arm(
         links={link.name: link for link in map(read_link, root.iterfind("link"))},
-        joints=_outwards([read_joint(joint) for joint in root.iterfind("joint")]),
+        joints=_sort_outwards([read_joint(joint) for joint in root.iterfind("joint")]),
         mimics={name: mimic.get("joint", "") for name, mimic in mimics.items() if mimic is not None},
         locked=frozenset(locked),
         shaped=frozenset(names_of(drawn)),
@@ -100,7 +100,7 @@ def moving_bodies(arm: Arm) -> list[Body]:
 
 
 def link_pose(arm: Arm, link: str) -> np.ndarray:
-    """Pose of a link that does not move in the frame of the root, shape (4, 4), lengths in m."""
+    """Return the pose of a link that does not move in the frame of the root, shape (4, 4), lengths in m."""
     over, pose = {joint.child: joint for joint in arm.joints}, np.eye(4)
     while (joint := over.get(link)) is not None:
         pose, link = _pose(joint) @ pose, joint.parent
@@ -108,7 +108,7 @@ def link_pose(arm: Arm, link: str) -> np.ndarray:
 
 
 def axis_inertia(arm: Arm, body: Body) -> float:
-    """Moment of inertia of a body about the axis of its joint [kg m^2].
+    """Return the moment of inertia of a body about the axis of its joint [kg m^2].
 
     Each link adds a' I a + m |a x c|^2 (the parallel axis theorem), with a the unit axis, I the inertia about
     the centre of mass c, and m the mass.
@@ -125,11 +125,11 @@ def axis_inertia(arm: Arm, body: Body) -> float:
 
 
 def has_direction(joint: Joint) -> bool:
-    """Whether the axis of a joint is long enough to point somewhere."""
+    """Return whether the axis of a joint is long enough to have a direction."""
     return bool(np.linalg.norm(joint.axis) > NO_AXIS)
 
 
-def _outwards(joints: Sequence[Joint]) -> tuple[Joint, ...]:
+def _sort_outwards(joints: Sequence[Joint]) -> tuple[Joint, ...]:
     """Sort the joints of a tree so that each comes after the one that carries it."""
     hanging: dict[str, list[Joint]] = {}
     for joint in joints:

@@ -1,4 +1,4 @@
-"""The numbers of a URDF: read as urdfdom reads them, and checked to be numbers at all."""
+"""The numbers of a URDF: read as urdfdom reads them, and checked to be valid."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from lxml import etree
 
 from pathcontrol._arrays import LARGEST
-from pathcontrol.robot.urdf.checks.finding import Finding, shown
+from pathcontrol.robot.urdf.checks.finding import Finding, quote
 from pathcontrol.robot.urdf.elements import MOMENTS, first, links_and_joints, place_of
 
 MAX_DIGITS = 400
@@ -53,7 +53,7 @@ def read_numbers(text: str, length: int) -> tuple[float, ...] | None:
 
 
 def check_numbers(root: etree._Element) -> Iterator[Finding]:
-    """Every number of the dynamics is a finite number of bounded size, and there are as many as expected."""
+    """Check that every number of the dynamics is finite and of bounded size, and that there are as many as expected."""
     for element in links_and_joints(root):
         for path, lengths in _NUMBERS[element.tag].items():
             if (part := first(element, path)) is None:
@@ -67,10 +67,10 @@ def _check_number(where: str, what: str, text: str, length: int) -> Iterator[Fin
     values = read_numbers(text, length)
     if values is None:
         expected = "a finite number" if length == 1 else f"{length} finite numbers with spaces between"
-        message = f"{what} is {shown(text)}; expected {expected}, correct it"
+        message = f"{what} is {quote(text)}; expected {expected}, correct it"
         yield Finding("error", "not-a-number", where, message)
     elif not what.endswith("<limit>") and max(map(abs, values)) >= ABSURD:
-        message = f"{what} is {shown(text)}; expected SI units, below {ABSURD:g}"
+        message = f"{what} is {quote(text)}; expected SI units, below {ABSURD:g}"
         yield Finding("error", "number-absurd", where, message)
 
 

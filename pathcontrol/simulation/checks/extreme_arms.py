@@ -6,7 +6,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.robot.batch import RobotBatch
-from pathcontrol.robot.friction import levels_vary, of_rollout
+from pathcontrol.robot.friction import levels_vary, select_rollout
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.checks.fast_modes import steepest_fall
 from pathcontrol.simulation.loops import Arm
@@ -16,7 +16,7 @@ def arm_of(robot: Arm, rollout: int) -> RobotModel:
     """Return the arm of a rollout, with the friction of that rollout."""
     if not isinstance(robot, RobotBatch):
         return robot
-    return robot.robots[rollout].with_friction(of_rollout(robot.friction, rollout))
+    return robot.robots[rollout].with_friction(select_rollout(robot.friction, rollout))
 
 
 def find_extreme_arms(robot: Arm, q: Array) -> list[int]:

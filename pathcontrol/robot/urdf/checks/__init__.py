@@ -1,1 +1,1 @@
-"""Checks of a robot description, each of one kind of fault."""
+"""Checks of a robot description, grouped by kind of fault."""

@@ -1,4 +1,4 @@
-"""``<pathcontrol>``: what URDF has no word for. Coulomb friction by direction of motion, and encoders.
+"""The ``<pathcontrol>`` extension of URDF: Coulomb friction by direction of motion, and encoders.
 
 <pathcontrol>
 <joint name="elbow">
@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 from lxml import etree
 
-from pathcontrol.robot.urdf.checks.finding import Finding, shown
+from pathcontrol.robot.urdf.checks.finding import Finding, quote
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES
 from pathcontrol.robot.urdf.numbers import ABSURD, read_numbers
 
@@ -23,7 +23,7 @@ _ATTRIBUTES = {"coulomb": ("positive", "negative"), "encoder": ("counts_per_revo
 
 
 def extension_values(root: etree._Element, tag: str) -> dict[str, tuple[float, ...]]:
-    """The attributes of each ``<tag>`` of a checked URDF as numbers, by joint."""
+    """Return the attributes of each ``<tag>`` of a checked URDF as numbers, by joint."""
     found = {joint.get("name"): joint.find(tag) for joint in root.iterfind("pathcontrol/joint")}
     return {
         name: tuple(float(element.get(key)) for key in _ATTRIBUTES[tag])
@@ -33,12 +33,12 @@ def extension_values(root: etree._Element, tag: str) -> dict[str, tuple[float, .
 
 
 def check_extension(root: etree._Element) -> Iterator[Finding]:
-    """Every joint named exists and moves, every element is known, and its numbers make sense."""
+    """Check that every joint named exists and moves, that elements are known, and that numbers are valid."""
     movable = [joint.get("name") for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES]
     for joint in root.iterfind("pathcontrol/*"):
-        name, where = joint.get("name"), f"<pathcontrol> joint {shown(joint.get('name'))}"
+        name, where = joint.get("name"), f"<pathcontrol> joint {quote(joint.get('name'))}"
         if joint.tag != "joint" or name not in movable:
-            message = f"<{joint.tag}> names {shown(name)}; expected <joint name=...> of one of: {', '.join(movable)}"
+            message = f"<{joint.tag}> names {quote(name)}; expected <joint name=...> of one of: {', '.join(movable)}"
             yield Finding("error", "extension-joint", where, message)
             continue
         for element in joint.iterchildren(etree.Element):
@@ -47,6 +47,7 @@ def check_extension(root: etree._Element) -> Iterator[Finding]:
 
 
 def _check_element(element: etree._Element, where: str) -> Iterator[Finding]:
+    """Check one element of the extension."""
     if element.tag not in _ATTRIBUTES:
         message = f"<{element.tag}> is unknown; expected one of: {', '.join(_ATTRIBUTES)}"
         yield Finding("error", "extension-element", where, message)
@@ -55,11 +56,12 @@ def _check_element(element: etree._Element, where: str) -> Iterator[Finding]:
         values = read_numbers(element.get(key, ""), 1)
         least = "above" if element.tag == "encoder" else "not below"
         if values is None or not 0 <= values[0] < ABSURD or (element.tag == "encoder" and values[0] == 0):
-            message = f"{key} of <{element.tag}> is {shown(element.get(key))}; expected a number {least} 0"
+            message = f"{key} of <{element.tag}> is {quote(element.get(key))}; expected a number {least} 0"
             yield Finding("error", "extension-number", where, message)
 
 
 def _check_encoders(root: etree._Element, movable: list[str]) -> Iterator[Finding]:
+    """Check that every joint has an encoder or none has."""
     having = {joint.get("name") for joint in root.iterfind("pathcontrol/joint[encoder]")}
     missing = [name for name in movable if name not in having]
     if having and missing:

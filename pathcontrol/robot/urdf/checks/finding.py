@@ -1,4 +1,4 @@
-"""What a check has to say about a robot description, and the report that collects it."""
+"""Findings about a robot description, and the report that collects them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _REPR.maxstring = 80
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing to know about a robot description.
+    """A single finding about a robot description.
 
     Attributes:
         level: ``"error"`` (unusable), ``"warning"`` (probably not meant) or ``"note"`` (good to know).
@@ -34,7 +34,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class UrdfReport:
-    """What the checks found in one robot description.
+    """The findings of all checks about one robot description.
 
     Attributes:
         name: Name of the robot, empty if it could not be read.
@@ -68,11 +68,11 @@ class UrdfReport:
         return {**asdict(self), "ok": self.ok}
 
 
-def shown(text: str | None) -> str:
-    """Quote a text on one line and of bounded length, for a message."""
+def quote(text: str | None) -> str:
+    """Quote a text for a message, on one line and of bounded length."""
     return _REPR.repr(text)
 
 
 def place(kind: str, name: str | None) -> str:
-    """Say which link or joint is meant, such as ``"joint 'elbow'"``."""
-    return f"{kind} {shown(name)}"
+    """Name a link or joint for a message, such as ``"joint 'elbow'"``."""
+    return f"{kind} {quote(name)}"

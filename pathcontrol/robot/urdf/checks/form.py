@@ -1,4 +1,4 @@
-"""Checks of form: what must hold before any value of a robot is looked at.
+"""Checks of the form of a URDF, which come before any check of values.
 
 Form is names, references, one tree, numbers that are numbers. The rules are those of the URDF reader inside
 Pinocchio (urdfdom), which says only "not a valid URDF model" when one is broken, or drops an inertial without
@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 from lxml import etree
 
-from pathcontrol.robot.urdf.checks.finding import Finding, place, shown
+from pathcontrol.robot.urdf.checks.finding import Finding, place, quote
 from pathcontrol.robot.urdf.checks.parts import check_quaternions, check_repeated, check_required
 from pathcontrol.robot.urdf.checks.tree import check_ends, check_tree
 from pathcontrol.robot.urdf.elements import JOINT_TYPES, place_of
@@ -26,20 +26,20 @@ _TYPE_CHOICES = "one of " + ", ".join(JOINT_TYPES)
 
 
 def check_form(root: etree._Element) -> Iterator[Finding]:
-    """Yield everything wrong with the form of a robot, before its values can be looked at."""
+    """Yield all faults of the form of a robot, before its values are looked at."""
     for check in FORM_CHECKS:
         yield from check(root)
 
 
 def check_robot(root: etree._Element) -> Iterator[Finding]:
-    """The robot has a name, a version the reader knows, and between one and `MAX_LINKS` links."""
+    """Check that the robot has a name, a version the reader knows, and 1 to `MAX_LINKS` links."""
     if not root.get("name"):
         message = "the attribute name is missing or empty; give the robot a name"
         yield Finding("error", "name-missing", "robot", message)
     version, count = root.get("version", "1.0"), len(root.findall("link"))
     if version not in VERSIONS:
         choices = ", ".join(VERSIONS)
-        message = f"version {shown(version)} is none of {choices}; remove it"
+        message = f"version {quote(version)} is none of {choices}; remove it"
         yield Finding("error", "version-unknown", "robot", message)
     if count == 0:
         message = "there is no <link> directly inside <robot>; expected at least two"
@@ -50,7 +50,7 @@ def check_robot(root: etree._Element) -> Iterator[Finding]:
 
 
 def check_names(root: etree._Element) -> Iterator[Finding]:
-    """Every link and joint has a name; no two links, joints or materials of the robot share one."""
+    """Check that every link and joint has a name, and that no two links, joints or materials share one."""
     for kind in ("link", "joint", "material"):
         names = Counter(element.get("name", "") for element in root.findall(kind))
         if names[""] and kind != "material":
@@ -63,14 +63,14 @@ def check_names(root: etree._Element) -> Iterator[Finding]:
 
 
 def check_types(root: etree._Element) -> Iterator[Finding]:
-    """Every joint says what kind it is."""
+    """Check that every joint states a known type."""
     for joint in root.findall("joint"):
         kind = joint.get("type")
         if kind is None:
             message = f"the type is missing; expected {_TYPE_CHOICES}"
             yield Finding("error", "type-missing", place_of(joint), message)
         elif kind not in JOINT_TYPES:
-            message = f"type {shown(kind)}; expected {_TYPE_CHOICES}"
+            message = f"type {quote(kind)}; expected {_TYPE_CHOICES}"
             yield Finding("error", "type-unknown", place_of(joint), message)
 
 

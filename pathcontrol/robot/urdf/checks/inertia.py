@@ -1,4 +1,4 @@
-"""Checks of masses and inertias: could they be those of rigid bodies, and can every joint be moved."""
+"""Checks of masses and inertias: physically possible, and enough for every joint to move something."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NO_MASS = 1e-15  # kg
 
 
 def check_masses(arm: Arm) -> Iterator[Finding]:
-    """No mass is negative; what has inertia has mass."""
+    """Check that no mass is negative, and that a body with inertia has mass."""
     moving = arm.moving
     for name, inertial in arm.inertials.items():
         if inertial.mass < 0:
@@ -33,7 +33,7 @@ def check_masses(arm: Arm) -> Iterator[Finding]:
 
 
 def check_inertias(arm: Arm) -> Iterator[Finding]:
-    """Every inertia could be that of a rigid body: no moment negative or above the sum of the two others.
+    """Check that every inertia is physically possible: no moment negative or above the sum of the two others.
 
     A negative moment that is tiny, as rounding leaves it, does no harm where the mass matrix is positive definite.
     """
@@ -54,7 +54,7 @@ def check_inertias(arm: Arm) -> Iterator[Finding]:
 
 
 def check_inertials(arm: Arm) -> Iterator[Finding]:
-    """Every moving body has an inertial, and so has every moving link with a shape."""
+    """Check that every moving body has an inertial, and so has every moving link with a shape."""
     if is_massless(arm):
         return  # which is told once
     for body in moving_bodies(arm):
@@ -67,7 +67,7 @@ def check_inertials(arm: Arm) -> Iterator[Finding]:
 
 
 def check_mass_matrix(arm: Arm) -> Iterator[Finding]:
-    """Every joint has something to move; otherwise the mass matrix is singular in every configuration."""
+    """Check that every joint moves some mass; otherwise the mass matrix is singular in every configuration."""
     if is_massless(arm):
         message = (
             "no link has a mass, so there are kinematics and no dynamics; give <inertial>, or let it be estimated with "
@@ -94,7 +94,7 @@ def check_mass_matrix(arm: Arm) -> Iterator[Finding]:
 
 
 def is_massless(arm: Arm) -> bool:
-    """Whether nothing that moves has a mass or an inertia."""
+    """Return whether no moving link has a mass or an inertia."""
     return not any(_weight(arm.links[name]).any() for name in arm.moving)
 
 

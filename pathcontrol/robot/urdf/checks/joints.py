@@ -1,4 +1,4 @@
-"""Checks of the joints: their kinds, axes, limits and friction."""
+"""Checks of the joints: their types, axes, limits and friction."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pathcontrol.robot.urdf.checks.finding import Finding, place, shown
+from pathcontrol.robot.urdf.checks.finding import Finding, place, quote
 from pathcontrol.robot.urdf.dynamics import dynamics, postures
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES
 from pathcontrol.robot.urdf.links import Joint, Limit
@@ -17,7 +17,7 @@ UNIT_TOLERANCE = 1e-3
 
 
 def check_joint_types(arm: Arm) -> Iterator[Finding]:
-    """The base is fixed and something moves."""
+    """Check that the base is fixed and that a joint moves."""
     for joint in arm.joints:
         if joint.type in ("floating", "planar"):
             message = f"type '{joint.type}' is refused: fixed-base arms only; make the joint fixed"
@@ -28,12 +28,12 @@ def check_joint_types(arm: Arm) -> Iterator[Finding]:
 
 
 def check_mimics(arm: Arm) -> Iterator[Finding]:
-    """No joint follows another, for Pinocchio would take it as independent."""
+    """Check that no joint follows another, for Pinocchio would take it as independent."""
     for joint in arm.movable:
         if joint.name in arm.mimics and joint.name not in arm.locked:
             leader = arm.mimics[joint.name]
-            message = f"it mimics joint {shown(leader)}, which is refused; " + (
-                f"lock {shown(leader)}, which locks it too, or keep other joints only, or make it fixed or independent"
+            message = f"it mimics joint {quote(leader)}, which is refused; " + (
+                f"lock {quote(leader)}, which locks it too, or keep other joints only, or make it fixed or independent"
                 if leader != joint.name and leader in {other.name for other in arm.joints}
                 else "no other joint has that name; correct it, lock this one, or make it fixed or independent"
             )
@@ -41,7 +41,7 @@ def check_mimics(arm: Arm) -> Iterator[Finding]:
 
 
 def check_axes(arm: Arm) -> Iterator[Finding]:
-    """Every axis has a direction and unit length."""
+    """Check that every axis has a direction and unit length."""
     for joint in arm.movable:
         length = float(np.linalg.norm(joint.axis))
         axis = " ".join(f"{value:g}" for value in joint.axis)
@@ -54,7 +54,7 @@ def check_axes(arm: Arm) -> Iterator[Finding]:
 
 
 def check_limits(arm: Arm) -> Iterator[Finding]:
-    """Limits are there, in order, and neither zero nor absurd."""
+    """Check that limits are given, in order, and neither zero nor absurdly large."""
     for joint in arm.movable:
         if joint.limit is None:
             yield _no_limit(joint)
@@ -65,7 +65,7 @@ def check_limits(arm: Arm) -> Iterator[Finding]:
 
 
 def check_dynamics(arm: Arm) -> Iterator[Finding]:
-    """No friction drives the arm; friction that is there is pointed out, and so are continuous joints."""
+    """Check that no friction drives the arm; note friction that is given, and continuous joints."""
     for joint in arm.free:
         given = {name: float(getattr(joint.dynamics, name, None) or 0) for name in ("damping", "friction")}
         for name, value in given.items():
@@ -82,7 +82,7 @@ def check_dynamics(arm: Arm) -> Iterator[Finding]:
 
 
 def check_efforts(arm: Arm) -> Iterator[Finding]:
-    """No joint is too weak to hold what it carries, in any of some hundred postures within its limits."""
+    """Check that each joint can hold what it carries, in some hundred postures within the limits."""
     bodies = moving_bodies(arm)
     if not bodies or not all(has_direction(body.joint) for body in bodies):
         return

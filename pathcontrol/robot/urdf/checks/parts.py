@@ -1,4 +1,4 @@
-"""Checks that links and joints have the parts a reader needs, each once and in a form it knows."""
+"""Checks that links and joints have the parts a reader needs, each once and in a known form."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from lxml import etree
 
-from pathcontrol.robot.urdf.checks.finding import Finding, shown
+from pathcontrol.robot.urdf.checks.finding import Finding, quote
 from pathcontrol.robot.urdf.elements import MOMENTS, first, links_and_joints, place_of
 
 _REQUIRED_ATTRIBUTES: dict[str, dict[str, tuple[str, ...]]] = {
@@ -25,7 +25,7 @@ _REQUIRED_CHILDREN = {"inertial": ("mass", "inertia"), "joint": ("parent", "chil
 
 
 def check_required(root: etree._Element) -> Iterator[Finding]:
-    """Every element has the parts without which the reader refuses it or drops it."""
+    """Check that every element has the parts without which the reader refuses it or drops it."""
     for element in links_and_joints(root):
         for path, names in _REQUIRED_ATTRIBUTES[element.tag].items():
             part = first(element, path)
@@ -42,16 +42,16 @@ def check_required(root: etree._Element) -> Iterator[Finding]:
 
 
 def check_quaternions(root: etree._Element) -> Iterator[Finding]:
-    """No orientation is given as a quaternion: readers of URDF 1.0 silently take it as zero rotation."""
+    """Check that no orientation is a quaternion: readers of URDF 1.0 silently take it as zero rotation."""
     for element in links_and_joints(root):
         for origin in element.iter("origin"):
             if (value := origin.get("quat_xyzw")) is not None:
-                message = f"quat_xyzw {shown(value)} is not read everywhere; write the rotation as rpy"
+                message = f"quat_xyzw {quote(value)} is not read everywhere; write the rotation as rpy"
                 yield Finding("error", "origin-quaternion", place_of(element), message)
 
 
 def check_repeated(root: etree._Element) -> Iterator[Finding]:
-    """No part is given twice: readers take the first and are silent about the rest."""
+    """Check that no part is given twice: readers silently take the first."""
     parts = {path.split("/")[0] for paths in _REQUIRED_ATTRIBUTES.values() for path in paths}
     for element in links_and_joints(root):
         for tag, count in Counter(part.tag for part in element).items():

@@ -1,4 +1,4 @@
-"""Checks that the joints join the links of a robot to one tree."""
+"""Checks that the joints connect the links of a robot to one tree."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from collections.abc import Iterator, Sequence
 
 from lxml import etree
 
-from pathcontrol.robot.urdf.checks.finding import Finding, place, shown
+from pathcontrol.robot.urdf.checks.finding import Finding, place, quote
 from pathcontrol.robot.urdf.elements import place_of
 
 
 def check_ends(root: etree._Element) -> Iterator[Finding]:
-    """Every joint joins two links that exist."""
+    """Check that every joint connects two links that exist."""
     links = {link.get("name") for link in root.findall("link")}
     for joint in root.findall("joint"):
         for end in ("parent", "child"):
             name = _end(joint, end)
             if name is not None and name not in links:
-                message = f"the {end} link {shown(name)} does not exist; add that <link> or correct the name"
+                message = f"the {end} link {quote(name)} does not exist; add that <link> or correct the name"
                 yield Finding("error", f"{end}-unknown", place_of(joint), message)
 
 
 def check_tree(root: etree._Element) -> Iterator[Finding]:
-    """The links form one tree: one root, one parent for every other link, no loop."""
+    """Check that the links form one tree: one root, one parent for every other link, no loop."""
     parents: dict[str, str] = {}
     holders: dict[str, list[str]] = {}
     for joint in root.findall("joint"):
@@ -39,7 +39,7 @@ def check_tree(root: etree._Element) -> Iterator[Finding]:
             message = f"it is the child of the joints {_listed(joints)}; expected one, remove the others"
             yield Finding("error", "two-parents", place("link", name), message)
     if loop := _loop(parents):
-        chain = " -> ".join(map(shown, loop))
+        chain = " -> ".join(map(quote, loop))
         message = f"the links {chain} form a loop; expected a tree, remove one of the joints"
         yield Finding("error", "loop", place("link", loop[0]), message)
 
@@ -50,7 +50,7 @@ def _end(joint: etree._Element, end: str) -> str | None:
 
 
 def _loop(parents: dict[str, str]) -> list[str]:
-    """Return one loop in a map from child to parent, its first link repeated at the end, or nothing."""
+    """Return the links of a loop in a map from child to parent, the first repeated at the end, or an empty list."""
     settled: set[str] = set()
     for start in parents:
         path: dict[str, None] = {}
@@ -67,4 +67,4 @@ def _loop(parents: dict[str, str]) -> list[str]:
 
 def _listed(names: Sequence[str], most: int = 5) -> str:
     more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(map(shown, names[:most])) + more
+    return ", ".join(map(quote, names[:most])) + more

@@ -1,4 +1,4 @@
-"""Checks of what a robot looks like: shapes that can be read, meshes that can be found."""
+"""Checks of the shapes and meshes of a robot."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 from lxml import etree
 
 from pathcontrol.errors import UrdfError
-from pathcontrol.robot.urdf.checks.finding import Finding, shown
+from pathcontrol.robot.urdf.checks.finding import Finding, quote
 from pathcontrol.robot.urdf.elements import place_of
-from pathcontrol.robot.urdf.mesh_files import find_mesh, may_be_found
+from pathcontrol.robot.urdf.mesh_files import find_mesh, has_candidates
 from pathcontrol.robot.urdf.mesh_names import is_local
 from pathcontrol.robot.urdf.numbers import POSE, read_numbers
 
@@ -24,7 +24,7 @@ _SHAPES: dict[str, dict[str, int]] = {
 
 
 def check_shapes(root: etree._Element) -> Iterator[Finding]:
-    """Every shape can be read; readers leave out one that cannot, and all after it in its link."""
+    """Check that every shape can be read; readers leave out one that cannot, and all after it in its link."""
     for link in root.iterfind("link"):
         for holder in link.iterchildren("visual", "collision"):
             for problem in _shape_problems(holder):
@@ -33,28 +33,29 @@ def check_shapes(root: etree._Element) -> Iterator[Finding]:
 
 
 def check_meshes(root: etree._Element, base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Finding]:
-    """Every mesh that is drawn is a file that can be found; nothing is fetched. The others are counted."""
+    """Check that every mesh that is drawn is found, without fetching any; missing collision meshes are counted."""
     problem = cache(lambda name: _mesh_problem(name, base_dir, package_dirs))
     yield from _check_drawn(root, problem)
     names = dict.fromkeys(mesh.get("filename", "") for mesh in root.iterfind("link/collision/geometry/mesh"))
     missing = [name for name in names if problem(name)]
     if missing:
         count = f"{len(missing)} of {len(names)} collision meshes"
-        message = f"{count} cannot be read, {shown(missing[0])} first; they are never drawn or needed"
+        message = f"{count} cannot be read, {quote(missing[0])} first; they are never drawn or needed"
         yield Finding("note", "collision-mesh-missing", "robot", message)
 
 
 def _check_drawn(root: etree._Element, problem: Callable[[str], str | None]) -> Iterator[Finding]:
+    """Check the meshes of visuals."""
     for link in root.iterfind("link"):
         for name in dict.fromkeys(mesh.get("filename", "") for mesh in link.iterfind("visual/geometry/mesh")):
             if name and (reason := problem(name)):
                 code = "mesh-missing" if is_local(name) else "mesh-remote"
-                yield Finding("warning", code, place_of(link), f"mesh {shown(name)}: {reason}")
+                yield Finding("warning", code, place_of(link), f"mesh {quote(name)}: {reason}")
 
 
 def _mesh_problem(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> str | None:
-    """Why a mesh cannot be read, ``None`` if it can, or if there is no folder to look in."""
-    if is_local(name) and not may_be_found(name, base_dir, package_dirs):
+    """Return the reason why a mesh cannot be read; ``None`` if it can, or if there is no folder to look in."""
+    if is_local(name) and not has_candidates(name, base_dir, package_dirs):
         return None
     try:
         find_mesh(name, base_dir, package_dirs)
@@ -64,6 +65,7 @@ def _mesh_problem(name: str, base_dir: Path | None, package_dirs: Sequence[Path]
 
 
 def _shape_problems(holder: etree._Element) -> Iterator[str]:
+    """Yield the faults of a ``<visual>`` or ``<collision>``."""
     for origin in holder.findall("origin")[:1]:
         yield from _bad_numbers(origin, POSE)
     shape = next(holder.iterfind("geometry/*"), None)
@@ -80,4 +82,4 @@ def _bad_numbers(element: etree._Element, lengths: dict[str, int]) -> Iterator[s
     for name, length in lengths.items():
         text = element.get(name)
         if text and read_numbers(text, length) is None:
-            yield f"{name} of <{element.tag}> is {shown(text)}, expected {length} finite number(s)"
+            yield f"{name} of <{element.tag}> is {quote(text)}, expected {length} finite number(s)"

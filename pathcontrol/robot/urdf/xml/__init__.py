@@ -1,1 +1,1 @@
-"""From the bytes of a URDF file to its elements."""
+"""Parsing of the bytes of a URDF file into its elements."""

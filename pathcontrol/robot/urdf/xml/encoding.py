@@ -1,4 +1,4 @@
-"""From the bytes of a URDF file to its text."""
+"""Decoding of the bytes of a URDF file to text."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _MARKS = {
 }
 
 
-def decoded(data: bytes, name: str) -> str:
-    """The text of the file ``name``: in UTF-8 or UTF-16, else in the encoding it declares, else in ISO-8859-1.
+def decode(data: bytes, name: str) -> str:
+    """Decode the file ``name``: UTF-8 or UTF-16, else the encoding it declares, else ISO-8859-1.
 
     What is not Unicode is taken with a warning that names the first line that is not.
 
@@ -26,13 +26,13 @@ def decoded(data: bytes, name: str) -> str:
     """
     for mark, encoding in _MARKS.items():
         if data.startswith(mark):
-            return _strictly(data, encoding, name)
+            return _decode_strictly(data, encoding, name)
     if b"\0" in data:
         raise UrdfError(f"{name!r} holds NUL bytes and is no text; expected a URDF, saved as UTF-8")
     try:
         return data.decode()
     except UnicodeDecodeError as error:
-        text, encoding = _in_another(data)
+        text, encoding = _decode_as_declared(data)
         warnings.warn(
             f"{name}: line {data[: error.start].count(10) + 1}: this is not UTF-8 and is read as {encoding}; "
             "save the file as UTF-8",
@@ -42,15 +42,16 @@ def decoded(data: bytes, name: str) -> str:
         return text
 
 
-def _strictly(data: bytes, encoding: str, name: str) -> str:
+def _decode_strictly(data: bytes, encoding: str, name: str) -> str:
+    """Decode a text whose byte order mark says its encoding."""
     try:
         return data.decode(encoding)
     except UnicodeDecodeError as error:
         raise UrdfError(f"{name!r} is not a text file in {encoding.upper()[:6]}: {error}") from error
 
 
-def _in_another(data: bytes) -> tuple[str, str]:
-    """The text in the encoding that is declared, or in ISO-8859-1, which any bytes are; and which it is."""
+def _decode_as_declared(data: bytes) -> tuple[str, str]:
+    """Decode a text that is not UTF-8; return the text and the encoding."""
     found = _DECLARED.match(data)
     declared = "ISO-8859-1" if found is None else found[1].decode()
     try:

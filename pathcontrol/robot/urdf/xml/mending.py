@@ -1,4 +1,4 @@
-"""XML that is not quite well-formed, as most readers of URDF take it: mended in the text, told with the line.
+"""Repair of slightly malformed XML, as most readers of URDF accept it, with warnings that name the line.
 
 Every line of the mended text is the same line of the text that was given.
 """
@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from lxml import etree
 
-from pathcontrol.robot.urdf.checks.finding import Finding, shown
+from pathcontrol.robot.urdf.checks.finding import Finding, quote
 from pathcontrol.robot.urdf.xml.prolog import COMMENT, end_of_prolog
 
 _DECLARATION = re.compile(r"<\?xml\s(?P<inside>.*?)\?>", re.DOTALL)
@@ -22,23 +22,24 @@ _MOST_PREFIXES = 50
 _UNDECLARED = "undeclared:"  # the namespace that a prefix without one is put into
 
 
-def mended(text: str) -> tuple[str, list[Finding]]:
-    """The text with what is wrong in its declaration, comments and prefixes put right, and what that was."""
+def mend(text: str) -> tuple[str, list[Finding]]:
+    """Repair the declaration, comments and prefixes of a text; return it with the findings."""
     findings: list[Finding] = []
-    for mend in (_without_declaration, _without_comments, _with_prefixes):
-        text, found = mend(text)
+    for repair in (_without_declaration, _without_comments, _with_prefixes):
+        text, found = repair(text)
         findings += found
     return text, findings
 
 
 def parser(*, recover: bool = False) -> etree.XMLParser:
-    """A parser that touches neither the network, nor any other file, nor any entity."""
+    """Return a parser that touches neither the network, nor any other file, nor any entity."""
     return etree.XMLParser(
         encoding="utf-8", resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, recover=recover
     )
 
 
 def _without_declaration(text: str) -> tuple[str, list[Finding]]:
+    """Blank an XML declaration that is wrong or misplaced."""
     start = end_of_prolog(text, COMMENT)
     found = _DECLARATION.match(text, start)
     if found is None:
@@ -50,12 +51,13 @@ def _without_declaration(text: str) -> tuple[str, list[Finding]]:
         said.append(f"line {line}: <?xml ...?> is not at the very start of the file; remove what stands before it")
     version = _VERSION.search(found["inside"])
     if version is not None and version[1] not in ("1.0", "1.1"):
-        said.append(f"line {line}: there is no XML version {shown(version[1])}; write 1.0")
+        said.append(f"line {line}: there is no XML version {quote(version[1])}; write 1.0")
     end = found.end()
     return before + _blank(text[start:end]) + text[end:], [_finding("xml-declaration", message) for message in said]
 
 
 def _without_comments(text: str) -> tuple[str, list[Finding]]:
+    """Blank all comments if one of them has a '--' inside."""
     comments = list(_comments(text))
     bad = [start for start, end in comments if "--" in text[start + 4 : end - 2]]  # also where it ends in --->
     if not bad:
@@ -70,7 +72,7 @@ def _without_comments(text: str) -> tuple[str, list[Finding]]:
 
 
 def _comments(text: str) -> Iterator[tuple[int, int]]:
-    """Where each comment begins and ends."""
+    """Yield the begin and the end of each comment."""
     start = text.find("<!--")
     while start >= 0 and (end := text.find("-->", start + 4)) >= 0:
         yield start, end + 3
@@ -78,7 +80,7 @@ def _comments(text: str) -> Iterator[tuple[int, int]]:
 
 
 def _with_prefixes(text: str) -> tuple[str, list[Finding]]:
-    """The text with a namespace for each prefix that has none."""
+    """Declare a namespace for each prefix that has none."""
     findings: list[Finding] = []
     root = _ROOT.search(text, _prolog(text))
     while root is not None and len(findings) < _MOST_PREFIXES:
@@ -92,7 +94,7 @@ def _with_prefixes(text: str) -> tuple[str, list[Finding]]:
 
 
 def _prolog(text: str) -> int:
-    """Where the comments before the first element end."""
+    """Return the end of the comments before the first element."""
     end = 0
     for start, after in _comments(text):
         if _ROOT.search(text, end, start):
@@ -102,7 +104,7 @@ def _prolog(text: str) -> int:
 
 
 def _undeclared(text: str) -> Iterator[tuple[str, int]]:
-    """Prefixes without a namespace and the line of each, as many as the parser tells of at once; the first counts."""
+    """Yield the prefixes without a namespace that the parser reports, with their lines, the last first."""
     reading = parser(recover=True)
     try:
         etree.fromstring(text.encode(), reading)
@@ -114,7 +116,7 @@ def _undeclared(text: str) -> Iterator[tuple[str, int]]:
 
 
 def _prefix(prefix: str, line: int) -> Finding:
-    message = f"line {line}: the prefix {shown(prefix + ':')} is declared nowhere; add xmlns:{prefix}=... to <robot>"
+    message = f"line {line}: the prefix {quote(prefix + ':')} is declared nowhere; add xmlns:{prefix}=... to <robot>"
     return _finding("xml-prefix", message)
 
 
@@ -123,7 +125,7 @@ def _finding(code: str, message: str) -> Finding:
 
 
 def _blank(text: str) -> str:
-    """As many lines, and at least one space."""
+    """Return as many line breaks as a text has, at least one space."""
     return "\n" * text.count("\n") or " "
 
 

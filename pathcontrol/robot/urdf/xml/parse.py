@@ -1,4 +1,4 @@
-"""From text to a ``<robot>`` element: XML of a robot, and nothing that could do harm."""
+"""Safe parsing of a text into a ``<robot>`` element."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import NamedTuple
 from lxml import etree
 
 from pathcontrol.errors import UrdfError
-from pathcontrol.robot.urdf.checks.finding import Finding, shown
-from pathcontrol.robot.urdf.xml.mending import mended, parser
+from pathcontrol.robot.urdf.checks.finding import Finding, quote
+from pathcontrol.robot.urdf.xml.mending import mend, parser
 from pathcontrol.robot.urdf.xml.prolog import COMMENT, INSTRUCTION, end_of_prolog
 
 MAX_BYTES = 64 * 2**20
@@ -21,7 +21,7 @@ _RUN_XACRO = "run xacro first and load what it prints"
 
 
 class Parsed(NamedTuple):
-    """The ``<robot>`` element of a URDF, and what in its XML was put right."""
+    """The ``<robot>`` element of a URDF, and the findings about repairs of its XML."""
 
     root: etree._Element
     findings: tuple[Finding, ...]
@@ -46,11 +46,11 @@ def parse_urdf(text: str) -> etree._Element:
 
 
 def parse_and_mend(text: str) -> Parsed:
-    """Do as :func:`parse_urdf` does, and say what in the XML was put right."""
-    data = _encoded(text)
+    """Parse as :func:`parse_urdf` does, and return the findings about repairs as well."""
+    data = _encode(text)
     if text.startswith("<!DOCTYPE", end_of_prolog(text, COMMENT, INSTRUCTION)):  # before the parser sees it
         raise UrdfError(_NO_DOCTYPE)
-    root, findings = _parsed(text, data)
+    root, findings = _parse(text, data)
     if root.getroottree().docinfo.doctype:
         raise UrdfError(_NO_DOCTYPE)
     _refuse_other_roots(root)
@@ -60,7 +60,8 @@ def parse_and_mend(text: str) -> Parsed:
     return Parsed(root, tuple(findings))
 
 
-def _encoded(text: str) -> bytes:
+def _encode(text: str) -> bytes:
+    """Check that a text is not empty, is Unicode and of bounded length; return its bytes."""
     if not text.strip("\ufeff \t\r\n"):
         raise UrdfError("the file is empty; expected a URDF, that is XML with the root <robot>")
     try:
@@ -73,11 +74,12 @@ def _encoded(text: str) -> bytes:
     return data
 
 
-def _parsed(text: str, data: bytes) -> tuple[etree._Element, list[Finding]]:
+def _parse(text: str, data: bytes) -> tuple[etree._Element, list[Finding]]:
+    """Parse a text, repaired if it is malformed."""
     try:
         return etree.fromstring(data, parser()), []
     except etree.XMLSyntaxError as error:
-        better, findings = mended(text)
+        better, findings = mend(text)
         if not findings:
             raise _not_xml(error) from None
     try:
@@ -93,7 +95,7 @@ def _not_xml(error: etree.XMLSyntaxError) -> UrdfError:
 
 
 def _without_stray_xacro(root: etree._Element) -> list[Finding]:
-    """Take out definitions of xacro that nothing in the robot uses, as other readers pass over them."""
+    """Remove definitions of xacro that nothing in the robot uses; other readers ignore them too."""
     if any(map(_uses_xacro, _own_elements(root))):
         return []
     stray = [child for child in root.iterchildren(etree.Element) if _is_definition(child)]
@@ -116,16 +118,17 @@ def _uses_xacro(element: etree._Element) -> bool:
 
 
 def _without_old_version(root: etree._Element) -> list[Finding]:
-    """Take out a version of URDF below the first, which some exporters write and readers pass over."""
+    """Remove a URDF version below 1, which some exporters write and readers ignore."""
     version = root.get("version", "")
     if re.fullmatch(r"0(\.\d{1,9})?", version) is None:
         return []
     del root.attrib["version"]
-    message = f"line {root.sourceline}: there is no URDF version {shown(version)}, read as 1.0; remove it"
+    message = f"line {root.sourceline}: there is no URDF version {quote(version)}, read as 1.0; remove it"
     return [Finding("warning", "xml-version", "file", message)]
 
 
 def _refuse_xacro(root: etree._Element) -> None:
+    """Refuse a robot with macros of xacro."""
     ours = set(_own_elements(root))
     for element in root.iter(etree.Element):
         name = etree.QName(element)
@@ -138,14 +141,15 @@ def _refuse_xacro(root: etree._Element) -> None:
 
 
 def _refuse_other_roots(root: etree._Element) -> None:
+    """Refuse a root other than ``<robot>``, and elements in a default namespace."""
     if etree.QName(root).localname != "robot":
         raise UrdfError(
-            f"line {root.sourceline}: the root is {shown(root.tag)}; expected <robot>", line=root.sourceline
+            f"line {root.sourceline}: the root is {quote(root.tag)}; expected <robot>", line=root.sourceline
         )
     for element in _own_elements(root):
         name = etree.QName(element)
         if name.namespace and (element is root or element.prefix is None):
-            namespace = shown(name.namespace)
+            namespace = quote(name.namespace)
             raise UrdfError(
                 f"line {element.sourceline}: <{name.localname}> is in the XML namespace {namespace}; "
                 "expected none, remove that xmlns"
@@ -153,7 +157,7 @@ def _refuse_other_roots(root: etree._Element) -> None:
 
 
 def _own_elements(root: etree._Element) -> Iterator[etree._Element]:
-    """Yield the root and what is inside links, joints and materials: extensions are left out."""
+    """Yield the root and all elements of links, joints and materials, without extensions."""
     yield root
     for child in root.iterchildren(etree.Element):
         if etree.QName(child).localname in ("link", "joint", "material"):
