@@ -9,7 +9,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import UnknownNameError
-from pathcontrol.tasks.batch.task_batch import rows_of
+from pathcontrol.tasks.batch.task_batch import select_rows
 from pathcontrol.tasks.task import PathTask
 
 Branch = Literal["follow", "nearest", "local"]
@@ -63,7 +63,7 @@ class BranchPolicy:
         away = distance > self.capture
         if not away.any():
             return s
-        there = rows_of(task, away)
+        there = select_rows(task, away)
         other = there.sigma_bar(q[away])
         jumps = np.linalg.norm(there.q_d(other) - q[away], axis=-1) < _NEARER * distance[away]
         s = np.array(s)

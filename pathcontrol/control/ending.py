@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.tasks.base import PathPoint
-from pathcontrol.tasks.batch.task_batch import TaskBatch, of_each
+from pathcontrol.tasks.batch.task_batch import TaskBatch, map_tasks
 from pathcontrol.tasks.profile import END_TIME
 from pathcontrol.tasks.task import PathTask
 
@@ -41,7 +41,7 @@ class Ending(NamedTuple):
     def of(cls, task: PathTask) -> Self | None:
         """Return the ending of ``task``, ``None`` where it has none."""
         if isinstance(task, TaskBatch):
-            return None if task.closed else cls(*of_each(task, cls.of).T)
+            return None if task.closed else cls(*map_tasks(task, cls.of).T)
         if not np.isfinite(task.s_end):
             return None
         s = np.linspace(task.s0, task.s_end, _SAMPLES)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.control.ending import arrival_parameter
 from pathcontrol.errors import InputError, UnknownNameError
-from pathcontrol.tasks.batch.task_batch import of_each
+from pathcontrol.tasks.batch.task_batch import map_tasks
 from pathcontrol.tasks.task import PathTask
 
 Until = Literal["end", "duration"]
@@ -56,7 +56,7 @@ class AtEnd(Finish):
 
     def __init__(self, task: PathTask, rollouts: int, ends_run: bool = True) -> None:
         super().__init__(rollouts, ends_run)
-        self._arrival = of_each(task, arrival_parameter)
+        self._arrival = map_tasks(task, arrival_parameter)
         self._since = np.full(rollouts, np.inf)
 
     def finished(self, t: float, s: Array, qd: Array) -> Array | None:

@@ -1,1 +1,1 @@
-"""What is asked of the arm: paths and velocity profiles."""
+"""Tasks for the arm: paths and velocity profiles."""

@@ -1,4 +1,4 @@
-"""What a task is: a desired path and a desired velocity profile."""
+"""The interface of a task: a desired path and a desired velocity profile."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MOST_SHOWN = 16  # values of an array in a repr
 
 
 class PathPoint(NamedTuple):
-    """A task at path parameter s: all that a controller asks of it."""
+    """The values of a task at path parameter s, all that a controller needs of it."""
 
     q_d: Array
     dq_d: Array
@@ -39,7 +39,7 @@ class PathPoint(NamedTuple):
 
 
 class Task(ABC):
-    """What control laws and simulations ask of a task; :class:`PathTask` is what people subclass.
+    """The interface of tasks that control laws and simulations use; users subclass :class:`PathTask`.
 
     Attributes:
         s0: first path parameter.
@@ -70,26 +70,26 @@ class Task(ABC):
 
     @abstractmethod
     def q_d(self, s: Array) -> Array:
-        """Desired path [rad], (*batch, n), at s (*batch,); twice continuously differentiable."""
+        """Return the desired path [rad], (*batch, n), at s (*batch,); it is twice continuously differentiable."""
 
     @abstractmethod
     def theta(self, s: Array) -> Array:
-        """Desired velocity profile ϑ(s) > 0 [1/s], (*batch,): the rate of the path parameter."""
+        """Return the desired velocity profile ϑ(s) > 0 [1/s], (*batch,): the rate of the path parameter."""
 
     def dq_d(self, s: Array) -> Array:
-        """First derivative q_d'(s) = dq_d/ds [rad], (*batch, n)."""
+        """Return the first derivative q_d'(s) = dq_d/ds [rad], (*batch, n)."""
         return self._path_derivative(s, 1)
 
     def ddq_d(self, s: Array) -> Array:
-        """Second derivative q_d''(s) = d²q_d/ds² [rad], (*batch, n)."""
+        """Return the second derivative q_d''(s) = d²q_d/ds² [rad], (*batch, n)."""
         return self._path_derivative(s, 2)
 
     def dtheta(self, s: Array) -> Array:
-        """Derivative of the profile, ϑ'(s) = dϑ/ds [1/s], (*batch,)."""
+        """Return the derivative of the profile, ϑ'(s) = dϑ/ds [1/s], (*batch,)."""
         return self._profile_derivative(s, 1)
 
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
-        """Projection σ̄(q) [-], (*batch,): the path parameter of the point of the path nearest to q (*batch, n).
+        """Return the projection σ̄(q) [-], (*batch,): the parameter of the point of the path nearest to q (*batch, n).
 
         It solves (q_d(σ̄) − q)ᵀ q_d'(σ̄) = 0, eq. (29). Without ``near`` it is the global minimum, in [s0, s0 + period)
         for closed paths. With ``near`` (*batch,), the parameter of a moment ago, it is the local minimum downhill from
@@ -102,7 +102,7 @@ class Task(ABC):
         return self._closest_point(q, near)
 
     def at(self, s: Array) -> PathPoint:
-        """q_d, q_d', q_d'', ϑ and ϑ' at s (*batch,). Override where they share work."""
+        """Return q_d, q_d', q_d'', ϑ and ϑ' at s (*batch,). Override where they share work."""
         zero = np.zeros_like(s, dtype=np.float64)  # ϑ may be a plain number
         return PathPoint(self.q_d(s), self.dq_d(s), self.ddq_d(s), self.theta(s) + zero, self.dtheta(s) + zero)
 
@@ -118,7 +118,7 @@ class Task(ABC):
 
     @property
     def one_traverse(self) -> tuple[float, float]:
-        """The parameters [rad or -] between which every point of the path is passed once.
+        """The parameters [rad or -] of the begin and the end of one pass over the whole path.
 
         Raises:
             TaskError: the path goes on for ever without repeating.
@@ -133,7 +133,7 @@ class Task(ABC):
 
     @property
     def knots(self) -> Array | None:
-        """Where the pieces of a path made of pieces meet, increasing, (K,); ``None`` for a path all of one piece.
+        """The parameters where the pieces of the path meet, increasing, (K,); ``None`` for a path of one piece.
 
         The projection cuts the path there first, and so misses no piece of a long one.
         """
@@ -141,7 +141,7 @@ class Task(ABC):
 
     @property
     def profile_knots(self) -> Array | None:
-        """Where ϑ' may jump, increasing, (J,); ``None`` for a smooth profile.
+        """The parameters where ϑ' may jump, increasing, (J,); ``None`` for a smooth profile.
 
         The distance to Γ is searched between them, as Γ has a corner there.
         """
@@ -149,7 +149,7 @@ class Task(ABC):
 
     @property
     def sampled_interval(self) -> tuple[float, float]:
-        """A finite part of the domain that stands for the whole."""
+        """A finite part of the domain that represents the whole."""
         end = self.s_end if self.period is None else self.s0 + self.period
         return self.s0, end if np.isfinite(end) else self.s0 + 2 * np.pi
 
@@ -157,11 +157,11 @@ class Task(ABC):
         return f"{type(self).__name__}({', '.join(f'{k}={_short(v)}' for k, v in plain_attributes(self).items())})"
 
     def describe(self) -> dict[str, Any]:
-        """Name and public parameters, for the record of a run."""
+        """Return the name and the public parameters, for the record of a run."""
         return {"task": type(self).__name__} | plain_attributes(self)
 
     def keep_tool(self, *paths: Task) -> None:
-        """Take over the frame that ``paths`` were made for, and what follows them in it, if it is the same for all."""
+        """Take over the frame of ``paths``, and the tool pose in it, if these are the same for all."""
         frame, pose = paths[0].frame, paths[0].tool_pose
         if isinstance(frame, str) and all(path.frame == frame and _same(path.tool_pose, pose) for path in paths):
             self.frame, self.tool_pose = frame, pose
@@ -192,7 +192,7 @@ class Task(ABC):
 
 
 def refuse_batch(name: str, task: Task) -> None:
-    """Check that something is for one task.
+    """Check that ``task`` is a single task and not a batch; errors call it ``name``.
 
     Raises:
         InputError: ``task``, which is called so, is a batch.
@@ -202,11 +202,11 @@ def refuse_batch(name: str, task: Task) -> None:
 
 
 def _same(a: Array | None, b: Array | None) -> bool:
-    """Whether two poses, or the lack of them, are the same."""
+    """Return whether two poses are the same, or both missing."""
     return a is b or (a is not None and b is not None and np.array_equal(a, b))
 
 
 def _short(value: Any) -> str:
-    """A number, a text or a small array in full, of a large array its shape."""
+    """Write a number, a text or a small array in full, and of a large array its shape."""
     shape = np.shape(value)
     return f"<{' × '.join(map(str, shape))} values>" if np.size(value) > _MOST_SHOWN else str(value)

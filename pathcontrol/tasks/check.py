@@ -1,4 +1,4 @@
-"""A task checked once, before a run is spent on it."""
+"""The check of a task before it is simulated."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _GOLDEN = (5**0.5 - 1) / 2
 
 
 def check_task(task: PathTask, n: int) -> None:
-    """Check shapes and values of a task, or of each in a batch, for an arm of ``n`` joints on samples of its domain.
+    """Check shapes and values of a task, or of each in a batch, for ``n`` joints, on samples of its domain.
 
     Raises:
         TaskError: it is not a path for ``n`` joints, returns a wrong shape or NaN, or ϑ is not positive somewhere.
@@ -70,7 +70,7 @@ def _check_domain(task: PathTask, name: str) -> None:
 
 
 def _check_derivative(task: PathTask, name: str, s: Array, function: str, derivative: str) -> None:
-    """A derivative given by hand is the one of its function; at most of the samples, since a kink may be at a few."""
+    """Check a derivative given by hand against its function at most samples; a few may be kinks."""
     span = s[-1] - s[0]
     h = 1e-5 * span
     # irregular places, that the kinks of tables and splines do not fall on
@@ -88,7 +88,7 @@ def _check_derivative(task: PathTask, name: str, s: Array, function: str, deriva
 
 
 def _check_period(task: PathTask, name: str) -> None:
-    """A path that says it is closed is where it was, and as fast, a period later."""
+    """Check that a closed path has the same posture and rate a period later."""
     if task.period is None:
         return
     s = task.s0 + np.array([0.0, 0.37 * task.period])
@@ -102,7 +102,7 @@ def _check_period(task: PathTask, name: str) -> None:
 
 
 def _check_values(label: str, function: Callable[[Any], Any], s: Array, n: int | None) -> Array:
-    """Values at s and at one s alone, with the shapes that the batch convention asks for."""
+    """Check that values at s and at a single s have the shapes of the batch convention; return them."""
     for argument in (s, s[0]):
         expected = np.shape(argument) + (() if n is None else (n,))
         try:

@@ -28,11 +28,11 @@ class JointCurve(PathTask):
 
     @abstractmethod
     def dq_d(self, s: Array) -> Array:
-        """q_d'(s), (*batch, n)."""
+        """Return q_d'(s), (*batch, n)."""
 
     @abstractmethod
     def ddq_d(self, s: Array) -> Array:
-        """q_d''(s), (*batch, n)."""
+        """Return q_d''(s), (*batch, n)."""
 
     def theta(self, s: Array) -> Array:
         return self._profile.theta(self, s)
@@ -90,11 +90,11 @@ class Ellipse(JointCurve):
         return -self._outward(s)
 
     def _outward(self, s: Array) -> Array:
-        """From the centre to the path, (*batch, n)."""
+        """Return the vector from the centre to the path, (*batch, n)."""
         return self._in_plane(self._a * np.cos(s), self._b * np.sin(s))
 
     def _in_plane(self, x: Array, y: Array) -> Array:
-        """The vectors, (*batch, n), with components x and y (*batch,) along the two joints."""
+        """Return the vectors, (*batch, n), with components x and y (*batch,) along the two joints."""
         vector = np.zeros((*x.shape, self.center.shape[-1]))
         vector[..., self.joints[0]], vector[..., self.joints[1]] = x, y
         return vector
@@ -147,7 +147,7 @@ class Circle(Ellipse):
 
 
 class Lissajous(JointCurve):
-    """Each joint swings at its own frequency: q_{d,i}(s) = c_i + a_i sin(f_i s + φ_i).
+    """A Lissajous curve, each joint at its own frequency: q_{d,i}(s) = c_i + a_i sin(f_i s + φ_i).
 
     With whole frequencies the path closes after 2π; frequencies (1, 2) draw a figure of eight.
 
@@ -208,7 +208,7 @@ class Lissajous(JointCurve):
 
 
 class Line(JointCurve):
-    """The straight line from ``start`` to ``end`` in joint space, its parameter the arc length.
+    """The straight line from ``start`` to ``end`` in joint space, with its arc length as parameter.
 
     q_d(s) = start + s u,  u = (end − start)/‖end − start‖,  s ∈ [0, ‖end − start‖],  ϑ = ``speed``.
 

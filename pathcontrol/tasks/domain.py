@@ -1,4 +1,4 @@
-"""What a task given from outside says beside its path: its domain, and one of speed and profile."""
+"""Checks of the domain of a path, and of the choice between a speed and a profile."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathcontrol.tasks.task import PathTask
 
 
 def take_domain(task: PathTask, s0: Any, s_end: Any, period: Any) -> None:
-    """Set s0, s_end and period of ``task``; anything that is a number will do, 2π of sympy too.
+    """Set s0, s_end and period of ``task`` from any kind of number, such as 2π of sympy.
 
     Raises:
         InputError: the domain is empty, begins at infinity, or both ends and repeats.
@@ -34,7 +34,7 @@ def take_domain(task: PathTask, s0: Any, s_end: Any, period: Any) -> None:
 
 
 def refuse_two_rates(speed: Any, theta: Any) -> None:
-    """One of ``speed`` and ``theta`` says how fast the path is taken.
+    """Check that exactly one of ``speed`` and ``theta`` is given.
 
     Raises:
         InputError: both or none are given.

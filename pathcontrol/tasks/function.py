@@ -1,4 +1,4 @@
-"""A path given as any function of the path parameter."""
+"""A path given by any function of the path parameter."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.differentiation import Differentiator
 from pathcontrol.tasks.base import PathPoint
-from pathcontrol.tasks.batched import batched
 from pathcontrol.tasks.domain import refuse_two_rates, take_domain
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, Path, VelocityProfile
 from pathcontrol.tasks.task import PathTask
+from pathcontrol.tasks.vectorization import vectorize
 
 _PROBES = (0.11, 0.27, 0.5, 0.68, 0.93)  # of the domain
 
 
 class FunctionPath(PathTask):
-    """A path given as a Python function of s, without a class of its own.
+    """A path given by a Python function of s, without a class of its own.
 
     The function may work on arrays, s (*batch,) to (*batch, n), or on numbers only, s to n values: that is found out
     once, and a function of numbers is called for each s. Derivatives that are not given are computed to about 1e-10.
@@ -61,10 +61,10 @@ class FunctionPath(PathTask):
             raise InputError("theta_derivative is given without a function theta, expected both or none")
         self.function = getattr(function, "__qualname__", type(function).__qualname__)
         probes = np.interp(_PROBES, [0, 1], self.sampled_interval)
-        self._q_d = batched("function", function, probes, None)
-        self._dq_d = batched("derivative", derivative, probes, self._q_d.shape) if derivative else None
+        self._q_d = vectorize("function", function, probes, None)
+        self._dq_d = vectorize("derivative", derivative, probes, self._q_d.shape) if derivative else None
         self._ddq_d = (
-            batched("second_derivative", second_derivative, probes, self._q_d.shape) if second_derivative else None
+            vectorize("second_derivative", second_derivative, probes, self._q_d.shape) if second_derivative else None
         )
         self._profile: VelocityProfile
         if speed is not None:
@@ -72,8 +72,8 @@ class FunctionPath(PathTask):
         elif not callable(theta):
             self._profile = ConstantRate(scalar("theta", theta, positive=True))
         else:
-            rate = batched("theta", theta, probes, ())
-            slope = batched("theta_derivative", theta_derivative, probes, ()) if theta_derivative else None
+            rate = vectorize("theta", theta, probes, ())
+            slope = vectorize("theta_derivative", theta_derivative, probes, ()) if theta_derivative else None
             self._profile = _FunctionProfile(rate, slope or partial(self._differentiator(rate), order=1))
 
     def q_d(self, s: Array) -> Array:
@@ -107,7 +107,7 @@ class FunctionPath(PathTask):
 
 @dataclass(frozen=True)
 class _FunctionProfile(VelocityProfile):
-    """ϑ and ϑ' as functions of s."""
+    """A velocity profile given by ϑ and ϑ' as functions of s."""
 
     rate: Callable[[Array], Array]
     slope: Callable[[Array], Array]

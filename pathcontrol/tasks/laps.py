@@ -1,4 +1,4 @@
-"""A closed path gone round a number of times, as an open path."""
+"""Several laps of a closed path as an open path."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ MOST_LAPS = 10_000  # each is a piece of the path in which the nearest point is 
 
 
 class Laps(PathSection):
-    """So many laps of a closed path from its s0 on, as an open path with the same parameter.
+    """A number of laps of a closed path from its s0 on, as an open path with the same parameter.
 
     Args:
         path: a closed path.

@@ -13,7 +13,7 @@ from pathcontrol.tasks.base import Task
 
 
 def arc_length(task: Task, s0: ArrayLike | None = None, s_end: ArrayLike | None = None) -> Array:
-    """Length ∫‖q_d'‖ds [rad], (*batch,), of the path from ``s0`` to ``s_end``, (*batch,) each; negative backwards.
+    """Return the length ∫‖q_d'‖ds [rad], (*batch,), from ``s0`` to ``s_end``, (*batch,) each; negative backwards.
 
     To about 1e-14 of the length for smooth paths, and for splines.
 
@@ -27,15 +27,17 @@ def arc_length(task: Task, s0: ArrayLike | None = None, s_end: ArrayLike | None 
         TaskError: the path stands still somewhere.
     """
     expect("task", task, Task, error=TaskError)
-    if s_end is None and not np.isfinite(last(task)):
+    if s_end is None and not np.isfinite(last_parameter(task)):
         raise InputError(f"{type(task).__name__} neither ends nor repeats, so s_end is needed")
-    start = _inside(task, "s0", task.s0 if s0 is None else s0)
-    end = _inside(task, "s_end", last(task) if s_end is None else s_end)
+    start = _check_inside(task, "s0", task.s0 if s0 is None else s0)
+    end = _check_inside(task, "s_end", last_parameter(task) if s_end is None else s_end)
     try:
         both = np.stack(np.broadcast_arrays(start, end))
     except ValueError as error:
         raise InputError(f"s0 has shape {start.shape} and s_end {end.shape}, expected shapes that broadcast") from error
-    lower, upper = (task.s0, last(task)) if task.closed else (both.min(initial=np.inf), both.max(initial=-np.inf))
+    lower, upper = (
+        (task.s0, last_parameter(task)) if task.closed else (both.min(initial=np.inf), both.max(initial=-np.inf))
+    )
     if not lower < upper:  # nothing is asked for
         return np.zeros(both.shape[1:])
     length = length_along(task, float(lower), float(upper))(both)
@@ -43,7 +45,7 @@ def arc_length(task: Task, s0: ArrayLike | None = None, s_end: ArrayLike | None 
 
 
 def curvature(task: Task, s: ArrayLike) -> Array:
-    """Curvature κ = ‖q_d' ∧ q_d''‖/‖q_d'‖³ [1/rad], (*batch,), at s (*batch,); the same in every parametrisation.
+    """Return the curvature κ = ‖q_d' ∧ q_d''‖/‖q_d'‖³ [1/rad], (*batch,), at s (*batch,), in any parametrisation.
 
     ‖a ∧ b‖ is the area that a and b span; divided by ‖a‖ it is the part of b normal to a.
     """
@@ -57,13 +59,13 @@ def length_along(task: Task, lower: float, upper: float) -> ArcLength:
     return ArcLength(task.dq_d, lower, upper, task.closed, task.knots, type(task).__name__)
 
 
-def last(task: Task) -> float:
-    """Where a path ends, or its first lap; ``inf`` if it neither ends nor repeats."""
+def last_parameter(task: Task) -> float:
+    """Return the end of a path, or of its first lap; ``inf`` if it neither ends nor repeats."""
     return task.s_end if task.period is None else task.s0 + task.period
 
 
-def _inside(task: Task, name: str, s: ArrayLike) -> Array:
-    """``s`` if the path is there."""
+def _check_inside(task: Task, name: str, s: ArrayLike) -> Array:
+    """Check that ``s`` is in the domain of the path."""
     s = finite(name, as_array(name, s))
     slack = 1e-12 * (1 + np.abs(s))
     outside = (s < task.s0 - slack) | (s > task.s_end + slack)

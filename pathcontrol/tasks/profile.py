@@ -1,4 +1,4 @@
-"""Velocity profiles ϑ(s): how fast a path is taken, kept apart from where it goes."""
+"""Velocity profiles ϑ(s), which say how fast a path is taken, apart from its shape."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ END_TIME = 0.1
 
 
 class Path(Protocol):
-    """What a profile may ask of a path; every :class:`PathTask` is one."""
+    """The part of a path that profiles use; every :class:`PathTask` has it."""
 
     s0: float
     s_end: float
@@ -25,20 +25,20 @@ class Path(Protocol):
 
     @property
     def knots(self) -> Array | None:
-        """Where the pieces of the path meet; ``None`` for a path all of one piece."""
+        """The parameters where the pieces of the path meet; ``None`` for a path of one piece."""
 
     def q_d(self, s: Array) -> Array:
-        """The desired path, (*batch, n)."""
+        """Return the desired path, (*batch, n)."""
 
     def dq_d(self, s: Array) -> Array:
-        """First derivative q_d'(s), (*batch, n)."""
+        """Return the first derivative q_d'(s), (*batch, n)."""
 
     def ddq_d(self, s: Array) -> Array:
-        """Second derivative q_d''(s), (*batch, n)."""
+        """Return the second derivative q_d''(s), (*batch, n)."""
 
 
 class VelocityProfile(ABC):
-    """ϑ(s) > 0 for any path; the motion plan (6) is ṡ = ϑ(s).
+    """A velocity profile ϑ(s) > 0 for any path; the motion plan (6) is ṡ = ϑ(s).
 
     Attributes:
         kept_by_arguments: whether a saved run keeps it by the arguments of its constructor, which are attributes of the
@@ -49,28 +49,28 @@ class VelocityProfile(ABC):
 
     @abstractmethod
     def theta(self, path: Path, s: Array) -> Array:
-        """ϑ(s) [1/s], (*batch,)."""
+        """Return ϑ(s) [1/s], (*batch,)."""
 
     @abstractmethod
     def dtheta(self, path: Path, s: Array) -> Array:
-        """ϑ'(s) [1/s], (*batch,)."""
+        """Return ϑ'(s) [1/s], (*batch,)."""
 
     def at(self, dq_d: Array, ddq_d: Array, path: Path, s: Array) -> tuple[Array, Array]:
-        """ϑ and ϑ' where q_d' and q_d'' are known already. Override where that saves evaluating the path again."""
+        """Return ϑ and ϑ' for known q_d' and q_d''. Override where that saves evaluating the path again."""
         return self.theta(path, s), self.dtheta(path, s)
 
     def knots(self, path: Path) -> Array | None:
-        """Where ϑ' may jump, increasing, (J,); ``None`` for a smooth profile."""
+        """Return the parameters where ϑ' may jump, increasing, (J,); ``None`` for a smooth profile."""
         return None
 
     def describe(self) -> dict[str, Any]:
-        """Name and parameters, for the record of a run."""
+        """Return the name and the parameters, for the record of a run."""
         return {"profile": type(self).__name__} | plain_attributes(self)
 
 
 @dataclass(frozen=True)
 class ConstantRate(VelocityProfile):
-    """ϑ(s) = ``rate`` [1/s]: the path parameter grows steadily."""
+    """The constant profile ϑ(s) = ``rate`` [1/s]: the path parameter grows steadily."""
 
     kept_by_arguments = True
     rate: Rate
@@ -87,7 +87,7 @@ class ConstantRate(VelocityProfile):
 
 @dataclass(frozen=True)
 class ConstantSpeed(VelocityProfile):
-    """ϑ(s) = v₀/‖q_d'(s)‖: the joints move at the path speed ‖q̇‖ = ``speed`` [rad/s]."""
+    """The profile ϑ(s) = v₀/‖q_d'(s)‖: the joints move at the path speed ‖q̇‖ = ``speed`` [rad/s]."""
 
     kept_by_arguments = True
     speed: Speed
@@ -108,7 +108,7 @@ class ConstantSpeed(VelocityProfile):
 
 
 def plain_attributes(instance: Any) -> dict[str, Any]:
-    """The public attributes of an object that are numbers, texts or regular arrays of them, fit for JSON."""
+    """Return the public attributes that are numbers, texts or regular arrays of them, fit for JSON."""
     plain = {}
     for name, value in vars(instance).items():
         with contextlib.suppress(ValueError):  # a ragged list is no array

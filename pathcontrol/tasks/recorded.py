@@ -1,4 +1,4 @@
-"""A path and a velocity profile known by samples, as those that a saved run keeps of its task."""
+"""Paths and velocity profiles known by samples, as saved runs keep them of their task."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MARGIN = 0.1  # of the part that was used of an endless path
 
 
 class RecordedProfile(VelocityProfile):
-    """ϑ(s) by cubics between samples of ϑ and ϑ'; beyond them that of the nearest, or of the lap before.
+    """A profile ϑ(s) by cubics between samples of ϑ and ϑ'; constant beyond them, or periodic.
 
     Args:
         s: increasing parameters, (m,); of a closed path from s0 to s0 + period.
@@ -34,15 +34,15 @@ class RecordedProfile(VelocityProfile):
     """
 
     def __init__(self, s: ArrayLike, jets: ArrayLike, period: float | None = None) -> None:
-        self.s, self.jets = _checked(s, jets, 2)
-        self.period = _checked_period(self.s, period)
+        self.s, self.jets = _check_samples(s, jets, 2)
+        self.period = _check_period(self.s, period)
         self._rate = hermite_polynomials(self.s, self.jets[..., None])
 
     def theta(self, path: Path, s: Array) -> Array:
-        return self._rate(self._within(s))[..., 0]
+        return self._rate(self._wrap(s))[..., 0]
 
     def dtheta(self, path: Path, s: Array) -> Array:
-        return self._rate(self._within(s), 1)[..., 0]
+        return self._rate(self._wrap(s), 1)[..., 0]
 
     def knots(self, path: Path) -> Array | None:
         return self.s
@@ -50,12 +50,12 @@ class RecordedProfile(VelocityProfile):
     def describe(self) -> dict[str, Any]:
         return {"profile": "RecordedProfile", "samples": len(self.s)}
 
-    def _within(self, s: Array) -> Array:
-        return _within(np.asarray(s, dtype=np.float64), self.s, self.period)
+    def _wrap(self, s: Array) -> Array:
+        return _wrap(np.asarray(s, dtype=np.float64), self.s, self.period)
 
 
 def recorded_profile(task: PathTask, upto: float | None = None) -> VelocityProfile:
-    """ϑ(s) of a task: a constant rate or path speed as such, others by samples within 1e-9 of their range.
+    """Record ϑ(s) of a task: as a constant rate or path speed, or by samples within 1e-9 of its range.
 
     ``upto`` is the largest s that was used of an endless path.
     """
@@ -76,7 +76,7 @@ def recorded_profile(task: PathTask, upto: float | None = None) -> VelocityProfi
 
 
 class RecordedPath(PathTask):
-    """A path by quintics between samples of q_d, q_d' and q_d''; a spline of up to that degree is the same again.
+    """A path by quintics between samples of q_d, q_d' and q_d''; exact for splines of up to that degree.
 
     What :meth:`of` makes of a smooth path differs from it by 1e-11 of its extent, and its q_d' by 1e-9 of the largest;
     the projection is the nearest point on it, whatever formula the original has. An endless path is known as far as
@@ -114,18 +114,18 @@ class RecordedPath(PathTask):
         tool_pose: ArrayLike | None = None,
         rotations: int = 0,
     ) -> None:
-        self.samples, self.jets = _checked(samples, jets, 3)
+        self.samples, self.jets = _check_samples(samples, jets, 3)
         self.profile, self.endless, self.projects, self.original = profile, endless, projects, original
         self.s0, self._last = float(self.samples[0]), float(self.samples[-1])
-        self.period = _checked_period(self.samples, period)
+        self.period = _check_period(self.samples, period)
         self.s_end = np.inf if endless or period is not None else self._last
-        self.frame, self.tool_pose = _checked_tool(frame, tool_pose)
-        self.rotations = _checked_rotations(rotations)
-        self._knots = None if knots is None else _checked_knots(knots)
+        self.frame, self.tool_pose = _check_tool(frame, tool_pose)
+        self.rotations = _check_rotations(rotations)
+        self._knots = None if knots is None else _check_knots(knots)
 
     @classmethod
     def of(cls, task: PathTask, profile: VelocityProfile | None = None, upto: float | None = None) -> RecordedPath:
-        """A task as samples.
+        """Record a task by samples.
 
         Args:
             task: any path.
@@ -165,13 +165,13 @@ class RecordedPath(PathTask):
         return self.profile.knots(self)
 
     def q_d(self, s: Array) -> Array:
-        return self._curves[0](self._within(s))
+        return self._curves[0](self._wrap(s))
 
     def dq_d(self, s: Array) -> Array:
-        return self._curves[1](self._within(s))
+        return self._curves[1](self._wrap(s))
 
     def ddq_d(self, s: Array) -> Array:
-        return self._curves[2](self._within(s))
+        return self._curves[2](self._wrap(s))
 
     def theta(self, s: Array) -> Array:
         return self.profile.theta(self, s)
@@ -180,7 +180,7 @@ class RecordedPath(PathTask):
         return self.profile.dtheta(self, s)
 
     def at(self, s: Array) -> PathPoint:
-        q_d, dq_d, ddq_d = (curve(self._within(s)) for curve in self._curves)
+        q_d, dq_d, ddq_d = (curve(self._wrap(s)) for curve in self._curves)
         return PathPoint(q_d, dq_d, ddq_d, *self.profile.at(dq_d, ddq_d, self, s))
 
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
@@ -199,18 +199,18 @@ class RecordedPath(PathTask):
     def _recorded_point(self) -> ClosestPoint:
         return ClosestPoint(Curve(self.q_d, self.dq_d, self.ddq_d), self.s0, self._last, False, self.knots)
 
-    def _within(self, s: Array) -> Array:
+    def _wrap(self, s: Array) -> Array:
         s = np.asarray(s, dtype=np.float64)
         if self.endless and (s > self._last).any():
             raise TaskError(
                 f"the endless {self.original or 'path'} is known up to s = {self._last:g}, a little further than its "
                 f"run went, not at s = {s.max():g}; make the task anew to go on"
             )
-        return s if self.period is None else _within(s, self.samples, self.period)
+        return s if self.period is None else _wrap(s, self.samples, self.period)
 
 
 def _first_cells(task: PathTask, upto: float | None, cells: int) -> Array:
-    """The ends of so many cells or a few more, each within one piece of the path."""
+    """Return the ends of at least ``cells`` cells, each within one piece of the path."""
     lower, upper = task.sampled_interval
     if upto is not None and task.period is None and not np.isfinite(task.s_end):
         upper = max(upper, upto + _MARGIN * (upto - lower))
@@ -221,14 +221,14 @@ def _first_cells(task: PathTask, upto: float | None, cells: int) -> Array:
     return np.interp(np.arange(counts.sum() + 1), np.append(0, np.cumsum(counts)), pieces)
 
 
-def _within(s: Array, knots: Array, period: float | None) -> Array:
-    """``s`` in the first lap of a closed path, or between the ends of an open one."""
+def _wrap(s: Array, knots: Array, period: float | None) -> Array:
+    """Move ``s`` into the first lap of a closed path, or between the ends of an open one."""
     if period is None:
         return np.clip(s, knots[0], knots[-1])
     return knots[0] + np.mod(s - knots[0], period)
 
 
-def _checked_period(s: Array, period: float | None) -> float | None:
+def _check_period(s: Array, period: float | None) -> float | None:
     """Check that the samples of a closed path reach from s0 to s0 + period."""
     if period is None:
         return None
@@ -237,22 +237,23 @@ def _checked_period(s: Array, period: float | None) -> float | None:
     return float(period)
 
 
-def _checked_knots(given: ArrayLike) -> Array:
-    """Check that there are finite knots in a row."""
+def _check_knots(given: ArrayLike) -> Array:
+    """Check that the knots are a finite array (K,)."""
     knots = finite("knots", as_array("knots", given))
     if knots.ndim != 1:
         raise InputError(f"knots have shape {knots.shape}, expected (K,)")
     return readonly(knots)
 
 
-def _checked_rotations(rotations: int) -> int:
-    """Check that there are so many rotations of a tool to be prescribed."""
+def _check_rotations(rotations: int) -> int:
+    """Check that 0, 2 or 3 rotations of the tool are prescribed."""
     if rotations not in (0, 2, 3):
         raise InputError(f"rotations = {rotations!r}, expected 3, 2 or 0")
     return rotations
 
 
-def _checked_tool(frame: str | None, tool_pose: ArrayLike | None) -> tuple[str | None, Array | None]:
+def _check_tool(frame: str | None, tool_pose: ArrayLike | None) -> tuple[str | None, Array | None]:
+    """Check the frame of the tool and its pose."""
     if not isinstance(frame, str | None):
         raise InputError(f"frame = {frame!r}, expected the name of a frame, or None")
     if tool_pose is None:
@@ -263,7 +264,8 @@ def _checked_tool(frame: str | None, tool_pose: ArrayLike | None) -> tuple[str |
     return frame, readonly(pose)
 
 
-def _checked(s: ArrayLike, jets: ArrayLike, order: int) -> tuple[Array, Array]:
+def _check_samples(s: ArrayLike, jets: ArrayLike, order: int) -> tuple[Array, Array]:
+    """Check that parameters increase and that jets have their shape."""
     knots, values = finite("s", as_array("s", s)), finite("jets", as_array("jets", jets))
     if knots.ndim != 1 or len(knots) < 2 or not (np.diff(knots) > 0).all():
         raise InputError(f"s has shape {knots.shape}, expected two or more increasing parameters")

@@ -1,4 +1,4 @@
-"""Whether a path moves on with s everywhere: it neither stands still nor turns back."""
+"""The regularity of a path: it neither stands still nor turns back."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _OPPOSITE = -0.99  # cosine of an angle
 
 
 def check_moves(task: Task) -> None:
-    """Check that a path moves on with s everywhere on its domain: it neither stands still nor turns back.
+    """Check that a path is regular on its domain: it neither stands still nor turns back.
 
     Raises:
         TaskError: it does, and where.
@@ -25,7 +25,7 @@ def check_moves(task: Task) -> None:
 
 
 def _check_regular(task: Task, name: str, s: Array) -> None:
-    """The path never stands still: q_d' vanishes nowhere."""
+    """Check that the path never stands still: q_d' vanishes nowhere."""
     length = np.linalg.norm(task.dq_d(s), axis=-1)
     if not length.min() > 1e-9 * length.max():
         raise TaskError(
@@ -36,7 +36,7 @@ def _check_regular(task: Task, name: str, s: Array) -> None:
 
 
 def _check_cusps(task: Task, name: str, s: Array) -> None:
-    """The path turns back nowhere: between samples its direction does not jump to the opposite one."""
+    """Check that the path turns back nowhere: its direction does not reverse between samples."""
     directions = _directions(task, s)
     turns = np.flatnonzero((directions[1:] * directions[:-1]).sum(-1) < 0)
     if not turns.size:
@@ -59,6 +59,6 @@ def _check_cusps(task: Task, name: str, s: Array) -> None:
 
 
 def _directions(task: Task, s: Array) -> Array:
-    """q_d'/‖q_d'‖, (*batch, n)."""
+    """Return the unit tangents q_d'/‖q_d'‖, (*batch, n)."""
     tangent = np.asarray(task.dq_d(s))
     return tangent / np.maximum(np.linalg.norm(tangent, axis=-1, keepdims=True), np.finfo(float).tiny)

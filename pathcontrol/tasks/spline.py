@@ -1,4 +1,4 @@
-"""A path given as a spline."""
+"""Paths given by splines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathcontrol.tasks.curves import JointCurve
 
 
 class SplinePath(JointCurve):
-    """A path given as a spline q_d(s) of at least two continuous derivatives.
+    """A path given by a spline q_d(s) of at least two continuous derivatives.
 
     Args:
         spline: a ``scipy.interpolate.BSpline`` of degree 3 or more with values of shape (n,); it begins at its first
@@ -44,7 +44,7 @@ class SplinePath(JointCurve):
     def from_samples(
         q: ArrayLike, speed: float, tolerance: float, s: ArrayLike | None = None, closed: bool = False
     ) -> SplinePath:
-        """The cubic spline with few knots that passes all samples within a tolerance, ‖q_d(s_i) − q_i‖ ≤ ``tolerance``.
+        """Fit a cubic spline with few knots to samples, ‖q_d(s_i) − q_i‖ ≤ ``tolerance``.
 
         Least squares on knots that are added where the tolerance is exceeded (de Boor, A Practical Guide to Splines,
         ch. XIV). Where the samples are noisier than the tolerance that ends at the spline through every sample, which
@@ -71,7 +71,7 @@ class SplinePath(JointCurve):
 
     @property
     def knots(self) -> Array:
-        """Where the pieces of the spline meet, both ends included, (K,)."""
+        """The parameters where the pieces of the spline meet, both ends included, (K,)."""
         return self._curves[0].x
 
     def q_d(self, s: Array) -> Array:
@@ -90,7 +90,7 @@ class SplinePath(JointCurve):
 
 
 def _polynomials(spline: BSpline) -> PPoly:
-    """The spline in the Taylor form of its pieces: the time to find that of an s hardly grows with their number."""
+    """Return the pieces as polynomials; to find that of an s takes hardly longer with more of them."""
     knots = np.unique(spline.t[spline.k : len(spline.t) - spline.k])
     # extrapolate: a periodic spline would round knots into its first lap, and so to the piece before
     taylor = [spline(knots[:-1], order, extrapolate=True) / factorial(order) for order in range(spline.k, -1, -1)]

@@ -1,4 +1,4 @@
-"""A task as people subclass it, and the paths that are made of one: reversed, moved, cut, by arc length.
+"""The base class of tasks, and the paths derived from one: reversed, moved, cut, by arc length.
 
 They stand in one module because each knows the others: what is made of a path can be made into another one again.
 """
@@ -14,7 +14,7 @@ from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.geometry.arc_length import curvature_vector, drop_coincident
 from pathcontrol.tasks.base import PathPoint, Task, refuse_batch
-from pathcontrol.tasks.lengths import arc_length, curvature, last, length_along
+from pathcontrol.tasks.lengths import arc_length, curvature, last_parameter, length_along
 from pathcontrol.tasks.profile import VelocityProfile
 from pathcontrol.tasks.regularity import check_moves
 
@@ -40,43 +40,43 @@ class PathTask(Task):
     """
 
     def with_profile(self, profile: VelocityProfile) -> PathTask:
-        """The same path with another velocity profile."""
+        """Return the same path with another velocity profile."""
         return Reprofiled(self, profile)
 
     def reversed(self) -> PathTask:
-        """The path taken backwards: ϑ(s) is that of the mirrored parameter. A closed one begins where it did."""
+        """Return the path taken backwards, with ϑ of the mirrored parameter. A closed one begins where it did."""
         return ReversedPath(self)
 
     def shifted(self, offset: ArrayLike) -> PathTask:
-        """The path moved by an ``offset`` [rad], (n,)."""
+        """Return the path moved by an ``offset`` [rad], (n,)."""
         return ShiftedPath(self, offset)
 
     def scaled(self, factor: ArrayLike, about: ArrayLike | None = None) -> PathTask:
-        """The path scaled by a ``factor``, one for all joints or (n,), ``about`` a posture [rad], (n,).
+        """Return the path scaled by a ``factor``, one for all joints or (n,), ``about`` a posture [rad], (n,).
 
         By default about q_d(s0). The parameter keeps its rate ϑ(s), so that the joints move faster by the factor.
         """
         return ScaledPath(self, factor, about)
 
     def between(self, s0: float, s_end: float) -> PathTask:
-        """The stretch from ``s0`` to ``s_end`` as an open path with the same parameter; of a closed path any laps."""
+        """Return the stretch from ``s0`` to ``s_end``, of a closed path any laps, as an open path with the same parameter."""
         return PathSection(self, s0, s_end)
 
     def by_arc_length(self) -> PathTask:
-        """The same path, taken as fast as this one, with its arc length [rad] as parameter: ‖q_d'‖ = 1."""
+        """Return the same path, as fast as this one, with its arc length [rad] as parameter: ‖q_d'‖ = 1."""
         return ArcLengthPath(self)
 
     def arc_length(self, s0: ArrayLike | None = None, s_end: ArrayLike | None = None) -> Array:
-        """Length [rad], (*batch,), from ``s0`` to ``s_end``, (*batch,); by default of the whole path, or of one lap."""
+        """Return the length [rad], (*batch,), from ``s0`` to ``s_end``, (*batch,); by default of the path, or a lap."""
         return arc_length(self, s0, s_end)
 
     def curvature(self, s: ArrayLike) -> Array:
-        """Curvature κ = ‖q_d' ∧ q_d''‖/‖q_d'‖³ [1/rad], (*batch,), at s (*batch,)."""
+        """Return the curvature κ = ‖q_d' ∧ q_d''‖/‖q_d'‖³ [1/rad], (*batch,), at s (*batch,)."""
         return curvature(self, s)
 
 
 class Reprofiled(PathTask):
-    """A path with a velocity profile that is not its own; made by :meth:`PathTask.with_profile`."""
+    """A path with another velocity profile than its own; made by :meth:`PathTask.with_profile`."""
 
     def __init__(self, path: PathTask, profile: VelocityProfile) -> None:
         self.path, self.profile = path, profile
@@ -119,7 +119,7 @@ class Reprofiled(PathTask):
 
 
 class DerivedPath(PathTask):
-    """A path made from ``path`` by a change of its parameter or of its values, which a subclass says in :meth:`at`.
+    """A path made from ``path`` by a change of its parameter or of its values; a subclass defines :meth:`at`.
 
     It names the path underneath in the record of a run.
     """
@@ -146,18 +146,18 @@ class DerivedPath(PathTask):
 
     @property
     def knots(self) -> Array | None:
-        return None if self.path.knots is None else self._moved(self.path.knots)
+        return None if self.path.knots is None else self._map_knots(self.path.knots)
 
     @property
     def profile_knots(self) -> Array | None:
-        return None if self.path.profile_knots is None else self._moved(self.path.profile_knots)
+        return None if self.path.profile_knots is None else self._map_knots(self.path.profile_knots)
 
-    def _moved(self, knots: Array) -> Array:
-        """Where knots (K,) of the path underneath are on this one."""
+    def _map_knots(self, knots: Array) -> Array:
+        """Return the knots (K,) of the path underneath in the parameter of this one."""
         return knots
 
     def _keep_domain(self) -> None:
-        """The domain is that of the path underneath."""
+        """Take over the domain of the path underneath."""
         self.s0 = self.path.s0
         if self.path.period is not None:
             self.period = self.path.period
@@ -173,7 +173,7 @@ class DerivedPath(PathTask):
 
 
 class ReversedPath(DerivedPath):
-    """The path taken backwards, q_d(s) = path.q_d(m − s) and ϑ(s) = path.ϑ(m − s).
+    """A path taken backwards, q_d(s) = path.q_d(m − s) and ϑ(s) = path.ϑ(m − s).
 
     m = s0 + s_end for an open path; m = 2s0 for a closed one, which begins where it did.
     """
@@ -198,7 +198,7 @@ class ReversedPath(DerivedPath):
         s = self._mirror - self.path.sigma_bar(q)
         return s if self.period is None else self.s0 + np.mod(s - self.s0, self.period)
 
-    def _moved(self, knots: Array) -> Array:
+    def _map_knots(self, knots: Array) -> Array:
         return self._mirror - knots[::-1] + (self.period or 0.0)
 
 
@@ -213,7 +213,7 @@ class _SameParameter(DerivedPath):
 
 
 class _MovedPath(_SameParameter):
-    """q_d(s) = a ∘ path.q_d(s) + b, joint by joint."""
+    """An affine image of a path, joint by joint: q_d(s) = a ∘ path.q_d(s) + b."""
 
     def __init__(self, path: PathTask, factor: Array, offset: Array) -> None:
         super().__init__(path)
@@ -231,7 +231,7 @@ class _MovedPath(_SameParameter):
 
 
 class ShiftedPath(_MovedPath):
-    """The path moved by an ``offset`` [rad], (n,)."""
+    """A path moved by an ``offset`` [rad], (n,)."""
 
     def __init__(self, path: PathTask, offset: ArrayLike) -> None:
         self.offset = readonly(finite("offset", as_array("offset", offset)))
@@ -243,7 +243,7 @@ class ShiftedPath(_MovedPath):
 
 
 class ScaledPath(_MovedPath):
-    """The path scaled by a ``factor``, for all joints or (n,), ``about`` a posture [rad], (n,).
+    """A path scaled by a ``factor``, for all joints or (n,), ``about`` a posture [rad], (n,).
 
     The parameter keeps its rate ϑ, so that the joints move faster by the factor.
     """
@@ -287,8 +287,8 @@ class PathSection(_SameParameter):
     def ddq_d(self, s: Array) -> Array:
         return self.path.ddq_d(s)
 
-    def _moved(self, knots: Array) -> Array:
-        """Knots of the path that lie in the stretch, those of a closed one in each lap, and its ends."""
+    def _map_knots(self, knots: Array) -> Array:
+        """Return the knots of the path within the stretch, of a closed one those of each lap, and the ends."""
         if self.path.period is not None:
             first, last_one = np.floor((np.array([self.s0, self.s_end]) - self.path.s0) / self.path.period)
             # a lap ends with the first knot of the next
@@ -309,12 +309,12 @@ class ArcLengthPath(DerivedPath):
 
     def __init__(self, path: PathTask) -> None:
         super().__init__(path)
-        if not np.isfinite(last(path)):
+        if not np.isfinite(last_parameter(path)):
             raise TaskError(
                 f"{type(path).__name__} neither ends nor repeats, expected a path of finite length; cut a stretch "
                 "of it, as in task.between(0.0, 10.0).by_arc_length()"
             )
-        self._length = length_along(path, path.s0, last(path))
+        self._length = length_along(path, path.s0, last_parameter(path))
         check_moves(path)
         self.s0 = 0.0
         if path.closed:
@@ -337,11 +337,11 @@ class ArcLengthPath(DerivedPath):
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
         return self._length(self.path.sigma_bar(q, None if near is None else self._parameter(as_array("near", near))))
 
-    def _moved(self, knots: Array) -> Array:
-        """Knots at their arc lengths, without those that are one place."""
+    def _map_knots(self, knots: Array) -> Array:
+        """Return the arc lengths of the knots, without those that coincide."""
         return drop_coincident(self._length(knots)) if len(knots) else knots
 
     def _parameter(self, s: Array) -> Array:
-        """The parameter u of the path underneath."""
+        """Return the parameter u of the path underneath."""
         s = np.asarray(s, dtype=np.float64)
         return self._length.inverse(s if self.closed else np.clip(s, 0.0, self.s_end))

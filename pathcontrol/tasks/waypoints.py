@@ -1,4 +1,4 @@
-"""A smooth path through postures, exactly or within a tolerance."""
+"""A smooth path through waypoints, exactly or within a tolerance."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class WaypointPath(SplinePath):
         ring = np.concatenate([self.points, self.points[:1]]) if closed else self.points
         self.parameters = readonly(_parameters(ring, parametrisation))
         if self.tolerance:
-            ring = _smoothed(self.parameters, ring, self.tolerance, closed)
+            ring = _smooth(self.parameters, ring, self.tolerance, closed)
         super().__init__(_interpolant(self.parameters, ring, closed), speed, closed)
         self._refuse_standstill()
 
@@ -90,12 +90,12 @@ def _parameters(ring: Array, parametrisation: Parametrisation | ArrayLike) -> Ar
 
 
 def _interpolant(s: Array, ring: Array, closed: bool) -> BSpline:
-    """The C² cubic through ``ring``: periodic, or natural at the ends (q_d'' = 0)."""
+    """Return the C² cubic spline through ``ring``: periodic, or natural at the ends (q_d'' = 0)."""
     return make_interp_spline(s, ring, k=3, bc_type="periodic" if closed else "natural")
 
 
-def _smoothed(s: Array, ring: Array, tolerance: float, closed: bool) -> Array:
-    """The points moved within ``tolerance`` so that the spline through them bends least."""
+def _smooth(s: Array, ring: Array, tolerance: float, closed: bool) -> Array:
+    """Return the points moved within ``tolerance`` so that the spline through them bends least."""
     points = ring[:-1] if closed else ring
     energies, modes = np.linalg.eigh(_bending(s, len(points), closed))
     energies, weights = np.maximum(energies, 0.0), modes.T @ points
@@ -115,7 +115,7 @@ def _smoothed(s: Array, ring: Array, tolerance: float, closed: bool) -> Array:
 
 
 def _bending(s: Array, m: int, closed: bool) -> Array:
-    """The matrix K of ∫‖q_d''‖²ds = Σ yᵀKy over the spline through y, (m, m)."""
+    """Return the matrix K, (m, m), of ∫‖q_d''‖²ds = Σ yᵀKy over the spline through y."""
     unit = np.eye(m)
     bend = _interpolant(s, np.concatenate([unit, unit[:1]]) if closed else unit, closed).derivative(2)(s)
     left, right, step = bend[:-1], bend[1:], np.diff(s)[:, None, None]

@@ -1,1 +1,1 @@
-"""Tasks that differ from rollout to rollout."""
+"""Batches of tasks, which differ from rollout to rollout."""

@@ -1,4 +1,4 @@
-"""What the tasks of a batch have in common, and what they must have."""
+"""Checks of the tasks of a batch, and the summary of their descriptions."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from pathcontrol.errors import InputError
 from pathcontrol.tasks.task import PathTask
 
 
-def listed(tasks: Any) -> tuple[PathTask, ...]:
-    """``tasks`` if they are tasks, one at least.
+def check_tasks(tasks: Any) -> tuple[PathTask, ...]:
+    """Check that ``tasks`` is a non-empty iterable of PathTask; return it as a tuple.
 
     Raises:
         InputError: they are not.
@@ -30,7 +30,7 @@ def listed(tasks: Any) -> tuple[PathTask, ...]:
     return found
 
 
-def by_identity(tasks: Sequence[PathTask]) -> list[NDArray[np.intp]]:
+def group_by_identity(tasks: Sequence[PathTask]) -> list[NDArray[np.intp]]:
     """Return the rows (k,) of each different task."""
     rows: dict[int, list[int]] = {}
     for i, task in enumerate(tasks):
@@ -38,14 +38,14 @@ def by_identity(tasks: Sequence[PathTask]) -> list[NDArray[np.intp]]:
     return [np.array(some) for some in rows.values()]
 
 
-def check_alike(tasks: Sequence[PathTask]) -> None:
-    """Single tasks are for as many joints, and all closed or all open.
+def check_same_kind(tasks: Sequence[PathTask]) -> None:
+    """Check that all tasks have the same number of joints, and that all are closed or all are open.
 
     Raises:
         InputError: they are not, or one neither ends nor repeats.
     """
     first, n = kind_of(tasks[0]), _joints(tasks, 0)
-    for rows in by_identity(tasks):
+    for rows in group_by_identity(tasks):
         i, task = rows[0], tasks[rows[0]]
         if _joints(tasks, i) != n:
             raise InputError(
@@ -66,8 +66,8 @@ def check_alike(tasks: Sequence[PathTask]) -> None:
             )
 
 
-def in_common_or_range(every: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """What several descriptions have in common, and the range of numbers that differ."""
+def summarize(every: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Merge several descriptions: equal values are kept, numbers that differ become shape, min and max."""
     first, told = every[0], {}
     for name in first:
         values = [one[name] for one in every if name in one]
@@ -76,7 +76,7 @@ def in_common_or_range(every: Sequence[dict[str, Any]]) -> dict[str, Any]:
         if all(value == values[0] for value in values):
             told[name] = values[0]
         elif all(isinstance(value, dict) for value in values):
-            told[name] = in_common_or_range(values)
+            told[name] = summarize(values)
         else:
             with suppress(ValueError):  # other things than numbers, or numbers of several shapes
                 array = np.array(values)
@@ -86,11 +86,12 @@ def in_common_or_range(every: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def kind_of(task: PathTask) -> str:
-    """Whether a path is ``"closed"``, ``"open"``, or ``"endless"``."""
+    """Return the kind of a path: ``"closed"``, ``"open"``, or ``"endless"``."""
     return "closed" if task.closed else "open" if np.isfinite(task.s_end) else "endless"
 
 
 def _joints(tasks: Sequence[PathTask], i: int) -> int:
+    """Return the number of joints of a task."""
     try:
         return tasks[i].n
     except (TypeError, ValueError, IndexError) as error:

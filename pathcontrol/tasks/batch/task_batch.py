@@ -1,4 +1,4 @@
-"""Tasks that differ from rollout to rollout, as the task of a batch."""
+"""A batch of tasks, one for each rollout, as the task of a batched simulation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pathcontrol._arrays import Array, as_array, merge_rows
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathPoint, refuse_batch
-from pathcontrol.tasks.batch.checks import by_identity, check_alike, in_common_or_range, listed
+from pathcontrol.tasks.batch.checks import check_same_kind, check_tasks, group_by_identity, summarize
 from pathcontrol.tasks.profile import VelocityProfile
 from pathcontrol.tasks.task import PathTask
 
@@ -39,13 +39,13 @@ class TaskBatch(PathTask):
     """
 
     def __init__(self, tasks: Sequence[PathTask]) -> None:
-        self.tasks = listed(tasks)
+        self.tasks = check_tasks(tasks)
         for i, task in enumerate(self.tasks):
             refuse_batch(f"tasks[{i}]", task)
-        check_alike(self.tasks)
-        self.s0, self.s_end = (_number([getattr(task, name) for task in self.tasks]) for name in ("s0", "s_end"))
+        check_same_kind(self.tasks)
+        self.s0, self.s_end = (_merge_numbers([getattr(task, name) for task in self.tasks]) for name in ("s0", "s_end"))
         if self.tasks[0].closed:
-            self.period = _number([task.period for task in self.tasks])
+            self.period = _merge_numbers([task.period for task in self.tasks])
         self._n, self.rollouts = self.tasks[0].n, len(self.tasks)
         self.keep_tool(*self.tasks)
 
@@ -60,22 +60,22 @@ class TaskBatch(PathTask):
         return self._n
 
     def q_d(self, s: Array) -> Array:
-        return self._evaluated("q_d", s, (self._n,))
+        return self._evaluate("q_d", s, (self._n,))
 
     def dq_d(self, s: Array) -> Array:
-        return self._evaluated("dq_d", s, (self._n,))
+        return self._evaluate("dq_d", s, (self._n,))
 
     def ddq_d(self, s: Array) -> Array:
-        return self._evaluated("ddq_d", s, (self._n,))
+        return self._evaluate("ddq_d", s, (self._n,))
 
     def theta(self, s: Array) -> Array:
-        return self._evaluated("theta", s, ())
+        return self._evaluate("theta", s, ())
 
     def dtheta(self, s: Array) -> Array:
-        return self._evaluated("dtheta", s, ())
+        return self._evaluate("dtheta", s, ())
 
     def at(self, s: Array) -> PathPoint:
-        s = self._of_rows("s", s, 1)
+        s = self._check_rollouts("s", s, 1)
         vectors, numbers = np.empty((3, *s.shape, self._n)), np.empty((2, *s.shape))
         for task, rows in self._groups:
             point = task.at(s[..., rows])
@@ -86,7 +86,7 @@ class TaskBatch(PathTask):
         return PathPoint(*vectors, *numbers)
 
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
-        q = self._of_rows("q", as_array("q", q), 2)
+        q = self._check_rollouts("q", as_array("q", q), 2)
         start = None if near is None else np.broadcast_to(as_array("near", near), q.shape[:-1])
         s = np.empty(q.shape[:-1])
         for task, rows in self._groups:
@@ -102,7 +102,7 @@ class TaskBatch(PathTask):
         return self.one_traverse
 
     def rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> PathTask:
-        """The task of some ``rows``, a mask (N,) or numbers (k,); of one row its own, and of all this batch itself."""
+        """Return the task of some ``rows``, a mask (N,) or numbers (k,); a single row gives its own task."""
         chosen = np.arange(len(self))[rows]
         if len(chosen) == 1:
             return self.tasks[chosen[0]]
@@ -111,7 +111,7 @@ class TaskBatch(PathTask):
         return TaskBatch([self.tasks[i] for i in chosen])
 
     def groups(self) -> list[tuple[PathTask, NDArray[np.intp]]]:
-        """Each different task, and the rows (k,) that have it."""
+        """Return each different task with the rows (k,) that have it."""
         return list(self._groups)
 
     def with_profile(self, profile: VelocityProfile) -> TaskBatch:
@@ -139,29 +139,29 @@ class TaskBatch(PathTask):
         return f"TaskBatch({len(self)} tasks, {', '.join(self.describe()['kinds'])})"
 
     def describe(self) -> dict[str, Any]:
-        """How many tasks there are, of which kinds, and what they have in common; of numbers that differ the range."""
+        """Return the number of tasks, their kinds and common values, and the range of numbers that differ."""
         every = [task.describe() for task, _ in self.groups()]
         kinds = list(dict.fromkeys(one.get("task", "unknown") for one in every))
         count = {"task": "TaskBatch", "tasks": len(self), "different": len(every), "kinds": kinds}
-        return count | {name: value for name, value in in_common_or_range(every).items() if name != "task"}
+        return count | {name: value for name, value in summarize(every).items() if name != "task"}
 
     # --- inside ---------------------------------------------------------------------------------------------
 
     @cached_property
     def _groups(self) -> list[tuple[PathTask, NDArray[np.intp]]]:
-        return [(self.tasks[rows[0]], rows) for rows in by_identity(self.tasks)]
+        return [(self.tasks[rows[0]], rows) for rows in group_by_identity(self.tasks)]
 
-    def _evaluated(self, method: str, s: Array, shape: tuple[int, ...]) -> Array:
-        """A method of all tasks at s (*batch, N), of values (*batch, N, *shape)."""
-        s = self._of_rows("s", s, 1)
+    def _evaluate(self, method: str, s: Array, shape: tuple[int, ...]) -> Array:
+        """Evaluate a method of all tasks at s (*batch, N), with values (*batch, N, *shape)."""
+        s = self._check_rollouts("s", s, 1)
         values, whole = np.empty(s.shape + shape), [slice(None)] * len(shape)
         for task, rows in self._groups:
             where: tuple[Any, ...] = (..., rows, *whole)
             values[where] = getattr(task, method)(s[..., rows])
         return values
 
-    def _of_rows(self, name: str, values: ArrayLike, axes: int) -> Array:
-        """``values`` with the rollouts as the last but so many of their ``axes``; one number is for all."""
+    def _check_rollouts(self, name: str, values: ArrayLike, axes: int) -> Array:
+        """Check that the last ``axes`` of ``values`` begin with the rollouts; a single number is broadcast."""
         array = np.asarray(values, dtype=np.float64)
         if array.ndim == 0:
             return np.broadcast_to(array, len(self))
@@ -171,13 +171,13 @@ class TaskBatch(PathTask):
         return array
 
 
-def rows_of(task: PathTask, rows: NDArray[np.bool_] | NDArray[np.intp]) -> PathTask:
-    """The task of some rollouts, a mask (N,) or numbers (k,): one task is that of any."""
+def select_rows(task: PathTask, rows: NDArray[np.bool_] | NDArray[np.intp]) -> PathTask:
+    """Return the task of some rollouts, a mask (N,) or numbers (k,); a single task serves all of them."""
     return task.rows(rows) if isinstance(task, TaskBatch) else task
 
 
-def of_each(task: PathTask, function: Callable[[PathTask], Any]) -> Any:
-    """What a function gives of a task: of a batch numbers (N,), or several, (N, m), of each of its tasks."""
+def map_tasks(task: PathTask, function: Callable[[PathTask], Any]) -> Any:
+    """Apply a function to a task; for a TaskBatch, to each task, stacked as (N,) or (N, m)."""
     if not isinstance(task, TaskBatch):
         return function(task)
     groups = task.groups()
@@ -188,7 +188,7 @@ def of_each(task: PathTask, function: Callable[[PathTask], Any]) -> Any:
     return values
 
 
-def _number(values: Sequence[Any]) -> Any:
-    """What all have, or (N,)."""
+def _merge_numbers(values: Sequence[Any]) -> Any:
+    """Return the number that all values share, or else all of them, (N,)."""
     rows = merge_rows([np.asarray(value, dtype=np.float64) for value in values])
     return float(rows) if rows.ndim == 0 else rows

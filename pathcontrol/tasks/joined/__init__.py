@@ -1,1 +1,1 @@
-"""Paths that follow one another."""
+"""Paths made of several paths in a row."""

@@ -1,4 +1,4 @@
-"""Open paths one after another as one path."""
+"""The concatenation of open paths to a single path."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from pathcontrol.errors import InputError
 from pathcontrol.geometry.arc_length import drop_coincident
 from pathcontrol.tasks.base import PathPoint, refuse_batch
 from pathcontrol.tasks.joined.blend import Blend
-from pathcontrol.tasks.joined.junction import gap, why_apart, why_not_smooth
+from pathcontrol.tasks.joined.junction import explain_gap, explain_jump, gap
 from pathcontrol.tasks.lengths import length_along
 from pathcontrol.tasks.task import PathTask
 
 
 def concatenated(paths: Sequence[PathTask], blend: float | None = None) -> ConcatenatedPath:
-    """Open paths one after another as one path, whose parameter begins as that of the first.
+    """Join open paths one after another to a single path, whose parameter begins as that of the first.
 
     Where one ends and the next begins with the same posture, direction, curvature and speed (to 1e-6), they are
     joined: the parameter u of each is scaled, du/ds = c, so that q_d' is continuous, and if q_d'' is then continuous
@@ -50,11 +50,11 @@ class _Piece(NamedTuple):
 
     @property
     def end(self) -> float:
-        """The s at which it ends."""
+        """The parameter s at the end of the piece."""
         return self.start + (self.last - self.first) / self.rate
 
     def at(self, u: Array) -> PathPoint:
-        return _rescaled(self.path.at(u), self.rate)
+        return _rescale(self.path.at(u), self.rate)
 
 
 class ConcatenatedPath(PathTask):
@@ -62,41 +62,41 @@ class ConcatenatedPath(PathTask):
 
     def __init__(self, paths: Sequence[PathTask], blend: float | None = None) -> None:
         self.blend = 0.0 if blend is None else scalar("blend", blend, positive=True)
-        self.paths = _checked(paths)
+        self.paths = _check_paths(paths)
         self.keep_tool(*self.paths)
         self.s0 = self.paths[0].s0
-        self._pieces = self._joined()
+        self._pieces = self._join()
         self._starts = np.array([piece.start for piece in self._pieces])
         self.s_end = self._pieces[-1].end
 
     def q_d(self, s: Array) -> Array:
-        return self._assembled(s, lambda piece, u: [piece.path.q_d(u)])[0]
+        return self._assemble(s, lambda piece, u: [piece.path.q_d(u)])[0]
 
     def dq_d(self, s: Array) -> Array:
-        return self._assembled(s, lambda piece, u: [piece.rate * piece.path.dq_d(u)])[0]
+        return self._assemble(s, lambda piece, u: [piece.rate * piece.path.dq_d(u)])[0]
 
     def ddq_d(self, s: Array) -> Array:
-        return self._assembled(s, lambda piece, u: [piece.rate**2 * piece.path.ddq_d(u)])[0]
+        return self._assemble(s, lambda piece, u: [piece.rate**2 * piece.path.ddq_d(u)])[0]
 
     def theta(self, s: Array) -> Array:
-        return self._assembled(s, lambda piece, u: [np.zeros_like(u) + piece.path.theta(u) / piece.rate])[0]
+        return self._assemble(s, lambda piece, u: [np.zeros_like(u) + piece.path.theta(u) / piece.rate])[0]
 
     def dtheta(self, s: Array) -> Array:
-        return self._assembled(s, lambda piece, u: [np.zeros_like(u) + piece.path.dtheta(u)])[0]
+        return self._assemble(s, lambda piece, u: [np.zeros_like(u) + piece.path.dtheta(u)])[0]
 
     def at(self, s: Array) -> PathPoint:
-        return PathPoint(*self._assembled(s, _Piece.at))
+        return PathPoint(*self._assemble(s, _Piece.at))
 
     @property
     def knots(self) -> Array:
-        return self._of_pieces("knots")
+        return self._collect_knots("knots")
 
     @property
     def profile_knots(self) -> Array:
-        return self._of_pieces("profile_knots")
+        return self._collect_knots("profile_knots")
 
-    def _of_pieces(self, which: str) -> Array:
-        """Where the pieces meet, and the knots of each of them."""
+    def _collect_knots(self, which: str) -> Array:
+        """Return the junctions of the pieces and the knots of each of them."""
         ends = [np.append(self._starts, self.s_end)]
         for piece in self._pieces:
             knots = getattr(piece.path, which)
@@ -110,8 +110,8 @@ class ConcatenatedPath(PathTask):
 
     # --- inside ---------------------------------------------------------------------------------------------
 
-    def _assembled(self, s: Array, evaluate: Callable[[_Piece, Array], Sequence[Array]]) -> list[Array]:
-        """What ``evaluate`` gives for each s (*batch,), in the piece that it lies in."""
+    def _assemble(self, s: Array, evaluate: Callable[[_Piece, Array], Sequence[Array]]) -> list[Array]:
+        """Evaluate each s (*batch,) in the piece that holds it, and put the values together."""
         s = np.asarray(s, dtype=np.float64)
         flat = s.ravel()
         index = np.maximum(np.searchsorted(self._starts, flat, side="right") - 1, 0)
@@ -125,11 +125,12 @@ class ConcatenatedPath(PathTask):
         return [value.reshape(s.shape + value.shape[1:]) for value in whole]
 
     def _within(self, piece: _Piece, s: Array, evaluate: Callable[[_Piece, Array], Sequence[Array]]) -> Sequence[Array]:
+        """Evaluate a piece at s."""
         u = piece.first + piece.rate * (s - piece.start)
         return evaluate(piece, np.clip(u, piece.first, piece.last))
 
-    def _joined(self) -> list[_Piece]:
-        """The pieces, with blends between them where they are needed."""
+    def _join(self) -> list[_Piece]:
+        """Return the pieces, with blends between them where they are needed."""
         blended = [self._needs_blend(i) for i in range(len(self.paths) - 1)]
         cuts = [self._cut(i, *ends) for i, ends in enumerate(zip([False, *blended], [*blended, False], strict=True))]
         pieces = [_Piece(self.paths[0], *cuts[0], self.s0, 1.0)]
@@ -139,23 +140,23 @@ class ConcatenatedPath(PathTask):
             speed = float(np.linalg.norm(before.dq_d))
             rate = speed / float(np.linalg.norm(after.dq_d))
             if needed:
-                bridge = self._bridge(i, before, _rescaled(after, rate), speed)
+                bridge = self._bridge(i, before, _rescale(after, rate), speed)
                 pieces.append(_Piece(bridge, 0.0, bridge.s_end, start, 1.0))
                 start = pieces[-1].end
             pieces.append(_Piece(path, *cut, start, rate))
         return pieces
 
     def _needs_blend(self, i: int) -> bool:
-        """Whether paths i and i + 1 join only by a blend."""
+        """Return whether paths i and i + 1 join only by a blend."""
         before, after = self.paths[i : i + 2]
         distance = gap(before, after)
-        reason = why_apart(before, after) if distance else why_not_smooth(before, after)
+        reason = explain_gap(before, after) if distance else explain_jump(before, after)
         if reason and (not self.blend or distance > self.blend):
             raise InputError(f"paths[{i}] and paths[{i + 1}] do not join: {reason}")
         return reason is not None
 
     def _cut(self, i: int, at_start: bool, at_end: bool) -> tuple[float, float]:
-        """What is left of path i between its blends."""
+        """Return the ends of path i between its blends."""
         path = self.paths[i]
         if not (at_start or at_end):
             return path.s0, path.s_end
@@ -176,12 +177,12 @@ class ConcatenatedPath(PathTask):
             raise InputError(f"paths[{i}] and paths[{i + 1}] do not join: {error}") from error
 
 
-def _rescaled(point: PathPoint, rate: float) -> PathPoint:
-    """The point for another parameter s, du/ds = ``rate``."""
+def _rescale(point: PathPoint, rate: float) -> PathPoint:
+    """Return the point for another parameter s with du/ds = ``rate``."""
     return PathPoint(point.q_d, rate * point.dq_d, rate**2 * point.ddq_d, point.theta / rate, point.dtheta)
 
 
-def _checked(paths: Sequence[PathTask]) -> list[PathTask]:
+def _check_paths(paths: Sequence[PathTask]) -> list[PathTask]:
     checked = list(paths)
     if len(checked) < 2:
         raise InputError(f"{len(checked)} paths are given, expected two or more")

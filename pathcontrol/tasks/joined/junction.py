@@ -1,4 +1,4 @@
-"""Where one path ends and another begins: whether they meet, and smoothly."""
+"""The junction of two paths: whether they meet there, and whether smoothly."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ _SAME = 1e-6  # rad; without unit for directions and speeds, 1/rad for curvature
 
 
 def gap(before: PathTask, after: PathTask) -> float:
-    """Distance [rad] from the end of one path to the beginning of the next; 0 where it does not count."""
+    """Return the distance [rad] from the end of one path to the beginning of the next; 0 if it is negligible."""
     distance = float(np.linalg.norm(_start(after).q_d - _end(before).q_d))
     return distance if distance > _SAME else 0.0
 
 
-def why_apart(before: PathTask, after: PathTask) -> str:
-    """Which joint is where at a gap, and what may help."""
+def explain_gap(before: PathTask, after: PathTask) -> str:
+    """Explain a gap between two paths: the joint with the largest, its positions, and what may help."""
     here, there = _end(before).q_d, _start(after).q_d
     j = int(np.argmax(np.abs(there - here)))
     apart = f"joint {j} ends at {here[j]:.9g} and begins at {there[j]:.9g} rad, {abs(there[j] - here[j]):.3g} rad apart"
@@ -28,8 +28,8 @@ def why_apart(before: PathTask, after: PathTask) -> str:
     return f"{apart}; correct the paths, or bridge the gap with blend={np.linalg.norm(there - here):.2g} or more"
 
 
-def why_not_smooth(before: PathTask, after: PathTask) -> str | None:
-    """What jumps where two paths meet: direction, curvature or speed; ``None`` if nothing does."""
+def explain_jump(before: PathTask, after: PathTask) -> str | None:
+    """Explain what jumps where two paths meet: direction, curvature or speed; ``None`` if nothing does."""
     ends = _end(before), _start(after)
     lengths = [np.linalg.norm(p.dq_d) for p in ends]
     tangents = [p.dq_d / length for p, length in zip(ends, lengths, strict=True)]
@@ -51,15 +51,17 @@ def why_not_smooth(before: PathTask, after: PathTask) -> str | None:
 
 
 def _jump(a: np.ndarray, b: np.ndarray) -> int | None:
-    """The joint in which two vectors differ most, if they do."""
+    """Return the joint in which two vectors differ most, ``None`` if they do not."""
     difference = np.abs(b - a)
     scale = 1 + max(np.abs(a).max(), np.abs(b).max())
     return int(np.argmax(difference)) if difference.max() > _SAME * scale else None
 
 
 def _start(path: PathTask) -> PathPoint:
+    """Return the first point of a path."""
     return path.at(np.asarray(path.s0))
 
 
 def _end(path: PathTask) -> PathPoint:
+    """Return the last point of a path."""
     return path.at(np.asarray(path.s_end))

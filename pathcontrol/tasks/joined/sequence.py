@@ -1,4 +1,4 @@
-"""Several paths one after another, with a stop in between."""
+"""A sequence of paths, with a stop after each."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MEET = 1e-3  # rad
 
 
 class PathSequence(PathTask):
-    """Open paths one after another, each begun when the arm has come to rest at the end of the one before.
+    """A sequence of open paths, each begun when the arm has come to rest at the end of the one before.
 
     Their parameters are strung together: path i holds s ∈ [S_i, S_{i+1}], S_0 = 0. q_d is continuous there, its
     derivatives are not, so no controller follows a whole sequence at once: :func:`simulate_sequence` gives it the
@@ -61,22 +61,22 @@ class PathSequence(PathTask):
         return len(self.paths)
 
     def q_d(self, s: Array) -> Array:
-        return self._of_paths("q_d", s, (self.n,))
+        return self._evaluate("q_d", s, (self.n,))
 
     def dq_d(self, s: Array) -> Array:
-        return self._of_paths("dq_d", s, (self.n,))
+        return self._evaluate("dq_d", s, (self.n,))
 
     def ddq_d(self, s: Array) -> Array:
-        return self._of_paths("ddq_d", s, (self.n,))
+        return self._evaluate("ddq_d", s, (self.n,))
 
     def theta(self, s: Array) -> Array:
-        return self._of_paths("theta", s, ())
+        return self._evaluate("theta", s, ())
 
     def dtheta(self, s: Array) -> Array:
-        return self._of_paths("dtheta", s, ())
+        return self._evaluate("dtheta", s, ())
 
     def index(self, s: ArrayLike) -> Array:
-        """Which of the paths holds s, (*batch,); at a seam the later one."""
+        """Return the index of the path that holds s, (*batch,); at a junction that of the later one."""
         found = np.searchsorted(self.starts, as_array("s", s), side="right") - 1
         return np.clip(found, 0, len(self.paths) - 1)
 
@@ -87,7 +87,7 @@ class PathSequence(PathTask):
     def sigma_bar(self, q: ArrayLike, near: ArrayLike | None = None) -> Array:
         q = as_array("q", q)
         if near is not None:
-            return self._projected(q, np.broadcast_to(as_array("near", near), q.shape[:-1]))
+            return self._project(q, np.broadcast_to(as_array("near", near), q.shape[:-1]))
         local = np.stack([path.sigma_bar(q) for path in self.paths])
         distance = [np.linalg.norm(path.q_d(s) - q, axis=-1) for path, s in zip(self.paths, local, strict=True)]
         best = np.argmin(distance, axis=0)
@@ -97,16 +97,16 @@ class PathSequence(PathTask):
     def describe(self) -> dict[str, Any]:
         return {"task": "PathSequence", "paths": [path.describe() for path in self.paths]}
 
-    def _projected(self, q: Array, near: Array) -> Array:
-        """σ̄ on the path that holds ``near``."""
+    def _project(self, q: Array, near: Array) -> Array:
+        """Return σ̄ on the path that holds ``near``."""
         which, s = self.index(near), np.empty(near.shape)
         for i in np.unique(which):
             rows, shift = which == i, self.starts[i] - self.paths[i].s0
             s[rows] = self.paths[i].sigma_bar(q[rows], near=near[rows] - shift) + shift
         return s
 
-    def _of_paths(self, name: str, s: Array, shape: tuple[int, ...]) -> Array:
-        """A method of the path that holds s, at s (*batch,)."""
+    def _evaluate(self, name: str, s: Array, shape: tuple[int, ...]) -> Array:
+        """Evaluate a method of the path that holds s, at s (*batch,)."""
         s = np.asarray(s, dtype=np.float64)
         which, values = self.index(s), np.empty(s.shape + shape)
         for i in np.unique(which):
@@ -116,6 +116,7 @@ class PathSequence(PathTask):
         return values
 
     def _check_meeting(self) -> None:
+        """Check that each path begins where the one before it ends."""
         for i, (path, after) in enumerate(zip(self.paths[:-1], self.paths[1:], strict=True)):
             if path.n != after.n:
                 raise InputError(f"path {i} is for {path.n} joints, path {i + 1} for {after.n}")

@@ -1,1 +1,1 @@
-"""Paths written as formulas."""
+"""Paths given by formulas."""

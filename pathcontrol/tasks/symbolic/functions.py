@@ -1,4 +1,4 @@
-"""Expressions of s differentiated, and compiled to functions of arrays."""
+"""Derivatives of expressions of s, and their compilation to functions of arrays."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LARGEST = 3000  # operations in the derivative of a text; that of a long produc
 
 
 def derivatives(label: str, formula: sympy.Expr, s: sympy.Symbol, bounded: bool) -> list[sympy.Expr]:
-    """First and second derivative by s of a formula.
+    """Return the first and the second derivative of a formula by s.
 
     Args:
         label: what it is called in messages.
@@ -52,8 +52,8 @@ def derivatives(label: str, formula: sympy.Expr, s: sympy.Symbol, bounded: bool)
     return [first, second]
 
 
-def compiled(s: sympy.Symbol, expressions: list[sympy.Expr]) -> Callable[[Array], list[Any]]:
-    """One function for the values of all ``expressions`` at s (*batch,), each (*batch,) or a number."""
+def compile_expressions(s: sympy.Symbol, expressions: list[sympy.Expr]) -> Callable[[Array], list[Any]]:
+    """Compile ``expressions`` to one function of s (*batch,), whose values are each (*batch,) or a number."""
     import sympy
 
     # NumPy makes objects of integers longer than its own

@@ -1,4 +1,4 @@
-"""Formulas in text, made into sympy expressions without evaluating the text.
+"""A parser of formulas in text to sympy expressions, which evaluates no code.
 
 Only numbers, + - * / **, brackets and the functions and constants listed here are understood, and every constant part
 must be a number that a float can hold; so a formula from a file can neither run code nor ask for endless work.
@@ -33,11 +33,11 @@ RESERVED = frozenset(_FUNCTIONS) | frozenset(_CONSTANTS)
 
 
 class _FormulaError(Exception):
-    """Why a formula is refused, without saying which one."""
+    """The reason why a formula is refused, without its label."""
 
 
 def parse(label: str, text: str, names: Mapping[str, Any]) -> Any:
-    """The sympy expression that ``text`` writes, where ``names`` stand for the symbols or numbers given.
+    """Parse ``text`` to a sympy expression, where ``names`` stand for the symbols or numbers given.
 
     Raises:
         UnknownNameError: a name in the formula is none of ``names``.
@@ -61,7 +61,7 @@ def parse(label: str, text: str, names: Mapping[str, Any]) -> Any:
 
 
 def number(value: float) -> Any:
-    """``value`` for sympy, whole numbers as such: s**2 has simpler derivatives than s**2.0."""
+    """Convert ``value`` for sympy, with whole numbers as integers: s**2 has simpler derivatives than s**2.0."""
     import sympy
 
     whole = abs(value) < 2**53 and float(value).is_integer()
@@ -124,7 +124,7 @@ def _named(name: str, names: Mapping[str, Any]) -> Any:
 
 
 def _chain(node: ast.expr, operators: tuple[type[ast.operator], ...], names: Mapping[str, Any], depth: int) -> Any:
-    """a + b − c … or a * b / c …, of any length."""
+    """Parse a + b − c … or a * b / c …, of any length."""
     import sympy
 
     terms = []
@@ -155,7 +155,7 @@ def _power(base: Any, exponent: Any) -> Any:
 
 
 def _refuse_high(exponent: Any) -> None:
-    """Powers that sympy would work on for ever."""
+    """Refuse exponents so high that sympy would not come to an end."""
     if not exponent.free_symbols and abs(_value("the exponent", lambda a: a, [exponent])) > _HIGHEST:
         raise _FormulaError(f"it has a power of more than {_HIGHEST}")
 
@@ -174,7 +174,7 @@ def _call(name: str, arguments: list[Any]) -> Any:
 
 
 def _value(name: str, function: Any, arguments: list[Any]) -> float:
-    """The value of a function of constants, which must be a real number that a float can hold."""
+    """Return the value of a function of constants, which must be real and fit into a float."""
     try:
         value = function(*map(float, arguments))
     except (ArithmeticError, ValueError, TypeError):

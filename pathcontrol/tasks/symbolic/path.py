@@ -1,4 +1,4 @@
-"""A path written down as formulas in s."""
+"""A path given by formulas in s."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.domain import refuse_two_rates, take_domain
 from pathcontrol.tasks.profile import ConstantSpeed
-from pathcontrol.tasks.symbolic.functions import compiled, derivatives
+from pathcontrol.tasks.symbolic.functions import compile_expressions, derivatives
 from pathcontrol.tasks.symbolic.parser import RESERVED, number, parse
 from pathcontrol.tasks.task import PathTask
 
@@ -68,38 +68,38 @@ class SymbolicPath(PathTask):
         if theta is not None:
             given["theta"] = theta
         self.formulas = {label: self._read(label, formula, values=False) for label, formula in given.items()}
-        self._expressions = self._differentiated(given)
+        self._expressions = self._differentiate(given)
         self._functions: dict[tuple[str, ...], Callable[[Array], list[Any]]] = {}
 
     def q_d(self, s: Array) -> Array:
-        return self._evaluated(s, "q_d")[0]
+        return self._evaluate(s, "q_d")[0]
 
     def dq_d(self, s: Array) -> Array:
-        return self._evaluated(s, "dq_d")[0]
+        return self._evaluate(s, "dq_d")[0]
 
     def ddq_d(self, s: Array) -> Array:
-        return self._evaluated(s, "ddq_d")[0]
+        return self._evaluate(s, "ddq_d")[0]
 
     def theta(self, s: Array) -> Array:
         if self.speed is not None:
             return ConstantSpeed(self.speed).theta(self, s)
-        return self._evaluated(s, "theta")[0][..., 0]
+        return self._evaluate(s, "theta")[0][..., 0]
 
     def dtheta(self, s: Array) -> Array:
         if self.speed is not None:
             return ConstantSpeed(self.speed).dtheta(self, s)
-        return self._evaluated(s, "dtheta")[0][..., 0]
+        return self._evaluate(s, "dtheta")[0][..., 0]
 
     def at(self, s: Array) -> PathPoint:
         path = ("q_d", "dq_d", "ddq_d")
         if self.speed is None:
-            q_d, dq_d, ddq_d, theta, dtheta = self._evaluated(s, *path, "theta", "dtheta")
+            q_d, dq_d, ddq_d, theta, dtheta = self._evaluate(s, *path, "theta", "dtheta")
             return PathPoint(q_d, dq_d, ddq_d, theta[..., 0], dtheta[..., 0])
-        q_d, dq_d, ddq_d = self._evaluated(s, *path)
+        q_d, dq_d, ddq_d = self._evaluate(s, *path)
         return PathPoint(q_d, dq_d, ddq_d, *ConstantSpeed(self.speed).at(dq_d, ddq_d, self, s))
 
     def latex(self) -> str:
-        """q_d(s) and ϑ(s) in LaTeX, for a report; parameters by their names."""
+        """Return q_d(s) and ϑ(s) in LaTeX, for a report, with parameters by their names."""
         import sympy
 
         s = sympy.latex(self._s)
@@ -117,7 +117,7 @@ class SymbolicPath(PathTask):
     # --- from formulas to functions -------------------------------------------------------------------------
 
     def _read(self, label: str, formula: Formula, values: bool) -> sympy.Expr:
-        """``formula`` as an expression of our s, its parameters replaced by their ``values`` or left as symbols."""
+        """Read ``formula`` as an expression of our s, with its parameters replaced by ``values`` or left as symbols."""
         import sympy
 
         names = {k: number(v) if values else sympy.Symbol(k, real=True) for k, v in self.parameters.items()}
@@ -134,8 +134,8 @@ class SymbolicPath(PathTask):
             )
         return formula.subs({symbol: names[symbol.name] for symbol in formula.free_symbols})
 
-    def _differentiated(self, given: dict[str, Formula]) -> dict[str, list[sympy.Expr]]:
-        """The expressions of q_d, q_d', q_d'', ϑ and ϑ', checked."""
+    def _differentiate(self, given: dict[str, Formula]) -> dict[str, list[sympy.Expr]]:
+        """Return the expressions of q_d, q_d', q_d'', ϑ and ϑ', checked."""
         rows = {}
         for label, formula in given.items():
             expression = self._read(label, formula, values=True)
@@ -144,10 +144,12 @@ class SymbolicPath(PathTask):
         path = {name: [row[order] for row in rows.values()] for order, name in enumerate(("q_d", "dq_d", "ddq_d"))}
         return path if theta is None else path | {"theta": [theta[0]], "dtheta": [theta[1]]}
 
-    def _evaluated(self, s: Array, *names: str) -> list[Array]:
-        """The values of the named groups of expressions, (*batch, expressions) each."""
+    def _evaluate(self, s: Array, *names: str) -> list[Array]:
+        """Return the values of the named groups of expressions, (*batch, expressions) each."""
         if names not in self._functions:
-            self._functions[names] = compiled(self._s, [e for name in names for e in self._expressions[name]])
+            self._functions[names] = compile_expressions(
+                self._s, [e for name in names for e in self._expressions[name]]
+            )
         s = np.asarray(s, dtype=np.float64)
         with np.errstate(all="ignore"):  # check_task finds what is not finite
             try:

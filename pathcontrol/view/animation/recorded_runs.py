@@ -12,7 +12,7 @@ from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.batch.task_batch import rows_of
+from pathcontrol.tasks.batch.task_batch import select_rows
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.animation.rollout import Take
 from pathcontrol.view.animation.scene.palette import run_color
@@ -52,7 +52,7 @@ def cast_takes(
     for i, (name, one) in enumerate(runs.items()):
         part = one.rollout(rollout)
         arm = part.robot if robot is None else robot
-        path = part.task if task is None else rows_of(task, np.array([rollout]))
+        path = part.task if task is None else select_rows(task, np.array([rollout]))
         if arm.source not in looks:
             looks[arm.source] = link_visuals(arm.source, FINENESS) or stick_figure(arm.source)
         path = path if "s" in one else None  # where on it the arm should be is not known

@@ -14,7 +14,7 @@ from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.batch.task_batch import rows_of
+from pathcontrol.tasks.batch.task_batch import select_rows
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.figures.lines import drawable
@@ -77,7 +77,7 @@ def shown(run: Runs, task: PathTask | None = None, rollout: int | None = None) -
     if task is not None:
         expect("task", task, PathTask)
     if rollout is not None and task is not None:
-        task = rows_of(task, np.array([rollout]))
+        task = select_rows(task, np.array([rollout]))
     chosen = {name: one if rollout is None else _alone(one, rollout) for name, one in named.items()}
     return [
         Shown(

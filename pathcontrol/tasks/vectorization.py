@@ -1,4 +1,4 @@
-"""Any function of s as one that takes batches."""
+"""Adaptation of any function of s to batches."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathcontrol.errors import InputError
 
 
 @dataclass(frozen=True)
-class Batched:
+class VectorizedFunction:
     """A function of s (*batch,) with values (*batch, *shape), from one that takes rows of numbers or single numbers."""
 
     function: Callable[[Any], Any]
@@ -30,8 +30,10 @@ class Batched:
         return np.asarray(values, dtype=np.float64).reshape(s.shape + self.shape)
 
 
-def batched(name: str, function: Callable[[Any], Any], probes: Array, shape: tuple[int, ...] | None) -> Batched:
-    """``function`` for any batch, by the calls it understands, which are found out at ``probes``, (5,).
+def vectorize(
+    name: str, function: Callable[[Any], Any], probes: Array, shape: tuple[int, ...] | None
+) -> VectorizedFunction:
+    """Wrap ``function`` for any batch; whether it takes arrays or numbers is found out at ``probes``, (5,).
 
     Args:
         name: what it is called in messages.
@@ -44,13 +46,13 @@ def batched(name: str, function: Callable[[Any], Any], probes: Array, shape: tup
     """
     if not callable(function):
         raise InputError(f"{name} = {function!r}, expected a function of s")
-    many, one = _tried(function, probes), _tried(function, probes[:1])
+    many, one = _try_call(function, probes), _try_call(function, probes[:1])
     if isinstance(many, np.ndarray) and isinstance(one, np.ndarray) and many.ndim and many.ndim == one.ndim:
         rows = len(many) == len(probes) and many[:1].shape == one.shape and np.allclose(many[:1], one, equal_nan=True)
         if rows and _is_value(many.shape[1:], shape):
-            return Batched(function, many.shape[1:], True)
+            return VectorizedFunction(function, many.shape[1:], True)
     s = float(probes[0])
-    alone = _tried(function, s)
+    alone = _try_call(function, s)
     if not isinstance(alone, np.ndarray):
         raise InputError(
             f"{name}(s={s:g}) fails with {alone!r}, and for an array of s with {many!r}; expected a function of "
@@ -59,15 +61,16 @@ def batched(name: str, function: Callable[[Any], Any], probes: Array, shape: tup
     if not _is_value(alone.shape, shape):
         expected = "one value for each joint, (n,)" if shape is None else f"{shape}" if shape else "a number"
         raise InputError(f"{name}(s={s:g}) has shape {alone.shape}, expected {expected}")
-    return Batched(function, alone.shape, False)
+    return VectorizedFunction(function, alone.shape, False)
 
 
 def _is_value(got: tuple[int, ...], expected: tuple[int, ...] | None) -> bool:
+    """Return whether a shape is the expected one, or (n,) if any is allowed."""
     return len(got) == 1 and got[0] > 0 if expected is None else got == expected
 
 
-def _tried(function: Callable[[Any], Any], s: Any) -> Array | Exception:
-    """The value as an array of numbers, or what went wrong."""
+def _try_call(function: Callable[[Any], Any], s: Any) -> Array | Exception:
+    """Return the value as an array of numbers, or the exception raised."""
     try:
         return np.asarray(function(s), dtype=np.float64)
     except Exception as error:
