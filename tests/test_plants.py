@@ -30,7 +30,7 @@ from pathcontrol import (
     simulate,
     simulate_sequence,
 )
-from pathcontrol.robot.friction import combine_laws
+from pathcontrol.robot.friction import friction_of_each
 from pathcontrol.robot.recipe import recipe_of, robot_of
 
 START = np.deg2rad([40.0, 70.0])
@@ -142,7 +142,7 @@ def test_equal_arms_are_one(arm):
 
 def test_friction_of_each_is_that_of_each():
     laws = [*LAWS, Ramp(), Ramp(), *LAWS[::-1]]
-    together = combine_laws(laws)
+    together = friction_of_each(laws)
     qd = np.random.default_rng(6).normal(size=(len(laws), 2))
     qd[3] = 0.0
     assert_array_equal(together.torque(qd), [one.torque(v) for one, v in zip(laws, qd, strict=True)])

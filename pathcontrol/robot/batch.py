@@ -14,7 +14,7 @@ from pathcontrol._arrays import Array, merge_rows
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.robot.actuation import Actuation, Limits
-from pathcontrol.robot.friction import FrictionLaw, combine_laws
+from pathcontrol.robot.friction import FrictionLaw, friction_of_each
 from pathcontrol.robot.model import RobotModel
 
 
@@ -49,7 +49,7 @@ class RobotBatch:
                 raise InputError(f"plant[{i}] has the joints {robot.joint_names}, plant[0] {first.joint_names}")
         self.n, self.name, self.joint_names = first.n, first.name, first.joint_names
         self.position_units = first.position_units
-        law = combine_laws([robot.friction for robot in self.robots]) if friction is None else friction
+        law = friction_of_each([robot.friction for robot in self.robots]) if friction is None else friction
         self.actuation = Actuation(_limits(self.robots), law, _encoder_counts(self.robots))
         self.bodies, self.body = _distinct_bodies(self.robots)
         # the rows of each body

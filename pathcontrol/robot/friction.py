@@ -235,7 +235,7 @@ class FrictionOfGroups(FrictionLaw):
         return {"law": "FrictionOfGroups", "parts": parts}
 
 
-def combine_laws(laws: Sequence[FrictionLaw]) -> FrictionLaw:
+def friction_of_each(laws: Sequence[FrictionLaw]) -> FrictionLaw:
     """Combine the laws of many rollouts, each (n,), into one law for the batch; row i follows ``laws[i]``."""
     if all(law is laws[0] for law in laws):
         return laws[0]

@@ -59,7 +59,7 @@ class PathTask(Task):
         return ScaledPath(self, factor, about)
 
     def between(self, s0: float, s_end: float) -> PathTask:
-        """Return the stretch from ``s0`` to ``s_end``, of a closed path any laps, as an open path with the same parameter."""
+        """Return the stretch from ``s0`` to ``s_end``, of a closed path any laps, open with the same parameter."""
         return PathSection(self, s0, s_end)
 
     def by_arc_length(self) -> PathTask:
