@@ -61,6 +61,10 @@ class Unit:
 
 Rate = Annotated[float, Form.POSITIVE, Unit("1/s")]
 Speed = Annotated[float, Form.POSITIVE, Unit("rad/s")]
+Length = Annotated[float, Form.POSITIVE, Unit("m")]
+Point = Annotated[ArrayLike, Form.NUMBERS, Unit("m")]
+Points = Annotated[ArrayLike, Form.POINTS, Unit("m")]
+Direction = Annotated[ArrayLike, Form.NUMBERS]
 Posture = Annotated[ArrayLike, Form.NUMBERS, Unit("rad")]
 Torques = Annotated[ArrayLike, Form.NUMBERS, Unit("N m")]
 

@@ -7,9 +7,10 @@ that a file can name by itself. A class of a user enters by being defined: its b
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import Any
 
 
@@ -44,89 +45,97 @@ class Kind:
 
 
 LAWS = Kind(
-    "control.base.Controller",
+    "control.base:Controller",
     {
-        "extended_motion_plan": "control.extended_motion_plan.ExtendedMotionPlan",
-        "projection": "control.projection.Projection",
-        "computed_torque": "control.motion.ComputedTorque",
-        "pd_plus": "control.motion.PDPlus",
-        "slotine_li": "control.motion.SlotineLi",
+        "extended_motion_plan": "control.extended_motion_plan:ExtendedMotionPlan",
+        "projection": "control.projection:Projection",
+        "computed_torque": "control.motion:ComputedTorque",
+        "pd_plus": "control.motion:PDPlus",
+        "slotine_li": "control.motion:SlotineLi",
     },
     ("robot", "task"),
 )
 TASKS = Kind(
-    "tasks.task.PathTask",
+    "tasks.task:PathTask",
     {
-        "circle": "tasks.curves.Circle",
-        "ellipse": "tasks.curves.Ellipse",
-        "lissajous": "tasks.curves.Lissajous",
-        "line": "tasks.curves.Line",
-        "waypoint_path": "tasks.waypoints.WaypointPath",
-        "symbolic_path": "tasks.symbolic.path.SymbolicPath",
-        "cartesian_path": "cartesian.path.CartesianPath",
+        "circle": "tasks.curves:Circle",
+        "ellipse": "tasks.curves:Ellipse",
+        "lissajous": "tasks.curves:Lissajous",
+        "line": "tasks.curves:Line",
+        "waypoint_path": "tasks.waypoints:WaypointPath",
+        "symbolic_path": "tasks.symbolic.path:SymbolicPath",
+        "cartesian_path": "cartesian.path:CartesianPath",
     },
     ("robot",),
 )
 PROFILES = Kind(
-    "tasks.profile.VelocityProfile",
+    "tasks.profile:VelocityProfile",
     {
-        "constant_rate": "tasks.profile.ConstantRate",
-        "constant_speed": "tasks.profile.ConstantSpeed",
-        "tool_speed": "profiles.tool_speed.ToolSpeed",
-        "limited": "profiles.limited.limited.limited_motion",
-        "time_optimal": "profiles.topp.time_optimal.time_optimal",
-        "smooth_start_stop": "profiles.jerk.start_stop.SmoothStartStop",
+        "constant_rate": "tasks.profile:ConstantRate",
+        "constant_speed": "tasks.profile:ConstantSpeed",
+        "tool_speed": "profiles.tool_speed:ToolSpeed",
+        "limited": "profiles.limited.limited:limited_motion",
+        "time_optimal": "profiles.topp.time_optimal:time_optimal",
+        "smooth_start_stop": "profiles.jerk.start_stop:SmoothStartStop",
     },
     ("robot", "path"),
 )
 MOTIONS = Kind(
-    "profiles.motion.Motion",
-    {"joint_motion": "profiles.motion.JointMotion", "tool_motion": "profiles.motion.ToolMotion"},
+    "profiles.motion:Motion",
+    {"joint_motion": "profiles.motion:JointMotion", "tool_motion": "profiles.motion:ToolMotion"},
     ("robot",),
 )
-ORIENTATIONS = Kind(
-    "cartesian.orientation.Orientation",
+CURVES = Kind(
+    "toolpaths.curve:ToolCurve",
     {
-        "fixed": "cartesian.orientation.FixedOrientation",
-        "tangent": "cartesian.orientation.TangentOrientation",
-        "normal": "cartesian.orientation.NormalOrientation",
+        "line": "toolpaths.curve:ToolCurve.line",
+        "circle": "toolpaths.curve:ToolCurve.circle",
+        "spline": "toolpaths.curve:ToolCurve.spline",
+        "polyline": "toolpaths.curve:ToolCurve.polyline",
+    },
+)
+ORIENTATIONS = Kind(
+    "cartesian.orientation:Orientation",
+    {
+        "fixed": "cartesian.orientation:FixedOrientation",
+        "tangent": "cartesian.orientation:TangentOrientation",
+        "normal": "cartesian.orientation:NormalOrientation",
     },
 )
 FRICTION_LAWS = Kind(
-    "robot.friction.FrictionLaw",
+    "robot.friction:FrictionLaw",
     {
-        "viscous": "robot.friction.Viscous",
-        "coulomb": "robot.friction.Coulomb",
-        "stribeck": "robot.friction.Stribeck",
+        "viscous": "robot.friction:Viscous",
+        "coulomb": "robot.friction:Coulomb",
+        "stribeck": "robot.friction:Stribeck",
     },
 )
 DISTURBANCES = Kind(
-    "simulation.arm.disturbance.Disturbance",
+    "simulation.arm.disturbance:Disturbance",
     {
-        "push": "simulation.arm.disturbance.Push",
-        "harmonic": "simulation.arm.disturbance.Harmonic",
-        "frame_force": "simulation.arm.disturbance.FrameForce",
+        "push": "simulation.arm.disturbance:Push",
+        "harmonic": "simulation.arm.disturbance:Harmonic",
+        "frame_force": "simulation.arm.disturbance:FrameForce",
     },
     ("robot",),
 )
-LOOPS = Kind("", {"sampled": "simulation.loops.SampledLoop", "continuous": "simulation.loops.ContinuousTime"})
-KINDS = (LAWS, TASKS, PROFILES, MOTIONS, ORIENTATIONS, FRICTION_LAWS, DISTURBANCES)
+LOOPS = Kind("", {"sampled": "simulation.loops:SampledLoop", "continuous": "simulation.loops:ContinuousTime"})
+KINDS = (LAWS, TASKS, PROFILES, MOTIONS, CURVES, ORIENTATIONS, FRICTION_LAWS, DISTURBANCES)
 
 
 def load(place: str) -> Any:
-    """Return what is at a dotted ``place`` in this package, such as ``tasks.curves.Circle``."""
-    module, _, name = place.rpartition(".")
-    return getattr(import_module(f"{__package__}.{module}"), name)
+    """Return what is at a ``place`` in this package, such as ``tasks.curves:Circle``."""
+    return resolve_name(f"{__package__}.{place}")
 
 
 def kind_of(base: Any) -> Kind | None:
     """Return the kind whose base a class is, or ``None``."""
-    place = f"{getattr(base, '__module__', '')}.{getattr(base, '__qualname__', '')}"
+    place = f"{getattr(base, '__module__', '')}:{getattr(base, '__qualname__', '')}"
     return next((kind for kind in KINDS if place == f"{__package__}.{kind.base}"), None)
 
 
 def _last(place: str) -> str:
-    return place.rpartition(".")[2]
+    return re.split(r"[.:]", place)[-1]
 
 
 def _subclasses(base: type) -> Iterator[type]:

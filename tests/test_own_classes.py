@@ -12,7 +12,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import pathcontrol as pc
 from pathcontrol import ExperimentError, Run
+from pathcontrol.experiments.load import read_toml
 from pathcontrol.experiments.runner import load_setup, run_experiment
+from pathcontrol.experiments.sweep_runner import of_samples
+from pathcontrol.experiments.swept import SweptExperiment
 from pathcontrol.registry import Kind
 from pathcontrol.view.report.report import report
 from pathcontrol.view.report.reproduction import recipe
@@ -215,3 +218,20 @@ def test_what_is_wrong_is_told_by_key(own, tmp_path, old, new, message):
     with pytest.raises(ExperimentError) as error:
         load_setup(tmp_path / "own.toml")
     assert message in str(error.value)
+
+
+def test_gains_of_ones_own_law_vary_within_the_batches_of_a_sweep(own, tmp_path):
+    (tmp_path / "own.toml").write_text(FILE.format(place="my_classes.py"), encoding="utf-8")
+    swept = SweptExperiment(of_samples(read_toml(tmp_path / "own.toml")), tmp_path)
+    gains, sizes = np.array([2000.0, 900.0, 400.0]), np.array([45.0, 30.0, 45.0])
+    names = {"controller.parameters.K": gains, "task.parameters.size": sizes, "disturbance.parameters.at": gains / 1e5}
+    parts = swept({name: names[name] for name in list(names)[:2]}, np.arange(3))
+    [(rows, arguments)] = parts
+    assert rows.tolist() == [0, 1, 2]
+    assert_array_equal(arguments["controller"].K, gains[:, None])
+    run = pc.simulate(**arguments, progress=False)
+    for i in range(3):
+        [(_, alone)] = swept({name: names[name][i : i + 1] for name in list(names)[:2]}, np.array([i]))
+        assert_allclose(run.array("q")[i], pc.simulate(**alone, progress=False).array("q")[0], rtol=0, atol=1e-12)
+    # nobody knows whether a disturbance of one's own may have rows
+    assert [rows.tolist() for rows, _ in swept(names, np.arange(3))] == [[0], [1], [2]]

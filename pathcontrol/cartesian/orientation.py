@@ -13,7 +13,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
-from pathcontrol.arguments import Form, Unit
+from pathcontrol.arguments import Direction, Form, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.curve import ToolCurve
 
@@ -101,7 +101,7 @@ class TangentOrientation(Orientation):
         InputError: on evaluation, where the tangent is parallel to ``up``.
     """
 
-    def __init__(self, up: Annotated[ArrayLike, Form.NUMBERS] = (0.0, 0.0, 1.0)) -> None:
+    def __init__(self, up: Direction = (0.0, 0.0, 1.0)) -> None:
         self.up = readonly(_direction("up", up))
 
     def frames(self, curve: ToolCurve, s: Array) -> Array:
@@ -131,7 +131,7 @@ class NormalOrientation(Orientation):
         self,
         normals: Annotated[ArrayLike, Form.ARRAY] | Callable[[Array], Array],
         at: Annotated[ArrayLike, Form.NUMBERS, Unit("m")] | None = None,
-        reference: Annotated[ArrayLike, Form.NUMBERS] | None = None,
+        reference: Direction | None = None,
     ) -> None:
         self.reference = None if reference is None else readonly(_direction("reference", reference))
         self.rows = 2 if reference is None else 3

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, readonly, scalar
 from pathcontrol._expect import expect
-from pathcontrol.arguments import Form, Unit
+from pathcontrol.arguments import Form, Length, Points, Unit
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.solve import posture, solve
 from pathcontrol.cartesian.orientation import FixedOrientation, FreeOrientation, Orientation
@@ -75,12 +75,12 @@ class CartesianPath(SplinePath):
         self,
         robot: RobotModel,
         frame: str,
-        curve: ToolCurve | Annotated[ArrayLike, Form.POINTS, Unit("m")],
+        curve: ToolCurve | Points,
         orientation: Orientation | Literal["keep"] | None = None,
         *,
         speed: Annotated[float, Form.POSITIVE, Unit("m/s")] = 0.1,
         start: Annotated[ArrayLike, Form.NUMBERS, Unit("rad", "m")] | None = None,
-        tolerance: Annotated[float, Form.POSITIVE, Unit("m")] = 1e-5,
+        tolerance: Length = 1e-5,
         angle_tolerance: Annotated[float, Form.POSITIVE, Unit("rad")] = 1e-4,
         tool: Annotated[ArrayLike, Form.ARRAY, Unit("m")] | None = None,
         closed: bool | None = None,

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self
 from pydantic import PlainValidator, model_validator
 
 from pathcontrol.arguments import Unit
-from pathcontrol.experiments.derived import chooser, section_of
+from pathcontrol.experiments.derived import chooser, one_or_several, section_of
 from pathcontrol.experiments.section import Section
 from pathcontrol.experiments.values import Number, Numbers, Text, expected
 from pathcontrol.registry import FRICTION_LAWS, load
@@ -85,20 +85,18 @@ class FrictionTable(Section):
         return self
 
 
-_LAW = chooser(FRICTION_LAWS)
+_LAWS = one_or_several(chooser(FRICTION_LAWS))
 
 
 def _friction(value: Any) -> Any:
-    if isinstance(value, list | tuple) and value:
-        return [_LAW(one) for one in value]
-    if isinstance(value, Section) or (isinstance(value, dict) and "type" in value):
-        return value if isinstance(value, FrictionTable) else _LAW(value)
-    if isinstance(value, dict):
+    if isinstance(value, FrictionTable) or (isinstance(value, dict) and "type" not in value):
         return FrictionTable.model_validate(value)
+    if isinstance(value, Section | list | dict) and value:
+        return _LAWS(value)
     if value not in ("urdf", "none"):
         raise expected(
-            "'urdf', 'none', a table of 'viscous', 'coulomb' and 'stribeck', or a friction law with its 'type', or a "
-            "list of such laws"
+            "'urdf', 'none', a table of 'viscous', 'coulomb' and 'stribeck', a friction law with its 'type', or a list "
+            "of such laws"
         )
     return value
 

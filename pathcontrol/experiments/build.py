@@ -13,14 +13,15 @@ from pathcontrol._arrays import Array, finite, joint_array
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.build_arms import build_arms
+from pathcontrol.experiments.build_disturbance import build_disturbance
 from pathcontrol.experiments.build_duration import build_duration
 from pathcontrol.experiments.build_task import build_task
 from pathcontrol.experiments.keyed import keyed, refuse_unit, users_code
 from pathcontrol.experiments.making import Place, make
 from pathcontrol.experiments.schema import Experiment, Output
-from pathcontrol.registry import DISTURBANCES, LAWS
+from pathcontrol.registry import LAWS
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
+from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.arm.noise import NoiseSource
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.finish import Until
@@ -87,7 +88,7 @@ def build(experiment: Experiment, base_dir: str | Path = ".") -> Setup:
         duration, laps = build_duration(experiment, task)
         loop = _loop(experiment, plant, float(np.max(duration)), place)
         q, qd = _state(experiment, controllers[0])
-        disturbance = _disturbance(experiment, plant, (q, qd), place)
+        disturbance = build_disturbance([experiment], plant, q[None], qd[None], place)
     setup = Setup(controllers, task, plant, loop, q, qd, duration, laps, experiment.engine, experiment.output)
     return setup._replace(until=experiment.until, disturbance=disturbance)
 
@@ -117,22 +118,6 @@ def law_of(
     """
     law: Controller = make("controller", experiment.controller, LAWS, place, {"robot": model, "task": task}, gains)
     return law
-
-
-def _disturbance(
-    experiment: Experiment, plant: RobotModel, state: tuple[Array, Array], place: Place
-) -> Disturbance | None:
-    """What pushes the plant, which has been tried once: the sum of all that the file says."""
-    given, several = experiment.disturbance, isinstance(experiment.disturbance, list)
-    sections = given if several else [] if given is None else [given]
-    total: Disturbance | None = None
-    for i, section in enumerate(sections):
-        key = f"disturbance[{i}]" if several else "disturbance"
-        one: Disturbance = make(key, section, DISTURBANCES, place, {"robot": plant})
-        with users_code(key, f"{type(one).__name__} at the start"):
-            check_disturbance(one, *(part[None] for part in state))
-        total = one if total is None else total + one
-    return total
 
 
 def _refuse_joints(output: Output, robot: RobotModel) -> None:

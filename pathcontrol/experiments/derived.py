@@ -9,7 +9,7 @@ from functools import lru_cache, partial
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
 
-from pydantic import Field, PlainValidator, create_model
+from pydantic import Field, PlainValidator, TypeAdapter, create_model
 
 from pathcontrol.arguments import Form, Parameter, parameters_of
 from pathcontrol.experiments.section import Section, choose
@@ -80,6 +80,12 @@ def chooser(
     return partial(choose, key=key, find=find, choices=choices, default=default, also=also)
 
 
+def one_or_several(validate: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return a validator that takes what ``validate`` does, or a list of it."""
+    several = TypeAdapter(list[Annotated[Any, PlainValidator(validate)]])
+    return lambda value: several.validate_python(value) if isinstance(value, list) and value else validate(value)
+
+
 @lru_cache(maxsize=256)
 def section_of(target: Callable[..., Any], base: type[Section] = Section, given: tuple[str, ...] = ()) -> type[Section]:
     """Return the section whose keys are the parameters of a class or function, but for those that are ``given``."""
@@ -96,25 +102,29 @@ def section_of(target: Callable[..., Any], base: type[Section] = Section, given:
 def _annotation(parameter: Parameter) -> Any:
     """Return the annotation of a field for a parameter."""
     literals = [value for kind in parameter.types if get_origin(kind) is Literal for value in get_args(kind)]
-    validate, words = _validator(parameter)
-    if not literals:
-        return Annotated[Any, PlainValidator(validate), *parameter.marks]
-    if validate is _anything:
-        return Literal[tuple(literals)]
-    return Annotated[Any, PlainValidator(partial(_one_or, literals, words, validate)), *parameter.marks]
-
-
-def _validator(parameter: Parameter) -> tuple[Callable[[Any], Any], str]:
-    """Return what checks a value that is none of its literals, and what that expects in words."""
     form = parameter.form or next((_FORMS[kind] for kind in parameter.types if kind in _FORMS), None)
-    if form is not None:
-        return partial(check, form), form.value
-    for one in parameter.types:
-        if (kind := kind_of(one)) is not None:
-            return chooser(kind), "a table with the key 'type'"
-        if is_dataclass(one) and isinstance(one, type):
-            return section_of(one).model_validate, "a table"
-    return _anything, ""
+    table = next(filter(None, map(_table_of, parameter.types)), None)
+    if literals and form is None and table is None:
+        return Literal[tuple(literals)]
+    validate = partial(check, form) if form else _anything
+    words = [form.value] if form else []
+    if table is not None:
+        validate, words = partial(_table_or, table, validate), [*words, "a table with the key 'type'"]
+    if literals:
+        validate = partial(_one_or, literals, ", or ".join(words), validate)
+    return Annotated[Any, PlainValidator(validate), *parameter.marks]
+
+
+def _table_of(kind: Any) -> Callable[[Any], Any] | None:
+    """Return what makes a section of a table for an object that a parameter may be, if it may be one."""
+    if (known := kind_of(kind)) is not None:
+        return chooser(known)
+    return section_of(kind).model_validate if isinstance(kind, type) and is_dataclass(kind) else None
+
+
+def _table_or(table: Callable[[Any], Any], validate: Callable[[Any], Any], value: Any) -> Any:
+    """Return the section that a table is, or what ``validate`` makes of any other value."""
+    return table(value) if isinstance(value, dict | Section) or validate is _anything else validate(value)
 
 
 def _anything(value: Any) -> Any:

@@ -11,7 +11,7 @@ from pydantic import Field, PlainValidator
 
 from pathcontrol.arguments import Unit
 from pathcontrol.experiments.arm_sections import Plant, Robot
-from pathcontrol.experiments.derived import chooser
+from pathcontrol.experiments.derived import chooser, one_or_several
 from pathcontrol.experiments.section import Section
 from pathcontrol.experiments.sweep_section import SweepSection
 from pathcontrol.experiments.task_sections import Task
@@ -35,16 +35,6 @@ class LoopSection(Section):
 
 
 _LOOP = chooser(LOOPS, LoopSection, None, key="mode", default="sampled")
-_DISTURBANCE = chooser(DISTURBANCES)
-
-
-def _disturbances(value: Any) -> Any:
-    """One table, or a list of them, which add up."""
-    if isinstance(value, list | tuple):
-        if not value:
-            raise expected("a table with the key 'type', or a list of such tables")
-        return [_DISTURBANCE(one) for one in value]
-    return None if value is None else _DISTURBANCE(value)
 
 
 def _file(*suffixes: str) -> PlainValidator:
@@ -114,7 +104,7 @@ class Experiment(Section):
     start: Start = Start()
     plant: Plant = Plant()
     loop: Annotated[Any, PlainValidator(_LOOP)] = Field(default_factory=lambda: _LOOP({}))
-    disturbance: Annotated[Any, PlainValidator(_disturbances)] = None
+    disturbance: Annotated[Any, PlainValidator(one_or_several(chooser(DISTURBANCES)))] | None = None
     output: Output = Output()
     sweep: SweepSection | None = None
     tune: TuneSection | None = None

@@ -100,7 +100,7 @@ def in_si(at: tuple[int | str, ...], value: Any, units: tuple[str, ...], wrong: 
         return value
     if isinstance(value, list):
         return [in_si((*at, i), item, units, wrong) for i, item in enumerate(value)]
-    if isinstance(value, dict):
+    if isinstance(value, dict) and "type" not in value:  # one that has it is a section, which has its own units
         return {key: in_si((*at, key), item, units, wrong) for key, item in value.items()}
     if isinstance(value, str) and is_quantity(value):
         try:

@@ -24,6 +24,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.build import Setup, build, law_of
 from pathcontrol.experiments.build_arms import build_models, build_plant
+from pathcontrol.experiments.build_disturbance import build_disturbance, varies_together
 from pathcontrol.experiments.keyed import keyed
 from pathcontrol.experiments.load import finding
 from pathcontrol.experiments.making import Place, arguments_of, target_of
@@ -38,7 +39,7 @@ from pathcontrol.tasks.task import PathTask
 
 _GAIN = re.compile(r"controller\.(?:parameters\.)?(\w+)(\[\d+\])*")
 _MAY_BE_ZERO = {Form.GAIN: False, Form.GAIN_OR_ZERO: True}
-_TOGETHER = re.compile(r"(start|plant|task)\.")  # what may differ from rollout to rollout of a batch, as gains may
+_TOGETHER = ("start", "plant", "task")  # what may differ from rollout to rollout of a batch, as gains may
 _KEY = re.compile(r"[^\[\].]+(\[\d+\])*(\.[^\[\].]+(\[\d+\])*)*")
 _STEP = re.compile(r"([^\[\].]+)|\[(\d+)\]")
 _REMEMBERED = 16  # groups whose task and arm are kept from chunk to chunk
@@ -104,35 +105,44 @@ class SweptExperiment:
     ) -> list[tuple[NDArray[np.intp], dict[str, Any]]]:
         """The rows that fit in one batch, and the arguments of simulate() for them."""
         experiments = [self._experiment(parameters, row, int(i)) for row, i in enumerate(samples)]
-        plants, tasks = (any(name.startswith(key) for name in parameters) for key in ("plant.", "task."))
         gains = set.intersection(*(set(self._gains(experiment)) for experiment in experiments))
-        apart = [name for name in parameters if not (_TOGETHER.match(name) or _named(name) in gains)]
+        apart = [name for name in parameters if not self._together(name, gains, experiments)]
+        varied = {_section(name) for name in parameters.keys() - apart}
         groups: dict[str, list[int]] = {}
         for row in range(len(samples)):
             groups.setdefault(json.dumps([parameters[name][row].tolist() for name in apart]), []).append(row)
         parts: list[tuple[NDArray[np.intp], dict[str, Any]]] = []
         for key, rows in groups.items():
             try:
-                parts += self._parts(key, np.array(rows), [experiments[row] for row in rows], plants, tasks)
+                parts += self._parts(key, np.array(rows), [experiments[row] for row in rows], varied)
             except ExperimentError as error:
                 raise ExperimentError(f"in samples {samples[rows[0]]} to {samples[rows[-1]]}: {error}") from error
         return parts
 
     def _parts(
-        self, key: str, rows: NDArray[np.intp], experiments: list[Experiment], plants: bool, tasks: bool
+        self, key: str, rows: NDArray[np.intp], experiments: list[Experiment], varied: set[str]
     ) -> Iterator[tuple[NDArray[np.intp], dict[str, Any]]]:
         """The batches of samples that differ in nothing but what may differ between rollouts."""
         setup, bare, model = self._of_group(key, experiments[0])
         found = [SweptTask(setup.task, float(setup.duration), setup.laps)] * len(rows)
-        if tasks:
+        if "task" in varied:
             found = swept_tasks(experiments, model, self._base_dir)
         for some in rows_together(found):
             chosen, own = [experiments[i] for i in some], [found[i] for i in some]
             plant: Any = setup.plant
-            if plants:
+            if "plant" in varied:
                 plant = [build_plant(experiment, bare, model, self._base_dir) for experiment in chosen]
-            law = self._law(model, chosen, joined(own))
-            yield rows[some], {"controller": law, "plant": plant} | _arguments(setup, chosen, own)
+            law, arguments = self._law(model, chosen, joined(own)), _arguments(setup, chosen, own)
+            if "disturbance" in varied:
+                place, state = Place(self._base_dir, chosen[0].to_radians), (arguments["q"], arguments["qd"])
+                arguments["disturbance"] = build_disturbance(chosen, setup.plant, *state, place)
+            yield rows[some], {"controller": law, "plant": plant} | arguments
+
+    def _together(self, name: str, gains: set[str], experiments: list[Experiment]) -> bool:
+        """Whether samples that differ in a key may be rollouts of one batch."""
+        if _section(name) == "disturbance":
+            return all(varies_together(name, experiment) for experiment in experiments)
+        return _section(name) in _TOGETHER or _named(name) in gains
 
     def _law(self, model: RobotModel, experiments: list[Experiment], task: PathTask) -> Controller:
         """The law of some samples, with a row for each of them of the gains that differ."""
@@ -233,6 +243,11 @@ def _gains_of(law: Callable[..., Any]) -> dict[str, bool]:
     """The gains among the arguments of a law, and which of them may be 0."""
     forms = {name: one.form for name, one in parameters_of(law).items()}
     return {name: _MAY_BE_ZERO[form] for name, form in forms.items() if form in _MAY_BE_ZERO}
+
+
+def _section(key: str) -> str:
+    """The section of the file that a dotted key is in."""
+    return re.split(r"[.[]", key)[0]
 
 
 def _named(key: str) -> str:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol.arguments import Direction, Length, Point, Points
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.geometry.quintic import CurvePoint, quintic_spline
@@ -90,7 +91,7 @@ class ToolCurve:
     # --- curves given in closed form --------------------------------------------------------------------------
 
     @classmethod
-    def line(cls, start: ArrayLike, end: ArrayLike) -> ToolCurve:
+    def line(cls, start: Point, end: Point) -> ToolCurve:
         """The straight line from ``start`` to ``end`` [m], each (3,)."""
         a, b = _vector("start", start), _vector("end", end)
         length = float(np.linalg.norm(b - a))
@@ -102,10 +103,10 @@ class ToolCurve:
     @classmethod
     def circle(
         cls,
-        center: ArrayLike,
-        radius: float,
-        normal: ArrayLike = (0.0, 0.0, 1.0),
-        start: ArrayLike = (1.0, 0.0, 0.0),
+        center: Point,
+        radius: Length,
+        normal: Direction = (0.0, 0.0, 1.0),
+        start: Direction = (1.0, 0.0, 0.0),
     ) -> ToolCurve:
         """A full circle, counterclockwise seen against ``normal``.
 
@@ -124,7 +125,7 @@ class ToolCurve:
         return cls(r * angle, c + r * outward, cos * sideways - sin * towards, -outward / r, closed=True)
 
     @classmethod
-    def spline(cls, points: ArrayLike, closed: bool = False) -> ToolCurve:
+    def spline(cls, points: Points, closed: bool = False) -> ToolCurve:
         """The C² cubic spline through points [m], (m, 3), parametrised by chord length.
 
         Args:
@@ -145,7 +146,7 @@ class ToolCurve:
         return cls(s, ring, curve(s, 1), curve(s, 2), closed)
 
     @classmethod
-    def polyline(cls, points: ArrayLike, tolerance: float = 1e-4, closed: bool = False) -> ToolCurve:
+    def polyline(cls, points: Points, tolerance: Length = 1e-4, closed: bool = False) -> ToolCurve:
         """Straight edges through points [m], (m, 3), with corners blended; see :func:`smooth`.
 
         Args:

@@ -31,16 +31,16 @@ if TYPE_CHECKING:
 
 #: where the classes are that no experiment file names, but that are made again from their arguments too
 _PLACES = {
-    "TabulatedProfile": "profiles.tabulated.TabulatedProfile",
-    "Reprofiled": "tasks.task.Reprofiled",
-    "Laps": "tasks.laps.Laps",
-    "RecordedPath": "tasks.recorded.RecordedPath",
-    "RecordedProfile": "tasks.recorded.RecordedProfile",
-    "PathSequence": "tasks.joined.sequence.PathSequence",
-    "PathSection": "tasks.task.PathSection",
-    "ReversedPath": "tasks.task.ReversedPath",
-    "ScaledPath": "tasks.task.ScaledPath",
-    "ShiftedPath": "tasks.task.ShiftedPath",
+    "TabulatedProfile": "profiles.tabulated:TabulatedProfile",
+    "Reprofiled": "tasks.task:Reprofiled",
+    "Laps": "tasks.laps:Laps",
+    "RecordedPath": "tasks.recorded:RecordedPath",
+    "RecordedProfile": "tasks.recorded:RecordedProfile",
+    "PathSequence": "tasks.joined.sequence:PathSequence",
+    "PathSection": "tasks.task:PathSection",
+    "ReversedPath": "tasks.task:ReversedPath",
+    "ScaledPath": "tasks.task:ScaledPath",
+    "ShiftedPath": "tasks.task:ShiftedPath",
 }
 _TOOLPATH = (
     "frame",
@@ -180,7 +180,7 @@ def _make(recipe: Any, store: ArrayStore, parts: Sequence[Any] = ()) -> Any:
         return _make_toolpath(values, store, parts)
     cls = _class_of(recipe["class"])
     if cls is None:
-        names = [place.rpartition(".")[2] for kind in (TASKS, PROFILES) for place in kind.members.values()]
+        names = [place.rpartition(":")[2] for kind in (TASKS, PROFILES) for place in kind.members.values()]
         known = [*filter(_class_of, names), *_PLACES]
         raise InputError(f"class {recipe['class']!r} of a task, expected one of {', '.join(known)}")
     return _try_out(cls(**{name: _make(value, store, parts) for name, value in values.items()}))

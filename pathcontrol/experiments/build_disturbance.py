@@ -1,0 +1,66 @@
+"""From ``[disturbance]`` to what pushes the simulated arm."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import reduce
+from operator import add
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.arguments import Form, parameters_of
+from pathcontrol.experiments.derived import OwnSection
+from pathcontrol.experiments.keyed import users_code
+from pathcontrol.experiments.making import Place, arguments_of, make
+from pathcontrol.experiments.schema import Experiment
+from pathcontrol.registry import DISTURBANCES
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
+
+_ARGUMENT = re.compile(r"disturbance(?:\[(\d+)\])?\.(\w+)(?:\[\d+\])*")
+_NUMBERS = (Form.NUMBER, Form.NUMBERS, Form.POSITIVE)
+
+
+def build_disturbance(
+    experiments: Sequence[Experiment], plant: RobotModel, q: Array, qd: Array, place: Place
+) -> Disturbance | None:
+    """The sum of all that a file says, which has been tried once.
+
+    Args:
+        experiments: one, or one for each rollout, that differ in arguments of which :func:`varies_together` is true.
+        plant: the arm that is pushed.
+        q: joint positions at the start [rad], (N, n).
+        qd: joint velocities at the start [rad/s], (N, n).
+        place: where the file is, and its angles.
+
+    Raises:
+        ExperimentError: one cannot be made, or gives no torques for the arm.
+    """
+    made: list[Disturbance] = []
+    for i, sections in enumerate(zip(*map(_listed, experiments), strict=True)):
+        key = f"disturbance[{i}]" if isinstance(experiments[0].disturbance, list) else "disturbance"
+        values = [arguments_of(key, section, DISTURBANCES, place) for section in sections]
+        differ = {name for one in values for name in one if one[name] != values[0].get(name)}
+        rows = {name: np.array([one[name] for one in values]) for name in differ}
+        one: Disturbance = make(key, sections[0], DISTURBANCES, place, {"robot": plant}, rows)
+        with users_code(key, f"{type(one).__name__} at the start"):
+            check_disturbance(one, q, qd)
+        made.append(one)
+    return reduce(add, made) if made else None
+
+
+def varies_together(key: str, experiment: Experiment) -> bool:
+    """Whether a dotted key sets numbers of a disturbance of the library, which may have some for each rollout."""
+    match = _ARGUMENT.fullmatch(key)
+    if match is None or isinstance(section := _listed(experiment)[int(match[1] or 0)], OwnSection):
+        return False
+    target = type(section).target
+    return DISTURBANCES.has(target.__name__) and parameters_of(target)[match[2]].form in _NUMBERS
+
+
+def _listed(experiment: Experiment) -> list[Any]:
+    given = experiment.disturbance
+    return given if isinstance(given, list) else [] if given is None else [given]
