@@ -1,4 +1,4 @@
-"""What runs and states say: metrics, distances, errors, Lyapunov functions.
+"""The analysis of runs and states: metrics, distances, errors, Lyapunov functions.
 
 The public functions are listed in ``__init__.pyi`` and load what they need on first use; they are in
 :mod:`pathcontrol` as well.

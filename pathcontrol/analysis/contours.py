@@ -1,4 +1,4 @@
-"""A run contour by contour, or path by path: how long each took, how fast, how near to it, how much of it."""
+"""The numbers of a run contour by contour, or path by path: time, speed, deviation and coverage."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from pathcontrol.analysis.coverage import Points, even_points, passed, refined, traverse
-from pathcontrol.analysis.known import where_known
-from pathcontrol.analysis.tool import LedCurve, feed_along, tool_of, tool_speed
+from pathcontrol.analysis.coverage import Points, even_points, measure_coverage, refine, traverse
+from pathcontrol.analysis.metric_helpers import apply_where_finite
+from pathcontrol.analysis.tool import PlannedToolCurve, feed_along, find_tool, tool_speed
 from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.robot.model import RobotModel
@@ -21,19 +21,19 @@ from pathcontrol.tasks.task import PathTask
 if TYPE_CHECKING:
     from pathcontrol.toolpaths.contour import Contour
 
-_MOST = 20_000  # points of a segment
-_FINER = 0.5  # of the tolerance, between points of a drawing
+_MOST = 20_000  # limit of points on a segment
+_FINER = 0.5  # distance between points of a drawing, as a share of the tolerance
 
 
 class ContourNumbers(NamedTuple):
-    """What a run did on one contour of a toolpath, or on one path of a sequence.
+    """The numbers of a run on one contour of a toolpath, or on one path of a sequence.
 
     Attributes:
-        name: what the file calls it.
-        rapid: whether it is a positioning move.
-        length: of the drawing [m].
-        time: from its begin to its end [s], NaN where it was not finished.
-        feed: speed asked for [m/s].
+        name: its name in the file.
+        rapid: True for a positioning move.
+        length: length of the drawing [m].
+        time: time from its begin to its end [s], NaN where it was not finished.
+        feed: commanded speed [m/s].
         speed: mean speed of the tool [m/s], NaN where it was not begun.
         deviation: largest distance of the tool from the drawing [m].
         missed: largest distance of the drawing from the tool's way [m].
@@ -54,9 +54,9 @@ class ContourNumbers(NamedTuple):
 def contour_numbers(
     run: Run, task: PathSequence, robot: RobotModel, tolerance: float = 1e-3, stop: int | None = None
 ) -> list[ContourNumbers]:
-    """The numbers of each contour in their order; rapids between them included.
+    """Return the numbers of each contour in order, with the rapids between them.
 
-    Of a sequence of other paths each is a contour: the curve on which it leads the tool.
+    In a sequence of other paths each path is a contour: the curve on which it leads the tool.
 
     Args:
         run: a run along ``task``, of one rollout.
@@ -67,16 +67,16 @@ def contour_numbers(
     """
     q = run.array("q")[:, :stop]
     tool = Tool(robot, str(task.frame), task.tool_pose)
-    x = where_known(lambda q: tool.kinematics(q).position, q, shape=(3,))[0]
+    x = apply_where_finite(lambda q: tool.kinematics(q).position, q, shape=(3,))[0]
     speed = tool_speed(run, robot, task)[0, :stop]
     which, finish = run.array("path_index")[:stop], run.array("path_finish_time")
     found = []
-    for contour, paths in _grouped(task, tool):
+    for contour, paths in _group_paths(task, tool):
         there = np.isin(which, paths)
         begin = 0.0 if paths[0] == 0 else finish[paths[0] - 1]
         way, known = x[there], np.isfinite(x[there]).all(-1)
-        points = contour.points if isinstance(contour, LedCurve) else contour_points(contour, tolerance)
-        share, missed = passed(points, way, tolerance)
+        points = contour.points if isinstance(contour, PlannedToolCurve) else contour_points(contour, tolerance)
+        share, missed = measure_coverage(points, way, tolerance)
         found.append(
             ContourNumbers(
                 contour.name,
@@ -107,9 +107,9 @@ HEADS = (
 
 
 def contour_table(run: Run, robot: RobotModel | None = None) -> list[list[str]]:
-    """The numbers of each contour of a run along a toolpath, or of each path of a sequence, as texts for a reader.
+    """Return the numbers of each contour of a run, or of each path of a sequence, as texts for a reader.
 
-    Heads come first; it is empty for a run of another kind.
+    Column heads come first; the table is empty for a run of another kind.
 
     Raises:
         InputError: the run does not know its robot.
@@ -118,12 +118,13 @@ def contour_table(run: Run, robot: RobotModel | None = None) -> list[list[str]]:
     if not isinstance(task, PathSequence) or "path_finish_time" not in run or "qd" not in run:
         return []
     arm = run.robot if robot is None else robot
-    if tool_of(arm, task) is None:
+    if find_tool(arm, task) is None:
         return []
     return [list(HEADS), *(_texts(i, one) for i, one in enumerate(contour_numbers(run, task, arm)))]
 
 
 def _texts(number: int, one: ContourNumbers) -> list[str]:
+    """Return one row of the table."""
     begun = np.isfinite(one.speed)
     return [
         one.name or str(number),
@@ -135,10 +136,10 @@ def _texts(number: int, one: ContourNumbers) -> list[str]:
     ]
 
 
-def feed_of(contour: Contour | LedCurve, task: PathSequence, paths: Sequence[int], robot: RobotModel) -> float:
-    """The speed [m/s] that is asked for on a contour that some ``paths`` follow; of other paths its mean along them."""
+def feed_of(contour: Contour | PlannedToolCurve, task: PathSequence, paths: Sequence[int], robot: RobotModel) -> float:
+    """Return the commanded speed [m/s] on a contour that some ``paths`` follow; the mean along other paths."""
     toolpath = as_toolpath(task)
-    if toolpath is None or isinstance(contour, LedCurve):
+    if toolpath is None or isinstance(contour, PlannedToolCurve):
         return _feed_of_path(task.paths[paths[0]], robot)
     if contour.rapid:
         return float(toolpath.rapid_speed)
@@ -146,7 +147,7 @@ def feed_of(contour: Contour | LedCurve, task: PathSequence, paths: Sequence[int
 
 
 def _feed_of_path(path: PathTask, robot: RobotModel) -> float:
-    """The speed [m/s] that a path asks of the tool, its mean over s where it changes."""
+    """Return the commanded speed [m/s] of the tool on a path, its mean over s where it changes."""
     from pathcontrol.cartesian.path import CartesianPath
 
     if isinstance(path, CartesianPath):
@@ -155,24 +156,24 @@ def _feed_of_path(path: PathTask, robot: RobotModel) -> float:
 
 
 def contour_points(contour: Contour, tolerance: float) -> Points:
-    """Points of a contour [m], (k, 3), no farther apart than half of the ``tolerance``, each on the contour itself."""
+    """Return points on a contour [m], (k, 3), at most half of the ``tolerance`` apart."""
     from pathcontrol.toolpaths.segments.base import Polyline
 
     parts = []
     for segment in contour.segments:
         if isinstance(segment, Polyline):
-            parts.append(refined(segment.points, _FINER * tolerance))
+            parts.append(refine(segment.points, _FINER * tolerance))
         else:
             count = int(np.clip(np.ceil(segment.length / (_FINER * tolerance)), 32, _MOST))
             parts.append(segment.point(np.linspace(0.0, 1.0, count + 1)))
     return even_points(np.concatenate(parts))
 
 
-def _grouped(task: PathSequence, tool: Tool) -> Sequence[tuple[Contour | LedCurve, list[int]]]:
-    """Each contour with the paths that follow it: several where the arm stops at corners."""
+def _group_paths(task: PathSequence, tool: Tool) -> Sequence[tuple[Contour | PlannedToolCurve, list[int]]]:
+    """Return each contour with the paths that follow it, several where the arm stops at corners."""
     toolpath = as_toolpath(task)
     if toolpath is None:
-        return [(LedCurve(path, tool), [i]) for i, path in enumerate(task.paths)]
+        return [(PlannedToolCurve(path, tool), [i]) for i, path in enumerate(task.paths)]
     every = list(enumerate(toolpath.contours))
     return [
         (toolpath.contours[paths[0]], paths)

@@ -1,4 +1,4 @@
-"""How much of a path was passed at all: what an arm that stays where it is on the path must not hide."""
+"""The coverage of a path: the share of its length that the arm or its tool passed."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from pathcontrol.errors import TaskError
 from pathcontrol.geometry.closest_point.cells import FARTHEST
 from pathcontrol.tasks.task import PathTask
 
-_POINTS = 1000  # of a path, at least
-_MOST = 200_000  # points that a trace is refined to
-_FINER = 0.5  # of the tolerance, between the points of a trace
+_POINTS = 1000  # points of a path, at least
+_MOST = 200_000  # limit of points of a refined trace
+_FINER = 0.5  # distance between points of a trace, as a share of the tolerance
 
 
 class Points(NamedTuple):
-    """Points (k, m) that stand for a curve, and how much of its length each stands for, (k,)."""
+    """Points (k, m) on a curve, and the length of the curve that each represents, (k,)."""
 
     at: Array
     length: Array
 
 
-class Passed(NamedTuple):
-    """How a trace covers a curve: the share of its length within a tolerance, and how far its farthest point is."""
+class Coverage(NamedTuple):
+    """The coverage of a curve by a trace: the share of its length within a tolerance, and its farthest distance."""
 
     share: float
     farthest: float
 
 
 def path_points(task: PathTask) -> Points:
-    """Points of one traverse of a path in joint space, its knots among them.
+    """Return points of one traverse of a path in joint space, its knots among them.
 
     Raises:
         TaskError: the path goes on for ever without repeating.
@@ -40,7 +40,7 @@ def path_points(task: PathTask) -> Points:
 
 
 def traverse(task: PathTask) -> Array:
-    """Increasing parameters (k,) of one traverse of a path, a thousand and its knots.
+    """Return increasing parameters (k,) of one traverse of a path: a thousand, and its knots.
 
     Raises:
         TaskError: the path goes on for ever without repeating.
@@ -53,7 +53,7 @@ def traverse(task: PathTask) -> Array:
 
 
 def even_points(at: Array) -> Points:
-    """The points (k, m) of a curve in their order, each with half of the chords to its neighbours.
+    """Return the points (k, m) of a curve in order, each with half of the chords to its neighbours.
 
     Raises:
         TaskError: one of them is not finite, or too far away for its square to be.
@@ -64,32 +64,32 @@ def even_points(at: Array) -> Points:
     return Points(at, 0.5 * (np.append(chord, 0.0) + np.append(0.0, chord)))
 
 
-def passed(points: Points, trace: Array, tolerance: float) -> Passed:
-    """How a ``trace`` (t, m), straight between its samples, covers a curve."""
+def measure_coverage(points: Points, trace: Array, tolerance: float) -> Coverage:
+    """Return the coverage of a curve by a ``trace`` (t, m), straight between its samples."""
     distance = distance_to_trace(points.at, trace, tolerance)
     total = points.length.sum()
     share = points.length[distance <= tolerance].sum() / total if total else float((distance <= tolerance).all())
-    return Passed(float(share), float(distance.max()))
+    return Coverage(float(share), float(distance.max()))
 
 
 def distance_to_trace(x: Array, trace: Array, resolution: float) -> Array:
-    """Distance of points (k, m) from a trace (t, m), straight between its samples, (k,).
+    """Return the distance of points (k, m) from a trace (t, m), straight between its samples, (k,).
 
     The trace is refined until its points are half of the ``resolution`` apart; then the straight lines on either side
     of the nearest point count.
     """
-    fine = refined(trace[(np.abs(trace) < FARTHEST).all(-1)], _FINER * resolution)
+    fine = refine(trace[(np.abs(trace) < FARTHEST).all(-1)], _FINER * resolution)
     if not len(fine):
         return np.full(len(x), np.inf)
     from scipy.spatial import cKDTree  # takes a fifth of a second to load
 
     nearest = cKDTree(fine, balanced_tree=False).query(x)[1]
     sides = [(np.maximum(nearest - 1, 0), nearest), (nearest, np.minimum(nearest + 1, len(fine) - 1))]
-    return np.min([_to_line(x, fine[a], fine[b]) for a, b in sides], axis=0)
+    return np.min([_line_distance(x, fine[a], fine[b]) for a, b in sides], axis=0)
 
 
-def refined(trace: Array, step: float) -> Array:
-    """The points of a trace (t, m) and more between them on straight lines, no farther apart than ``step``."""
+def refine(trace: Array, step: float) -> Array:
+    """Add points on the straight lines of a trace (t, m), so that points are at most ``step`` apart."""
     chord = np.linalg.norm(np.diff(trace, axis=0), axis=-1)
     if not len(chord):
         return trace
@@ -99,8 +99,8 @@ def refined(trace: Array, step: float) -> Array:
     return np.stack([np.interp(wanted, place, column) for column in trace.T], axis=-1)
 
 
-def _to_line(x: Array, start: Array, end: Array) -> Array:
-    """Distance from points (k, m) to straight lines between two points (k, m) each."""
+def _line_distance(x: Array, start: Array, end: Array) -> Array:
+    """Return the distance from points (k, m) to straight lines between two points (k, m) each."""
     line = end - start
     square = np.maximum((line * line).sum(-1), np.finfo(float).tiny)
     share = np.clip(((x - start) * line).sum(-1) / square, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Distance of a state to the curve Γ of a task, eqs. (4) and (5)."""
+"""The distance of a state to the curve Γ of a task, eqs. (4) and (5)."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ from pathcontrol.tasks.task import PathTask
 def distance_to_gamma(
     task: PathTask, q: ArrayLike, qd: ArrayLike, weight: float = 1.0, return_s: bool = False, *, braking: bool = False
 ) -> Array | tuple[Array, Array]:
-    """dist([q; q̇], Γ) = min over s of √(‖q_d(s) − q‖² + w²‖q_d'(s)ϑ(s) − q̇‖²), a global minimum.
+    """Return the distance of the state [q; q̇] to Γ, a global minimum, eq. (5).
 
-    Γ is a curve in state space, so this is the closest-point problem of the path on [q_d; w q_d'ϑ]. It has a corner
+    It is min over s of √(‖q_d(s) − q‖² + w²‖q_d'(s)ϑ(s) − q̇‖²). Γ is a curve in state space, so this is the
+    closest-point problem of the path on [q_d; w q_d'ϑ]. It has a corner
     wherever ϑ' jumps, as at the knots of a table; the search begins by cutting it there.
 
     Args:
@@ -37,7 +38,7 @@ def distance_to_gamma(
             :class:`~pathcontrol.control.ending.Ending`; an arm that does exactly what the plan asks for is then at
             distance 0 to the last. Closed paths have nothing to brake for.
 
-    A :class:`TaskBatch` takes q and q̇ of shape (*batch, N, n). Of a :class:`PathSequence` the nearest of its paths
+    A :class:`TaskBatch` takes q and q̇ of shape (*batch, N, n). For a :class:`PathSequence` the nearest of its paths
     counts.
 
     Returns:
@@ -52,32 +53,34 @@ def distance_to_gamma(
     if q.shape != qd.shape:
         raise InputError(f"q has shape {q.shape} and qd {qd.shape}, expected the same")
     if isinstance(task, TaskBatch):
-        each = [_nearest(one, q[..., i, :], qd[..., i, :], w, braking) for i, one in enumerate(task)]
+        each = [_find_nearest(one, q[..., i, :], qd[..., i, :], w, braking) for i, one in enumerate(task)]
         distance, s = (np.stack(parts, axis=-1) for parts in zip(*each, strict=True))
     else:
-        distance, s = _nearest(task, q, qd, w, braking)
+        distance, s = _find_nearest(task, q, qd, w, braking)
     return (distance, s) if return_s else distance
 
 
-def _nearest(task: PathTask, q: Array, qd: Array, weight: float, braking: bool) -> tuple[Array, Array]:
-    """Distance and parameter, (*batch,) each, for one task."""
+def _find_nearest(task: PathTask, q: Array, qd: Array, weight: float, braking: bool) -> tuple[Array, Array]:
+    """Return distance and parameter, (*batch,) each, for one task."""
     if isinstance(task, PathSequence):
-        return _nearest_of(task, q, qd, weight, braking)
+        return _find_nearest_path(task, q, qd, weight, braking)
     try:
         if q.ndim > 1:
             return distances_to_gamma(task, q, qd, weight, braking)
     except EngineError:
         pass  # the search below is for any task, and needs no compiled library
     ending = Ending.of(task) if braking else None
-    state, gamma = np.concatenate([q, weight * qd], axis=-1), _curve(_planned(task, ending), weight)
+    state, gamma = np.concatenate([q, weight * qd], axis=-1), _curve(_plan_task(task, ending), weight)
     lower, upper = task.one_traverse
     s = ClosestPoint(gamma, lower, upper, task.closed, task.knots, _kinks(task, ending))(state)
     return np.linalg.norm(gamma.p(s) - state, axis=-1), s
 
 
-def _nearest_of(sequence: PathSequence, q: Array, qd: Array, weight: float, braking: bool) -> tuple[Array, Array]:
-    """The nearest of the paths of a sequence: Γ jumps from one to the next."""
-    each = [_nearest(path, q, qd, weight, braking) for path in sequence]
+def _find_nearest_path(
+    sequence: PathSequence, q: Array, qd: Array, weight: float, braking: bool
+) -> tuple[Array, Array]:
+    """Return distance and parameter for the nearest path of a sequence; Γ jumps from one to the next."""
+    each = [_find_nearest(path, q, qd, weight, braking) for path in sequence]
     shifts = [start - path.s0 for start, path in zip(sequence.starts, sequence, strict=False)]
     distances = np.stack([distance for distance, _ in each])
     parameters = np.stack([s + shift for (_, s), shift in zip(each, shifts, strict=True)])
@@ -86,21 +89,22 @@ def _nearest_of(sequence: PathSequence, q: Array, qd: Array, weight: float, brak
 
 
 def planned_rate(task: PathTask, s: Array) -> Array:
-    """The rate ϑ(s) [1/s], (*batch,), at which controllers take a path: at the end of an open one, with its braking."""
+    """Return the rate ϑ(s) [1/s], (*batch,), of the controllers' plan, with braking at the end of an open path."""
     ending = Ending.of(task)
     if ending is None:
         return np.broadcast_to(task.theta(s), np.shape(s))  # it may be a plain number
-    return _planned(task, ending)(s).theta
+    return _plan_task(task, ending)(s).theta
 
 
-def _planned(task: PathTask, ending: Ending | None) -> Callable[[Array], PathPoint]:
-    """The task at s, with the ending of the controllers' plan where there is one."""
+def _plan_task(task: PathTask, ending: Ending | None) -> Callable[[Array], PathPoint]:
+    """Return the task as a function of s, with the ending of the controllers' plan where there is one."""
     if ending is None:
         return task.at
     return lambda s: ending.braked(task.at(np.clip(s, task.s0, task.s_end)), s)
 
 
 def _kinks(task: PathTask, ending: Ending | None) -> Array | None:
+    """Return the parameters at which ϑ' jumps."""
     if ending is None:
         return task.profile_knots
     begin = np.array([ending.s_end - ending.braking])
@@ -108,7 +112,7 @@ def _kinks(task: PathTask, ending: Ending | None) -> Array | None:
 
 
 def _curve(at: Callable[[Array], PathPoint], weight: float) -> Curve:
-    """Γ as a curve s ↦ [q_d(s); w r(s)] in R²ⁿ, r = q_d'ϑ, with its derivative."""
+    """Return Γ as a curve s ↦ [q_d(s); w r(s)] in R²ⁿ, r = q_d'ϑ, with its derivative."""
 
     def p(s: Array) -> Array:
         point = at(s)

@@ -16,12 +16,12 @@ from pathcontrol.simulation.run import Run
 
 #: the metrics that are above 1 where a limit is passed
 RATIOS = {"position_limit_ratio": "position", "velocity_limit_ratio": "velocity", "torque_limit_ratio": "torque"}
-_NO_LIMIT = 1e6  # rad, m, rad/s or m/s: files that know no limit say some huge number
+_NO_LIMIT = 1e6  # rad, m, rad/s or m/s: files without a limit give some huge number
 _ROUNDING = 1e-9
 
 
 class Worst(NamedTuple):
-    """Where a share of a limit is largest in a rollout: which joint, when [s], and the share."""
+    """The largest share of a limit in a rollout: the joint, the time [s], and the share."""
 
     joint: str
     time: float
@@ -29,17 +29,17 @@ class Worst(NamedTuple):
 
 
 def limit_ratios(run: Run, own: Samples) -> dict[str, Array]:
-    """The largest share of each kind of limit that any joint had at any time, (rollout,); left out without a limit.
+    """Return the largest share of each kind of limit over joints and time, (rollout,); left out without a limit.
 
     The share of a position is 0 in the middle between its limits and 1 at either of them.
     """
-    found = {name: own.reduced(_largest, shares) for name, shares in limit_shares(run).items()}
+    found = {name: own.reduce(_largest, shares) for name, shares in limit_shares(run).items()}
     return {name: value for name, value in found.items() if not np.isnan(value).all()}
 
 
 def limit_shares(run: Run) -> dict[str, Array]:
-    """|q − middle| over half of the range, |q̇| and |τ| over their limits, (rollout, time, joint); NaN without one."""
-    robots, n, shares = robots_of(run), len(run.array("joint")), {}
+    """Return the shares of all limits, (rollout, time, joint), by metric; NaN where a joint has no limit."""
+    robots, n, shares = list_robots(run), len(run.array("joint")), {}
     with np.errstate(invalid="ignore"):
         if "q" in run:
             middle, half = np.array([_range(robot, n) for robot in robots]).swapaxes(0, 1)[:, :, None]
@@ -48,14 +48,14 @@ def limit_shares(run: Run) -> dict[str, Array]:
             most = np.array([_velocity(robot, n) for robot in robots])
             shares["velocity_limit_ratio"] = np.abs(run.array("qd")) / most[:, None]
         if "tau" in run:
-            limits = limits_of_each(run)
+            limits = stack_torque_limits(run)
             limits = np.where(np.isfinite(limits), limits, np.nan)
             shares["torque_limit_ratio"] = np.abs(run.array("tau")) / limits[:, None]
     return shares
 
 
-def worst_shares(run: Run, own: Samples, rollout: int = 0) -> dict[str, Worst]:
-    """Where each kind of share is largest in a rollout, by its metric; left out without a limit."""
+def find_worst_shares(run: Run, own: Samples, rollout: int = 0) -> dict[str, Worst]:
+    """Return the largest share of each kind of limit in a rollout, by its metric; left out without a limit."""
     joints, found = run.joints, {}
     for name, shares in limit_shares(run).items():
         mine = shares[rollout, own.first[rollout] : own.stop[rollout]]
@@ -68,27 +68,27 @@ def worst_shares(run: Run, own: Samples, rollout: int = 0) -> dict[str, Worst]:
 
 
 def is_passed(share: Array | float) -> Array:
-    """Whether a share of a limit is above 1, not by rounding alone."""
+    """Return whether a share of a limit is above 1, by more than rounding."""
     return np.asarray(share) > 1 + _ROUNDING
 
 
-def robots_of(run: Run) -> Sequence[RobotModel | None]:
-    """The arm of each rollout, ``None`` where the run does not know it."""
+def list_robots(run: Run) -> Sequence[RobotModel | None]:
+    """Return the arm of each rollout, ``None`` where the run does not know it."""
     try:
         return run.robots
     except InputError:
         return [None] * run.rollouts
 
 
-def limits_of_each(run: Run) -> Array:
-    """Torque limits [N m], (rollout, n); inf without one, or where the run does not know its robot."""
-    robots = robots_of(run)
+def stack_torque_limits(run: Run) -> Array:
+    """Return torque limits [N m], (rollout, n); inf without one, or where the run does not know its robot."""
+    robots = list_robots(run)
     each = {id(robot): torque_limits(run, robot) for robot in robots}
     return np.array([each[id(robot)] for robot in robots])
 
 
 def _range(robot: RobotModel | None, n: int) -> tuple[Array, Array]:
-    """The middle between the limits of each joint and half of its range, (n,) each; NaN without both limits."""
+    """Return the middle between the limits of each joint and half of its range, (n,) each; NaN without both."""
     if robot is None or robot.n != n:
         return np.full(n, np.nan), np.full(n, np.nan)
     lower, upper = robot.limits.lower, robot.limits.upper
@@ -97,7 +97,7 @@ def _range(robot: RobotModel | None, n: int) -> tuple[Array, Array]:
 
 
 def _velocity(robot: RobotModel | None, n: int) -> Array:
-    """Velocity limits, (n,); NaN without one."""
+    """Return the velocity limits, (n,); NaN without one."""
     if robot is None or robot.n != n:
         return np.full(n, np.nan)
     most = np.abs(robot.limits.velocity)
@@ -105,5 +105,6 @@ def _velocity(robot: RobotModel | None, n: int) -> Array:
 
 
 def _largest(shares: Array) -> float:
+    """Return the largest finite share."""
     known = shares[np.isfinite(shares)]
     return float(known.max()) if known.size else np.nan

@@ -1,4 +1,4 @@
-"""What the metrics are called, and their units."""
+"""The labels of the metrics, and their units."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ UNITS = {
     "velocity_limit_ratio": "",
     "torque_limit_ratio": "",
 }
-#: what each metric is called where a person reads, in the order in which they are shown
+#: the label of each metric for a reader, in the order in which they are shown
 LABELS = {
     "tool_deviation_peak": "tool from its path, peak",
     "tool_deviation_rms": "tool from its path, RMS",

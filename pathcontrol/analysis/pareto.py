@@ -1,4 +1,4 @@
-"""Which of many choices no other one beats: the non-dominated set."""
+"""The non-dominated set of many choices."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 from pathcontrol._arrays import Array, as_array
 from pathcontrol.errors import InputError
 
-_BLOCK = 256  # points that are compared with all others at once
+_BLOCK = 256  # points compared with all others at once
 
 
 def non_dominated(values: ArrayLike) -> NDArray[np.bool_]:
-    """Which rows of ``values`` (N, d), of d quantities that are the better the smaller, no other row dominates, (N,).
+    """Return which rows of ``values`` (N, d), d quantities that are to be small, no other row dominates, (N,).
 
     A row dominates another that it is nowhere larger than, and somewhere smaller. So of equal rows all are dominated
     or none is. Rows with a value that is not finite neither dominate nor are they in the set. With d = 2 it takes a
@@ -27,21 +27,21 @@ def non_dominated(values: ArrayLike) -> NDArray[np.bool_]:
     found = np.zeros(len(table), dtype=bool)
     known = np.flatnonzero(np.isfinite(table).all(1))
     points, which = np.unique(table[known], axis=0, return_inverse=True)  # in lexicographic order
-    best = _of_two(points) if points.shape[1] <= 2 else _of_many(points)
+    best = _sweep_front(points) if points.shape[1] <= 2 else _filter_blocks(points)
     found[known] = best[which.reshape(-1)]
     return found
 
 
-def _of_two(points: Array) -> NDArray[np.bool_]:
-    """Of different points in lexicographic order: those below all before them."""
+def _sweep_front(points: Array) -> NDArray[np.bool_]:
+    """Return the non-dominated ones of different points in lexicographic order, at most two columns."""
     last = points[:, -1]
     before = np.minimum.accumulate(last)[:-1]
     first = np.ones(min(1, len(points)), dtype=bool)
     return np.concatenate([first, last[1:] < before if points.shape[1] == 2 else np.zeros(len(before), dtype=bool)])
 
 
-def _of_many(points: Array) -> NDArray[np.bool_]:
-    """Of different points: block by block, the most promising first, so that few are left to be compared."""
+def _filter_blocks(points: Array) -> NDArray[np.bool_]:
+    """Return the non-dominated ones of different points, block by block, the most promising first."""
     found = np.zeros(len(points), dtype=bool)
     spread = np.ptp(points, axis=0) if len(points) else np.ones(points.shape[1])
     left = np.argsort((points / np.where(spread > 0, spread, 1.0)).sum(1), kind="stable")
@@ -52,12 +52,12 @@ def _of_many(points: Array) -> NDArray[np.bool_]:
         best = ~np.any(within, axis=1)
         found[left[:_BLOCK][best]] = True  # what could dominate one of them comes before it
         left = left[_BLOCK:]
-        left = left[~_above(points[left], block[best])]
+        left = left[~_find_dominated(points[left], block[best])]
     return found
 
 
-def _above(points: Array, others: Array) -> NDArray[np.bool_]:
-    """Which ``points`` are nowhere below one of the ``others``, all different from them."""
+def _find_dominated(points: Array, others: Array) -> NDArray[np.bool_]:
+    """Return which ``points`` are nowhere below one of the ``others``, all different from them."""
     columns = np.ascontiguousarray(points.T)
     above = np.zeros(len(points), dtype=bool)
     for other in others:

@@ -1,4 +1,4 @@
-"""Metrics as a person reads them: degrees for radians, millimetres or micrometres for metres."""
+"""Metrics in units for a reader: degrees for radians, millimetres or micrometres for metres."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from pathcontrol._arrays import Array
 from pathcontrol.analysis.run_metrics import UNITS
 from pathcontrol.simulation.run import Run
 
-_NOTHING = 1e-7  # of the largest of several numbers
-_ROUNDING = 1e-9  # rad, m, N m, …: what an arm of these sizes has by the digits of floats alone
+_NOTHING = 1e-7  # share of the largest of several numbers that counts as 0
+_ROUNDING = 1e-9  # rad, m, N m, …: rounding of floats for an arm of usual size
 _VARIABLES = {"rad": "q", "rad/s": "qd", "N m": "tau_demand"}
 
 
 def reading(unit: str, values: Array) -> tuple[float, str]:
-    """The factor to, and the name of, the unit in which a person reads values of a unit."""
+    """Return the factor to the unit in which a person reads values of a unit, and its name."""
     if unit in ("rad", "rad/s"):
         return 180 / np.pi, unit.replace("rad", "deg")
     if unit == "m/s":
@@ -33,14 +33,14 @@ def without_rounding(values: Array) -> Array:
 
 
 def in_degrees(values: Array, unit: str) -> tuple[Array, str]:
-    """Values over time, and their unit: degrees for angles; unchanged where joints slide, too."""
+    """Return values over time, and their unit, in degrees if they are angles; unchanged where joints slide, too."""
     if unit.split("/")[0] != "rad" or " or " in unit:
         return values, unit
     return np.rad2deg(values), unit.replace("rad", "deg")
 
 
 def readable_number(value: float, unit: str) -> str:
-    """A number with its unit, as a person reads it."""
+    """Return a number with its unit as a text."""
     if np.isnan(value):
         return "–"
     if np.isinf(value):
@@ -51,9 +51,9 @@ def readable_number(value: float, unit: str) -> str:
 
 
 def unit_of(metric: str, run: Run) -> str:
-    """The unit of a metric; that of the run where joints slide."""
+    """Return the unit of a metric, as it is for the joints of the run."""
     unit = UNITS[metric]
-    if metric == "orientation_error_peak":  # an angle whatever the joints do
+    if metric == "orientation_error_peak":  # an angle for joints of any kind
         return unit
     if unit == "N m/rad":
         return " or ".join(map("/".join, zip(*(_units(part, run) for part in ("N m", "rad")), strict=True)))
@@ -61,31 +61,32 @@ def unit_of(metric: str, run: Run) -> str:
 
 
 def _units(unit: str, run: Run) -> list[str]:
-    """What stands for a unit where joints turn, slide, or both."""
+    """Return the units where joints turn, slide, or both."""
     return run.unit(_VARIABLES[unit]).split(" or ") if _VARIABLES.get(unit, "") in run else [unit]
 
 
 def readable_parameters(parameters: Mapping[str, Any], digits: int = 4) -> str:
-    """Parameters in as many digits, by name; of dotted keys by the last part, where that tells them apart."""
+    """Return parameters by name with ``digits`` digits; dotted keys by the last part if that is unique."""
     last = [name.rpartition(".")[2] for name in parameters]
     names = last if len(set(last)) == len(last) else list(parameters)
     return ", ".join(
-        f"{name} = {_value(value, digits)}" for name, value in zip(names, parameters.values(), strict=True)
+        f"{name} = {_format_value(value, digits)}" for name, value in zip(names, parameters.values(), strict=True)
     )
 
 
 def counted(number: int, word: str) -> str:
-    """A number of things: ``"1 path"``, ``"2 paths"``."""
+    """Return a number of things in words: ``"1 path"``, ``"2 paths"``."""
     return f"{number} {word}{'' if number == 1 else 's'}"
 
 
-def _value(value: Any, digits: int) -> str:
+def _format_value(value: Any, digits: int) -> str:
+    """Return a value as a text."""
     if np.ndim(value):
-        # what is next to nothing beside the others is 0 but for rounding
+        # a value that is tiny beside the others is 0 up to rounding
         numbers = np.asarray(value)
         if numbers.dtype.kind == "f":
             numbers = np.where(np.abs(numbers) < _NOTHING * np.abs(numbers).max(initial=0.0), 0.0, numbers)
-        return f"[{', '.join(_value(one, digits) for one in numbers)}]"
+        return f"[{', '.join(_format_value(one, digits) for one in numbers)}]"
     if np.asarray(value).dtype.kind != "f":
         return str(value)
     return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"

@@ -1,4 +1,4 @@
-"""Numbers that sum up a run: errors in steady state, along and across the path, and when they settled."""
+"""Metrics of a run: errors in steady state, along and across the path, and settling times."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 
 from pathcontrol._arrays import Array, scalar
 from pathcontrol._expect import expect
-from pathcontrol.analysis.coverage import passed, path_points
+from pathcontrol.analysis.coverage import measure_coverage, path_points
 from pathcontrol.analysis.gamma import distance_to_gamma, planned_rate
-from pathcontrol.analysis.known import by_task, known_task, of_rollouts, where_known
 from pathcontrol.analysis.laps import lap_time
 from pathcontrol.analysis.limit_shares import RATIOS, limit_ratios
+from pathcontrol.analysis.metric_helpers import apply_by_task, apply_where_finite, resolve_task, split_by_task
 from pathcontrol.analysis.names import LABELS, UNITS
 from pathcontrol.analysis.progress import progress
 from pathcontrol.analysis.tool_metrics import NAMES as TOOL_METRICS
@@ -33,7 +33,7 @@ _OF_ERRORS = [f"{name}_{kind}" for name in _ERRORS for kind in ("peak", "rms")]
 
 
 def steady_state(run: Run, fraction: float = 0.5) -> Run:
-    """The last ``fraction`` of the time until the last rollout is finished; the paper's peaks are of the second half.
+    """Return the last ``fraction`` of the time until the last rollout finished; the paper takes the second half.
 
     Rollouts that are finished at different times have no such time in common: :func:`metrics` takes each one's own.
     """
@@ -46,58 +46,60 @@ def steady_state(run: Run, fraction: float = 0.5) -> Run:
 
 
 def peak(values: Array) -> Array:
-    """The largest value over time, (rollout,) of (rollout, time)."""
+    """Return the largest value over time, (rollout,) from (rollout, time)."""
     return values.max(-1)
 
 
 def rms(values: Array) -> Array:
-    """The root mean square over time, (rollout,) of (rollout, time)."""
+    """Return the root mean square over time, (rollout,) from (rollout, time)."""
     return np.sqrt(np.ascontiguousarray(values**2).mean(-1))
 
 
 def contour_error(run: Run, task: PathTask | None = None) -> Array:
-    """‖q_d(σ̄(q)) − q‖ [rad], (rollout, time): distance from the path itself, whatever s the controller was at.
+    """Return ‖q_d(σ̄(q)) − q‖ [rad], (rollout, time): the distance from the path, independent of s.
 
     The path is ``run.task`` unless another is given.
     """
-    return of_rollouts(_contour_error, run, task)
+    return apply_by_task(_contour_error, run, task)
 
 
 def _contour_error(run: Run, task: PathTask) -> Array:
+    """Return the contour error for one task."""
     return _distance(task, run.array("q"))
 
 
 def _distance(task: PathTask, q: Array) -> Array:
-    """Distance from the path, (rollout, time), of joint positions (rollout, time, n)."""
-    return where_known(lambda q: np.linalg.norm(task.q_d(task.sigma_bar(q)) - q, axis=-1), q)
+    """Return the distance from the path, (rollout, time), of joint positions (rollout, time, n)."""
+    return apply_where_finite(lambda q: np.linalg.norm(task.q_d(task.sigma_bar(q)) - q, axis=-1), q)
 
 
 def lag_error(run: Run, task: PathTask | None = None) -> Array:
-    """Component of q_d(s) − q along the path [rad], (rollout, time): positive where the arm is behind s.
+    """Return the component of q_d(s) − q along the path [rad], (rollout, time): > 0 where the arm is behind s.
 
     The path is ``run.task`` unless another is given.
     """
-    return of_rollouts(_lag_error, run, task)
+    return apply_by_task(_lag_error, run, task)
 
 
 def _lag_error(run: Run, task: PathTask) -> Array:
+    """Return the lag error for one task."""
     return _lag(task, run.array("s"), run.array("q"))
 
 
 def _lag(task: PathTask, s: Array, q: Array) -> Array:
-    """Lag, (rollout, time), at path parameters (rollout, time) and joint positions (rollout, time, n)."""
+    """Return the lag, (rollout, time), at path parameters (rollout, time) and joint positions (rollout, time, n)."""
 
     def lag(s: Array, q: Array) -> Array:
         tangent = task.dq_d(s)
         return ((task.q_d(s) - q) * tangent).sum(-1) / np.linalg.norm(tangent, axis=-1)
 
-    return where_known(lag, s, q)
+    return apply_where_finite(lag, s, q)
 
 
 def settling_time(values: Array, time: Array, band: float) -> Array:
-    """The time [s] from which ``values`` (rollout, time) stay within ``band``, (rollout,).
+    """Return the time [s] from which ``values`` (rollout, time) stay within ``band``, (rollout,).
 
-    It is inf where they never do, and NaN where some are no numbers.
+    It is inf where they never do, and NaN where some are NaN.
     """
     outside = np.abs(values) > scalar("band", band, positive=True)
     last = values.shape[-1] - 1 - np.argmax(outside[:, ::-1], axis=-1)
@@ -106,17 +108,18 @@ def settling_time(values: Array, time: Array, band: float) -> Array:
 
 
 def end_error(run: Run, task: PathTask | None = None) -> Array:
-    """‖q_d(s_end) − q‖ [rad] when the rollout was finished, (rollout,); NaN where it was not.
+    """Return ‖q_d(s_end) − q‖ [rad] when the rollout finished, (rollout,); NaN where it did not.
 
     The path is ``run.task`` unless another is given.
 
     Raises:
         TaskError: the path has no end.
     """
-    return of_rollouts(_end_error, run, task)
+    return apply_by_task(_end_error, run, task)
 
 
 def _end_error(run: Run, task: PathTask) -> Array:
+    """Return the end error for one task."""
     if not np.isfinite(task.s_end):
         raise TaskError(f"{type(task).__name__} has no end that an arm could be away from")
     finished = run.status == "finished"
@@ -134,7 +137,7 @@ def metrics(
     *,
     window: Window | None = None,
 ) -> dict[str, Any]:
-    """The usual numbers of a run on its task, or on another, each a list with one entry for each rollout.
+    """Return the usual metrics of a run on its task, or on another, each a list with one entry for each rollout.
 
     The time of a rollout is its own: it ends when that rollout is finished, whatever others do, and so the numbers of
     a rollout are the same alone and beside any others. Of that time the last ``fraction`` counts, unless a ``window``
@@ -170,10 +173,10 @@ def metrics(
     Rollouts with a task each have the numbers of their own.
 
     Args:
-        run: what happened.
+        run: the run.
         task: the path; by default the run's own.
         fraction: how much of its time counts for errors, if no ``window`` is given.
-        band: of the settling time and of coverage [rad].
+        band: band of the settling time and of coverage [rad].
         only: the metrics wanted.
         window: from when to when the errors are, ``(t0, t1)`` in seconds, or ``"second half"`` or ``"all"`` of each
             rollout's time. A rollout that was finished before has NaN there.
@@ -185,7 +188,7 @@ def metrics(
     """
     band = scalar("band", band, positive=True)
     values: dict[str, Array] = {}
-    for part, own, rows in by_task(run, known_task(run, task)):
+    for part, own, rows in split_by_task(run, resolve_task(run, task)):
         counted = samples_of(part, window, fraction)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers from a file, which may be huge
             found = _metrics(part, own, counted, band, only)
@@ -195,19 +198,19 @@ def metrics(
 
 
 def _metrics(run: Run, task: PathTask, counted: Samples, band: float, only: Collection[str]) -> dict[str, Array]:
-    """The metrics of rollouts with one task, (rollout,) each."""
+    """Return the metrics of rollouts with one task, (rollout,) each."""
     own, wanted = samples_of(run, "all"), set(only)
     values: dict[str, Array] = {}
     makers: list[tuple[Collection[str], Callable[[], Mapping[str, Array]]]] = [
-        (_OF_ERRORS, lambda: _of_errors(run, task, counted, wanted)),
+        (_OF_ERRORS, lambda: _measure_errors(run, task, counted, wanted)),
         (("speed_ratio",), lambda: {"speed_ratio": _speed_ratio(run, task, counted)}),
         (("settling_time",), lambda: {"settling_time": _settling_times(run, own, band)}),
         (TORQUE_METRICS, lambda: torque_metrics(run, own, counted)),
         (RATIOS, lambda: limit_ratios(run, own)),
         (TOOL_METRICS, lambda: tool_metrics(run, task, counted, only)),
         (("progress",), lambda: {"progress": progress(run, task)}),
-        (("coverage", "path_deviation_peak"), lambda: _of_coverage(run, task, own, band)),
-        (("path_time", "end_error"), lambda: _of_end(run, task)),
+        (("coverage", "path_deviation_peak"), lambda: _cover_path(run, task, own, band)),
+        (("path_time", "end_error"), lambda: _measure_end(run, task)),
         (("lap_time",), lambda: {"lap_time": lap_time(run, task)} if task.closed else {}),
     ]
     for names, make in makers:
@@ -217,8 +220,8 @@ def _metrics(run: Run, task: PathTask, counted: Samples, band: float, only: Coll
     return {name: np.where(sound, value, np.nan) for name, value in values.items() if name in wanted}
 
 
-def _of_errors(run: Run, task: PathTask, counted: Samples, wanted: Collection[str]) -> dict[str, Array]:
-    """Peaks and RMS of errors over the samples that count, (rollout,) each."""
+def _measure_errors(run: Run, task: PathTask, counted: Samples, wanted: Collection[str]) -> dict[str, Array]:
+    """Return peaks and RMS of errors over the samples that count, (rollout,) each."""
     late, values = counted.of_span(), dict[str, Array]()
 
     def of(*names: str) -> list[Array]:
@@ -236,42 +239,43 @@ def _of_errors(run: Run, task: PathTask, counted: Samples, wanted: Collection[st
         if not set(wanted).isdisjoint(of_it):
             with suppress(TaskError):  # no nearest point on an endless path
                 found = signal()
-                values |= {key: late.reduced(reduce, found) for key, reduce in of_it.items() if key in wanted}
+                values |= {key: late.reduce(reduce, found) for key, reduce in of_it.items() if key in wanted}
     return values
 
 
 def _gamma_distance(task: PathTask, q: Array, qd: Array) -> Array:
-    """Distance to Γ with the braking that controllers plan, (rollout, time)."""
+    """Return the distance to Γ with the braking that controllers plan, (rollout, time)."""
     return np.asarray(distance_to_gamma(task, q, qd, braking=True))
 
 
 def _speed_ratio(run: Run, task: PathTask, counted: Samples) -> Array:
-    """The mean rate of s over the mean of what the plan asks for, (rollout,)."""
-    theta = where_known(lambda s: planned_rate(task, s), counted.within(run.array("s")))
-    return counted.reduced(np.mean, run.array("sdot")) / counted.reduced(np.mean, theta)
+    """Return the mean rate of s over the mean of the planned rate, (rollout,)."""
+    theta = apply_where_finite(lambda s: planned_rate(task, s), counted.within(run.array("s")))
+    return counted.reduce(np.mean, run.array("sdot")) / counted.reduce(np.mean, theta)
 
 
 def _settling_times(run: Run, own: Samples, band: float) -> Array:
-    """When ‖e_p‖ of each rollout settled [s], (rollout,)."""
+    """Return the settling time of ‖e_p‖ of each rollout [s], (rollout,)."""
     e_p = run.norm("e_p")
     time = np.broadcast_to(run.time, e_p.shape)
-    return own.reduced(lambda e, t: settling_time(e[None], t, band)[0], e_p, time)
+    return own.reduce(lambda e, t: settling_time(e[None], t, band)[0], e_p, time)
 
 
-def _of_end(run: Run, task: PathTask) -> dict[str, Array]:
-    """When an open path was finished and how far from its end, (rollout,) each."""
+def _measure_end(run: Run, task: PathTask) -> dict[str, Array]:
+    """Return when an open path was finished and how far from its end, (rollout,) each."""
     return {"path_time": run.finish_time, "end_error": _end_error(run, task)} if np.isfinite(task.s_end) else {}
 
 
-def _of_coverage(run: Run, task: PathTask, own: Samples, band: float) -> dict[str, Array]:
-    """How much of the path was passed, and how far the rest of it is, (rollout,) each."""
+def _cover_path(run: Run, task: PathTask, own: Samples, band: float) -> dict[str, Array]:
+    """Return the covered share of the path, and the distance of its farthest point, (rollout,) each."""
     try:
         points = path_points(task)
     except TaskError:  # nor does an endless path have a share
         return {}
-    share, farthest = own.reduced(lambda q: np.array(passed(points, q, band)), run.array("q")).T
+    share, farthest = own.reduce(lambda q: np.array(measure_coverage(points, q, band)), run.array("q")).T
     return {"coverage": share, "path_deviation_peak": farthest}
 
 
 def _rms(values: Array) -> float:
+    """Return the root mean square of all values."""
     return float(np.sqrt(np.mean(values**2)))

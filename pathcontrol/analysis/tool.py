@@ -1,4 +1,4 @@
-"""What the tool of a run did beside what its path asks of it: how fast, how far from its curve, and how turned."""
+"""The tool of a run compared with its path: speed, position and orientation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.coverage import Points, even_points, traverse
-from pathcontrol.analysis.known import where_known
+from pathcontrol.analysis.metric_helpers import apply_where_finite
 from pathcontrol.cartesian.tool import Tool, ToolKinematics
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
@@ -20,13 +20,13 @@ from pathcontrol.tasks.task import PathTask
 
 
 class ToolSignals(NamedTuple):
-    """What a tool did over time, (rollout, time) each; NaN where it is not known or does not count.
+    """The signals of a tool over time, (rollout, time) each; NaN where unknown or not counted.
 
     Attributes:
         speed: ‖J(q)q̇‖ [m/s].
-        feed: ‖J(q_d)q_d'‖ϑ [m/s], the speed that the path asks for at s.
+        feed: ‖J(q_d)q_d'‖ϑ [m/s], the speed that the path commands at s.
         orientation: angle between the tool and itself at q_d(s) [rad], as far as the path prescribes it.
-        position: where it was [m], (rollout, time, 3).
+        position: position of the tool [m], (rollout, time, 3).
     """
 
     speed: Array
@@ -35,10 +35,11 @@ class ToolSignals(NamedTuple):
     position: Array
 
 
-class LedCurve:
-    """The curve [m] on which a path leads the tool of an arm, as q = q_d(s): of a Cartesian path within its tolerance.
+class PlannedToolCurve:
+    """The curve [m] on which a path leads the tool of an arm, as q = q_d(s).
 
-    It is known by cubics between a thousand points at least. For a circle that is exact to 1e-11 of its radius.
+    For a Cartesian path it is the path within its tolerance. It consists of cubics
+    between at least a thousand points. For a circle that is exact to 1e-11 of its radius.
 
     Raises:
         TaskError: the path goes on for ever without repeating.
@@ -59,49 +60,49 @@ class LedCurve:
 
     @property
     def length(self) -> float:
-        """Its length [m]."""
+        """The length [m]."""
         return float(self.points.length.sum())
 
     def distance(self, x: Array) -> Array:
-        """Distance of points x (N, 3) from it [m], (N,)."""
+        """Return the distance of points x (N, 3) from it [m], (N,)."""
         return np.linalg.norm(self._curve(self._closest(x)) - x, axis=-1)
 
 
-def tool_of(robot: RobotModel, task: PathTask) -> Tool | None:
-    """The tool of an arm that a path was made for; None if the path was made for none, or the arm has no such frame."""
+def find_tool(robot: RobotModel, task: PathTask) -> Tool | None:
+    """Return the tool of an arm that a path was made for; None if there is none, or the arm has no such frame."""
     if task.frame is None or task.frame not in robot.frame_names or task.n != robot.n:
         return None
     return Tool(robot, task.frame, task.tool_pose)
 
 
 def tool_speed(run: Run, robot: RobotModel, task: PathTask) -> Array:
-    """‖J(q)q̇‖ [m/s], (rollout, time): how fast the tool moved that a path was made for."""
-    tool = made_for(robot, task)
+    """Return ‖J(q)q̇‖ [m/s], (rollout, time): the speed of the tool that a path was made for."""
+    tool = require_tool(robot, task)
 
     def speed(q: Array, qd: Array) -> Array:
         return np.linalg.norm(_velocity(tool.kinematics(q), qd), axis=-1)
 
-    return where_known(speed, run.array("q"), run.array("qd"))
+    return apply_where_finite(speed, run.array("q"), run.array("qd"))
 
 
 def feed_along(task: PathTask, robot: RobotModel, s: Array) -> Array:
-    """The speed [m/s], (*batch,), at which the plan leads the tool at s: the feed, or less where it is limited."""
-    there = made_for(robot, task).kinematics(task.q_d(s))
+    """Return the speed [m/s], (*batch,), at which the plan leads the tool at s: the feed, or less where limited."""
+    there = require_tool(robot, task).kinematics(task.q_d(s))
     return np.linalg.norm(_velocity(there, task.dq_d(s)), axis=-1) * task.theta(s)
 
 
 def orientation_error(run: Run, task: PathTask, robot: RobotModel) -> Array:
-    """The angle [rad], (rollout, time), between the tool and itself at q_d(s), see :func:`angle_between`."""
-    tool = made_for(robot, task)
+    """Return the angle [rad], (rollout, time), between the tool and itself at q_d(s), see :func:`angle_between`."""
+    tool = require_tool(robot, task)
 
     def angle(s: Array, q: Array) -> Array:
         return angle_between(tool.kinematics(task.q_d(s)).rotation, tool.kinematics(q).rotation, task.rotations)
 
-    return where_known(angle, run.array("s"), run.array("q"))
+    return apply_where_finite(angle, run.array("s"), run.array("q"))
 
 
 def angle_between(wanted: Array, there: Array, rotations: int = 3) -> Array:
-    """The angle [rad], (*batch,), of R R_dᵀ for rotations R_d and R (*batch, 3, 3); with 2 of their z axes only."""
+    """Return the angle [rad], (*batch,), of R R_dᵀ for rotations R_d and R (*batch, 3, 3); 2: of their z axes."""
     if rotations == 2:
         across = np.linalg.norm(np.cross(wanted[..., 2], there[..., 2]), axis=-1)
         return np.arctan2(across, (wanted[..., 2] * there[..., 2]).sum(-1))
@@ -111,16 +112,16 @@ def angle_between(wanted: Array, there: Array, rotations: int = 3) -> Array:
 
 
 def tool_signals(run: Run, task: PathTask, s: Array, q: Array, qd: Array) -> ToolSignals | None:
-    """The signals of a run at s (rollout, time), q and q̇ (rollout, time, n), where all of them are numbers.
+    """Return the signals of a run at s (rollout, time), q and q̇ (rollout, time, n), where all are finite.
 
-    The simulated arm of each rollout is compared with what the path asks of the arm that the law computes with. None
-    where the path was made for no tool, or the run does not know its arm.
+    The simulated arm of each rollout is compared with the commands of the path to the arm that the law computes with.
+    It is None where the path was made for no tool, or the run does not know its arm.
     """
     try:
-        robots, plan = run.robots, tool_of(run.model, task)
+        robots, plan = run.robots, find_tool(run.model, task)
     except InputError:
         return None
-    tools = {id(robot): tool_of(robot, task) for robot in robots}
+    tools = {id(robot): find_tool(robot, task) for robot in robots}
     if plan is None or None in tools.values():
         return None
     known = np.isfinite(s) & np.isfinite(q).all(-1) & np.isfinite(qd).all(-1)
@@ -134,7 +135,7 @@ def tool_signals(run: Run, task: PathTask, s: Array, q: Array, qd: Array) -> Too
 
 
 def _signals(task: PathTask, tool: Tool, plan: Tool, s: Array, q: Array, qd: Array) -> ToolSignals:
-    """Those of one arm at some moments, (N,) each."""
+    """Return the signals of one arm at some moments, (N,) each."""
     there, asked = tool.kinematics(q), plan.kinematics(task.q_d(s))
     return ToolSignals(
         np.linalg.norm(_velocity(there, qd), axis=-1),
@@ -145,15 +146,15 @@ def _signals(task: PathTask, tool: Tool, plan: Tool, s: Array, q: Array, qd: Arr
 
 
 def _by_tool(robots: list[RobotModel], tools: dict[int, Tool | None]) -> Iterator[tuple[Tool, NDArray[np.bool_]]]:
-    """Each tool and which rollouts have it, (rollout,)."""
+    """Yield each tool and which rollouts have it, (rollout,)."""
     names = np.array([id(robot) for robot in robots])
     for name, tool in tools.items():
         assert tool is not None
         yield tool, names == name
 
 
-def made_for(robot: RobotModel, task: PathTask) -> Tool:
-    """The tool that a path was made for.
+def require_tool(robot: RobotModel, task: PathTask) -> Tool:
+    """Return the tool that a path was made for.
 
     Raises:
         InputError: the path was made for none.
@@ -164,5 +165,5 @@ def made_for(robot: RobotModel, task: PathTask) -> Tool:
 
 
 def _velocity(there: ToolKinematics, qd: Array) -> Array:
-    """J_v q̇, (*batch, 3)."""
+    """Return J_v q̇, (*batch, 3)."""
     return (there.jacobian[..., :3, :] @ qd[..., None])[..., 0]

@@ -1,4 +1,4 @@
-"""Numbers that sum up what the tool of a run did: its speed beside the feed, its deviation and its orientation."""
+"""Metrics of the tool of a run: its speed beside the feed, its deviation and its orientation."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ NAMES = (*_DEVIATION, "tool_speed_mean", "tool_speed_peak", "feed", "orientation
 
 
 def tool_metrics(run: Run, task: PathTask, counted: Samples, only: Collection[str] = NAMES) -> dict[str, Array]:
-    """What the tool did over the samples that count, (rollout,) each; nothing if the path was made for no tool.
+    """Return the metrics of the tool over the samples that count, (rollout,) each; none without a tool.
 
-    Mean and largest speed of the tool, and the mean of the ``feed`` that the path asked for at s, all [m/s]; the
+    Mean and largest speed of the tool, and the mean of the ``feed`` that the path commands at s, all [m/s]; the
     largest and the RMS distance [m] from the curve on which the path leads the tool, or from the drawing of a toolpath,
     see :func:`~pathcontrol.analysis.deviation.geometry_of`; and the largest angle [rad] from the orientation at s, as
     far as the path prescribes it.
@@ -33,24 +33,25 @@ def tool_metrics(run: Run, task: PathTask, counted: Samples, only: Collection[st
     signals = tool_signals(run, task, *(counted.within(run.array(name)) for name in ("s", "q", "qd")))
     if signals is None:
         return {}
-    from pathcontrol.cartesian.path import CartesianPath  # its paths are there if the tool is
+    from pathcontrol.cartesian.path import CartesianPath  # loaded already if there is a tool
 
     values = {
-        "tool_speed_mean": counted.reduced(np.mean, signals.speed),
-        "tool_speed_peak": counted.reduced(np.max, signals.speed),
-        "feed": counted.reduced(np.mean, signals.feed),
+        "tool_speed_mean": counted.reduce(np.mean, signals.speed),
+        "tool_speed_peak": counted.reduce(np.max, signals.speed),
+        "feed": counted.reduce(np.mean, signals.feed),
     }
-    if isinstance(task, CartesianPath):  # which its joints lead the tool at within 0.1 %
+    if isinstance(task, CartesianPath):  # its joints lead the tool at this speed within 0.1 %
         values["feed"] = np.where(np.isnan(values["feed"]), np.nan, task.speed)
     if task.rotations:
-        values["orientation_error_peak"] = counted.reduced(np.max, signals.orientation)
+        values["orientation_error_peak"] = counted.reduce(np.max, signals.orientation)
     if not set(only).isdisjoint(_DEVIATION):
         with suppress(TaskError):  # an endless path leads the tool on an endless curve
             away = contour_deviation(run, geometry_of(task, run.model), signals.position)
-            values |= {"tool_deviation_peak": counted.reduced(np.max, away)}
-            values |= {"tool_deviation_rms": counted.reduced(_rms, away)}
+            values |= {"tool_deviation_peak": counted.reduce(np.max, away)}
+            values |= {"tool_deviation_rms": counted.reduce(_rms, away)}
     return values
 
 
 def _rms(values: Array) -> float:
+    """Return the root mean square of all values."""
     return float(np.sqrt(np.mean(values**2)))

@@ -1,4 +1,4 @@
-"""Numbers that sum up the torques of a run: how large they are, how near to their limits, and how noisy."""
+"""Metrics of the torques of a run: their size, their share of limits, and their noise."""
 
 from __future__ import annotations
 
@@ -6,29 +6,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.limit_shares import limits_of_each
+from pathcontrol.analysis.limit_shares import stack_torque_limits
 from pathcontrol.analysis.window import Samples
 from pathcontrol.simulation.config import laws
 from pathcontrol.simulation.run import Run
 
 _DEMAND = "tau_demand"
-#: what :func:`torque_metrics` says
+#: the metrics of :func:`torque_metrics`
 NAMES = ("tau_demand_peak", "tau_peak", "tau_demand_ratio", "tau_noise", "noise_amplification")
 
 
 def torque_metrics(run: Run, own: Samples, counted: Samples) -> dict[str, Array]:
-    """What can be said of the torques of a run, (rollout,) each: peaks of all of it, noise of what is ``counted``.
+    """Return the metrics of torques, (rollout,) each: peaks of all samples, noise of those ``counted``.
 
-    Of several joints each number is that of the one where it is largest.
+    Each is the largest over the joints.
     """
-    values = {f"{name}_peak": own.reduced(_peak, run.array(name)).max(-1) for name in (_DEMAND, "tau") if name in run}
-    limits = limits_of_each(run)
+    values = {f"{name}_peak": own.reduce(_peak, run.array(name)).max(-1) for name in (_DEMAND, "tau") if name in run}
+    limits = stack_torque_limits(run)
     if np.isfinite(limits).any():
-        values["tau_demand_ratio"] = (own.reduced(_peak, run.array(_DEMAND)) / limits).max(-1)
-    noise = _of_joints(counted.reduced(_noise, run.array(_DEMAND), _unsteady(run)), run)
+        values["tau_demand_ratio"] = (own.reduce(_peak, run.array(_DEMAND)) / limits).max(-1)
+    noise = _expand_joints(counted.reduce(_noise, run.array(_DEMAND), _compensated_direction(run)), run)
     values["tau_noise"] = noise.max(-1)
     if "q_measured" in run:
-        heard = _of_joints(counted.reduced(_rms, run.array("q_measured") - run.array("q")), run)
+        heard = _expand_joints(counted.reduce(_rms, run.array("q_measured") - run.array("q")), run)
         if (heard > 0).any():
             gains = np.divide(noise, heard, out=np.zeros_like(noise), where=heard > 0)
             values["noise_amplification"] = gains.max(-1)
@@ -36,12 +36,12 @@ def torque_metrics(run: Run, own: Samples, counted: Samples) -> dict[str, Array]
 
 
 def noise_deviation(values: Array, left_out: NDArray[np.bool_] | None = None) -> Array:
-    """Standard deviation of the white noise on smooth signals (rollout, time, joint), (rollout, joint).
+    """Return the standard deviation of the white noise on smooth signals (rollout, time, joint), (rollout, joint).
 
-    From second differences, in which what is smooth cancels: √(mean (y_{k+1} − 2 y_k + y_{k−1})² / 6), as the
-    variance of one is (1 + 4 + 1) σ². It is NaN of less than three samples. (T. Gasser, L. Sroka and C.
-    Jennen-Steinmetz, Residual variance and residual pattern in nonlinear regression, Biometrika 73, 1986.) What a
-    smooth signal with the second derivative ÿ adds is h² ÿ / √6 at the period h. Noise that comes through a difference
+    It follows from second differences, in which smooth parts cancel: √(mean (y_{k+1} − 2 y_k + y_{k−1})² / 6), as the
+    variance of one is (1 + 4 + 1) σ². It is NaN for less than three samples. (T. Gasser, L. Sroka and C.
+    Jennen-Steinmetz, Residual variance and residual pattern in nonlinear regression, Biometrika 73, 1986.) A
+    smooth signal with the second derivative ÿ adds h² ÿ / √6 at the period h. Noise that comes through a difference
     of two samples is not white, and counts √(5/3) times its deviation.
 
     Differences over a step from one sample to the next are ``left_out``, (rollout, time − 1, joint), where the signal
@@ -55,11 +55,12 @@ def noise_deviation(values: Array, left_out: NDArray[np.bool_] | None = None) ->
 
 
 def _noise(values: Array, unsteady: Array) -> Array:
-    """The deviation of one rollout, (joint,), of torques (time, joint) and the directions that they are for."""
+    """Return the deviation of one rollout, (joint,), from torques (time, joint) and compensated directions."""
     return noise_deviation(values[None], (np.diff(unsteady, axis=0) != 0)[None])[0]
 
 
 def _noise_of_one(values: Array, left_out: NDArray[np.bool_]) -> Array:
+    """Return the deviation of the noise of one rollout, (joint,)."""
     counted = ~(left_out[1:] | left_out[:-1])
     squares = np.where(counted, np.diff(values, 2, axis=0) ** 2, 0.0)
     number = counted.sum(0)
@@ -67,10 +68,11 @@ def _noise_of_one(values: Array, left_out: NDArray[np.bool_]) -> Array:
     return np.sqrt(np.divide(total, 6 * number, out=np.full(len(total), np.nan), where=number > 0))
 
 
-def _unsteady(run: Run) -> Array:
-    """The direction in which a law compensates dry friction, (rollout, time, joint): +1, −1 or 0; 0 if it does not.
+def _compensated_direction(run: Run) -> Array:
+    """Return the direction in which a law compensates dry friction, (rollout, time, joint): +1, −1 or 0.
 
-    Where it changes, the torque jumps by design and not by noise: see :meth:`Controller.friction_torque`.
+    Where it changes, the torque jumps by design and not by noise: see :meth:`Controller.friction_torque`. It is 0 for a
+    law without such compensation.
     """
     known = all(name in run for name in ("qd_measured", "e_v"))
     if not known or not any(law.get("friction") == "full" for law in laws(run.config)):
@@ -80,15 +82,15 @@ def _unsteady(run: Run) -> Array:
 
 
 def _peak(values: Array) -> Array:
-    """The largest size over time, (joint,) of (time, joint)."""
+    """Return the largest size over time, (joint,) from (time, joint)."""
     return np.abs(values).max(0)
 
 
 def _rms(values: Array) -> Array:
-    """Over time, (joint,) of (time, joint); the same to the last bit however many rollouts there are."""
+    """Return the RMS over time, (joint,) from (time, joint); bit-identical for any number of rollouts."""
     return np.sqrt(np.ascontiguousarray((values**2).T).mean(-1))
 
 
-def _of_joints(values: Array, run: Run) -> Array:
-    """(rollout, joint), where none has a sample too."""
+def _expand_joints(values: Array, run: Run) -> Array:
+    """Return values as (rollout, joint), also where no rollout has a sample."""
     return np.broadcast_to(values.reshape(len(values), -1), (len(values), len(run.array("joint"))))

@@ -1,4 +1,4 @@
-"""The time that the numbers of a run are of: one rule for each rollout, whatever rollouts lie beside it."""
+"""The time window of metrics, by one rule for each rollout, independent of other rollouts."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from pathcontrol.simulation.finish import detection_times
 from pathcontrol.simulation.run import Run
 
 Choice = Literal["second half", "all"]
-#: from when to when [s], or a part of each rollout's own time
+#: begin and end [s], or a part of each rollout's own time
 Window = tuple[float, float] | Choice
 
-_SLACK = 1e-6  # of a period: times of samples are rounded
+_SLACK = 1e-6  # share of a period, as times of samples are rounded
 
 
 class Samples(NamedTuple):
-    """Which samples of each rollout count: from ``first`` up to, not including, ``stop``, (rollout,) each."""
+    """The samples of each rollout that count: from ``first`` up to, not including, ``stop``, (rollout,) each."""
 
     first: NDArray[np.intp]
     stop: NDArray[np.intp]
 
     @property
     def span(self) -> slice:
-        """From the first sample that counts in any rollout to the last."""
+        """The slice from the first sample that counts in any rollout to the last."""
         return slice(int(self.first.min()), int(self.stop.max()))
 
     def of_span(self) -> Samples:
-        """The same samples, counted from the beginning of :attr:`span`."""
+        """Return the same samples, counted from the beginning of :attr:`span`."""
         return Samples(self.first - self.span.start, self.stop - self.span.start)
 
     def within(self, values: Array) -> Array:
-        """``values`` (rollout, time, …) with NaN outside, so that nothing is computed of what does not count."""
+        """Return ``values`` (rollout, time, …) with NaN outside, so that nothing is computed there."""
         number = np.arange(values.shape[1])
         if not self.first.any() and (self.stop == len(number)).all():
             return values
         inside = (number >= self.first[:, None]) & (number < self.stop[:, None])
         return np.where(inside.reshape(*inside.shape, *[1] * (values.ndim - 2)), values, np.nan)
 
-    def reduced(self, function: Callable[..., float | Array], *values: Array) -> Array:
-        """A ``function`` of the samples (k, …) of each rollout that count, (rollout, …); NaN where none does.
+    def reduce(self, function: Callable[..., float | Array], *values: Array) -> Array:
+        """Apply a ``function`` to the samples (k, …) of each rollout that count, (rollout, …); NaN where none does.
 
         Each rollout is reduced by itself, from memory laid out as if it were alone: the result has the same bits
         whatever is beside it.
@@ -59,10 +59,10 @@ class Samples(NamedTuple):
 
 
 def own_samples(run: Run) -> NDArray[np.intp]:
-    """How many samples of each rollout are its own, (rollout,): until it is seen to be finished, or diverged.
+    """Return the number of samples that are each rollout's own, (rollout,): until it finished or diverged.
 
-    It is where the run would have ended had the rollout been alone. One that is finished is held at the end of its path
-    while others go on, which says nothing of it.
+    There the run would have ended had the rollout been alone. A finished one is held at the end of its path
+    while others go on, which tells nothing about it.
     """
     closed = "laps" in run
     ended = np.where(run.status == "finished", detection_times(run.finish_time, not closed), np.inf)
@@ -71,7 +71,7 @@ def own_samples(run: Run) -> NDArray[np.intp]:
 
 
 def samples_of(run: Run, window: Window | None = None, fraction: float = 0.5) -> Samples:
-    """The samples of each rollout in a ``window``, of its own time only; by default the last ``fraction`` of that.
+    """Return the samples of each rollout in a ``window``, of its own time only; by default the last ``fraction``.
 
     Raises:
         InputError: the window is something else, or begins after the run's time was up.
@@ -88,8 +88,8 @@ def samples_of(run: Run, window: Window | None = None, fraction: float = 0.5) ->
     return Samples(np.minimum(first, stop), np.minimum(stop, np.searchsorted(time, end + _slack(run), side="right")))
 
 
-def told(window: Window | None = None, fraction: float = 0.5) -> str:
-    """From when numbers are, in words: ``"the second half of the time"``."""
+def describe_window(window: Window | None = None, fraction: float = 0.5) -> str:
+    """Return the time window in words: ``"the second half of the time"``."""
     if window is None and fraction != 0.5:
         return f"the last {100 * fraction:.4g} % of the time"
     if window is None or isinstance(window, str):
@@ -99,6 +99,7 @@ def told(window: Window | None = None, fraction: float = 0.5) -> str:
 
 
 def _share(window: str | None, fraction: float) -> float:
+    """Return the share of the time that counts."""
     if window is None:
         fraction = scalar("fraction", fraction, positive=True)
         if fraction > 1:
@@ -111,6 +112,7 @@ def _share(window: str | None, fraction: float) -> float:
 
 
 def _seconds(window: object) -> tuple[float, float]:
+    """Check a window in seconds; return begin and end."""
     try:
         begin, end = (float(t) for t in window)  # type: ignore[attr-defined]
     except (TypeError, ValueError):
@@ -122,4 +124,5 @@ def _seconds(window: object) -> tuple[float, float]:
 
 
 def _slack(run: Run) -> float:
+    """Return the tolerance of times [s]."""
     return _SLACK * float(run.time[1] - run.time[0]) if len(run.time) > 1 else 0.0

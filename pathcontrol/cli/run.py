@@ -55,7 +55,7 @@ def _tell(done: Outcome, as_json: bool) -> None:
     from rich import print as rich_print
 
     from pathcontrol.analysis.remarks import remarks
-    from pathcontrol.analysis.window import told
+    from pathcontrol.analysis.window import describe_window
     from pathcontrol.cli.tables import contour_lines, metric_lines, remark_lines
 
     written = {name: str(path) for name, path in done.written.items()}
@@ -68,7 +68,9 @@ def _tell(done: Outcome, as_json: bool) -> None:
         return
     click.echo(repr(done.run))
     cuts = "path_time" in done.metrics and "tool_deviation_peak" in done.metrics
-    click.echo(f"  errors are of {'the cuts' if cuts else told()}, torques and shares of limits of all of it")
+    click.echo(
+        f"  errors are of {'the cuts' if cuts else describe_window()}, torques and shares of limits of all of it"
+    )
     if posture := getattr(done.run.task, "posture", ""):
         click.echo(f"  posture: {posture}")
     for line in metric_lines(done.metrics, done.run):

@@ -14,7 +14,7 @@ from pathcontrol.analysis.limit_shares import RATIOS, is_passed
 from pathcontrol.analysis.readable import readable_number, unit_of
 from pathcontrol.analysis.remarks import remarks
 from pathcontrol.analysis.run_metrics import LABELS, metrics
-from pathcontrol.analysis.window import told
+from pathcontrol.analysis.window import describe_window
 from pathcontrol.view.animation.rollout import Take
 from pathcontrol.view.animation.settings import settings
 
@@ -66,7 +66,7 @@ def _laps(takes: Sequence[Take]) -> list[dict[str, Any]]:
 def _meant(takes: Sequence[Take]) -> str:
     """Of which time the errors are: the charts beside them show all of it."""
     drawn = [take.toolpath is not None for take in takes]
-    cuts, late = "over the cuts", f"of {told()}"
+    cuts, late = "over the cuts", f"of {describe_window()}"
     return f"peaks and RMS {cuts if all(drawn) else f'{late}, of toolpaths {cuts}' if any(drawn) else late}"
 
 

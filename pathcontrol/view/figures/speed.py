@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.known import where_known
-from pathcontrol.analysis.tool import feed_along, tool_of, tool_speed
+from pathcontrol.analysis.metric_helpers import apply_where_finite
+from pathcontrol.analysis.tool import feed_along, find_tool, tool_speed
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.figures.inset import magnified
 from pathcontrol.view.figures.limits import extent, over_time, span
@@ -71,14 +71,14 @@ def draw_speed(axes: Axes, one: Shown) -> Array:
 def _has_tool(one: Shown) -> bool:
     """Whether a run is along a path that was made for a tool of its arm, whose speed is known."""
     arm = own_robot(one.run)
-    return arm is not None and one.task is not None and "qd" in one.run and tool_of(arm, one.task) is not None
+    return arm is not None and one.task is not None and "qd" in one.run and find_tool(arm, one.task) is not None
 
 
 def _draw_feed(axes: Axes, one: Shown) -> Array:
     """The speed of the tool and the feed, of the first rollout; what is drawn, (2, time)."""
     assert one.task is not None
     task, robot = one.task, one.run.robot
-    wanted = where_known(lambda s: feed_along(task, robot, s), one.run.array("s"))
+    wanted = apply_where_finite(lambda s: feed_along(task, robot, s), one.run.array("s"))
     drawn = [drawable(1e3 * tool_speed(one.run, robot, task)[0]), drawable(1e3 * wanted[0])]
     series(axes, one.run.time, drawn[0], **one.look)
     series(axes, one.run.time, drawn[1], zorder=2.5, **PROFILE_LOOK)

@@ -15,7 +15,7 @@ from pathcontrol.analysis.contours import contour_table
 from pathcontrol.analysis.laps import lap_table
 from pathcontrol.analysis.remarks import remarks
 from pathcontrol.analysis.run_metrics import UNITS
-from pathcontrol.analysis.window import told
+from pathcontrol.analysis.window import describe_window
 from pathcontrol.simulation.run import Run
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.view.page.html import Section
@@ -48,7 +48,7 @@ def sections(runs: Mapping[str, Run], made_by: str, sweep: SweepResult | None = 
             remarks=[(name, sentence) for name, run in runs.items() for sentence in remarks(run)],
             contours=[(name, table) for name, run in runs.items() if (table := contour_table(run))],
             laps=[(name, table) for name, run in runs.items() if (table := lap_table(run))],
-            window=told(),
+            window=describe_window(),
             files=[_metrics_file(numbers), json_file("configuration.json", configuration), *_signals(runs)],
         ),
         _section("Figures", pictures=pictures(runs)),

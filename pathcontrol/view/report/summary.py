@@ -74,7 +74,7 @@ def _without_path(run: Run) -> dict[str, list[float]]:
     own, late = samples_of(run, "all"), samples_of(run)
     errors = [name for name in ("e_p", "e_v") if name in run.data]
     kinds: dict[str, Callable[[Array], Any]] = {"peak": np.max, "rms": lambda v: np.sqrt(np.mean(v**2))}
-    values = {f"{name}_{kind}": late.reduced(of, run.norm(name)) for name in errors for kind, of in kinds.items()}
+    values = {f"{name}_{kind}": late.reduce(of, run.norm(name)) for name in errors for kind, of in kinds.items()}
     if "tau_demand" in run.data:
         values |= torque_metrics(run, own, late)
     values |= limit_ratios(run, own)

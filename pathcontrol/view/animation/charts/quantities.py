@@ -10,7 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.limit_shares import RATIOS, limit_shares
 from pathcontrol.analysis.readable import in_degrees
-from pathcontrol.analysis.tool import feed_along, tool_of, tool_speed
+from pathcontrol.analysis.tool import feed_along, find_tool, tool_speed
 from pathcontrol.analysis.torque_limits import torque_limits
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.animation.charts.chart import Chart, Curve
@@ -57,7 +57,7 @@ def _rates(shot: Shot, index: int, several: bool) -> list[_Entry]:
     take = shot.take
     if "sdot" not in take.run:
         return []
-    if take.task is not None and "qd" in take.run and tool_of(take.robot, take.task) is not None:
+    if take.task is not None and "qd" in take.run and find_tool(take.robot, take.task) is not None:
         return _feeds(take, take.task, index, several)
     curves = [Curve(take.name if several else "σ̇", take.time, take.run.array("sdot")[0], index)]
     if take.task is not None:

@@ -1,4 +1,4 @@
-"""What a run knows: its path, where the caller does not say, and numbers, where its rollouts have not diverged."""
+"""Helpers of metrics: find the task of a run, apply a function per task, and leave out samples that are not finite."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from pathcontrol.cartesian.toolpath_task import ToolpathTask
 
 
-def known_task(run: Run, task: PathTask | None) -> PathTask:
-    """``task``, or else that of the run.
+def resolve_task(run: Run, task: PathTask | None) -> PathTask:
+    """Return ``task``, or the run's own one by default, after checking that it fits.
 
     Raises:
         InputError: neither is known.
@@ -42,13 +42,13 @@ def known_task(run: Run, task: PathTask | None) -> PathTask:
     return task
 
 
-def known_toolpath(run: Run, task: ToolpathTask | None) -> ToolpathTask:
-    """``task``, or else that of the run, which is a toolpath.
+def resolve_toolpath(run: Run, task: ToolpathTask | None) -> ToolpathTask:
+    """Return ``task``, or the run's own one by default, which must be a toolpath.
 
     Raises:
         InputError: the task is none, or not known.
     """
-    found = known_task(run, task)
+    found = resolve_task(run, task)
     toolpath = as_toolpath(found)
     if toolpath is None:
         raise InputError(
@@ -58,21 +58,21 @@ def known_toolpath(run: Run, task: ToolpathTask | None) -> ToolpathTask:
     return toolpath
 
 
-def of_rollouts(function: Callable[[Run, PathTask], Array], run: Run, task: PathTask | None) -> Array:
-    """Values (rollout, …) that a ``function`` gives of a run and the one task of all its rollouts, of each by its own.
+def apply_by_task(function: Callable[[Run, PathTask], Array], run: Run, task: PathTask | None) -> Array:
+    """Apply a function of a run and a single task to the rollouts, with the task of each, (rollout, …).
 
     Raises:
         InputError: no task is known, or it is a batch for another number of rollouts.
     """
     values, rows = [], []
-    for part, own, some in by_task(run, known_task(run, task)):
+    for part, own, some in split_by_task(run, resolve_task(run, task)):
         values.append(function(part, own))
         rows.append(some)
     return np.concatenate(values)[np.argsort(np.concatenate(rows))]
 
 
-def by_task(run: Run, task: PathTask) -> Iterator[tuple[Run, PathTask, NDArray[np.intp]]]:
-    """The rollouts that have a task in common, as a run with its task, and their rows.
+def split_by_task(run: Run, task: PathTask) -> Iterator[tuple[Run, PathTask, NDArray[np.intp]]]:
+    """Yield the rollouts that share a task, as a run with its task, and their rows.
 
     Raises:
         InputError: ``task`` is a batch for another number of rollouts.
@@ -86,11 +86,11 @@ def by_task(run: Run, task: PathTask) -> Iterator[tuple[Run, PathTask, NDArray[n
         yield run.with_data(run.data.isel(rollout=rows)), own, rows
 
 
-def where_known(function: Callable[..., Array], *arrays: Array, shape: tuple[int, ...] = ()) -> Array:
-    """``function`` (k, *shape) of arrays (rollout, time, …), one moment a row, where all are numbers; else NaN.
+def apply_where_finite(function: Callable[..., Array], *arrays: Array, shape: tuple[int, ...] = ()) -> Array:
+    """Apply ``function`` to the samples of arrays (rollout, time, …) that are finite; others are NaN.
 
-    So no path is asked where it is at a NaN, which a rollout that diverged leaves behind. Numbers with squares that are
-    not finite count as none.
+    The function maps one moment a row to (k, *shape). So no path is evaluated at a NaN of a rollout that diverged.
+    Numbers whose squares are not finite count as not finite.
     """
     moments = arrays[0].shape[:2]
     known = np.all([(np.abs(a) < FARTHEST).reshape(*moments, -1).all(-1) for a in arrays], axis=0)
