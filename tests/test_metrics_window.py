@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import pathcontrol as pc
-from pathcontrol.analysis.coverage import distance_to_trace, even_points, passed
+from pathcontrol.analysis.coverage import distance_to_trace, even_points, measure_coverage
 
 START = [0.7, 1.2]
 LOOP = pc.SampledLoop(noise=pc.SensorNoise(position=1e-5, seed=3), velocity="difference")
@@ -129,10 +129,10 @@ def test_the_distance_to_a_trace_is_that_to_its_straight_lines(seed, resolution)
 
 def test_a_trace_covers_what_it_comes_near_to():
     edge = even_points(np.stack([np.linspace(0, 1, 2001), np.zeros(2001)], -1))
-    half = passed(edge, np.array([[0.0, 0.01], [0.5, 0.01]]), 0.02)
+    half = measure_coverage(edge, np.array([[0.0, 0.01], [0.5, 0.01]]), 0.02)
     assert half.share == pytest.approx(0.5 + np.sqrt(3e-4), abs=1e-3)
     assert half.farthest == pytest.approx(np.hypot(0.5, 0.01))
-    assert passed(edge, np.array([[0.2, 0.0]]), 0.1).share == pytest.approx(0.2, abs=1e-3)
+    assert measure_coverage(edge, np.array([[0.2, 0.0]]), 0.1).share == pytest.approx(0.2, abs=1e-3)
 
 
 def test_noise_without_the_jumps_of_compensated_friction(arm, ideal_arm, circle):
