@@ -248,7 +248,7 @@ def test_large_arrays_do_not_go_through_the_scheduler(address, tmp_path, monkeyp
     passed = {}
     for direct in (True, False):
         if not direct:  # as on a machine that cannot reach the workers
-            monkeypatch.setattr(desk, "_reachable", lambda client: False)
+            monkeypatch.setattr(desk, "_can_reach_workers", lambda client: False)
         counting = Counting(address)
         swept(tmp_path / str(direct), build=with_it, keep=pc.Keep(random=5), cluster=counting.address)
         passed[direct] = counting.bytes
