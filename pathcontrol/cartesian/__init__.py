@@ -1,1 +1,1 @@
-"""Curves of a tool in space become paths of the joints."""
+"""Paths of the joints that lead a tool along curves in space."""

@@ -1,4 +1,4 @@
-"""From smoothed contours to paths of the joints, one after another."""
+"""Conversion of smoothed contours to paths of the joints, one after another."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ _ROTATIONS: dict[Held, int] = {"free": 0, "down": 2, "normals": 2, "tangent": 3}
 
 
 def rotations_of(held: Held | Orientation) -> int:
-    """How many rotations of the tool are prescribed: 3, 2 where it may turn about its z axis, or 0."""
+    """Return the number of rotations that are prescribed: 3, 2 for a tool free to turn about its z axis, or 0."""
     return held.rows if isinstance(held, Orientation) else _ROTATIONS.get(held, 0)
 
 
 @dataclass(frozen=True, eq=False)
 class ContourPaths:
-    """What the paths of all contours have in common.
+    """A builder of the paths of all contours, with what they have in common.
 
     Attributes:
         robot: the arm.
@@ -65,7 +65,7 @@ class ContourPaths:
     def along(
         self, whole: Sequence[tuple[Contour, Smoothed]], start: ArrayLike | None
     ) -> Iterator[tuple[PathTask, Contour, str]]:
-        """The path of each curve, the contour it follows and its posture, each from where the one before it ends.
+        """Yield the path of each curve with its contour and its posture, each begun at the end of the one before.
 
         Raises:
             InputError: the orientation does not suit the contours.
@@ -83,7 +83,7 @@ class ContourPaths:
                 start = path.q_d(np.array(path.s_end))
 
     def start_on(self, tour: ToolCurve) -> CartesianPath | None:
-        """The path along a curve from a posture that is searched, or None if not all of it is in reach."""
+        """Return the path along a curve from a searched posture, or None if part of it is out of reach."""
         orientation = self.held if isinstance(self.held, Orientation) else None
         if orientation is None and self.held != "free":
             orientation = NormalOrientation(self.up)
@@ -95,7 +95,7 @@ class ContourPaths:
     def _path(
         self, contour: Contour, curve: ToolCurve, orientation: Orientation | None, start: ArrayLike | None
     ) -> tuple[PathTask, str]:
-        """One curve as a path of the joints, at its feed within the acceleration of the tool, and its posture."""
+        """Return the path of one curve, at its feed within the acceleration of the tool, and its posture."""
         speed = self.rapid_speed if contour.rapid else contour.feed or self.feed
         assert speed is not None
         path = CartesianPath(self.robot, self.frame, curve, orientation, speed=speed, start=start, closed=False)
@@ -117,7 +117,7 @@ class ContourPaths:
             )
 
     def _orientation(self, whole: Sequence[tuple[Contour, Smoothed]], i: int, j: int) -> Orientation | None:
-        """How the tool is turned along curve j of contour i."""
+        """Return the orientation of the tool along curve j of contour i."""
         if isinstance(self.held, Orientation):
             return self.held
         if self.held == "free":
@@ -138,7 +138,7 @@ class ContourPaths:
         return NormalOrientation(np.array([before, after]), at=np.array([curve.s0, curve.s_end]))
 
     def _frames(self, whole: Sequence[tuple[Contour, Smoothed]], i: int, j: int) -> tuple[Array, Array]:
-        """The frames along the tangent that rapids turn between, on the last of their curves."""
+        """Return the frames along the tangent that rapids turn between, on the last of their curves."""
         before = next((smooth.curves[-1] for contour, smooth in whole[:i][::-1] if not contour.rapid), None)
         after = next((smooth.curves[0] for contour, smooth in whole[i + 1 :] if not contour.rapid), None)
         tangent = TangentOrientation(-self.up)
@@ -151,7 +151,7 @@ class ContourPaths:
         return (first, last) if turns_here else (first, first)
 
     def _normal(self, neighbours: Sequence[tuple[Contour, Smoothed]], end: int) -> Array:
-        """The first normal that neighbouring contours give, at their last (-1) or first (0) point."""
+        """Return the first normal that neighbouring contours give, at their last (-1) or first (0) point."""
         for _, smooth in neighbours:
             given = smooth.normals[end]
             if given is not None:

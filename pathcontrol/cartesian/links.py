@@ -1,4 +1,4 @@
-"""From contours to curves that follow one another, with ways in between where a file gives none."""
+"""Connection of contours: the curves that stand for them, with rapids in between where they do not meet."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MEET = 1e-7  # m
 def linked(
     contours: Sequence[Contour], clearance: float, up: Array, tolerance: float, corner: Corners
 ) -> list[tuple[Contour, Smoothed]]:
-    """The contours with the curves that stand for them, and rapids in between where those do not meet.
+    """Return the contours with the curves that stand for them, and rapids between those that do not meet.
 
     Each begins and ends as :func:`from_end_to_end` says, so that the tool is not lifted where contours meet. A rapid
     goes ``clearance`` [m] above the higher of its ends, along ``up``, across and down again; straight where the
@@ -38,7 +38,7 @@ def linked(
 
 
 def from_end_to_end(contour: Contour, tolerance: float, corner: Corners) -> Smoothed:
-    """Curves that begin and end exactly where the contour does, a closed one too: the arm rests there.
+    """Smooth a contour to curves with exactly its ends, a closed one too: the arm rests there.
 
     The corner of a closed contour at its start is not blended: where the tool enters and leaves the material is up to
     the file.
@@ -47,7 +47,7 @@ def from_end_to_end(contour: Contour, tolerance: float, corner: Corners) -> Smoo
 
 
 def _way(start: Array, end: Array, clearance: float, up: Array) -> Array | None:
-    """Points (k, 3) on the way, None where there is nowhere to go."""
+    """Return the points (k, 3) of a rapid, None where its ends are the same."""
     if np.linalg.norm(end - start) < _MEET:
         return None
     if clearance == 0:

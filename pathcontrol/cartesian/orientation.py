@@ -1,4 +1,4 @@
-"""How a tool is turned along its curve: not at all prescribed, fixed, along the tangent, or against normals."""
+"""Orientations of a tool along its curve: free, fixed, along the tangent, or against normals."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _WIDE = -0.9  # cosine of angles whose axis is better known from the symmetric p
 
 
 class Orientation(ABC):
-    """The frame R_d(s) that the tool is to have along a curve, all of it or its z axis only.
+    """The desired frame R_d(s) of the tool along a curve, all of it or its z axis only.
 
     Attributes:
         rows: how many rotations it prescribes: 3 (the frame), 2 (its z axis, about which the tool may turn) or 0.
@@ -33,10 +33,10 @@ class Orientation(ABC):
 
     @abstractmethod
     def frames(self, curve: ToolCurve, s: Array) -> Array:
-        """R_d(s), (N, 3, 3), at s (N,): its columns are the tool's axes in the base frame."""
+        """Return R_d(s), (N, 3, 3), at s (N,): its columns are the tool's axes in the base frame."""
 
     def error(self, curve: ToolCurve, s: Array, rotation: Array) -> tuple[Array, Array]:
-        """The rotation e [rad] from R_d(s) to ``rotation`` (N, 3, 3), and de/dω where e = 0.
+        """Return the rotation e [rad] from R_d(s) to ``rotation`` (N, 3, 3), and de/dω where e = 0.
 
         With 3 rows e is the rotation vector of R R_dᵀ, with 2 that of the shortest rotation from R_d's z axis to the
         tool's, along R_d's x and y axes: (N, rows) and (N, rows, 3). ‖e‖ is the angle. ω is in axes parallel to the
@@ -55,7 +55,7 @@ class Orientation(ABC):
 
 
 class FreeOrientation(Orientation):
-    """Only the position of the tool is prescribed."""
+    """An orientation that is not prescribed: only the position of the tool is."""
 
     rows = 0
 
@@ -67,7 +67,7 @@ class FreeOrientation(Orientation):
 
 
 class FixedOrientation(Orientation):
-    """The same orientation all along.
+    """An orientation that is the same all along the curve.
 
     Args:
         rotation: rotation matrix (3, 3) of the tool in the base frame, or a unit quaternion (x, y, z, w).
@@ -89,7 +89,7 @@ class FixedOrientation(Orientation):
 
 
 class TangentOrientation(Orientation):
-    """The tool's x axis along the curve, its z axis as near to ``up`` as that allows.
+    """An orientation with the tool's x axis along the curve, and its z axis as near to ``up`` as possible.
 
     The frame turns with the curvature of the curve: q_d'' changes fast where the curvature does, at the ends of a
     blended corner for instance.
@@ -111,7 +111,7 @@ class TangentOrientation(Orientation):
 
 
 class NormalOrientation(Orientation):
-    """The tool's z axis against given normals, so that it points into the surface they stand on.
+    """An orientation with the tool's z axis against given surface normals, so that it points into the surface.
 
     The rotation about z is left free, five constraints in all, unless a reference direction is given for x.
 
@@ -156,7 +156,7 @@ class NormalOrientation(Orientation):
 
 
 def _interpolated(normals: Array, at: Array | None) -> Callable[[Array], Array]:
-    """Normals as a function of s."""
+    """Return the normals as a function of s."""
     finite("normals", normals)
     if normals.shape == (3,):
         return partial(_constant, _direction("normals", normals))
@@ -195,7 +195,7 @@ def _unit(vectors: Array, s: Array) -> Array:
 
 
 def _perpendicular(direction: Array, axis: Array, axis_name: str, name: str, s: Array) -> Array:
-    """The unit vector across ``axis`` (N, 3) nearest to ``direction`` (3,)."""
+    """Return the unit vector normal to ``axis`` (N, 3) nearest to ``direction`` (3,)."""
     across = direction - (axis @ direction)[..., None] * axis
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     if (length < _PARALLEL).any():
@@ -207,7 +207,7 @@ def _perpendicular(direction: Array, axis: Array, axis_name: str, name: str, s: 
 
 
 def _rotation_vector(rotation: Array) -> Array:
-    """The rotation vector [rad] of rotation matrices (N, 3, 3), (N, 3)."""
+    """Return the rotation vector [rad] of rotation matrices (N, 3, 3), (N, 3)."""
     skew = 0.5 * (rotation - rotation.swapaxes(-1, -2))
     axis = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
     cosine = 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1)
@@ -219,7 +219,7 @@ def _rotation_vector(rotation: Array) -> Array:
 
 
 def _wide_turn(rotation: Array, axis: Array, cosine: Array) -> Array:
-    """The rotation vector [rad] of turns by nearly or exactly π, (N, 3).
+    """Return the rotation vector [rad] of turns by nearly or exactly π, (N, 3).
 
     R − Rᵀ vanishes there. The symmetric part has the axis a instead: ½(R + Rᵀ) = cos θ I + (1 − cos θ) a aᵀ. Of the two
     that it leaves, the sign is that of ``axis`` (N, 3), a sin θ; for half a turn both are right.
@@ -234,7 +234,7 @@ def _wide_turn(rotation: Array, axis: Array, cosine: Array) -> Array:
 
 
 def _scaled(axis: Array, cosine: Array) -> Array:
-    """The rotation vector of an axis (N, 3) as long as the sine of the angle, whose ``cosine`` is given."""
+    """Return the rotation vector of an axis (N, 3) whose length is the sine of the angle, given its ``cosine``."""
     sine = np.linalg.norm(axis, axis=-1)
     factor = np.divide(np.arctan2(sine, cosine), sine, out=np.ones_like(sine), where=sine > _NO_SINE)
     return factor[..., None] * axis

@@ -1,4 +1,4 @@
-"""A path of the joints along which a tool follows a curve in space."""
+"""A path of the joints that leads a tool along a curve in space."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ class CartesianPath(SplinePath):
         question_length("the largest distance of the curve", float(np.linalg.norm(points, axis=-1).max()), robot, frame)
 
     def _feed(self, s: Array) -> tuple[Array, Array]:
-        """ϑ = v/‖p'‖ and ϑ' = −v p'ᵀp''/‖p'‖³."""
+        """Return ϑ = v/‖p'‖ and ϑ' = −v p'ᵀp''/‖p'‖³."""
         _, dp, ddp = self.curve.at(s)
         length = np.linalg.norm(dp, axis=-1)
         return self.speed / length, -self.speed * (dp * ddp).sum(-1) / length**3
@@ -139,7 +139,7 @@ def _closed(curve: ToolCurve, closed: bool | None) -> bool:
 
 
 def _check_closing(curve: ToolCurve, orientation: Orientation, closed: bool) -> None:
-    """The orientation at the end of a lap is the one at its beginning."""
+    """Check that the orientation at the end of a lap is the one at its beginning."""
     first, last = np.array([curve.s0]), np.array([curve.s_end])
     angle = float(np.linalg.norm(orientation.error(curve, last, orientation.frames(curve, first))[0]))
     if closed and angle > _SAME:

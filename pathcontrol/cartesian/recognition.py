@@ -1,4 +1,4 @@
-"""Which tasks follow a toolpath, told without loading all that makes toolpaths where there is none."""
+"""Recognition of tasks that follow a toolpath, without loading the code that makes toolpaths."""
 
 from __future__ import annotations
 

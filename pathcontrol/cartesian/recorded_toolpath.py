@@ -1,4 +1,4 @@
-"""The task of a toolpath without the arm it was made for, as a saved run keeps it."""
+"""The task of a toolpath without the arm it was made for, as saved runs keep it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pathcontrol.toolpaths.smoothing.smooth import Corners, Smoothed
 
 
 class RecordedToolpath(ToolpathTask):
-    """A :class:`ToolpathTask` from its paths and contours; no posture is searched.
+    """A :class:`ToolpathTask` rebuilt from its paths and contours; no posture is searched.
 
     Args:
         paths: the paths, each from where the one before it ends.
@@ -73,5 +73,5 @@ class RecordedToolpath(ToolpathTask):
 
     @cached_property
     def smoothed(self) -> tuple[Smoothed, ...]:  # type: ignore[override]
-        """For each contour how it is smoothed."""
+        """The smooth curves of each contour."""
         return tuple(from_end_to_end(contour, self.tolerance, self.corner) for contour in self._placed)

@@ -23,7 +23,7 @@ class ToolKinematics(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Tool:
-    """The tool of an arm.
+    """The tool of an arm: a frame and a pose in it.
 
     Args:
         robot: the arm.
@@ -46,7 +46,7 @@ class Tool:
         return None if self.offset is None else self._offset
 
     def kinematics(self, q: Array) -> ToolKinematics:
-        """Pose and Jacobian at q (N, n)."""
+        """Return pose and Jacobian at q (N, n)."""
         pose, jacobian = self.robot.frame_kinematics(q, self.frame)
         if self.offset is not None:
             lever = pose[..., :3, :3] @ self._offset[:3, 3]

@@ -1,4 +1,4 @@
-"""A whole toolpath as a task: every contour a path of the joints, one after another."""
+"""A whole toolpath as a task: a path of the joints for every contour, one after another."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class ToolpathTask(PathSequence):
 
 
 def _tour(toolpath: Toolpath, pose: Array) -> ToolCurve:
-    """Once round the box that holds the contours, at half its height, in the base frame."""
+    """Return a curve round the box that holds the contours, at half its height, in the base frame."""
     lower, upper = toolpath.bounds
     size = np.maximum(upper - lower, 1e-3 * np.linalg.norm(upper - lower))
     round_trip = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 0]])

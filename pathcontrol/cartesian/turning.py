@@ -1,4 +1,4 @@
-"""A tool that turns from one orientation to another on its way."""
+"""The orientation of a tool that turns on its way from one orientation to another."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathcontrol.toolpaths.curve import ToolCurve
 
 
 class TurningOrientation(Orientation):
-    """From one rotation to another about one axis, beginning and ending gently: twice continuously differentiable.
+    """A turn from one rotation to another about one axis, with gentle ends: twice continuously differentiable.
 
     Args:
         first: rotation matrix at the beginning of the curve, (3, 3).

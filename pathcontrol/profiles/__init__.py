@@ -1,1 +1,1 @@
-"""How fast a path is taken: velocity profiles ϑ(s) computed for a path."""
+"""Velocity profiles ϑ(s) computed for a given path."""

@@ -1,4 +1,4 @@
-"""How far the arm, or a tool, has come along a path."""
+"""The distance that the arm, or a tool, has covered along a path."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 def distance(path: Path, motion: Motion, s: Array) -> CubicHermiteSpline:
-    """∫‖p'‖ds from s[0], of a motion p(s), as a spline through its values at the increasing s (m,).
+    """Return ∫‖p'‖ds from s[0], of a motion p(s), as a cubic spline through its values at the increasing s (m,).
 
     Four Gauss points a cell; value and slope are right at every knot, to the 8th and the machine's order, and the value
     between them to the 4th.

@@ -1,4 +1,4 @@
-"""Whose speed along a path is meant: that of the joints, or that of a tool."""
+"""The motions whose speed along a path can be prescribed: of the joints, or of a tool."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from pathcontrol.tasks.profile import Path
 
 
 class Motion(ABC):
-    """The curve p(s) that a part of the arm draws while q = q_d(s); its speed is ‖p'(s)‖ϑ(s)."""
+    """The curve p(s) of a part of the arm while q = q_d(s); its speed is ‖p'(s)‖ϑ(s)."""
 
     @abstractmethod
     def of(self, q: Array, dq: Array, ddq: Array) -> tuple[Array, Array]:
-        """p' and p'', (*batch, m), where the path has q_d, q_d' and q_d'', (*batch, n)."""
+        """Return p' and p'', (*batch, m), given q_d, q_d' and q_d'' of the path, (*batch, n)."""
 
     def along(self, path: Path, s: Array) -> tuple[Array, Array]:
-        """p'(s) and p''(s), (*batch, m), for s (*batch,)."""
+        """Return p'(s) and p''(s), (*batch, m), for s (*batch,)."""
         return self.of(path.q_d(s), path.dq_d(s), path.ddq_d(s))
 
     def stretch(self, path: Path, s: Array) -> tuple[Array, Array]:
-        """‖p'(s)‖ and its relative growth d ln‖p'‖/ds, (*batch,): v = ‖p'‖ϑ and v̇ = ‖p'‖ (s̈ + ϑ² d ln‖p'‖/ds)."""
+        """Return ‖p'(s)‖ and d ln‖p'‖/ds, (*batch,): v = ‖p'‖ϑ and v̇ = ‖p'‖ (s̈ + ϑ² d ln‖p'‖/ds)."""
         dp, ddp = self.along(path, s)
         return np.linalg.norm(dp, axis=-1), growth(dp, ddp)
 
 
 @dataclass(frozen=True)
 class JointMotion(Motion):
-    """The posture itself, p = q_d(s); its speed is the path speed ‖q̇‖ [rad/s]."""
+    """The motion of the joints, p = q_d(s); its speed is the path speed ‖q̇‖ [rad/s]."""
 
     def __str__(self) -> str:
         return "the arm"
@@ -43,7 +43,7 @@ class JointMotion(Motion):
 
 @dataclass(frozen=True)
 class ToolMotion(Motion):
-    """The origin of a frame in the base frame [m]: p' = J_v q_d' and p'' = J_v q_d'' + J̇_v q_d'.
+    """The motion of the origin of a frame in the base frame [m]: p' = J_v q_d' and p'' = J_v q_d'' + J̇_v q_d'.
 
     Args:
         robot: the arm.
@@ -66,5 +66,5 @@ class ToolMotion(Motion):
 
 
 def growth(dp: Array, ddp: Array) -> Array:
-    """d ln‖p'‖/ds = p'ᵀp''/‖p'‖², (*batch,); 0 where p' = 0."""
+    """Return d ln‖p'‖/ds = p'ᵀp''/‖p'‖², (*batch,); 0 where p' = 0."""
     return (dp * ddp).sum(-1) / np.maximum((dp * dp).sum(-1), np.finfo(float).tiny)

@@ -13,7 +13,7 @@ from pathcontrol.tasks.profile import Path, VelocityProfile
 
 
 class TabulatedProfile(VelocityProfile):
-    """ϑ² linear in s between knots, so that s̈ = ½ dϑ²/ds is constant there and the time between two knots is exact.
+    """A velocity profile with ϑ² linear in s between knots, so that s̈ = ½ dϑ²/ds is constant there.
 
     ϑ is continuous; ϑ' jumps at the knots, where it is that of the cell to the right. Beyond the ends of an open
     path ϑ keeps its end values.
@@ -54,7 +54,7 @@ class TabulatedProfile(VelocityProfile):
         return float((2 * np.diff(self.s) / (theta[:-1] + theta[1:])).sum())
 
     def describe(self) -> dict[str, Any]:
-        """Name, number of knots and traversal time [s]: the table itself would swamp the record of a run."""
+        """Return name, number of knots and traversal time [s]; the whole table would be too long."""
         return {"profile": type(self).__name__, "knots": len(self.s), "traversal_time": self.traversal_time}
 
     def _both(self, s: Array) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Constant speed of a tool: the feed rate."""
+"""A profile of constant tool speed: the feed rate."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _STANDSTILL = 1e-7  # m/rad
 
 
 class ToolSpeed(VelocityProfile):
-    """ϑ(s) = v₀/‖p'(s)‖: the origin p of ``frame`` moves at the constant speed v₀ = ``speed`` [m/s].
+    """The profile ϑ(s) = v₀/‖p'(s)‖: the origin p of ``frame`` moves at the constant speed v₀ = ``speed`` [m/s].
 
     With p' = J_v q_d' and p'' = J_v q_d'' + J̇_v q_d',  ϑ' = −v₀ p'ᵀp''/‖p'‖³.
 

@@ -1,4 +1,4 @@
-"""Contours and the toolpath they make up, in the order and at the feed a file gives them."""
+"""Contours, and the toolpath that they form, in the order and at the feed of the file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MEET = 1e-9  # m, how near the ends of neighbouring segments are
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contour:
-    """Segments one after another, the tool's way without lifting it [m].
+    """A contour: segments one after another, along which the tool is not lifted [m].
 
     Attributes:
         segments: the pieces; each begins where the one before ends.
@@ -85,7 +85,7 @@ class Contour:
         return np.min(lower, axis=0), np.max(upper, axis=0)
 
     def distance(self, x: ArrayLike) -> Array:
-        """Distance from points x (*batch, 3) to the contour [m], (*batch,)."""
+        """Return the distance from points x (*batch, 3) to the contour [m], (*batch,)."""
         x = as_array("x", x)
         flat = x.reshape(-1, 3)
         best = np.where(np.isfinite(flat).all(-1), np.inf, np.nan)
@@ -102,26 +102,26 @@ class Contour:
         return best.reshape(x.shape[:-1])
 
     def placed(self, pose: ArrayLike) -> Contour:
-        """The contour moved from the workpiece's frame by a homogeneous transform (4, 4)."""
+        """Return the contour moved from the workpiece's frame by a homogeneous transform (4, 4)."""
         transform = rigid("pose", pose)
         normals = None if self.normals is None else self.normals @ transform[:3, :3].T
         return replace(self, segments=tuple(s.placed(transform) for s in self.segments), normals=normals)
 
     def reversed(self) -> Contour:
-        """The contour from its end to its start."""
+        """Return the contour from its end to its start."""
         normals = None if self.normals is None else self.normals[::-1]
         return replace(self, segments=tuple(s.reversed() for s in self.segments[::-1]), normals=normals)
 
     @cached_property
     def _by_kind(self) -> tuple[Cubics | None, tuple[Segment, ...]]:
-        """What is searched for the nearest point together, and what piece by piece."""
+        """The segments that are searched for the nearest point together, and those searched one by one."""
         cubics = [segment for segment in self.segments if is_cubic(segment)]
         others = tuple(segment for segment in self.segments if not is_cubic(segment))
         return Cubics(cubics) if cubics else None, others
 
     @cached_property
     def _ends(self) -> tuple[Array, Array]:
-        """Last and first points of the segments, each (k, 3)."""
+        """The last and the first points of the segments, each (k, 3)."""
         return np.array([s.last for s in self.segments]), np.array([s.first for s in self.segments])
 
 
@@ -162,7 +162,7 @@ class Toolpath:
 
     @property
     def cuts(self) -> tuple[Contour, ...]:
-        """The contours that are no rapids."""
+        """The contours that are not rapids."""
         return tuple(contour for contour in self.contours if not contour.rapid)
 
     @property
@@ -172,22 +172,22 @@ class Toolpath:
         return np.min(lower, axis=0), np.max(upper, axis=0)
 
     def placed(self, pose: ArrayLike) -> Toolpath:
-        """The toolpath moved from the workpiece's frame into the robot's base frame by a transform (4, 4)."""
+        """Return the toolpath moved from the workpiece's frame to the base frame by a transform (4, 4)."""
         return replace(self, contours=tuple(contour.placed(pose) for contour in self.contours))
 
     def distance(self, x: ArrayLike, contours: Sequence[Contour] | None = None) -> Array:
-        """Distance from points x (*batch, 3) to the nearest of the contours, by default of the cuts [m], (*batch,)."""
+        """Return the distance from points x (*batch, 3) to the nearest contour, by default a cut [m], (*batch,)."""
         chosen = self.cuts if contours is None else contours
         return np.min([contour.distance(x) for contour in chosen], axis=0)
 
 
 def _counted(name: str, contours: Sequence[Contour]) -> str:
-    """``"2 cuts, 0.19 m"``."""
+    """Write number and length of contours: ``"2 cuts, 0.19 m"``."""
     length = sum(contour.length for contour in contours)
     return f"{len(contours)} {name}{'s' * (len(contours) > 1)}, {length:.4g} m"
 
 
 def _to_box(x: Array, lower: Array, upper: Array) -> Array:
-    """Distance from x (N, 3) to a box [m], (N,), rounded down a little: bounds of curves are sampled."""
+    """Return the distance from x (N, 3) to a box [m], (N,), rounded down a little: bounds of curves are sampled."""
     outside = np.linalg.norm(np.maximum(np.maximum(lower - x, x - upper), 0.0), axis=-1)
     return outside - 1e-5 * float(np.linalg.norm(upper - lower))

@@ -51,32 +51,32 @@ class ToolCurve:
 
     @property
     def length(self) -> float:
-        """Length of the domain in s [m], which is that of the curve but for the blends of corners."""
+        """The length of the domain in s [m], which is that of the curve but for the blends of corners."""
         return self.s_end - self.s0
 
     def at(self, s: ArrayLike) -> CurvePoint:
-        """Position and derivatives at s (*batch,) [m]; an open curve is not continued beyond its ends."""
+        """Return position and derivatives at s (*batch,) [m]; an open curve is not continued beyond its ends."""
         inside = self._within(as_array("s", s))
         return CurvePoint(*(curve(inside) for curve in self._curves))
 
     def position(self, s: ArrayLike) -> Array:
-        """p(s) [m], (*batch, 3)."""
+        """Return p(s) [m], (*batch, 3)."""
         return self._curves[0](self._within(as_array("s", s)))
 
     def tangent(self, s: ArrayLike) -> Array:
-        """Unit tangent p'/‖p'‖, (*batch, 3)."""
+        """Return the unit tangent p'/‖p'‖, (*batch, 3)."""
         dp = self._curves[1](self._within(as_array("s", s)))
         return dp / np.linalg.norm(dp, axis=-1, keepdims=True)
 
     def nearest(self, x: ArrayLike, near: ArrayLike | None = None) -> Array:
-        """Parameter of the point of the curve nearest to x (*batch, 3) [m], (*batch,).
+        """Return the parameter of the point of the curve nearest to x (*batch, 3) [m], (*batch,).
 
         With ``near`` (*batch,), the one reached from there.
         """
         return self._closest_point(x, near)
 
     def distance(self, x: ArrayLike) -> Array:
-        """Distance from points x (*batch, 3) to the curve [m], (*batch,)."""
+        """Return the distance from points x (*batch, 3) to the curve [m], (*batch,)."""
         x = as_array("x", x)
         return np.linalg.norm(self.position(self.nearest(x)) - x, axis=-1)
 
@@ -92,7 +92,7 @@ class ToolCurve:
 
     @classmethod
     def line(cls, start: Point, end: Point) -> ToolCurve:
-        """The straight line from ``start`` to ``end`` [m], each (3,)."""
+        """Return the straight line from ``start`` to ``end`` [m], each (3,)."""
         a, b = _vector("start", start), _vector("end", end)
         length = float(np.linalg.norm(b - a))
         if length == 0:
@@ -108,7 +108,7 @@ class ToolCurve:
         normal: Direction = (0.0, 0.0, 1.0),
         start: Direction = (1.0, 0.0, 0.0),
     ) -> ToolCurve:
-        """A full circle, counterclockwise seen against ``normal``.
+        """Return a full circle, counterclockwise seen against ``normal``.
 
         Args:
             center: centre [m], (3,).
@@ -126,7 +126,7 @@ class ToolCurve:
 
     @classmethod
     def spline(cls, points: Points, closed: bool = False) -> ToolCurve:
-        """The C² cubic spline through points [m], (m, 3), parametrised by chord length.
+        """Return the C² cubic spline through points [m], (m, 3), parametrised by chord length.
 
         Args:
             points: m ≥ 4 points, or 5 for a closed curve, no two neighbours the same; the first is not repeated.
@@ -147,7 +147,7 @@ class ToolCurve:
 
     @classmethod
     def polyline(cls, points: Points, tolerance: Length = 1e-4, closed: bool = False) -> ToolCurve:
-        """Straight edges through points [m], (m, 3), with corners blended; see :func:`smooth`.
+        """Return straight edges through points [m], (m, 3), with corners blended; see :func:`smooth`.
 
         Args:
             points: m ≥ 2 points, no two neighbours the same.
@@ -177,7 +177,7 @@ def _vector(name: str, value: ArrayLike) -> Array:
 
 
 def _frame(normal: ArrayLike, start: ArrayLike) -> tuple[Array, Array]:
-    """Unit normal of a plane and the unit vector in it nearest to ``start``."""
+    """Return the unit normal of a plane and the unit vector in it nearest to ``start``."""
     axis, towards = _vector("normal", normal), _vector("start", start)
     if not np.linalg.norm(axis) > 0:
         raise InputError(f"normal = {axis.tolist()}, expected a vector with a length")

@@ -1,4 +1,4 @@
-"""Arc length of a curve, and the way back from it to the curve's own parameter."""
+"""The arc length of a curve, and the curve's parameter as a function of it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Function = Callable[[Array], Array]
 
 
 class ArcLength:
-    """s(u) = ∫₀ᵘ ‖dp/du‖ du [m] for u ∈ [0, 1], by Gauss–Legendre quadrature in cells small enough for it.
+    """The arc length s(u) = ∫₀ᵘ ‖dp/du‖ du [m] for u ∈ [0, 1], by Gauss–Legendre quadrature in small enough cells.
 
     Args:
         derivative: dp/du [m], (*batch, 3), at u (*batch,).
@@ -34,11 +34,11 @@ class ArcLength:
 
     @property
     def total(self) -> float:
-        """s(1) [m]."""
+        """The length of the whole curve, s(1) [m]."""
         return float(self._s[-1])
 
     def parameter(self, s: ArrayLike) -> Array:
-        """The u at which the arc length is s (*batch,) [m]."""
+        """Return the u at which the arc length is s (*batch,) [m]."""
         s = np.asarray(s, dtype=np.float64)
         cell = np.clip(np.searchsorted(self._s, s, side="right") - 1, 0, len(self._u) - 2)
         left, right, wanted = self._u[cell], self._u[cell + 1], s - self._s[cell]
@@ -52,7 +52,7 @@ class ArcLength:
 
 
 def _cells(derivative: Function) -> tuple[Array, Array]:
-    """Ends of cells over which the quadrature is accurate (k + 1,), and the length over each [m], (k,)."""
+    """Return the ends of cells over which the quadrature is accurate (k + 1,), and the length over each [m], (k,)."""
     u = np.linspace(0.0, 1.0, _FIRST_CELLS + 1)
     while True:
         middle = 0.5 * (u[:-1] + u[1:])
@@ -68,11 +68,11 @@ def _cells(derivative: Function) -> tuple[Array, Array]:
 
 
 def _length(derivative: Function, a: Array, b: Array) -> Array:
-    """Length from each a to b (*batch,) [m]."""
+    """Return the length from each a to b (*batch,) [m]."""
     half = 0.5 * (b - a)[..., None]
     return (_speed(derivative, 0.5 * (a + b)[..., None] + half * _NODES) * _WEIGHTS * half).sum(-1)
 
 
 def _speed(derivative: Function, u: Array) -> Array:
-    """‖dp/du‖ [m], (*batch,)."""
+    """Return ‖dp/du‖ [m], (*batch,)."""
     return np.linalg.norm(derivative(u), axis=-1)

@@ -1,4 +1,4 @@
-"""What a reader of toolpaths passes over: refused, or gathered and told, each kind once."""
+"""Collection of what a reader of toolpaths passes over: refused, or noted once for each kind."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _MOST_KINDS, _MOST_PLACES = 50, 8
 
 @dataclass
 class _Kind:
-    """How often something was passed over, and the first places of it."""
+    """The count of a kind of thing that was passed over, and its first places."""
 
     count: int = 0
     places: list[str] = field(default_factory=list)
 
 
 class Passed:
-    """Gathers what is passed over, and what is to be told of a file, for :attr:`Toolpath.notes`.
+    """A collector of notes on what a reader passes over or assumes, for :attr:`Toolpath.notes`.
 
     Args:
         unknown: ``"refuse"``, what is not understood is an error; ``"warn"``, it is passed over and told.
@@ -37,7 +37,7 @@ class Passed:
         self._sentences: dict[str, None] = {}
 
     def over(self, kind: str, place: int | str, fate: str = "was passed over") -> None:
-        """Count one thing of a kind that was passed over in a line, given by its number, or at another place.
+        """Count a thing of a kind that was passed over in a line, given by its number, or at another place.
 
         Where something else became of it than being passed over, ``fate`` says so.
         """
@@ -48,7 +48,7 @@ class Passed:
             found.places.append(text)
 
     def unless_refused(self, kind: str, place: int | str, reason: str) -> None:
-        """Pass over what is not understood.
+        """Pass over a thing that is not understood, unless the caller refuses it.
 
         Use it only for what cannot move the tool.
 
@@ -60,19 +60,19 @@ class Passed:
         self.over(kind, place)
 
     def tell(self, sentence: str) -> None:
-        """Put a sentence of another sort among the notes, once."""
+        """Add another sentence to the notes, once."""
         self._sentences[sentence] = None
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """A sentence for each kind, with its count and places, after those that were told."""
+        """The notes: those that were told, then a sentence for each kind, with its count and places."""
         kinds = list(self._kinds.items())
         more = [f"{len(kinds) - _MOST_KINDS} more kinds were passed over"] if len(kinds) > _MOST_KINDS else []
         return (*self._sentences, *(_sentence(*names, kind) for names, kind in kinds[:_MOST_KINDS]), *more)
 
 
 def _sentence(name: str, fate: str, kind: _Kind) -> str:
-    """``"M62 was passed over 2 times: lines 3, 5"``."""
+    """Write the note on a kind: ``"M62 was passed over 2 times: lines 3, 5"``."""
     times = "once" if kind.count == 1 else f"{kind.count} times"
     lines = "line " if len(kind.places) == 1 else "lines "
     shown = ", ".join(kind.places[:_MOST_PLACES]) + (", …" if len(kind.places) > _MOST_PLACES else "")

@@ -1,4 +1,4 @@
-"""A toolpath from a file of any kind that there is a reader for."""
+"""Reading of a toolpath from a file of any supported format."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ READERS = {
 
 
 def read_toolpath(path: str | Path, **options: Any) -> Toolpath:
-    """The contours of a file: CSV, G-code, SVG or DXF, by the end of its name.
+    """Read the contours of a file, CSV, G-code, SVG or DXF by its suffix.
 
     Args:
         path: the file.

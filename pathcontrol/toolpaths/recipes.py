@@ -1,4 +1,4 @@
-"""Contours as plain values and arrays, and back: lines, arcs and Bézier curves to the last bit."""
+"""Recipes of contours as plain values and arrays, exact for lines, arcs and Bézier curves."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ Get = Callable[[Mapping[str, Any]], Array]
 
 
 def contour_recipe(contour: Contour, put: Put) -> dict[str, Any]:
-    """Return what :func:`contour_of` makes the contour of; arrays are put away by ``put``."""
+    """Return the recipe of a contour, from which :func:`contour_of` rebuilds it; ``put`` stores arrays."""
     recipe: dict[str, Any] = {"segments": [_segment_recipe(segment, put) for segment in contour.segments]}
     recipe |= {"closed": contour.closed, "feed": contour.feed, "rapid": contour.rapid, "name": contour.name}
     return recipe if contour.normals is None else recipe | {"normals": put(contour.normals)}
 
 
 def contour_of(recipe: dict[str, Any], get: Get) -> Contour:
-    """Return the contour of a recipe, whose arrays ``get`` finds again."""
+    """Rebuild the contour of a recipe, whose arrays ``get`` loads."""
     segments = tuple(_segment_of(segment, get) for segment in recipe["segments"])
     normals = get(recipe["normals"]) if "normals" in recipe else None
     return Contour(segments, recipe["closed"], recipe["feed"], recipe["rapid"], recipe["name"], normals)
@@ -57,7 +57,7 @@ def _segment_of(recipe: dict[str, Any], get: Get) -> Segment:
 
 
 def _polyline(segment: Segment) -> Array:
-    """Points (k, 3) on a segment of any kind, whose edges are within 0.1 µm of it."""
+    """Return points (k, 3) on a segment of any kind, whose edges are within 0.1 µm of it."""
     edges = 64
     while True:
         points = segment.point(np.linspace(0.0, 1.0, 2 * edges + 1))

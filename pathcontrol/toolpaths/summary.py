@@ -1,4 +1,4 @@
-"""What is in a toolpath, in numbers."""
+"""A summary of a toolpath in numbers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathcontrol.toolpaths.smoothing.corners import corners
 
 
 def summary(toolpath: Toolpath) -> dict[str, Any]:
-    """Contours, lengths, corners, feeds and bounding box in SI units, fit for JSON.
+    """Return contours, lengths, corners, feeds and bounding box in SI units, fit for JSON.
 
     ``contours`` has for each, in order: ``name``, ``length_m``, ``closed``, ``points``, ``corners`` (those that
     turn by more than 5°), ``sharpest_deg``, ``feed_m_s`` (null where the file gives none), ``rapid`` and ``bounds_m``.

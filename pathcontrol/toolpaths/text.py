@@ -1,4 +1,4 @@
-"""Text files of toolpaths, read within bounds: whatever the file is, reading it takes little time and memory."""
+"""Text files of toolpaths, read within bounds of time and memory, whatever the file holds."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _MAX_LINE_LENGTH = 100_000
 
 
 def read_text(path: str | os.PathLike[str], what: str = "a toolpath") -> str:
-    r"""The text of a file, decoded from UTF-8, or from Latin-1 where it is none; lines end in ``\n``.
+    r"""Read a file as UTF-8, or as Latin-1 if it is not valid; lines end in ``\n``.
 
     Args:
         path: the file.
@@ -56,7 +56,7 @@ def read_text(path: str | os.PathLike[str], what: str = "a toolpath") -> str:
 
 
 def read_lines(path: str | os.PathLike[str], what: str = "a toolpath") -> list[str]:
-    """The lines of a file as :func:`read_text` reads it, without their ends.
+    """Read the lines of a file as :func:`read_text` does, without their ends.
 
     Raises:
         InputError: ``path`` is no path.

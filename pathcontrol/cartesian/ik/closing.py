@@ -1,4 +1,4 @@
-"""Closed curves: the posture at the end of a lap is made the one at its beginning."""
+"""Closure of a lap: the posture at its end is made the one at its beginning."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PACE = 0.1  # rad, taken back at a time
 
 
 def closed_lap(constraint: ToolConstraint, s: Array, q: Array) -> Array | None:
-    """Postures q (K, n) at s (K,) round a closed curve changed so that the last is the first; None if that fails.
+    """Close a lap: change postures q (K, n) at s (K,) so that the last is the first; None if that fails.
 
     Where there is a choice of postures, the difference that a lap of least motion leaves is taken back little by little
     and evenly along the curve, each time by the nearest postures that hold the tool.

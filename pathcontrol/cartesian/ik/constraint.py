@@ -1,4 +1,4 @@
-"""What the tool has to satisfy at each point of the curve, and how far a posture is from it."""
+"""The constraint on the tool at each point of the curve, and the deviation of a posture from it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NO_RANK = 1e-6  # singular values below this share of the largest are none
 
 @dataclass(frozen=True, eq=False)
 class ToolConstraint:
-    """f(q, s) = 0: the tool is on the curve and turned as asked.
+    """The constraint f(q, s) = 0: the tool is on the curve and has the prescribed orientation.
 
     f has m = 3 + ``orientation.rows`` rows: (x(q) − p(s))/ℓ, then the rotation that is left [rad].
 
@@ -46,7 +46,7 @@ class ToolConstraint:
     def of(
         cls, tool: Tool, curve: ToolCurve, orientation: Orientation, tolerance: tuple[float, float]
     ) -> ToolConstraint:
-        """The constraint with ℓ, rank and moving joints found on postures all over the workspace.
+        """Build the constraint; ℓ, rank and moving joints are found on postures all over the workspace.
 
         Raises:
             InputError: no joint moves the tool.
@@ -67,27 +67,27 @@ class ToolConstraint:
 
     @property
     def frozen(self) -> Array:
-        """Which joints have no room between their limits, (n,); they count as locked."""
+        """The mask of the joints without room between their limits, (n,); they count as locked."""
         return self.tool.robot.limits.lower >= self.tool.robot.limits.upper
 
     @property
     def freedom(self) -> int:
-        """How many ways the joints can move without moving the tool: n − rank."""
+        """The number of independent motions that leave the tool at rest: n − rank."""
         return self.tool.robot.n - self.rank
 
     @property
     def bases(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Shapes (m, r) and (r, n) of bases of the ranges of ∂f/∂q and of its transpose."""
+        """The shapes (m, r) and (r, n) of bases of the ranges of ∂f/∂q and of its transpose."""
         return (3 + self.orientation.rows, self.rank), (self.rank, self.tool.robot.n)
 
     def seeds(self, count: int) -> Array:
-        """Postures (count, n) spread over the joint range; joints that do not move the tool are at 0 or next to it."""
+        """Return postures (count, n) spread over the joint range; joints that do not move the tool are near 0."""
         robot = self.tool.robot
         still = np.clip(np.zeros(robot.n), robot.limits.lower, robot.limits.upper)
         return np.where(self.moving, spread_postures(robot, count), still)
 
     def at(self, q: Array, s: Array) -> tuple[Array, Array]:
-        """f (N, m) and ∂f/∂q (N, m, n) at q (N, n), s (N,)."""
+        """Return f (N, m) and ∂f/∂q (N, m, n) at q (N, n), s (N,)."""
         position, rotation, jacobian = self.tool.kinematics(q)
         turn, slope = self.orientation.error(self.curve, s, rotation)
         f = np.concatenate([(position - self.curve.position(s)) / self.length, turn], axis=-1)
@@ -95,10 +95,10 @@ class ToolConstraint:
         return f, np.where(self.frozen, 0.0, rows)
 
     def deviation(self, f: Array) -> tuple[Array, Array]:
-        """Distance [m] and angle [rad] that f (N, m) stands for, each (N,)."""
+        """Return the distance [m] and the angle [rad] of the deviations f (N, m), each (N,)."""
         return self.length * np.linalg.norm(f[:, :3], axis=-1), np.linalg.norm(f[:, 3:], axis=-1)
 
     def excess(self, f: Array) -> Array:
-        """Deviation as a multiple of the tolerance, the larger of position and angle, (N,)."""
+        """Return the deviation as a multiple of the tolerance, the larger of position and angle, (N,)."""
         position, angle = self.deviation(f)
         return np.maximum(position / self.tolerance[0], angle / self.tolerance[1])

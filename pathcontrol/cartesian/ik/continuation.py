@@ -1,4 +1,4 @@
-"""From a posture on a curve along the curve, several start postures side by side."""
+"""Continuation of start postures along a curve, several side by side."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _TIGHT = 0.2  # share of the way to a joint limit from which on a posture counts
 
 
 class Stop(IntEnum):
-    """Why a posture does not continue the path."""
+    """The reason why a posture does not continue the path."""
 
     NONE = 0
     LOST = 1  # Newton's method does not converge, or far from where it should
@@ -35,7 +35,7 @@ class Stop(IntEnum):
 
 @dataclass
 class Trail:
-    """Postures along a curve as far as one got from a start posture.
+    """Postures along a curve, as far as continuation from one start posture got.
 
     Attributes:
         s: path parameters [m].
@@ -55,7 +55,7 @@ class Trail:
 def follow(
     constraint: ToolConstraint, start: Array, s0: float, s_end: float, rest: Callable[[Array], Array] | None = None
 ) -> list[Trail]:
-    """Trails from the postures ``start`` (N, n) on the curve at s0 to s_end, by prediction and correction.
+    """Follow the curve from s0 to s_end from the postures ``start`` (N, n), by prediction and correction.
 
     The prediction is the secant through the last two postures. A step is cut in four where the correction fails, is
     large or comes to the other side of a singularity, and doubled where it is small. A choice of postures is made for
@@ -70,7 +70,7 @@ def follow(
 
 
 class _Walk:
-    """The state of :func:`follow`, row by row."""
+    """The state of :func:`follow`, with a row for each start posture."""
 
     def __init__(
         self,
@@ -90,7 +90,7 @@ class _Walk:
         self.going = np.full(len(start), s0 < s_end)
 
     def advance(self) -> bool:
-        """One step of every row that goes on; whether any did."""
+        """Take one step in every row that is still going; return whether there was any."""
         rows = np.flatnonzero(self.going)
         if not rows.size:
             return False
@@ -108,7 +108,7 @@ class _Walk:
         return True
 
     def given_up(self) -> list[Trail]:
-        """The trails as they are, those that still go on as lost."""
+        """Return the trails as they are, with those still going marked as lost."""
         for row in np.flatnonzero(self.going):
             self.trails[row].stop, self.trails[row].beyond = Stop.LOST, self.q[row]
         return self.trails
@@ -141,13 +141,13 @@ class _Walk:
 
 
 def verdicts(constraint: ToolConstraint, found: Corrected) -> Array:
-    """What is wrong with corrected postures, an array of :class:`Stop`, (N,)."""
+    """Return the fault of each corrected posture, an array of :class:`Stop`, (N,)."""
     beyond = outside(constraint.tool.robot, found.q)
     conditions = [~found.converged, beyond, found.conditioning < SINGULAR]
     return np.select(conditions, [Stop.LOST, Stop.LIMIT, Stop.SINGULAR], Stop.NONE)
 
 
 def comforts(constraint: ToolConstraint, found: Corrected) -> Array:
-    """Conditioning of postures, lowered in proportion where a joint is near a limit, (N,)."""
+    """Return the conditioning of postures, (N,), lowered in proportion where a joint is near a limit."""
     share = share_to_limits(constraint.tool.robot, found.q)
     return found.conditioning * np.clip(share / _TIGHT, 0.1, 1.0)

@@ -1,4 +1,4 @@
-"""Newton's method from nearly right postures to right ones, many at a time."""
+"""Correction of approximate postures by Newton's method, many at a time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FLAT = 1e-3  # curvatures of H below this do not make a step longer
 
 
 class Corrected(NamedTuple):
-    """Postures (N, n) and what is known about each of them, (N,).
+    """Corrected postures (N, n) with convergence, conditioning and branch of each, (N,).
 
     Attributes:
         q: the postures [rad].
@@ -36,12 +36,12 @@ class Corrected(NamedTuple):
     branch: Branch
 
     def rows(self, chosen: Array) -> Corrected:
-        """Some of the postures."""
+        """Return the ``chosen`` postures."""
         return Corrected(self.q[chosen], self.converged[chosen], self.conditioning[chosen], self.branch.rows(chosen))
 
 
 class _Linear(NamedTuple):
-    """f (N, m) and ∂f/∂q (N, m, n) at postures, its inverse (N, n, m), rows that span its null space (N, k, n)."""
+    """The linearisation at postures: f (N, m), ∂f/∂q (N, m, n), its inverse (N, n, m) and null space (N, k, n)."""
 
     f: Array
     slope: Array
@@ -52,7 +52,7 @@ class _Linear(NamedTuple):
 
 
 def correct(constraint: ToolConstraint, cost: PostureCost, q: Array, s: Array) -> Corrected:
-    """Postures that satisfy the constraint at s (N,) and minimise H, by Newton's method from q (N, n)."""
+    """Correct q (N, n) by Newton's method to satisfy the constraint at s (N,) and minimise H."""
     bases = Branch(*(np.zeros((len(q), *shape)) for shape in constraint.bases))
     out = Corrected(q.copy(), np.zeros(len(q), dtype=bool), np.zeros(len(q)), bases)
     moving = np.arange(len(q))
@@ -83,14 +83,14 @@ def _linearised(constraint: ToolConstraint, q: Array, s: Array) -> _Linear:
 
 
 def branch_at(constraint: ToolConstraint, q: Array, s: Array) -> Branch:
-    """On which side of singularities postures q (N, n) at s (N,) are."""
+    """Return the side of singularities on which postures q (N, n) at s (N,) are."""
     return _linearised(constraint, q, s).branch
 
 
 def _null_step(
     constraint: ToolConstraint, cost: PostureCost, q: Array, s: Array, linear: _Linear, step: Array
 ) -> Array:
-    """The part of Newton's step that does not move the tool, (N, n).
+    """Return the part of Newton's step that does not move the tool, (N, n).
 
     With the Lagrangian L = H + λᵀf and λ = −(∂f/∂q)⁺ᵀ∇H, Z∇L = 0 at the optimum, Z the rows ``linear.free``; ∇²L
     along them is a difference quotient of ∇L. Where it is not positive the step still goes downhill.

@@ -1,4 +1,4 @@
-"""Why a curve cannot be followed, in words that say where, how far it went, and what to change."""
+"""Errors about curves that cannot be followed: where, how far the tool got, and what to change."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _NEXT = 4  # of those ahead; out of reach in one of them is why the arm does not
 
 
 def refusal(constraint: ToolConstraint, trail: Trail, tries: int = 1) -> TaskError:
-    """The error for a trail that does not go on, the best of those from ``tries`` start postures."""
+    """Return the error for a trail that stops, the best of those from ``tries`` start postures."""
     s = trail.s[-1]
     along = 100 * (s - constraint.curve.s0) / constraint.curve.length
     best = f", from the best of {tries} start postures" if tries > 1 else ""
@@ -38,7 +38,7 @@ def refusal(constraint: ToolConstraint, trail: Trail, tries: int = 1) -> TaskErr
 
 
 def unreached(constraint: ToolConstraint, start: Array | None = None) -> TaskError:
-    """The error for a first point that is not reached from the posture ``start`` (n,), or from anywhere."""
+    """Return the error for a first point that is not reached from ``start`` (n,), or from anywhere."""
     seeds = constraint.seeds(_SEEDS) if start is None else start[None]
     whence = "from any posture" if start is None else "from this start posture"
     other = "" if start is None else "; give another start posture, or none to have one searched"
@@ -50,7 +50,7 @@ def unreached(constraint: ToolConstraint, start: Array | None = None) -> TaskErr
 
 
 def not_closing(constraint: ToolConstraint, trail: Trail) -> TaskError:
-    """The error for a trail round a closed curve that does not come back to where it began."""
+    """Return the error for a trail round a closed curve that does not come back to its beginning."""
     robot, change = constraint.tool.robot, trail.q[-1] - trail.q[0]
     i = int(np.argmax(np.abs(change)))
     return TaskError(
@@ -64,7 +64,7 @@ def not_closing(constraint: ToolConstraint, trail: Trail) -> TaskError:
 
 
 def place(constraint: ToolConstraint, s: float) -> str:
-    """A point of the curve as text."""
+    """Write a point of the curve for a message."""
     x, y, z = constraint.curve.position(np.array(s))
     return f"s = {s:.6g} m, the point ({x:.4f}, {y:.4f}, {z:.4f}) m"
 
@@ -81,14 +81,14 @@ def _reason(constraint: ToolConstraint, trail: Trail) -> str:
 
 
 def _passed_limit(robot: RobotModel, beyond: Array) -> tuple[int, str, float]:
-    """The joint farthest beyond its limits, on which side, and the limit."""
+    """Return the joint farthest beyond its limits, the side and the limit."""
     i = int(np.argmin(distance_to_limits(robot, beyond)))
     upper = beyond[i] > robot.limits.upper[i]
     return (i, "upper", robot.limits.upper[i]) if upper else (i, "lower", robot.limits.lower[i])
 
 
 def _limit_details(constraint: ToolConstraint, trail: Trail) -> dict[str, Any]:
-    """The joint that stops a trail at its limit, with both, for a program."""
+    """Return the joint that stops a trail at its limit, with both, as attributes of the error."""
     if trail.stop is not Stop.LIMIT:
         return {}
     robot = constraint.tool.robot
@@ -124,13 +124,13 @@ def _stuck(constraint: ToolConstraint, trail: Trail) -> str:
 
 
 def _also_freedom(constraint: ToolConstraint) -> str:
-    """Advice for tools whose rotation is all prescribed."""
+    """Return advice for tools whose rotation is fully prescribed."""
     free = "; or leave the rotation about the tool axis free (NormalOrientation without reference)"
     return free if constraint.orientation.rows == 3 else ""
 
 
 def _out_of_reach(constraint: ToolConstraint, trail: Trail) -> str | None:
-    """What is out of reach ahead of the end of a trail, if that is what ended it."""
+    """Return what is out of reach ahead of a trail, if that ended it, else None."""
     curve = constraint.curve
     ahead = np.unique(np.minimum(trail.s[-1] + _AHEAD * curve.length, curve.s_end))
     seeds = np.concatenate([trail.q[-1][None], constraint.seeds(_SEEDS)])
@@ -142,7 +142,7 @@ def _out_of_reach(constraint: ToolConstraint, trail: Trail) -> str | None:
 
 
 def _gap(constraint: ToolConstraint, seeds: Array, s: float) -> str:
-    """How near the tool gets to the curve at s, and what would bring them together."""
+    """Write how near the tool gets to the curve at s, and what would close the gap."""
     position, angle = _miss(constraint, seeds, s)
     turned = f" and {angle:.3g} rad" if constraint.orientation.rows else ""
     text = f"the nearest it gets is {np.linalg.norm(position):.3g} m{turned} away"
@@ -158,7 +158,7 @@ def _gap(constraint: ToolConstraint, seeds: Array, s: float) -> str:
 
 
 def _unfrozen(constraint: ToolConstraint) -> str:
-    """Advice for arms some of whose joints have no room to move."""
+    """Return advice for arms with joints that have no room to move."""
     robot = constraint.tool.robot
     held = [
         f"{name} cannot move, since both of its limits are {value:g} {unit} (in a URDF that leaves them out they are 0)"
@@ -171,7 +171,7 @@ def _unfrozen(constraint: ToolConstraint) -> str:
 
 
 def _miss(constraint: ToolConstraint, seeds: Array, s: float) -> tuple[Array, float]:
-    """The vector from the curve at s to the tool in the nearest posture [m], and the angle left [rad]."""
+    """Return the vector [m] from the curve at s to the tool in the nearest posture, and the remaining angle [rad]."""
     places = np.array([s])
     f, _ = constraint.at(nearest_postures(constraint, seeds, places), places)
     return constraint.length * f[0, :3], float(np.linalg.norm(f[0, 3:]))

@@ -1,4 +1,4 @@
-"""Inverse kinematics at any parameters of a curve, once a trail along it is known."""
+"""Inverse kinematics at any parameters of a curve along which a trail is known."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ class Samples(NamedTuple):
     q: Array
 
     def with_more(self, s: Array, q: Array) -> Samples:
-        """These and others at other parameters."""
+        """Return these samples with others at other parameters."""
         places, first = np.unique(np.concatenate([self.s, s]), return_index=True)
         return Samples(places, np.concatenate([self.q, q])[first])
 
     def only(self, s: Array) -> Samples:
-        """Those at the parameters s, which are among them."""
+        """Return the samples at the parameters s, which are among them."""
         return Samples(s, self.q[np.searchsorted(self.s, s)])
 
 
 @dataclass(frozen=True, eq=False)
 class InverseKinematics:
-    """q(s): of the postures that hold the tool on the curve at s the one nearest to ``rest``(s), (N, n)."""
+    """The posture q(s), (N, n), nearest to ``rest``(s) of those that hold the tool on the curve at s."""
 
     constraint: ToolConstraint
     rest: Callable[[Array], Array]
 
     def near(self, s: Array, known: Samples) -> tuple[Array, Array]:
-        """Postures (N, n) at s (N,) by Newton's method from interpolated ones, and which of them are fit, (N,).
+        """Correct postures (N, n), interpolated at s (N,); return them and the mask of the valid ones, (N,).
 
         Fit are those near to the interpolation, and on the same side of singularities as the ``known`` one before.
         """
@@ -55,7 +55,7 @@ class InverseKinematics:
         return found.q, near & ~hops & (verdicts(self.constraint, found) == Stop.NONE)
 
     def fill(self, known: Samples, s: Array) -> Samples:
-        """Postures at the increasing parameters s (N,), between those of ``known`` postures.
+        """Return postures at the increasing parameters s (N,), between ``known`` postures.
 
         What Newton's method does not reach from an interpolation of known postures is found by continuation.
 
@@ -72,7 +72,7 @@ class InverseKinematics:
         return known.only(s)
 
     def _walk(self, known: Samples, s: float) -> Samples:
-        """Continuation to s from the known posture before it."""
+        """Continue to s from the known posture before it."""
         before = int(np.searchsorted(known.s, s)) - 1
         trail = follow(self.constraint, known.q[before][None], float(known.s[before]), float(s), self.rest)[0]
         if trail.stop is not Stop.NONE:

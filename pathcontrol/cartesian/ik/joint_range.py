@@ -1,4 +1,4 @@
-"""Postures of an arm: spread over its joint range, counted round, measured from the limits."""
+"""Postures and the joint range: spread over it, with whole turns removed, and distances to the limits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _ROUNDING = 1e-9  # rad or m
 
 
 def spread_postures(robot: RobotModel, count: int) -> Array:
-    """Postures (count, n) spread evenly over the joint range, of at most one turn: the additive golden sequence.
+    """Return postures (count, n) spread evenly over the joint range, at most a turn: the additive golden sequence.
 
     The i-th coordinate is the fraction of k/φⁱ with φ^{n+1} = φ + 1, which for n = 1 is the golden ratio.
     """
@@ -24,7 +24,7 @@ def spread_postures(robot: RobotModel, count: int) -> Array:
 
 
 def one_turn(robot: RobotModel) -> tuple[Array, Array]:
-    """The joint range, of at most one turn about its middle, each (n,); about 0 where there are no limits."""
+    """Return the joint range, at most one turn about its middle, each (n,); about 0 where there are no limits."""
     lower, upper = robot.limits.lower, robot.limits.upper
     bounded = np.isfinite(lower) & np.isfinite(upper)
     middle = np.clip(0.0, lower, upper)
@@ -33,19 +33,19 @@ def one_turn(robot: RobotModel) -> tuple[Array, Array]:
 
 
 def unwound(robot: RobotModel, q: Array) -> Array:
-    """The same postures q (N, n) with whole turns taken out where the limits allow a turn and more."""
+    """Return the same postures q (N, n) without whole turns, where the limits allow a turn and more."""
     lower, upper = one_turn(robot)
     turns = (np.array(robot.position_units) == "rad") & (upper - lower > 2 * np.pi - 1e-9)
     return np.where(turns, lower + np.mod(q - lower, 2 * np.pi), q)
 
 
 def outside(robot: RobotModel, q: Array) -> Array:
-    """Whether a joint of postures q (*batch, n) is outside its limits by more than rounding, (*batch,)."""
+    """Return whether a joint of postures q (*batch, n) is outside its limits by more than rounding, (*batch,)."""
     return np.asarray((distance_to_limits(robot, q) < -_ROUNDING).any(-1))
 
 
 def distance_to_limits(robot: RobotModel, q: Array) -> Array:
-    """Distance of each joint to the nearer of its limits, (*batch, n); negative outside, inf where there is none.
+    """Return the distance of each joint to its nearer limit, (*batch, n); negative outside, inf without limit.
 
     A joint that has no room between its limits counts as locked there: inf too, unless it is elsewhere.
     """
@@ -55,7 +55,7 @@ def distance_to_limits(robot: RobotModel, q: Array) -> Array:
 
 
 def share_to_limits(robot: RobotModel, q: Array) -> Array:
-    """The least of the distances to the limits as a share of half the joint's range, (N,), 1 without limits."""
+    """Return the least distance to a limit as a share of half the joint's range, (N,), 1 without limits."""
     half = 0.5 * (robot.limits.upper - robot.limits.lower)
     share = np.divide(distance_to_limits(robot, q), half, out=np.ones_like(q), where=np.isfinite(half) & (half > 0))
     return share.min(-1)

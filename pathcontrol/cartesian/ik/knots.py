@@ -1,4 +1,4 @@
-"""Knots of a spline and the points between them."""
+"""Meshes of knots of a spline: graded, refined, and points in between."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ _GRADING = 3.0  # largest ratio of neighbouring intervals; interpolation by quin
 
 
 def first_mesh(knots: Array, longest: float) -> Array:
-    """The knots of a curve with intervals of at most ``longest``, and graded."""
+    """Return the knots of a curve, graded, with intervals of at most ``longest``."""
     pieces = np.maximum(1, np.ceil(np.diff(knots) / longest - 1e-9)).astype(int)
     return graded(subdivided(knots, pieces))
 
 
 def subdivided(mesh: Array, pieces: Array) -> Array:
-    """The mesh (K,) with each of its intervals cut into as many equal ``pieces`` (K − 1,)."""
+    """Cut each interval of a mesh (K,) into equal ``pieces`` (K − 1,)."""
     left, step = np.repeat(mesh[:-1], pieces), np.repeat(np.diff(mesh) / pieces, pieces)
     rank = np.arange(len(left)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     return np.append(left + rank * step, mesh[-1])
 
 
 def graded(mesh: Array) -> Array:
-    """The mesh with intervals halved until none is much longer than its neighbour."""
+    """Halve intervals of a mesh until none is much longer than its neighbour."""
     while True:
         steps = np.diff(mesh)
         beside = np.minimum(np.append(steps[1:], np.inf), np.append(np.inf, steps[:-1]))
@@ -34,5 +34,5 @@ def graded(mesh: Array) -> Array:
 
 
 def between(mesh: Array, fractions: Array) -> Array:
-    """Points at ``fractions`` (k,) of each interval, (K − 1, k)."""
+    """Return the points at ``fractions`` (k,) of each interval, (K − 1, k)."""
     return mesh[:-1, None] + np.diff(mesh)[:, None] * fractions

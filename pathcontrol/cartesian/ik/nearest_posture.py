@@ -1,4 +1,4 @@
-"""Postures that bring the tool as near as possible to the curve, from anywhere."""
+"""Search of the postures that bring the tool as near as possible to the curve."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _STUCK = 1e-6  # share of ‖f‖² by which a step that is worth going on has t
 
 
 def reach(constraint: ToolConstraint, q: Array, s: Array) -> Array:
-    """Postures (N, n) within the joint limits that locally minimise ‖f(q, s)‖ at s (N,), from q (N, n).
+    """Return postures (N, n) within the joint limits that locally minimise ‖f(q, s)‖ at s (N,), from q (N, n).
 
     The Levenberg–Marquardt method; a joint that is at a limit and would leave its range holds still.
     """
@@ -39,7 +39,7 @@ def reach(constraint: ToolConstraint, q: Array, s: Array) -> Array:
 
 
 def nearest_postures(constraint: ToolConstraint, seeds: Array, s: Array) -> Array:
-    """For each s (K,) the best of the postures that :func:`reach` finds from the ``seeds`` (N, n), (K, n)."""
+    """Return for each s (K,) the best posture that :func:`reach` finds from the ``seeds`` (N, n), (K, n)."""
     places, q = np.repeat(s, len(seeds)), np.tile(seeds, (len(s), 1))
     reached = reach(constraint, q, places)
     left = (constraint.at(reached, places)[0] ** 2).sum(-1).reshape(len(s), -1)
@@ -47,7 +47,7 @@ def nearest_postures(constraint: ToolConstraint, seeds: Array, s: Array) -> Arra
 
 
 def _damped_step(f: Array, slope: Array, damping: Array, q: Array, lower: Array, upper: Array) -> Array:
-    """The step −(JᵀJ + μI)⁻¹Jᵀf of the joints that are free to take it, (N, n)."""
+    """Return the step −(JᵀJ + μI)⁻¹Jᵀf of the joints that are not held by a limit, (N, n)."""
     downhill = -(slope.swapaxes(1, 2) @ f[..., None])[..., 0]
     free = ~((q <= lower) & (downhill < 0) | (q >= upper) & (downhill > 0))
     slope = slope * free[:, None]

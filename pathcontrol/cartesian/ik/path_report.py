@@ -1,4 +1,4 @@
-"""What a Cartesian path keeps, as measured on it."""
+"""Measured deviations and margins of a Cartesian path."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FINE, _ZOOMS = 33, 3  # points in each, and how often
 
 @dataclass(frozen=True)
 class CartesianReport:
-    """What was measured at the knots and on more places between them, ``points`` in all.
+    """Measurements at the knots and at more places between them, ``points`` in all.
 
     Attributes:
         position_deviation: largest distance between the tool and p(s) [m].
@@ -64,7 +64,7 @@ class CartesianReport:
 
 
 def measured(constraint: ToolConstraint, refined: Refined, start_postures: int, searched: bool) -> CartesianReport:
-    """The report on a refined spline, whose start posture was ``searched`` or given."""
+    """Measure a refined spline, whose start posture was ``searched`` or given."""
     robot, spline, found, s = constraint.tool.robot, refined.spline, refined.deviations, refined.checks
 
     def conditioning(s: Array) -> Array:
@@ -100,7 +100,7 @@ def measured(constraint: ToolConstraint, refined: Refined, start_postures: int, 
 
 
 def _posture(start_postures: int, searched: bool, lowest_joint: str, lowest_height: float) -> str:
-    """Which posture was chosen, and whether it keeps above the base plane."""
+    """Describe the chosen posture, and whether it keeps above the base plane."""
     choice = f"the best of {start_postures} searched" if searched else "from the start given"
     if lowest_height >= -PLANE:
         return f"{choice}, all joints above the base plane"
@@ -108,7 +108,7 @@ def _posture(start_postures: int, searched: bool, lowest_joint: str, lowest_heig
 
 
 def _lowest(function: Callable[[Array], Array], refined: Refined, values: Array) -> float:
-    """Where a function of s (N,) is least, looked for around the deepest of its ``values`` at the checks."""
+    """Return the least value of a function of s (N,), searched around the least of its ``values`` at the checks."""
     s, ends = refined.checks, (refined.mesh[0], refined.mesh[-1])
     padded = np.concatenate([[np.inf], values, [np.inf]])
     valleys = np.flatnonzero((values <= padded[:-2]) & (values <= padded[2:]))

@@ -1,4 +1,4 @@
-"""Which of the ways to hold a tool is preferred: above the base plane, elbow up, away from limits and singularities."""
+"""Preference among trails: above the base plane, elbow up, away from limits and singularities."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ _SAMPLES = 32  # postures of a trail that are looked at
 
 
 def heights(constraint: ToolConstraint, q: Array) -> Array:
-    """Heights of the joints that move the tool above the base plane, z = 0 of the base frame [m], (N, joints)."""
+    """Return the heights [m] above the base plane, z = 0, of the joints that move the tool, (N, joints)."""
     return constraint.tool.robot.frame_poses(q, _movers(constraint))[..., 2, 3]
 
 
 def lowest(constraint: ToolConstraint, q: Array) -> tuple[str, float]:
-    """The joint that comes lowest in postures q (N, n), and its height above the base plane [m]."""
+    """Return the joint that comes lowest in postures q (N, n), and its height above the base plane [m]."""
     least = heights(constraint, q).min(0)
     return _movers(constraint)[int(np.argmin(least))], float(least.min())
 
 
 def above_base(constraint: ToolConstraint, q: Array) -> Array:
-    """Whether all joints of postures q (N, n) are above the base plane, (N,)."""
+    """Return whether all joints of postures q (N, n) are above the base plane, (N,)."""
     return np.asarray((heights(constraint, q) >= -PLANE).all(-1))
 
 
 def by_preference(constraint: ToolConstraint, trails: Sequence[Trail]) -> list[Trail]:
-    """The trails, the preferred first.
+    """Return the trails, the preferred first.
 
     Those that stay above the base plane come before others; then those at least half as comfortable as the best, the
     higher their joints on average the sooner; then the others by comfort.
@@ -48,12 +48,12 @@ def by_preference(constraint: ToolConstraint, trails: Sequence[Trail]) -> list[T
 
 
 def _movers(constraint: ToolConstraint) -> list[str]:
-    """Names of the joints that move the tool."""
+    """Return the names of the joints that move the tool."""
     names = constraint.tool.robot.joint_names
     return [name for name, moves in zip(names, constraint.moving, strict=True) if moves]
 
 
 def _some(trail: Trail) -> Array:
-    """Postures of a trail from its beginning to its end, (k, n)."""
+    """Return postures of a trail from its beginning to its end, (k, n)."""
     chosen = np.unique(np.linspace(0, len(trail.q) - 1, _SAMPLES).astype(int))
     return np.array(trail.q)[chosen]

@@ -1,4 +1,4 @@
-"""Which of the postures that hold the tool is taken, where there is a choice."""
+"""The cost that selects a posture among those that hold the tool."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PUSH = 40.0  # rad or m, the push at the limit
 
 @dataclass(frozen=True, eq=False)
 class PostureCost:
-    """H(q) = ½‖q − q_rest‖² + w (½ε‖q − q_anchor‖² + Σ b(d_i)), of which the minimum is taken.
+    """The cost H(q) = ½‖q − q_rest‖² + w (½ε‖q − q_anchor‖² + Σ b(d_i)) of a posture, to be minimised.
 
     b grows when the distance d of a joint to a limit falls below a margin m, b' = −40 (1 − d/m)³, and ε = 0.1. With
     q_rest the posture before and w the length of a step over the lever arm of the joints this is the least motion of
@@ -39,20 +39,20 @@ class PostureCost:
 
     @classmethod
     def nearest(cls, rest: Array, limits: Limits) -> PostureCost:
-        """½‖q − q_rest‖²."""
+        """Return the cost ½‖q − q_rest‖²."""
         return cls(rest, rest, np.zeros(len(rest)), limits)
 
     def gradient(self, q: Array) -> Array:
-        """∇H at q (N, n)."""
+        """Return ∇H at q (N, n)."""
         return self.beside(q[:, None])[:, 0]
 
     def beside(self, q: Array) -> Array:
-        """∇H at several postures for each row, (N, k, n)."""
+        """Return ∇H at several postures for each row, (N, k, n)."""
         pull = _ATTRACTION * (q - self.anchor[:, None])
         return q - self.rest[:, None] + self.weight[:, None, None] * (pull - self._push(q))
 
     def rows(self, chosen: Array) -> PostureCost:
-        """The cost of some of the rows."""
+        """Return the cost of the ``chosen`` rows."""
         return PostureCost(self.rest[chosen], self.anchor[chosen], self.weight[chosen], self.limits)
 
     def _push(self, q: Array) -> Array:
@@ -63,7 +63,7 @@ class PostureCost:
 
 
 def rest_curve(s: Array, q: Array, closed: bool) -> BSpline:
-    """q_rest(s), the C² cubic spline through postures q (K, n) at s (K,), to which others are to be near."""
+    """Return q_rest(s), the C² cubic spline through postures q (K, n) at s (K,), as reference for others."""
     if not closed:
         return make_interp_spline(s, q, k=3, bc_type="natural")
     return make_interp_spline(s, np.concatenate([q[:-1], q[:1]]), k=3, bc_type="periodic")

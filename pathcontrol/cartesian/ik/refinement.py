@@ -1,4 +1,4 @@
-"""The joint spline along a curve, with as many knots as the tolerance needs."""
+"""Refinement of the joint spline along a curve until the tolerance is kept."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Refined(NamedTuple):
 
 
 def refine(kinematics: InverseKinematics, known: Samples, closed: bool) -> Refined:
-    """The spline through postures on the curve, with knots added between them until the tolerance is kept.
+    """Return the spline through postures on the curve, with knots added until the tolerance is kept.
 
     It begins with the knots of the curve, where p''' jumps. The tool's velocity is kept too, within 0.1 % of p'.
 
@@ -79,7 +79,7 @@ def _interpolant(known: Samples, closed: bool) -> BSpline:
 def _worst(
     constraint: ToolConstraint, spline: BSpline, mesh: Array, fractions: Array
 ) -> tuple[Array, Array, Deviations]:
-    """The largest deviation in each interval as a multiple of what is allowed, where it was looked for, and all."""
+    """Return the largest deviation of each interval as a multiple of what is allowed, its place, and all deviations."""
     s = between(mesh, fractions)
     found = deviations(constraint, spline, s.ravel())
     position, angle = constraint.tolerance

@@ -1,4 +1,4 @@
-"""On which side of a singularity an arm is."""
+"""The side of a singularity on which a posture is."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class Branch(NamedTuple):
     right: Array
 
     def rows(self, chosen: Array) -> Branch:
-        """The branch of some of the postures."""
+        """Return the branch of the ``chosen`` postures."""
         return Branch(self.left[chosen], self.right[chosen])
 
     def differs(self, other: Branch) -> Array:
-        """Whether a singularity lies between these postures and others next to them, (N,)."""
+        """Return whether a singularity lies between these postures and others next to them, (N,)."""
         turned = np.linalg.det(self.left.swapaxes(1, 2) @ other.left)
         return np.asarray(turned * np.linalg.det(self.right @ other.right.swapaxes(1, 2)) < 0)

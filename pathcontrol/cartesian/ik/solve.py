@@ -1,4 +1,4 @@
-"""From a constraint to a joint spline that keeps it: start posture, continuation, refinement, verification."""
+"""The solution of a constraint by a joint spline: start posture, continuation, refinement, verification."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _REWINDS = 3  # joints that are wound back one after another
 
 
 def solve(constraint: ToolConstraint, start: Array | None, closed: bool) -> tuple[BSpline, CartesianReport]:
-    """The joint spline along the curve and what was measured on it.
+    """Return the joint spline along the curve and the measurements on it.
 
     Raises:
         TaskError: the curve cannot be followed, or a closed path does not close.
@@ -40,7 +40,7 @@ def solve(constraint: ToolConstraint, start: Array | None, closed: bool) -> tupl
 
 
 def _searched(constraint: ToolConstraint) -> list[Trail]:
-    """Trails from the start postures that a search finds, a whole turn back where none gets along otherwise."""
+    """Return trails from searched start postures, a whole turn back where none gets along otherwise."""
     latest = _followed(constraint, search_starts(constraint))
     trails = list(latest)
     for _ in range(_REWINDS):
@@ -57,7 +57,7 @@ def _followed(constraint: ToolConstraint, starts: Array) -> list[Trail]:
 
 
 def posture(robot: RobotModel, start: ArrayLike) -> Array:
-    """``start`` as a posture (n,) within the joint limits."""
+    """Check that ``start`` is a posture (n,) within the joint limits."""
     q = finite("start", joint_array("start", start, robot.n, robot.joint_names))
     if q.shape != (robot.n,):
         raise InputError(f"start has shape {q.shape}, expected one posture ({robot.n},)")
@@ -75,7 +75,7 @@ def posture(robot: RobotModel, start: ArrayLike) -> Array:
 
 
 def _best(constraint: ToolConstraint, trails: list[Trail], closed: bool) -> Samples:
-    """The preferred of the trails that go all the way, and come back if they have to."""
+    """Return the preferred trail of those that go all the way, and come back if they have to."""
     complete = [trail for trail in trails if trail.stop is Stop.NONE]
     for trail in by_preference(constraint, complete):
         s, q = np.array(trail.s), np.array(trail.q)
@@ -88,7 +88,7 @@ def _best(constraint: ToolConstraint, trails: list[Trail], closed: bool) -> Samp
 
 
 def _check_between(constraint: ToolConstraint, refined: Refined, report: CartesianReport) -> None:
-    """Limits and singularities between the knots, where Newton's method has not been."""
+    """Check limits and singularities between the knots, where Newton's method has not been."""
     if outside(constraint.tool.robot, refined.spline(report.limit_at)):
         raise _refused_at(constraint, refined, report.limit_at, Stop.LIMIT)
     if report.smallest_singular_value < SINGULAR:

@@ -1,4 +1,4 @@
-"""How far the tool of an arm that follows a joint spline is from the curve."""
+"""The deviation from the curve of a tool whose arm follows a joint spline."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _CHUNK = 1 << 14  # postures looked at together
 
 
 class Deviations(NamedTuple):
-    """What was found at parameters s (N,), each (N,).
+    """The deviations found at parameters s (N,), each (N,).
 
     Attributes:
         position: distance between the tool and p(s) [m], not less than that to the curve.
@@ -31,7 +31,7 @@ class Deviations(NamedTuple):
 
 
 def deviations(constraint: ToolConstraint, spline: BSpline, s: Array) -> Deviations:
-    """The deviations at s (N,) of an arm led by q_d = ``spline``."""
+    """Return the deviations at s (N,) of an arm led by q_d = ``spline``."""
     slope = spline.derivative()
     parts = [_chunk(constraint, spline(part), slope(part), part) for part in np.array_split(s, len(s) // _CHUNK + 1)]
     return Deviations(*(np.concatenate(values) for values in zip(*parts, strict=True)))

@@ -1,4 +1,4 @@
-"""Postures that put the tool on the first point of a curve."""
+"""Search of the postures that put the tool on the first point of a curve."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _BELOW = 0.2  # how much a posture with a joint below the base plane is worth
 
 
 def search_starts(constraint: ToolConstraint) -> Array:
-    """Good start postures (N, n), the most comfortable of those above the base plane first.
+    """Search start postures (N, n), the most comfortable of those above the base plane first.
 
     Seeds spread over the joint range are moved onto the curve by :func:`reach`. Kept are at most 12 postures that are
     comfortable and differ from each other.
@@ -42,7 +42,7 @@ def search_starts(constraint: ToolConstraint) -> Array:
 
 
 def rewound_starts(constraint: ToolConstraint, trails: list[Trail]) -> Array:
-    """The starts (N, n) of trails that came to a joint limit, with that joint a whole turn back if it has room."""
+    """Return the starts (N, n) of trails that met a joint limit, with that joint a whole turn back if possible."""
     robot, starts = constraint.tool.robot, []
     for trail in trails:
         if trail.stop is Stop.LIMIT:
@@ -55,7 +55,7 @@ def rewound_starts(constraint: ToolConstraint, trails: list[Trail]) -> Array:
 
 
 def _no_start(constraint: ToolConstraint, found: Corrected, start: Array | None = None) -> TaskError:
-    """Why none of the postures is a start: singular where the tool is on the first point, else not there at all."""
+    """Return the error for a first point that is reached in singular postures only, or not at all."""
     s = np.full(len(found.q), constraint.curve.s0)
     there = np.flatnonzero(constraint.excess(constraint.at(found.q, s)[0]) <= KEPT)
     if not there.size:
@@ -64,7 +64,7 @@ def _no_start(constraint: ToolConstraint, found: Corrected, start: Array | None 
 
 
 def moved_start(constraint: ToolConstraint, start: Array) -> Array:
-    """The posture ``start`` (n,) moved onto the first point, (1, n).
+    """Return the posture ``start`` (n,) moved onto the first point, (1, n).
 
     Raises:
         TaskError: it does not get there, or is singular.
@@ -79,18 +79,18 @@ def moved_start(constraint: ToolConstraint, start: Array) -> Array:
 
 
 def _reached(constraint: ToolConstraint, q: Array) -> Array:
-    """Postures q (N, n) moved as near to the first point as they get."""
+    """Return postures q (N, n) moved as near to the first point as possible."""
     return reach(constraint, q, np.full(len(q), constraint.curve.s0))
 
 
 def _placed(constraint: ToolConstraint, q: Array) -> Corrected:
-    """Postures near q (N, n) that are exactly on the first point, if those are nearly."""
+    """Correct postures q (N, n) that are nearly on the first point to be exactly on it."""
     cost = PostureCost.nearest(q, constraint.tool.robot.limits)
     return correct(constraint, cost, q, np.full(len(q), constraint.curve.s0))
 
 
 def _comfortable_and_different(q: Array, comfort: Array) -> list[int]:
-    """Indices of postures (N, n), each the best by comfort times its distance to those before it."""
+    """Return indices of postures (N, n), each the best by comfort times distance to those before it."""
     chosen: list[int] = []
     worth = comfort.copy()
     while len(chosen) < _MOST and worth.max(initial=0.0) > 0:

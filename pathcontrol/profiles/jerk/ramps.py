@@ -15,13 +15,13 @@ Curve = SCurve | Approach
 
 
 class Ramp(NamedTuple):
-    """A curve of speed over distance that counts up to the distance ``until`` where a profile takes over."""
+    """A curve of speed over distance that holds up to the distance ``until``, where a profile takes over."""
 
     curve: Curve
     until: float
 
     def speed(self, distance: Array) -> tuple[Array, Array]:
-        """v and dv/dd at a ``distance`` d (*batch,) from the end of the path; ``inf`` and 0 where it does not count."""
+        """Return v and dv/dd at a ``distance`` d (*batch,) from the end of the path; ``inf`` and 0 beyond ``until``."""
         over = distance >= self.until
         if over.all():  # so it is nearly all along a path
             return np.full_like(distance, np.inf), np.zeros_like(distance)
@@ -29,7 +29,7 @@ class Ramp(NamedTuple):
         return np.where(over, np.inf, v), np.where(over, 0.0, slope)
 
     def distance_at(self, speed: float) -> float:
-        """The distance at which the curve reaches a ``speed`` that it begins below; 0 where it never does."""
+        """Return the distance at which the curve reaches a ``speed``; 0 where it never does."""
         most = float(self.curve.length)
         if not float(self.curve.speed(np.asarray(most))[0]) > speed:
             return 0.0
@@ -37,14 +37,14 @@ class Ramp(NamedTuple):
 
 
 class Course(NamedTuple):
-    """A profile between two ramps: speed v(s), distance σ(s) covered, at increasing parameters ``s`` (m,)."""
+    """A profile between two ramps: speed v(s) and distance σ(s) covered, at increasing parameters ``s`` (m,)."""
 
     s: Array
     speed: Callable[[Array], Array]
     distance: Callable[[Array], Array]
 
     def ramps(self, rise: Callable[[Any], Curve], fall: Callable[[Any], Curve]) -> tuple[Ramp, Ramp]:
-        """The first and the last ramp: to the profile's speed, or to the speed at which they meet on a short path."""
+        """Return the first and the last ramp, up to the profile's speed, or on a short path up to where they meet."""
         total = self.distance(self.s[-1])
         first = self._meeting(self.s, self.distance, rise)
         last = self._meeting(self.s[::-1], lambda s: total - self.distance(s), fall)
@@ -54,7 +54,7 @@ class Course(NamedTuple):
         return _ramp(rise, first, highest), _ramp(fall, last, highest)
 
     def _meeting(self, s: Array, distance: Callable[[Array], Array], curve: Callable[[Any], Curve]) -> float:
-        """The profile's speed where a ramp up to it first fits into the distance; ``inf`` if it nowhere does."""
+        """Return the profile's speed where a ramp up to it first fits into the distance; ``inf`` if nowhere."""
 
         def spare(s: Array) -> Array:
             return distance(s) - curve(self.speed(s)).length
@@ -72,7 +72,7 @@ def _ramp(curve: Callable[[Any], Curve], speed: float, highest: float) -> Ramp:
 
 
 def _root(function: Callable[[Any], Array]) -> float:
-    """Where an increasing function of a speed is 0."""
+    """Return the root of an increasing function of a speed."""
     most = 1.0
     while function(np.asarray(most)) < 0:
         most *= 2

@@ -1,4 +1,4 @@
-"""Jerk-limited rise of a speed, over the distance covered: the S-curve."""
+"""The S-curve: a jerk-limited rise of a speed, over the distance covered."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class SCurve:
 
     @property
     def length(self) -> Array:
-        """Distance over which the speed rises."""
+        """The distance over which the speed rises."""
         t_1, t_2 = self._durations
         return 0.5 * (self.first + self.last) * (2 * t_1 + t_2)
 
     def speed(self, distance: Array) -> tuple[Array, Array]:
-        """v and dv/dd after a ``distance`` d ≥ 0 (*batch,); V and 0 beyond the length.
+        """Return v and dv/dd after a ``distance`` d ≥ 0 (*batch,); V and 0 beyond the length.
 
         The first phase covers v₀t + jt³/6 in the time t, the last one Vt − jt³/6 in the time t that is left: two cubics
         with one real root in their phase, 2c sinh(⅓ asinh(3d/(2v₀c))), c² = 2v₀/j, and the same with sines.
@@ -54,7 +54,7 @@ class SCurve:
 
     @property
     def _durations(self) -> tuple[Array, Array]:
-        """t₁ and t₂ [s]; both 0 where there is no rise."""
+        """The durations t₁ and t₂ [s]; both 0 where there is no rise."""
         rise = np.maximum(self.last - self.first, 0.0)
         t_1 = np.minimum(np.sqrt(rise / self.jerk), self.acceleration / self.jerk)
         return t_1, np.maximum(rise / self.acceleration - self.acceleration / self.jerk, 0.0)
@@ -62,7 +62,7 @@ class SCurve:
 
 @dataclass(frozen=True)
 class Approach:
-    """The jerk-limited fall of a speed from V to the end of a path, exponential at last as that of the controllers.
+    """The jerk-limited fall of a speed from V to the end of a path, exponential at its end as that of the controllers.
 
     With T = 0.1 s and d the distance left, v = d/T has |v̇| = v/T and |v̈| = v/T². It meets the S-curve that rises from
     v₀ = jT²/2, moved by jT³/3, at d = jT³ with the same v, v̇ and v̈. For that the S-curve must not have left its first
@@ -80,11 +80,11 @@ class Approach:
 
     @property
     def length(self) -> Array:
-        """Distance over which the speed falls."""
+        """The distance over which the speed falls."""
         return self._tail / 3 + self._curve.length
 
     def speed(self, distance: Array) -> tuple[Array, Array]:
-        """v and dv/dd with a ``distance`` d ≥ 0 (*batch,) left to the end."""
+        """Return v and dv/dd with a ``distance`` d ≥ 0 (*batch,) left to the end."""
         v, slope = self._curve.speed(distance - self._tail / 3)
         at_last = distance < self._tail
         return np.where(at_last, distance / END_TIME, v), np.where(at_last, 1 / END_TIME, slope)

@@ -22,7 +22,7 @@ _FIRST_INSTANT = 0.01  # s
 
 
 class SmoothStartStop(VelocityProfile):
-    """Another profile on an open path, begun and ended with limited acceleration and jerk.
+    """A profile on an open path whose start and stop have limited acceleration and jerk, another in between.
 
     The speed v = ‖p'‖ϑ of the joints, or of a tool, rises by an S-curve, from ``start_speed`` at s0 to the speed of the
     other profile where it meets it, and falls likewise at the end; between the two ϑ is that of the other profile, if
@@ -88,7 +88,7 @@ class SmoothStartStop(VelocityProfile):
         return theta, dtheta
 
     def knots(self, path: Path) -> Array | None:
-        """Where the ramps meet the profile, and that profile's own knots."""
+        """Return the parameters where the ramps meet the profile, and that profile's own knots."""
         total = float(self._distance(self._distance.x[-1]))
         ends = [self._start.until, total - self._stop.until, total - self._stop.distance_at(self._least)]
         met = np.array(ends)
@@ -101,7 +101,7 @@ class SmoothStartStop(VelocityProfile):
         return super().describe() | {"motion": str(self.motion), "around": self.profile.describe()}
 
     def _ramp_speeds(self, s: Array) -> Iterator[tuple[Array, Array]]:
-        """v and dv/dσ of start and stop after the distance σ(s)."""
+        """Yield v and dv/dσ of start and stop after the distance σ(s)."""
         covered = self._distance(s)
         yield self._start.speed(covered)
         v, slope = self._stop.speed(self._distance(self._distance.x[-1]) - covered)

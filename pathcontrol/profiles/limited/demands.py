@@ -1,4 +1,4 @@
-"""What all limits together ask of ϑ along one path."""
+"""The demands of all limits on ϑ along one path."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Demands:
             self.last = self._rate_after(_END, path.s_end)
 
     def at(self, s: Array) -> tuple[Array, list[Tangential]]:
-        """The largest ϑ² [1/s²] that speeds, curvatures and ends allow, (cells, k), and the tangential limits."""
+        """Return the largest ϑ² [1/s²] for speeds, curvatures and ends, (cells, k), and the tangential limits."""
         dq = self.path.dq_d(s)
         rates = np.select([s == self.path.s0, s == self.path.s_end], [self.first, self.last], np.inf)
         with np.errstate(divide="ignore"):
@@ -49,18 +49,19 @@ class Demands:
         return np.minimum.reduce(ceilings), tangential
 
     def resolved(self, s: Array) -> NDArray[np.bool_]:
-        """Whether cells with the points s (cells, 5) are small enough for all limits, (cells,)."""
+        """Return whether cells with the points s (cells, 5) are small enough for all limits, (cells,)."""
         ceiling, tangential = self.at(s)
         return np.logical_and.reduce([excess(ceiling) <= _MAX_EXCESS, *(limit.resolved for limit in tangential)])
 
     def _rate_after(self, time: float, s: float) -> float:
-        """ϑ [1/s] that the tangential limits allow to build up from rest at s in a ``time`` [s]; ``inf`` without."""
+        """Return the ϑ [1/s] that is reached from rest at s in a ``time`` [s]; ``inf`` without tangential limits."""
         _, limits = self.at(np.full((1, 1), s))
         with np.errstate(divide="ignore"):
             return min((float(limit.largest * time / limit.length[0, 0]) for limit in limits), default=np.inf)
 
 
 def _checked_velocity(velocity: ArrayLike | None, n: int) -> Array:
+    """Check the velocity limits of the joints, (n,); ``inf`` for none."""
     fastest = joint_array("velocity", np.full(n, np.inf) if velocity is None else velocity, n)
     if not (fastest > 0).all():
         raise InputError(f"velocity = {fastest.tolist()}, expected speeds greater than 0; inf for no limit")

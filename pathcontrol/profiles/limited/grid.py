@@ -1,4 +1,4 @@
-"""Cells of a path that follow a function of s, and values at their edges whose chords stay below it."""
+"""A grid of cells on a path, fine enough for a function of s, with values whose chords stay below it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _HALVINGS = 12
 
 
 def edges(path: Path, cells: int) -> Array:
-    """The edges of so many cells or a few more over one traverse of a path, each within one piece of it.
+    """Return the edges of at least ``cells`` cells over one traverse of a path, each within one piece of it.
 
     Raises:
         TaskError: the path neither ends nor closes.
@@ -33,12 +33,12 @@ def edges(path: Path, cells: int) -> Array:
 
 
 def quarters(edges: Array) -> Array:
-    """The ends and the quarters of the cells between the ``edges`` (cells + 1,), (cells, 5)."""
+    """Return the ends and the quarters of the cells between the ``edges`` (cells + 1,), (cells, 5)."""
     return edges[:-1, None] + np.diff(edges)[:, None] * _SHARES
 
 
 def refined(resolved: Callable[[Array], NDArray[np.bool_]], edges: Array) -> Array:
-    """The ``edges`` of cells, and more: cells are halved, at most 12 times, unless their points (cells, 5) suffice."""
+    """Halve cells, at most 12 times, until their points (cells, 5) are ``resolved``; return all edges."""
     left, right, kept = edges[:-1], edges[1:], []
     for _ in range(_HALVINGS):
         coarse = ~resolved(left[:, None] + (right - left)[:, None] * _SHARES)
@@ -49,7 +49,7 @@ def refined(resolved: Callable[[Array], NDArray[np.bool_]], edges: Array) -> Arr
 
 
 def below(values: Array) -> Array:
-    """Values at the edges that are those of a function, known at the ``quarters`` (cells, 5), or less: (cells + 1,).
+    """Return values at the edges, (cells + 1,), not above a function known at the ``quarters`` (cells, 5).
 
     They are lowered where a chord would exceed the function at a quarter.
     """
@@ -59,7 +59,7 @@ def below(values: Array) -> Array:
 
 
 def excess(values: Array) -> Array:
-    """How many times larger than the ``values`` (cells, 5) the chord between the ends is at most, (cells,)."""
+    """Return the largest ratio of the chord between the ends to the ``values`` (cells, 5), (cells,)."""
     values = _without_peaks(values)
     with np.errstate(invalid="ignore"):
         chord = values[:, :1] + (values[:, -1:] - values[:, :1]) * _SHARES
@@ -68,5 +68,5 @@ def excess(values: Array) -> Array:
 
 
 def _without_peaks(values: Array) -> Array:
-    """The values with ends near those inside, so that no lone peak lowers the other end of its cell."""
+    """Lower ends far above the values inside, so that no lone peak lowers the other end of its cell."""
     return np.minimum(values, _PEAK * values[:, 1:-1].min(-1, keepdims=True))

@@ -31,7 +31,7 @@ def limited(
     points: int = 1000,
     start_rate: Rate | None = None,
 ) -> TabulatedProfile:
-    """The largest ϑ(s) that keeps every limit: curvature- and tolerance-limited speed with bounded acceleration.
+    """Return the largest ϑ(s) that keeps every limit: on speed, on curvature and on acceleration.
 
     Speed and curvature cap ϑ at every s; a forward and a backward sweep lower it until |v̇| is within the tangential
     limits, with ϑ² linear in each cell of a table. All limits hold at the quarters of every cell, and between these to

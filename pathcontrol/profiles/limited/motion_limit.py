@@ -14,7 +14,7 @@ from pathcontrol.robot.extent import question_speed
 
 @dataclass(frozen=True)
 class MotionLimit:
-    """What the motion p(s) may do along a path; lengths [rad] for the joints, [m] for a tool.
+    """A limit on the motion p(s) along a path; lengths are in [rad] for the joints, in [m] for a tool.
 
     With v = ‖p'‖ϑ the speed and κ the curvature of p, the acceleration has the parts v̇ along the path and κv² across.
     The arc vT of one control period T leaves its chord by κ(vT)²/8 at most, so that a chord error ε allows
@@ -47,7 +47,7 @@ class MotionLimit:
             question_speed("the speed of the tool", self.speed, self.motion.robot, self.motion.frame)
 
     def ceiling(self, dp: Array, ddp: Array) -> Array:
-        """The largest ϑ² [1/s²] that speed and curvature allow with p' and p'', (*batch,); ``inf`` where any."""
+        """Return the largest ϑ² [1/s²] for the limits of speed and curvature, given p' and p'', (*batch,)."""
         across = np.linalg.norm(ddp - growth(dp, ddp)[..., None] * dp, axis=-1)
         with np.errstate(divide="ignore"):
             by_speed = np.inf if self.speed is None else self.speed**2 / (dp * dp).sum(-1)

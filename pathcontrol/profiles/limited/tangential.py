@@ -1,4 +1,4 @@
-"""A limit on the acceleration along a path, as bounds on how ϑ² may rise and fall over the cells of a table."""
+"""A limit on the acceleration along a path, as bounds on the rise and fall of ϑ² over each cell."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _STANDSTILL = 1e-9
 
 
 class Tangential(NamedTuple):
-    """|v̇| ≤ ``largest`` [1/s²], v = ‖p'‖ϑ the speed of a ``motion``; ‖p'‖ and d ln‖p'‖/ds are known at places s.
+    """The limit |v̇| ≤ ``largest`` on the speed v = ‖p'‖ϑ of a ``motion``, with ‖p'‖ and d ln‖p'‖/ds at places s.
 
     The places are points of cells, (cells, k), from one end of each to the other.
     """
@@ -32,11 +32,11 @@ class Tangential(NamedTuple):
 
     @property
     def resolved(self) -> NDArray[np.bool_]:
-        """Whether ‖p'‖ is much the same all over a cell, (cells,)."""
+        """The mask of the cells, (cells,), over which ‖p'‖ hardly changes."""
         return self._change <= _MAX_GROWTH
 
     def steps(self) -> tuple[Lines, Lines]:
-        """How far ϑ² may rise and fall over each cell: a line for each of its points.
+        """Return bounds on the rise and on the fall of ϑ² over each cell: a line for each of its points.
 
         With x = ϑ² linear, s̈ = (x_{i+1} − x_i)/(2Δ). At the share λ of the cell |‖p'‖(s̈ + xγ)| ≤ a, γ = d ln‖p'‖/ds,
         then says βx_{i+1} ≤ αx_i + b and αx_i ≤ βx_{i+1} + b, where α = 1 − 2Δγ(1 − λ), β = 1 + 2Δγλ, b = 2Δa/‖p'‖.
@@ -55,6 +55,7 @@ class Tangential(NamedTuple):
         return np.abs(self.growth).max(-1) * (self.s[:, -1] - self.s[:, 0])
 
     def _check_moving(self) -> None:
+        """Check that the motion does not stand still."""
         still = (self.length <= _STANDSTILL * self.length.max()).any(-1) | ~(self._change < _UNRESOLVED)
         if still.any():
             raise TaskError(
@@ -65,7 +66,7 @@ class Tangential(NamedTuple):
 
 
 def all_steps(limits: Sequence[Tangential], cells: int) -> tuple[Lines, Lines]:
-    """How far ϑ² may rise and fall over each cell under all limits."""
+    """Return bounds on the rise and on the fall of ϑ² over each cell under all limits."""
     none = Lines(np.empty((0, cells)), np.empty((0, cells)))
     steps = [(none, none), *(limit.steps() for limit in limits)]
     up, down = (Lines(*map(np.concatenate, zip(*lines, strict=True))) for lines in zip(*steps, strict=True))

@@ -1,4 +1,4 @@
-"""The largest sequence under a ceiling whose steps up and down are bounded: a forward and a backward sweep."""
+"""The largest sequence under a ceiling with bounded steps up and down, by a forward and a backward sweep."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ class Lines(NamedTuple):
 
 
 def largest(ceiling: Array, up: Lines, down: Lines, closed: bool) -> Array:
-    """The largest x ≤ ``ceiling`` (m,) with x_{i+1} ≤ up_i(x_i) and x_i ≤ down_i(x_{i+1}) for each line and cell i.
+    """Return the largest x ≤ ``ceiling`` (m,) with x_{i+1} ≤ up_i(x_i) and x_i ≤ down_i(x_{i+1}) for all lines and i.
 
-    All these bounds allow, with two sequences, also their larger one value by value; so one sequence is the largest
-    everywhere. The forward sweep takes each value as large as its predecessor lets it be, the backward sweep as its
-    successor does; what this lowers its predecessor still reaches as long as y ≤ up(down(y)), which joins the ceiling
-    first. On a closed path the last value is the first again.
+    If two sequences keep the bounds, so does their element-wise maximum; hence there is one largest sequence. The
+    forward sweep makes each value as large as its predecessor allows, the backward sweep as its successor allows. A
+    value lowered by the backward sweep is still reached from its predecessor if y ≤ up(down(y)), a bound that is part
+    of the ceiling. On a closed path the last value is the first again.
     """
     ceiling = ceiling.copy()
     ceiling[1:] = np.minimum(ceiling[1:], _reachable(up, down))
@@ -35,7 +35,7 @@ def largest(ceiling: Array, up: Lines, down: Lines, closed: bool) -> Array:
 
 
 def _reachable(up: Lines, down: Lines) -> Array:
-    """The largest y of each cell with y ≤ up(down(y)), (cells,)."""
+    """Return the largest y of each cell with y ≤ up(down(y)), (cells,)."""
     bound = np.full(up.slope.shape[1], np.inf)
     for slope, offset in zip(*up, strict=True):
         closing = 1 - slope * down.slope
@@ -45,6 +45,7 @@ def _reachable(up: Lines, down: Lines) -> Array:
 
 
 def _sweep(ceiling: Array, lines: Lines, closed: bool) -> Array:
+    """Sweep once, or round a closed path until the values repeat."""
     values = _one_sweep(ceiling, lines)
     for _ in range(_MAX_LAPS):
         if not closed or values[-1] >= (1 - 1e-12) * values[0]:
@@ -57,7 +58,7 @@ def _sweep(ceiling: Array, lines: Lines, closed: bool) -> Array:
 
 
 def _one_sweep(ceiling: Array, lines: Lines) -> Array:
-    """Plain floats: a loop over arrays of one or two lines would take ten times as long."""
+    """Sweep once, in plain floats: a loop over arrays of one or two lines would take ten times as long."""
     x, *ceilings = ceiling.tolist()
     values = [x]
     for top, slopes, offsets in zip(ceilings, lines.slope.T.tolist(), lines.offset.T.tolist(), strict=True):

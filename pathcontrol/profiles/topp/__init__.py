@@ -1,1 +1,1 @@
-"""Time-optimal traversal of a path: the limits along it, what each cell of the grid allows, and the sweeps."""
+"""Time-optimal path parametrisation (TOPP): limits along the path, their form in each cell, and the passes."""

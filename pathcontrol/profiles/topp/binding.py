@@ -1,4 +1,4 @@
-"""Which limit binds where, and what to say when one cannot be kept."""
+"""The limits that bind along a path, and the errors about limits that cannot be kept."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Binding(NamedTuple):
 
 
 def binding(limits: JointLimits, samples: Samples, cells: Cells, x: Array) -> Binding:
-    """Where ṡ² = x at the knots (N + 1,) uses which limit most, on either side of a knot."""
+    """Return the most used limit at each knot, on either side of it, for ṡ² = x (N + 1,)."""
     used, m = cells.used(x), len(limits.rows)
     knots = np.full((len(x), m + len(limits.velocity)), -np.inf)
     knots[:-1, :m] = used[:, :m]
@@ -34,7 +34,7 @@ def binding(limits: JointLimits, samples: Samples, cells: Cells, x: Array) -> Bi
 
 
 def refuse_static_overload(limits: JointLimits, samples: Samples, torques: Torques) -> None:
-    """The arm must be able to pass every posture of the path slowly.
+    """Check that the arm can pass every posture of the path slowly.
 
     Raises:
         TaskError: somewhere weight and dry friction alone exceed the torque of a joint.
@@ -57,7 +57,7 @@ def refuse_static_overload(limits: JointLimits, samples: Samples, torques: Torqu
 
 
 def refuse_rate(limits: JointLimits, samples: Samples, cells: Cells, name: str, rate: float | None, x: Array) -> None:
-    """The rate [1/s] asked for at an end of the path must be one that the profile x, (N + 1,), has there.
+    """Check that the ``rate`` [1/s] at an end of the path is not above that of the profile x, (N + 1,).
 
     Raises:
         TaskError: it is larger.
@@ -78,4 +78,5 @@ def refuse_rate(limits: JointLimits, samples: Samples, cells: Cells, name: str, 
 
 
 def _text(q: Array) -> str:
+    """Write a posture for a message."""
     return str(np.round(q, 4).tolist())

@@ -1,4 +1,4 @@
-"""What the limits allow in each cell of the grid: a set in the plane of ṡ² at its two ends."""
+"""The constraints of each cell of the grid: a set in the plane of ṡ² at its two ends."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathcontrol.profiles.topp.joint_limits import JointLimits
 
 
 class Cells(NamedTuple):
-    """f = A x + B √x + A' x' + B' √x' + C ≤ 0 for x and x' = ṡ² at the two ends of each cell; arrays (N, rows).
+    """The constraints A x + B √x + A' x' + B' √x' + C ≤ 0 on x and x' = ṡ² at the ends of cells; arrays (N, rows).
 
     ṡ² is linear in s within a cell, so that s̈ = (x' − x)/(2Δs) there. The rows are the m rows of
     :meth:`JointLimits.shares` at the first end, less 1, those at the other end, and the velocity limit at the first.
@@ -26,28 +26,28 @@ class Cells(NamedTuple):
     C: Array
 
     def used(self, x: Array) -> Array:
-        """The share of each limit that x = ṡ² at the knots (N + 1,) uses, (N, rows)."""
+        """Return the share of each limit that x = ṡ² at the knots (N + 1,) uses, (N, rows)."""
         y = np.sqrt(x)
         own = self.A * x[:-1, None] + self.B * y[:-1, None]
         return own + self.A_next * x[1:, None] + self.B_next * y[1:, None] + self.C + 1
 
     def swapped(self) -> Cells:
-        """The same cells with their two ends exchanged."""
+        """Return the same cells with their two ends exchanged."""
         return Cells(self.A_next, self.B_next, self.A, self.B, self.C)
 
     def some(self, index: Array | int) -> Cells:
-        """Some of the cells."""
+        """Return the cells at an index."""
         return Cells(*(array[index] for array in self))
 
 
 def static_shares(limits: JointLimits, torques: Torques) -> Array:
-    """The shares that standing still uses at both ends of each cell, (N, 2, m); dry friction may jump at a knot."""
+    """Return the shares used at standstill at both ends of each cell, (N, 2, m); dry friction may jump at a knot."""
     ends = np.stack([torques.c[:-1], torques.c[1:]], axis=1)
     return limits.shares(np.zeros_like(ends), ends + torques.most[:, None], ends + torques.least[:, None])
 
 
 def cells_of(limits: JointLimits, samples: Samples, torques: Torques, speed: Array) -> Cells:
-    """The cells of a path on which ṡ² ≤ ``speed`` at the knots, (N + 1,)."""
+    """Return the cells of a path on which ṡ² ≤ ``speed`` at the knots, (N + 1,)."""
     knots, static = samples.knots, static_shares(limits, torques)
     u = limits.shares(knots.dq, torques.a, torques.a)
     x = limits.shares(knots.ddq, torques.b, torques.b)

@@ -1,4 +1,4 @@
-"""The arm's equations along a path: joint torques for every ṡ and s̈."""
+"""The arm's equations of motion along a path: joint torques for every ṡ and s̈."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ALL = 4000  # samples of the path, at least
 
 
 class Samples(NamedTuple):
-    """A path at the knots of N cells and evenly between them: s (kN + 1,); q_d and derivatives (kN + 1, n)."""
+    """Samples of a path at the knots of N cells and evenly between: s (kN + 1,); q_d and derivatives (kN + 1, n)."""
 
     s: Array
     q: Array
@@ -27,21 +27,21 @@ class Samples(NamedTuple):
 
     @property
     def knots(self) -> Samples:
-        """The knots alone, (N + 1,) and (N + 1, n)."""
+        """The samples at the knots alone, (N + 1,) and (N + 1, n)."""
         return Samples(self.s[:: self.k], self.q[:: self.k], self.dq[:: self.k], self.ddq[:: self.k], 1)
 
     @property
     def widths(self) -> Array:
-        """Widths Δs of the cells, (N,)."""
+        """The widths Δs of the cells, (N,)."""
         return np.diff(self.s[:: self.k])
 
     def by_cell(self, values: Array) -> Array:
-        """Values at the samples (kN + 1, …), or between them (kN, …), by cell without its right end, (N, k, …)."""
+        """Group values at the samples (kN + 1, …) or between (kN, …) by cell, without right ends, (N, k, …)."""
         return values[: len(self.widths) * self.k].reshape(-1, self.k, *values.shape[1:])
 
     @property
     def bulge(self) -> Array:
-        """The largest q_d'' within each cell over its chord, (N, n): large at a kink, as those at a spline's knots.
+        """The excess of q_d'' within each cell over its chord, (N, n); it is large at a kink of q_d''.
 
         A kink between two samples is k/(k − 1) times as high as they may show it.
         """
@@ -53,7 +53,7 @@ class Samples(NamedTuple):
 
 
 def sample(path: Path, knots: Array, n: int) -> Samples:
-    """``path``, for ``n`` joints, at ``knots`` (N + 1,) and between."""
+    """Sample ``path``, for ``n`` joints, at the ``knots`` (N + 1,) and between."""
     k = max(_SAMPLES, -(-_ALL // (len(knots) - 1)))
     s = np.interp(np.arange(k * (len(knots) - 1) + 1) / k, np.arange(len(knots)), knots)
     q, dq, ddq = (np.asarray(f(s), dtype=np.float64) for f in (path.q_d, path.dq_d, path.ddq_d))
@@ -74,7 +74,7 @@ def sample(path: Path, knots: Array, n: int) -> Samples:
 
 
 class Torques(NamedTuple):
-    """τ = a s̈ + b ṡ² + d ṡ + c + F [N m] at the knots, each (N + 1, n), with dry friction F from least to most.
+    """Torques τ = a s̈ + b ṡ² + d ṡ + c + F [N m] at the knots, each (N + 1, n), with bounds on the dry friction F.
 
     With q̇ = q_d'ṡ and q̈ = q_d's̈ + q_d''ṡ²: a = M q_d', b = M q_d'' + C(q_d, q_d')q_d', c = g(q_d), and viscous friction
     gives d (Bobrow, Dubowsky and Gibson, Int. J. Robotics Research 4, 1985). Of each cell, (N, n), are F and the bulge
@@ -91,7 +91,7 @@ class Torques(NamedTuple):
 
 
 def torques(robot: RobotModel, samples: Samples) -> Torques:
-    """The torques of ``robot`` along a path."""
+    """Return the torques of ``robot`` along a path."""
     _, q, dq, ddq, _ = samples.knots
     c, rest = robot.gravity(q), np.zeros(robot.n)
     rate = 1 / np.abs(dq).max()  # ṡ for which inertia is not lost beside weight, whatever the scale of s
@@ -102,7 +102,7 @@ def torques(robot: RobotModel, samples: Samples) -> Torques:
 
 
 def dry_friction(law: FrictionLaw, samples: Samples) -> tuple[Array, Array]:
-    """The least and the most dry friction [N m] in each cell, each (N, n), of motion with ṡ > 0.
+    """Return the least and the most dry friction [N m] in each cell, each (N, n), of motion with ṡ > 0.
 
     Where a joint turns back it is all between −F⁻ and F⁺; where one stands still, none. Levels that vary with velocity
     are taken to lie between those at rest and at infinite velocity.
@@ -118,7 +118,7 @@ def dry_friction(law: FrictionLaw, samples: Samples) -> tuple[Array, Array]:
 
 
 def _may_turn(samples: Samples) -> Array:
-    """Cells in which a joint may turn back twice between two samples, so that none of them shows it, (N, n)."""
+    """Return the mask, (N, n), of cells in which a joint may turn back twice between two samples, unseen by them."""
     speed, slope = np.abs(samples.dq), samples.ddq
     step = np.diff(samples.s)[:, None]
     reach = 0.5 * step * np.maximum(np.abs(slope[:-1]), np.abs(slope[1:]))
@@ -127,5 +127,5 @@ def _may_turn(samples: Samples) -> Array:
 
 
 def _over_cells(samples: Samples, values: Array, extreme: np.ufunc) -> Array:
-    """The extreme of values at the samples, (kN + 1, n), over each cell with both its ends, (N, n)."""
+    """Return the extreme over each cell with both its ends, (N, n), of values at the samples, (kN + 1, n)."""
     return extreme(extreme.reduce(samples.by_cell(values), axis=1), values[samples.k :: samples.k])

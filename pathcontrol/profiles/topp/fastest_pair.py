@@ -1,4 +1,4 @@
-"""How fast each cell can be passed, whatever comes before and after."""
+"""The fastest way to pass each cell, taken alone."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ _TINY = 1e-12  # share of a limit
 
 
 class Bound(NamedTuple):
-    """A bound on x for some x', and its slope dx/dx', each (N,)."""
+    """A bound on x as a function of x', and its slope dx/dx', each (N,)."""
 
     x: Array
     slope: Array
 
 
 def fastest_pair(cells: Cells, top: Array) -> tuple[Array, Array]:
-    """The allowed x' ≤ ``top`` and x with which each cell is passed the fastest, √x + √x' being largest; each (N,).
+    """Return the allowed x' ≤ ``top`` and x that maximise √x + √x' in each cell; each (N,).
 
     Where rest (0, 0) is allowed the set of allowed (x, x') is convex but for viscous friction, which bends its sides.
     Newton's method goes from ``top`` to the largest x' allowed, kept in a bracket. Where less is faster, because the
@@ -51,7 +51,7 @@ def fastest_pair(cells: Cells, top: Array) -> tuple[Array, Array]:
 
 
 def bounds(cells: Cells, x_next: Array) -> tuple[Bound, Bound]:
-    """The largest and the least x for x' (N,): roots of A x + B √x = −C − A'x' − B'√x' = z/2.
+    """Return the largest and the least x for x' (N,): roots of A x + B √x = −C − A'x' − B'√x' = z/2.
 
     Of two roots the one on the side of x = x' counts. Where a row for this x' bounds x to less than 0, the bound is
     continued there.

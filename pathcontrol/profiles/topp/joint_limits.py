@@ -1,4 +1,4 @@
-"""The limits of an arm's joints that a traversal has to keep."""
+"""The limits of the joints that a traversal has to keep."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _UNITS = {
 
 
 class JointLimits(NamedTuple):
-    """|q̇| ≤ ``velocity``, |q̈| ≤ ``acceleration`` and |τ| ≤ ``torque``, each (n,) in SI units; ``inf`` for no limit.
+    """Limits |q̇| ≤ ``velocity``, |q̈| ≤ ``acceleration``, |τ| ≤ ``torque``, each (n,) in SI units; ``inf`` for none.
 
     The torque is what the profile may use: the share ``margin`` of the drives' torque is left to feedback.
     """
@@ -35,7 +35,7 @@ class JointLimits(NamedTuple):
     margin: float
 
     def text(self, kind: str, joint: int) -> str:
-        """One limit for an error message: kind, value, unit and joint."""
+        """Write one limit for an error message: kind, value, unit and joint."""
         value, unit = getattr(self, kind)[joint], _UNITS[self.robot.position_units[joint]][kind]
         text = f"{kind} limit of {self.robot.joint_names[joint]}, {value:.4g} {unit}"
         if kind == "torque" and self.margin:
@@ -43,7 +43,7 @@ class JointLimits(NamedTuple):
         return text
 
     def shares(self, acceleration: Array, most: Array, least: Array) -> Array:
-        """The shares used of each finite limit in both directions, (*batch, m).
+        """Return the used share of each finite limit in both directions, (*batch, m).
 
         The rows are those of acceleration upwards and downwards, then those of torque, which lies between ``least``
         and ``most``; the arguments are (*batch, n).
@@ -54,7 +54,7 @@ class JointLimits(NamedTuple):
 
     @property
     def rows(self) -> list[tuple[str, int]]:
-        """Kind and joint of each row of :meth:`shares`."""
+        """The kind and the joint of each row of :meth:`shares`."""
         finite = [(kind, np.flatnonzero(np.isfinite(getattr(self, kind)))) for kind in ("acceleration", "torque")]
         return [(kind, int(i)) for kind, joints in finite for i in (*joints, *joints)]
 
@@ -62,7 +62,7 @@ class JointLimits(NamedTuple):
 def joint_limits(
     robot: RobotModel, velocity: LimitChoice, acceleration: LimitChoice, torque: LimitChoice, margin: float
 ) -> JointLimits:
-    """The limits that the caller chose, the torque less its margin.
+    """Return the limits that the caller chose, the torque less its margin.
 
     Raises:
         InputError: a limit is not positive, has a wrong shape, or there is none.

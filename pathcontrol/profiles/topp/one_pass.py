@@ -1,4 +1,4 @@
-"""One pass along the grid, from ṡ² at one end of each cell to the largest at the other."""
+"""One pass along the grid, from ṡ² at one end of each cell to the largest ṡ² at the other."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _UNBOUNDED = 1e-100
 
 
 class Steps(NamedTuple):
-    """The rows that bound x from above, as √x ≤ z/(B + √D) with (D, z) linear in (1, x', √x').
+    """The constraints that bound x from above, as √x ≤ z/(B + √D) with (D, z) linear in (1, x', √x').
 
     Attributes:
         weights: of 1, x' and √x' in D and z, (N, 3, 2 rows).
@@ -28,12 +28,12 @@ class Steps(NamedTuple):
     most: Array
 
     def reversed(self) -> Steps:
-        """The same cells in the other order."""
+        """Return the same cells in the opposite order."""
         return Steps(*(array[::-1] for array in self))
 
 
 def steps_of(cells: Cells, most: Array, scale: Array) -> Steps:
-    """The steps from x' ≤ ``most`` to x, where (x, x') = (``scale``, ``most``) is allowed; both are (N,).
+    """Return the steps from x' ≤ ``most`` to x, where (x, x') = (``scale``, ``most``) is allowed; both are (N,).
 
     The rows that grow with x there bound it: of A x + B √x = z/2 the root is √x = z/(B + √D), D = B² + 2A z.
     """
@@ -48,7 +48,7 @@ def steps_of(cells: Cells, most: Array, scale: Array) -> Steps:
 
 
 def swept(steps: Steps, start: float, ceiling: Array) -> Array:
-    """From ``start`` the largest x ≤ ``ceiling`` (N,), each the x' of the next cell, (N + 1,)."""
+    """Return the largest x ≤ ``ceiling`` (N,) from ``start`` on, each the x' of the next cell, (N + 1,)."""
     x, values, powers, rows = start, [start], np.ones(3), steps.B.shape[-1]
     both, zero = np.empty(2 * rows), np.zeros(rows)
     D, z = both[:rows], both[rows:]

@@ -1,4 +1,4 @@
-"""Backwards along the path for the ṡ² from which the rest can still be passed, forwards for the largest of them."""
+"""The two passes of TOPP: backwards for the controllable ṡ², forwards for the largest ṡ² inside that set."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LAPS = 100
 
 
 class Allowed(NamedTuple):
-    """What the limits allow.
+    """The pairs of ṡ² that the limits allow in each cell.
 
     Attributes:
         cells: the pairs of ṡ² at the ends of each of the N cells.
@@ -32,7 +32,7 @@ class Allowed(NamedTuple):
 
 
 def across(allowed: Allowed, widths: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
-    """The largest ṡ² at the knots of an open path from which its end can be reached, and the fastest, (N + 1,).
+    """Return the largest ṡ² at the knots of an open path from which its end can be reached, and the fastest, (N + 1,).
 
     ``start`` and ``end`` are the rates ṡ [1/s] at the ends; ``None`` for what the arm reaches from rest in a first
     instant, 2.5 ms, of the acceleration it is then capable of.
@@ -45,7 +45,7 @@ def across(allowed: Allowed, widths: Array, start: float | None, end: float | No
 
 
 def around(allowed: Allowed) -> Array:
-    """ṡ² at the knots of the fastest traversal of a closed path, (N + 1,): after a lap it is what it was."""
+    """Return ṡ² at the knots of the fastest periodic traversal of a closed path, (N + 1,)."""
     largest = _repeated(lambda x: _backwards(allowed, x)[::-1], allowed.leave[-1])[::-1]
     fastest = _repeated(lambda x: _forwards(allowed, largest, x), largest[0])
     fastest[0] = fastest[-1]
@@ -53,24 +53,26 @@ def around(allowed: Allowed) -> Array:
 
 
 def _from_rest(cell: Cells, width: float) -> float:
-    """ṡ [1/s] that one cell of ``width`` Δs lets the arm reach from rest in a first instant."""
+    """Return the ṡ [1/s] that the arm reaches from rest in a first instant, in one cell of ``width`` Δs."""
     A, C = cell.A[:-1], cell.C[:-1]  # without the row of velocity
     largest = np.where(A > 0, -C / A, np.inf).min(initial=np.inf)
     return float(largest) / (2 * width) * _FIRST_INSTANT
 
 
 def _backwards(allowed: Allowed, last: float) -> Array:
+    """Return the largest ṡ² at the knots from which ``last`` can be reached."""
     cells, speed, leave, enter = allowed
     return swept(steps_of(cells, leave, enter).reversed(), last, speed[-2::-1])[::-1]
 
 
 def _forwards(allowed: Allowed, largest: Array, first: float) -> Array:
+    """Return the fastest ṡ² at the knots that begins with ``first`` and stays below ``largest``."""
     scale = np.minimum(largest[1:], allowed.leave)
     return swept(steps_of(allowed.cells.swapped(), largest[:-1], scale), first, largest[1:])
 
 
 def _repeated(lap: Callable[[float], Array], first: float) -> Array:
-    """Laps, each begun as the last one ended, until it ends as it began; they only become slower."""
+    """Repeat laps, each begun as the last one ended, until one ends as it began; they only become slower."""
     for _ in range(_LAPS):
         values = lap(first)
         if values[-1] >= (1 - 1e-12) * first:

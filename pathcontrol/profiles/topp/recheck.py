@@ -1,4 +1,4 @@
-"""The limits checked inside the cells, and what is asked of a cell instead where they are exceeded."""
+"""A check of the limits inside the cells, and tighter constraints where they are exceeded."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _KEPT = 0.1  # of what rest leaves of a limit
 
 
 class Excess(NamedTuple):
-    """By how much ṡ² exceeds the limits in each cell, in shares; 0 where it does not.
+    """The excess of each cell over the limits, in shares; 0 where they are kept.
 
     Attributes:
         inside: of the m rows at the samples, over the chord between the ends, (N, m).
@@ -32,12 +32,12 @@ class Excess(NamedTuple):
 
     @property
     def cells(self) -> Array:
-        """The cells with any, (N,) of bool."""
+        """The mask of the cells with any excess, (N,)."""
         return self.inside.any(-1) | self.ends.any(-1) | (self.velocity > 0)
 
 
 def excess(limits: JointLimits, samples: Samples, torques: Torques, cells: Cells, x: Array) -> Excess:
-    """What ṡ² = x at the knots (N + 1,) uses too much of the limits, by inverse dynamics at the samples."""
+    """Return the excess of ṡ² = x at the knots (N + 1,), by inverse dynamics at the samples."""
     rows, velocity = _inside(limits, samples, torques, x)
     first, last = np.split(cells.used(x)[:, :-1], 2, axis=-1)
     chord = first[:, None] + (last - first)[:, None] * _shares(samples)
@@ -50,7 +50,7 @@ def excess(limits: JointLimits, samples: Samples, torques: Torques, cells: Cells
 
 
 def tightened(allowed: Allowed, cells: Cells, over: Excess, x: Array) -> Allowed:
-    """Less than ``allowed`` of the ``cells`` where ṡ² = x is too much, never so little that the arm could not rest."""
+    """Tighten the constraints of cells where ṡ² = x is too much, but never so far that rest is not allowed."""
     slower = np.where(over.velocity > 0, (1 + over.velocity) ** -2, np.inf)
     speed = np.minimum(allowed.speed, x * np.minimum(np.append(slower, np.inf), np.append(np.inf, slower)))
     A = np.hstack([cells.A[:, :-1], 1 / speed[:-1, None]])
@@ -65,7 +65,7 @@ def tightened(allowed: Allowed, cells: Cells, over: Excess, x: Array) -> Allowed
 
 
 def _inside(limits: JointLimits, samples: Samples, torques: Torques, x: Array) -> tuple[Array, Array]:
-    """The shares used at the samples within the cells of the m rows, (N, k − 1, m), and at most of velocity, (N,)."""
+    """Return the used shares at the samples within the cells, (N, k − 1, m), and the largest of velocity, (N,)."""
     q, dq, ddq = (samples.by_cell(a)[:, 1:] for a in (samples.q, samples.dq, samples.ddq))
     x_inside = x[:-1, None, None] + np.diff(x)[:, None, None] * _shares(samples)
     u = (np.diff(x) / (2 * samples.widths))[:, None, None]

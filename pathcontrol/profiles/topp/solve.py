@@ -1,4 +1,4 @@
-"""The fastest traversal of a path, sought again where a recheck inside the cells finds a limit exceeded."""
+"""The fastest traversal of a path, solved again until no limit is exceeded inside the cells."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ROUNDS = 12
 
 
 class Demand(NamedTuple):
-    """A path to be passed within limits, and what is asked of the ends of an open one, ``None`` for nothing.
+    """A path to be passed within limits, and the rates at the ends of an open one, ``None`` for free ones.
 
     Attributes:
         start_rate: ṡ at the start [1/s].
@@ -39,7 +39,7 @@ class Demand(NamedTuple):
 
 
 def fastest(demand: Demand) -> tuple[Array, Binding]:
-    """ṡ² at the knots (N + 1,) of the fastest traversal, and what limits it there.
+    """Return ṡ² at the knots (N + 1,) of the fastest traversal, and the limits that bind there.
 
     Raises:
         InputError: nothing limits the speed somewhere.

@@ -1,4 +1,4 @@
-"""The fastest traversal of a path that the arm's drives allow."""
+"""The time-optimal velocity profile of a path within the limits of the arm's drives."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _BINDING = 0.999
 
 
 class TimeOptimal(TabulatedProfile):
-    """The profile that :func:`time_optimal` computes: a table of ϑ² that knows what limits it.
+    """The profile that :func:`time_optimal` computes: a table of ϑ² with the limits that bind.
 
     Attributes:
         limiting: the limit that is used most at each knot, as ``"torque of elbow_joint"``, m of them.
@@ -47,7 +47,7 @@ class TimeOptimal(TabulatedProfile):
         return {str(names[i]): float(shares[i]) for i in np.argsort(-shares) if shares[i]}
 
     def describe(self) -> dict[str, Any]:
-        """Name, number of knots, traversal time [s], margin, and the share of the time for which each limit binds."""
+        """Return name, number of knots, traversal time [s], margin, and the share of time in which each limit binds."""
         return super().describe() | {"margin": self.margin, "limited_by": self.limited_by}
 
 
@@ -64,7 +64,7 @@ def time_optimal(
     end_rate: Rate | None = None,
     end_time: Annotated[float, Form.POSITIVE, Unit("s")] | None = None,
 ) -> TimeOptimal:
-    """The profile ϑ(s) that takes an arm along a path in the least time within the limits of its joints.
+    """Return the profile ϑ(s) that takes an arm along a path in the least time within the limits of its joints.
 
     Along the path the torques are τ = a s̈ + b ṡ² + d ṡ + c + F with ṡ = ϑ and s̈ = ϑϑ': inertia, centrifugal and
     Coriolis terms, viscous friction, weight, and dry friction in the direction of motion. On a grid, with ϑ² linear in

@@ -1,4 +1,4 @@
-"""The velocity limits along a path, and what an endless speed is."""
+"""Upper bounds on ṡ² along a path: velocity limits, an approach to the end, and a bound for unlimited speed."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ _ENDLESS = 1e6  # times the ṡ² that the arm's strength builds up over the pat
 
 
 def speed_limit(limits: JointLimits, samples: Samples, endless: float) -> Array:
-    """The largest ṡ² at the knots that the velocity limits allow, and ``endless`` where they allow any, (N + 1,)."""
+    """Return the largest ṡ² at the knots within the velocity limits, (N + 1,); ``endless`` without any."""
     return np.minimum((limits.velocity / np.abs(samples.knots.dq)).min(-1) ** 2, endless)
 
 
 def end_limit(samples: Samples, end_time: float) -> Array:
-    """ṡ² of an approach to the end with the time constant ``end_time`` [s], but for the last cell, (N + 1,)."""
+    """Return ṡ² of an approach to the end with the time constant ``end_time`` [s], but for the last cell, (N + 1,)."""
     s = samples.knots.s
     return (np.maximum(s[-1] - s, s[-1] - s[-2]) / end_time) ** 2
 
 
 def endless_speed(limits: JointLimits, samples: Samples, torques: Torques) -> float:
-    """An ṡ² out of reach of any arm that something limits; ``inf`` without limits of acceleration and torque."""
+    """Return an ṡ² out of reach of any arm that has limits; ``inf`` without limits of acceleration and torque."""
     strength = limits.shares(samples.knots.dq, torques.a, torques.a).max(initial=0.0)
     return float(_ENDLESS * samples.widths.sum() / strength)
 
 
 def refuse_endless(samples: Samples, x: Array, endless: float) -> None:
-    """Something has to limit ṡ² everywhere.
+    """Check that a limit bounds ṡ² everywhere.
 
     Raises:
         InputError: ṡ² = x at the knots, (N + 1,), is ``endless`` somewhere.

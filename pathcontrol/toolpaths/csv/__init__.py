@@ -1,3 +1,3 @@
-"""Tables of points as files of comma-separated values and the like."""
+"""Reading of tables of points: comma-separated values and the like."""
 
 from pathcontrol.toolpaths.csv.reader import read_csv as read_csv

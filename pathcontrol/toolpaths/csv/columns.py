@@ -1,4 +1,4 @@
-"""What the columns of a table of points are: by their names in the file, by their number, or as the caller says."""
+"""The meaning of the columns of a table of points, from the file's names, their number, or the caller."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _ANGLES_UNREAD = (
 
 @dataclass(frozen=True)
 class Columns:
-    """Where each known column is, how many there are, and the unit that the file names."""
+    """The position of each known column, the number of columns, and the unit that the file names."""
 
     places: dict[str, int]
     width: int
@@ -34,7 +34,7 @@ class Columns:
 
     @classmethod
     def of(cls, rows: Rows, chosen: Chosen | None, passed: Passed, *, flat: bool) -> Columns:
-        """The columns of the rows, out of which the line that names them is taken.
+        """Find the columns of the rows, and take the line that names them out of the rows.
 
         Args:
             rows: the lines of the table.
@@ -61,14 +61,14 @@ class Columns:
         return {name: self.places[name] for name in (*POINT, *AXIS, *QUATERNION) if name in self.places}
 
     def unit_with(self, unit: str | None) -> str:
-        """The unit of the coordinates, given the one that the caller names."""
+        """Return the unit of the coordinates, given the one that the caller names."""
         if unit and self.unit and unit != self.unit:
             raise ToolpathError(f"its columns are in {self.unit!r}, which unit = {unit!r} contradicts")
         return unit or self.unit or "m"
 
 
 def checked_choice(chosen: Any) -> Chosen | None:
-    """``columns`` as a caller gives it: names one after another, or a place for each name; a text lists either.
+    """Check ``columns`` of a caller: names in order, or a place for each name; a text lists either.
 
     Raises:
         InputError: it is neither.
@@ -89,7 +89,7 @@ def checked_choice(chosen: Any) -> Chosen | None:
 
 
 def _listed(text: str) -> list[str] | dict[str, int | str]:
-    """``x,y,z`` as names, ``x=0,y=Pos Y,z=2`` as places."""
+    """Split ``x,y,z`` into names, ``x=0,y=Pos Y,z=2`` into places."""
     if "=" not in text:
         return [name for name in re.split(r"[,;\s]+", text) if name]
     pairs = [item.partition("=") for item in text.split(",")]
@@ -97,7 +97,7 @@ def _listed(text: str) -> list[str] | dict[str, int | str]:
 
 
 def _names(rows: Rows, header: Header, chosen: Chosen | None, *, flat: bool) -> list[str]:
-    """The name of each column, empty where it is passed over."""
+    """Return the name of each column, empty for one that is passed over."""
     if isinstance(chosen, Mapping):
         names = [""] * header.width
         for name, at in chosen.items():
@@ -128,7 +128,7 @@ _UNNAMED = (
 
 
 def _mistake(names: list[str], places: Mapping[str, int], *, flat: bool) -> str | None:
-    """Why columns make up no points, or None."""
+    """Return the reason why columns form no points, or None."""
     once = len(places) == sum(map(bool, names))
     point = {"x", "y"} | (set() if flat else {"z"})
     parts = [len(places.keys() & group) in (0, len(group)) for group in (set(AXIS), set(QUATERNION))]
@@ -147,7 +147,7 @@ def _mistake(names: list[str], places: Mapping[str, int], *, flat: bool) -> str 
 
 
 def _called(header: Header, chosen: Chosen | None) -> list[str]:
-    """What to call each column: as the file does, else as the caller does, else by its number."""
+    """Return the name of each column: by the file, else by the caller, else by its number."""
     if header.names:
         return [name.text for name in header.names]
     said = [] if chosen is None or isinstance(chosen, Mapping) else chosen
@@ -155,7 +155,7 @@ def _called(header: Header, chosen: Chosen | None) -> list[str]:
 
 
 def _tell(texts: Sequence[str], places: Mapping[str, int], passed: Passed) -> None:
-    """Tell which columns are passed over."""
+    """Note the columns that are passed over."""
     unread = [text for k, text in enumerate(texts) if k not in places.values()]
     if unread:
         listed = ", ".join(map(reprlib.repr, unread[:_MOST_TOLD])) + (", …" if len(unread) > _MOST_TOLD else "")

@@ -1,4 +1,4 @@
-"""What a table of points says of its columns: in a first line, in a comment above, in a line of units."""
+"""The header of a table of points: names of columns in a first line or a comment, and a line of units."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Header:
 
     @classmethod
     def of(cls, rows: Rows) -> Header:
-        """The header of a table, which is taken out of its rows."""
+        """Read the header of a table, and take it out of its rows."""
         line, first = rows.lines[0], rows.texts[0]
         names = names_in(_fields(first, rows.separator))
         said = next(filter(None, (unit_in(text) for _, text in rows.comments)), None)
@@ -46,7 +46,7 @@ class Header:
         return cls(names, width, above[0], said)
 
     def place(self, at: int | str) -> int:
-        """The column of a number, or of a name in the file.
+        """Return the index of a column, given by a number or a name in the file.
 
         Raises:
             ToolpathError: there is none.
@@ -64,7 +64,7 @@ class Header:
         raise ToolpathError(f"columns= names a column {at!r}, the file has {there}")
 
     def unit(self, places: Mapping[str, int]) -> str | None:
-        """The unit of the coordinates, given where they are.
+        """Return the unit of the coordinates, given their columns.
 
         Raises:
             ToolpathError: they have different ones.
@@ -80,7 +80,7 @@ class Header:
 
 
 def number(field: str, decimal: str = ".") -> float | None:
-    """The number that a field is, in ASCII and without the underscores of Python, or None."""
+    """Convert a field to a number, in ASCII and without underscores, or return None."""
     if decimal == ",":
         field = "?" if "." in field else field.replace(",", ".")
     try:
@@ -90,20 +90,20 @@ def number(field: str, decimal: str = ".") -> float | None:
 
 
 def _fields(text: str, separator: str | None) -> list[str]:
-    """The names in a line; between blanks, ``x [mm]`` is one name."""
+    """Split a line into names; between blanks, ``x [mm]`` is one name."""
     if separator is None:
         text = " ".join(text.split()).replace(" [", "[").replace(" (", "(")
     return split(text, separator)
 
 
 def _are_names(names: list[Name], fields: list[str]) -> bool:
-    """Whether a line names columns: none of its values is a number, or x and y are among them."""
+    """Return whether a line names columns: no value is a number, or x and y are among them."""
     numbers = (number(field, mark) is not None for field in fields for mark in ".,")
     return {"x", "y"} <= {name.name for name in names} or not any(numbers)
 
 
 def _in_comments(rows: Rows, width: int) -> tuple[int, list[Name]] | None:
-    """The comment above the points that names as many columns, the last of them: its line and the names."""
+    """Return line and names of the last comment above the points that names as many columns, or None."""
     for line, text in reversed(rows.comments):
         for separator in (rows.separator, separator_of(text), None):
             names = names_in(_fields(text, separator))
@@ -113,6 +113,6 @@ def _in_comments(rows: Rows, width: int) -> tuple[int, list[Name]] | None:
 
 
 def _unit_of(names: list[Name]) -> str | None:
-    """The unit that all coordinates among names have."""
+    """Return the unit that all coordinates among names have, or None."""
     units = {name.unit for name in names if name.name in POINT}
     return units.pop() if len(units) == 1 else None

@@ -43,7 +43,7 @@ _HINT = re.compile(r"\b(mm|cm|inch(?:es)?|millimet(?:er|re)s?|µm)\b", re.IGNORE
 
 
 class Name(NamedTuple):
-    """What a column is called in a file.
+    """The name of a column in a file.
 
     Attributes:
         text: as it is there, without quotes.
@@ -57,7 +57,7 @@ class Name(NamedTuple):
 
     @classmethod
     def of(cls, text: str) -> Name:
-        """The name in a field such as ``x``, ``X [mm]``, ``x (mm)``, ``x_mm`` or ``nx``."""
+        """Read the name in a field such as ``x``, ``X [mm]``, ``x (mm)``, ``x_mm`` or ``nx``."""
         text = text.strip("\"' ")
         plain = text.lower().replace(" ", "")
         if len(plain) > _LONGEST:
@@ -76,12 +76,12 @@ class Name(NamedTuple):
 
     @property
     def plain(self) -> str:
-        """The text without case and blanks, to compare it."""
+        """The text without case and blanks, for comparison."""
         return self.text.lower().replace(" ", "")
 
 
 def _known(plain: str) -> str:
-    """The known name that a text is another spelling of, or an empty string."""
+    """Return the known name that a text is another spelling of, or an empty string."""
     if plain in KNOWN:
         return plain
     if first := _POINT_FIRST.fullmatch(plain):
@@ -93,26 +93,26 @@ def _known(plain: str) -> str:
 
 
 def names_in(fields: list[str]) -> list[Name]:
-    """The names in the fields of a line, without empty ones at its end."""
+    """Return the names in the fields of a line, without empty ones at its end."""
     last = next((k for k in range(len(fields), 0, -1) if fields[k - 1].strip("\"' ")), 0)
     return [Name.of(field) for field in fields[:last]]
 
 
 def unit_of_row(fields: list[str]) -> str | None:
-    """The unit that a line of units below the names, such as ``mm;mm;mm`` or ``[mm] [mm] [mm] -``, gives lengths."""
+    """Return the unit of lengths in a line of units below the names, such as ``mm;mm;mm`` or ``[mm] [mm] [mm] -``."""
     plain = [field.strip("\"' ").strip("[]()").lower() for field in fields]
     units = {_UNIT_ALIASES.get(unit, unit) for unit in plain if unit not in ("", "-", "1")}
     return units.pop() if len(units) == 1 and units <= UNITS.keys() else None
 
 
 def unit_in(comment: str) -> str | None:
-    """The unit that a comment such as ``units: mm``, ``x y z in mm`` or ``mm`` names."""
+    """Return the unit that a comment such as ``units: mm``, ``x y z in mm`` or ``mm`` names."""
     found = _ALONE.fullmatch(comment) or _IN_A_COMMENT.search(comment)
     unit = next(filter(None, found.groups())).lower() if found else None
     return None if unit is None else _UNIT_ALIASES.get(unit, unit)
 
 
 def hint_of_unit(comment: str) -> str | None:
-    """A word in a comment that sounds like a unit."""
+    """Return a word in a comment that resembles a unit, or None."""
     found = _HINT.search(comment)
     return found[0] if found else None

@@ -1,4 +1,4 @@
-"""Tool paths from tables of points: CSV, tab-separated, or columns between blanks."""
+"""Reader of tool paths in tables of points: CSV, tab-separated, or columns between blanks."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def read_csv(
     z: float | None = None,
     unknown: str = "refuse",
 ) -> Toolpath:
-    """Contours from a table of points, a point a line: ``x y z``, with the tool's axis or orientation if it has them.
+    """Read contours from a table of points, a point a line: ``x y z``, with axis or orientation of the tool if any.
 
     Semicolons, tabs, commas or blanks separate the values; the first line says which. It may name the columns, in any
     order and with the unit: ``x [mm]``, ``x / mm`` or ``x_mm``, and so may a comment above, or a line of units below.
@@ -90,7 +90,7 @@ def _check_choice(name: str, value: str | None, choices: list[str]) -> None:
 
 
 def _assumed(rows: Rows, passed: Passed) -> str:
-    """Metres, told where a comment sounds otherwise."""
+    """Return metres, with a note if a comment hints at another unit."""
     for line, comment in rows.comments:
         if (word := hint_of_unit(comment)) is not None:
             passed.tell(
@@ -101,7 +101,7 @@ def _assumed(rows: Rows, passed: Passed) -> str:
 
 
 def _decimal(rows: Rows, columns: Columns, passed: Passed) -> str:
-    """The decimal mark that the numbers have."""
+    """Return the decimal mark of the numbers."""
     mark = decimal_mark(rows, columns)
     if mark == ",":
         passed.tell("the numbers have a decimal comma")
@@ -109,7 +109,7 @@ def _decimal(rows: Rows, columns: Columns, passed: Passed) -> str:
 
 
 def _contour(table: Table, first: int, end: int, feed: float | None) -> Contour:
-    """The contour of the rows from ``first`` to before ``end``."""
+    """Return the contour of the rows from ``first`` to before ``end``."""
     points = table.points[first:end]
     kept = _distinct(points)
     if len(kept) < 2:
@@ -130,7 +130,7 @@ def _contour(table: Table, first: int, end: int, feed: float | None) -> Contour:
 
 
 def _distinct(points: Array) -> Array:
-    """Indices of the points that do not repeat the last one kept before them."""
+    """Return the indices of the points that do not repeat the last one kept before them."""
     places, kept = points.tolist(), [0]
     for index, place in enumerate(places):
         if math.dist(place, places[kept[-1]]) > _NOTHING:
@@ -139,7 +139,7 @@ def _distinct(points: Array) -> Array:
 
 
 def _check_axes(axes: Array, kept: Array, lines: list[int]) -> None:
-    """Raise if a point that is left out turns the tool."""
+    """Check that no point that is left out turns the tool."""
     stays = np.repeat(kept, np.diff([*kept, len(axes)]))
     turned = np.abs(axes - axes[stays]).max(1) > _NOTHING
     if turned.any():

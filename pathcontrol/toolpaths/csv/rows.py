@@ -1,4 +1,4 @@
-"""The lines of a table of points, and the values in each."""
+"""The rows of a table of points, and the values in each."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _INSIDE = "\x1f"  # the ASCII unit separator, between the values of lines that h
 
 @dataclass
 class Rows:
-    """The lines that are neither empty nor comments.
+    """The lines of a table that are neither empty nor comments.
 
     Attributes:
         texts: the lines without comments.
@@ -38,7 +38,7 @@ class Rows:
 
     @classmethod
     def of(cls, lines: list[str], decimal: str | None = None) -> Rows:
-        """The rows among the lines of a file, whose numbers have a decimal point, or a comma."""
+        """Read the rows among the lines of a file, whose numbers have a decimal point, or a comma."""
         rows, gap, said = cls(), False, None
         for line, content in enumerate(lines, 1):
             if line == 1 and (found := _UNIT_OF_LINES.fullmatch(content.strip(" "))):
@@ -59,18 +59,18 @@ class Rows:
         return rows
 
     def fields(self, text: str) -> list[str]:
-        """The values in a line."""
+        """Split a line into values."""
         return split(text, self.separator)
 
     def take_first(self) -> None:
-        """Leave the first row out, which is no point."""
+        """Remove the first row, which is no point."""
         del self.texts[0], self.lines[0]
         self.after_gap = [row - 1 for row in self.after_gap if row]
         if not self.texts:
             raise ToolpathError("there is no point in it, only the names of columns")
 
     def trim(self, width: int) -> None:
-        """Leave out separators at the ends of lines that have more values than columns."""
+        """Remove separators at the ends of lines that have more values than columns."""
         if self.separator is None:
             return
         for row, text in enumerate(self.texts):
@@ -78,7 +78,7 @@ class Rows:
                 self.texts[row] = _trimmed(text, self.separator, width)
 
     def _separate(self, separator: str | None) -> None:
-        """Split at a separator; quotes are taken away, with another separator that stands in no value."""
+        """Split lines at a separator; quotes are replaced by another separator that is in no value."""
         self.separator, self.between = separator, SEPARATORS[separator]
         if any('"' in text for text in self.texts):
             self.texts = [_unquoted(line, text, separator) for line, text in zip(self.lines, self.texts, strict=True)]
@@ -86,18 +86,18 @@ class Rows:
 
 
 def split(text: str, separator: str | None) -> list[str]:
-    """The values in a line."""
+    """Split a line into values."""
     return [value.strip() for value in text.split(separator)]
 
 
 def separator_of(text: str, decimal: str | None = None) -> str | None:
-    """The character between the values of a line; a comma only where it is not in the numbers."""
+    """Return the character between the values of a line; a comma only where it is not in the numbers."""
     candidates = ";\t" if decimal == "," and '"' not in text else ";\t,"
     return next((s for s in candidates if s in text), None)
 
 
 def _without_comment(content: str) -> str:
-    """The line without what follows a # outside quotes, and without blanks around it; tabs between values stay."""
+    """Return the line without the comment after a # outside quotes, and without blanks around it."""
     if "#" not in content:
         return content.strip(" ")
     if '"' in content:
@@ -110,7 +110,7 @@ def _without_comment(content: str) -> str:
 
 
 def _unquoted(line: int, text: str, separator: str | None) -> str:
-    """The values of a line with quotes, between unit separators."""
+    """Return the values of a line with quotes, between unit separators."""
     if separator is None:
         values = [value.strip('"') for value in _QUOTED_OR_WORD.findall(text)]
     else:
@@ -122,7 +122,7 @@ def _unquoted(line: int, text: str, separator: str | None) -> str:
 
 
 def _trimmed(text: str, separator: str, width: int) -> str:
-    """The line without empty values at its end that are more than ``width``."""
+    """Return the line without the empty values at its end beyond ``width``."""
     core, there = text.rstrip(separator + " "), text.count(separator)
     at_end, too_many = there - core.count(separator), there - (width - 1)
     return core + separator * (at_end - min(at_end, max(too_many, 0)))

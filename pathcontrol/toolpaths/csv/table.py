@@ -26,7 +26,7 @@ _THOUSANDS = re.compile(r"[-+]?[0-9]{1,3}(?:,[0-9]{3})+")
 
 @dataclass(frozen=True)
 class Table:
-    """Points, row by row.
+    """The points of a table, row by row.
 
     Attributes:
         points: coordinates [m], (k, 3).
@@ -44,7 +44,7 @@ class Table:
 
     @classmethod
     def of(cls, rows: Rows, columns: Columns, scale: float, decimal: str, z: float | None) -> Table:
-        """The table with the coordinates in ``scale`` metres, and z [m] where there is no such column."""
+        """Read the table, with coordinates in ``scale`` metres, and z [m] where there is no such column."""
         if len(rows.texts) > MAX_SEGMENTS:
             raise ToolpathError(
                 f"line {rows.lines[MAX_SEGMENTS]}: more than {MAX_SEGMENTS} points; split the file",
@@ -69,12 +69,12 @@ class Table:
 
     @property
     def parts(self) -> Iterator[tuple[int, int]]:
-        """First row of each contour, and the row after its last."""
+        """The first row of each contour, and the row after its last."""
         return pairwise([*self.starts, len(self.points)])
 
 
 def decimal_mark(rows: Rows, columns: Columns) -> str:
-    """``","`` where the numbers have a decimal comma and nothing else can be meant, else ``"."``.
+    """Return ``","`` if the numbers can only have a decimal comma, else ``"."``.
 
     Raises:
         ToolpathError: commas in the numbers could separate thousands, or points are there too.
@@ -104,7 +104,7 @@ def decimal_mark(rows: Rows, columns: Columns) -> str:
 
 
 def _values(rows: Rows, columns: Columns, decimal: str) -> Array:
-    """The numbers of the columns in their order, (k, columns)."""
+    """Return the numbers of the columns in their order, (k, columns)."""
     places = list(columns.numeric.values())
     texts = [text.translate(_SWAP) for text in rows.texts] if decimal == "," else rows.texts
     _find_wrong_width(rows, columns)
@@ -124,7 +124,7 @@ def _values(rows: Rows, columns: Columns, decimal: str) -> Array:
 
 
 def _find_wrong_width(rows: Rows, columns: Columns) -> None:
-    """Raise for the first line that has not one value for each column."""
+    """Raise for the first line whose number of values is not that of the columns."""
     separator, width = rows.separator, columns.width
     for line, text in zip(rows.lines, rows.texts, strict=True):
         found = len(text.split()) if separator is None else text.count(separator) + 1
@@ -154,7 +154,7 @@ def _find_mistake(rows: Rows, columns: Columns, decimal: str) -> None:
 
 
 def _axes(values: Array, lines: list[int]) -> Array | None:
-    """Tool axes as unit vectors, from i j k, or as those against which z of the orientation qx qy qz qw points."""
+    """Return the tool axes as unit vectors, from i j k or opposite to the z axis of qx qy qz qw."""
     if not values.size:
         return None
     largest = np.abs(values).max(1, keepdims=True)

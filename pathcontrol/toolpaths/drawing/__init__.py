@@ -1,1 +1,1 @@
-"""What drawings of both kinds are made of: pieces, chained into contours, some left out, some there twice."""
+"""The common part of drawings: pieces, their chains, and the choice of what is left out."""

@@ -1,4 +1,4 @@
-"""Loose curves that meet end to end, chained into contours."""
+"""Chaining of loose curves that meet end to end into contours."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _WIDEST_TOLD = 5e-5  # m, gaps up to this are told if they stay open
 
 
 class Strand(NamedTuple):
-    """What one entity draws.
+    """The curves that one entity draws.
 
     Attributes:
         name: for the contour.
@@ -41,16 +41,16 @@ class Strand(NamedTuple):
 
     @property
     def ends(self) -> tuple[Array, Array]:
-        """First and last point [m], each (3,)."""
+        """The first and the last point [m], each (3,)."""
         return ends_of(self.segments[0])[0], ends_of(self.segments[-1])[1]
 
     @property
     def extent(self) -> float:
-        """Size of a box around all that its curves are made of [m]."""
+        """The diagonal of a box around all control points [m]."""
         return _size([self])
 
     def contour(self, source: str, feed: float | None) -> Contour:
-        """The contour of a file.
+        """Return the contour of the strand.
 
         Raises:
             ToolpathError: its segments make none.
@@ -73,7 +73,7 @@ def checked_gap(gap: float | None) -> float | None:
 
 
 def chained(strands: Sequence[Strand], gap: float | None, passed: Passed) -> list[Strand]:
-    """The strands with those joined whose ends meet, each chain in the place and direction of its first strand.
+    """Join the strands whose ends meet, each chain in the place and direction of its first strand.
 
     Ends meet if they lie within the gap of each other and of no third one. Where they do not coincide both are moved
     half-way: the end of a line alone, a curve as a whole by an amount that fades towards its other end. A closed chain
@@ -120,7 +120,7 @@ def _tell_gaps(chains: Sequence[Strand], tolerance: float, passed: Passed) -> No
 
 
 def _open_gaps(strands: Sequence[Strand], tolerance: float) -> list[float]:
-    """Widths [m] of the gaps between ends that a larger tolerance, up to 50 µm, would close."""
+    """Return the widths [m] of the gaps between ends that a larger tolerance, up to 50 µm, would close."""
     ends = np.array([end for strand in strands for end in strand.ends])
     apart = cKDTree(ends).query(ends, k=2, distance_upper_bound=_WIDEST_TOLD)[0][:, 1]
     apart = apart[(apart > tolerance) & np.isfinite(apart)]
@@ -138,7 +138,7 @@ def _open_gaps(strands: Sequence[Strand], tolerance: float) -> list[float]:
 
 
 def _is_short(strands: Sequence[Strand], end: int, other: int, apart: float) -> bool:
-    """Whether two ends are those of one strand that is hardly longer than they are apart: nothing to be closed."""
+    """Return whether two ends are those of one strand hardly longer than their distance: nothing to be closed."""
     return end // 2 == other // 2 and strands[end // 2].extent < 2 * apart
 
 
@@ -156,7 +156,7 @@ def _chains(strands: Sequence[Strand], tolerance: float) -> list[Strand]:
 
 
 def _meets(ends: Array, tolerance: float) -> Array:
-    """For each end (2n, 3) the only other one that it meets, or −1. The ends of strand i are 2i and 2i + 1."""
+    """Return for each end (2n, 3) the only other one that it meets, or −1. Ends 2i and 2i + 1 are those of strand i."""
     cells, cell = np.unique(np.floor(ends / (0.5 * tolerance)), axis=0, return_inverse=True)
     cell = cell.reshape(-1)
     chosen = np.zeros(len(cells), dtype=int)
@@ -173,7 +173,7 @@ def _meets(ends: Array, tolerance: float) -> Array:
 
 
 def _chain(meets: Array, first: int) -> tuple[list[int], bool]:
-    """The ends at which the strands of a chain are entered, in order, and whether it is closed."""
+    """Return the ends at which the strands of a chain are entered, in order, and whether it is closed."""
     after = _follow(meets, 2 * first + 1)
     if after and after[-1] // 2 == first:
         return [2 * first, *after[:-1]], True
@@ -182,7 +182,7 @@ def _chain(meets: Array, first: int) -> tuple[list[int], bool]:
 
 
 def _follow(meets: Array, leaving: int) -> list[int]:
-    """The ends entered one after another, up to a loose end or to the strand begun with."""
+    """Return the ends entered one after another, up to a loose end or to the strand begun with."""
     entered, first = [], leaving // 2
     while (entering := int(meets[leaving])) >= 0:
         entered.append(entering)
@@ -193,12 +193,12 @@ def _follow(meets: Array, leaving: int) -> list[int]:
 
 
 def _entered(strand: Strand, backwards: bool) -> list[Segment]:
-    """The segments of a strand in the direction in which it is passed."""
+    """Return the segments of a strand in the direction in which it is passed."""
     return [segment.reversed() for segment in reversed(strand.segments)] if backwards else list(strand.segments)
 
 
 def _joined(parts: list[list[Segment]], closed: bool) -> list[Segment]:
-    """The segments of a chain, with the ends that meet moved together."""
+    """Return the segments of a chain, with the ends that meet moved together."""
     for i in range(len(parts) if closed else len(parts) - 1):
         before, after = parts[i], parts[(i + 1) % len(parts)]
         end, start = ends_of(before[-1])[1], ends_of(after[0])[0]
@@ -210,7 +210,7 @@ def _joined(parts: list[list[Segment]], closed: bool) -> list[Segment]:
 
 
 def _size(strands: Sequence[Strand]) -> float:
-    """Diagonal of a box around all that the curves are made of [m]."""
+    """Return the diagonal of a box around all curves [m]."""
     corners = np.concatenate([_frame(segment) for strand in strands for segment in strand.segments])
     return float(np.linalg.norm(np.ptp(corners, axis=0)))
 
@@ -223,7 +223,7 @@ def _frame(segment: Segment) -> Array:
 
 
 def _shifted(segment: Segment, start: Array, end: Array) -> Segment:
-    """The segment with its start and its end moved."""
+    """Return the segment with its start and its end moved."""
     if isinstance(segment, Polyline):
         points = segment.points.copy()
         points[0] += start

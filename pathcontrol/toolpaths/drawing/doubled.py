@@ -1,4 +1,4 @@
-"""Edges that a drawing has twice, which the tool would cut twice."""
+"""Detection of edges that a drawing has twice, which the tool would cut twice."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def tell_doubled(contours: Sequence[Contour], passed: Passed) -> None:
 
 
 def _features(contours: Sequence[Contour]) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """Of kinds of edges the contours they belong to (k,), and their first, middle and last points, each (k, 3)."""
+    """Yield for each kind of edge the contours (k,), and the first, middle and last points, each (k, 3)."""
     others: dict[int, list[tuple[int, Segment]]] = {}
     for index, contour in enumerate(contours):
         for segment in contour.segments:
@@ -56,7 +56,7 @@ def _features(contours: Sequence[Contour]) -> Iterator[tuple[Array, Array, Array
 
 
 def _three(segment: Segment) -> Array:
-    """First, middle and last point (3, 3); of a whole circle points that do not depend on where it begins."""
+    """Return first, middle and last point (3, 3); those of a whole circle do not depend on its start."""
     if isinstance(segment, Arc) and segment.circular and abs(abs(segment.sweep) - 2 * np.pi) < 1e-9:
         on = segment.center + np.linalg.norm(segment.x) * np.array([1.0, 0.0, 0.0])
         return np.stack([on, segment.center, on])

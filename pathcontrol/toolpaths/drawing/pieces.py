@@ -1,4 +1,4 @@
-"""Pieces of drawings: what SVG and DXF files draw with, under affine maps, made into the segments of contours."""
+"""Pieces of drawings: the curves of SVG and DXF files, under affine maps, and their conversion to segments."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Piece(Protocol):
     """A curve whose image under an affine map is a curve of the same kind."""
 
     def mapped(self, matrix: Array) -> Piece:
-        """The image under an affine map, a matrix (4, 4)."""
+        """Return the image under an affine map, a matrix (4, 4)."""
         ...
 
     def segments(self) -> list[Segment]:
-        """The piece, with lengths in metres, as segments that are regular inside; none if it has no length.
+        """Return the piece, with lengths in metres, as segments that are regular inside; none if it has no length.
 
         Raises:
             ToolpathError: it is not finite, or lies too far away.
@@ -93,7 +93,7 @@ class Curves:
 
 @dataclass(frozen=True, eq=False)
 class EllipticArc:
-    """c + cos φ x + sin φ y for φ from ``start`` to ``start`` + ``sweep`` [rad]; c, x and y are (3,)."""
+    """An elliptic arc c + cos φ x + sin φ y, φ from ``start`` to ``start`` + ``sweep`` [rad]; c, x and y are (3,)."""
 
     center: Array
     x: Array
@@ -115,12 +115,12 @@ class EllipticArc:
         return [Arc(self.center, self.x, self.y, self.start, self.sweep)]
 
     def at(self, angle: Array) -> Array:
-        """Points at angles (k,), (k, 3)."""
+        """Return points at angles (k,), (k, 3)."""
         with np.errstate(over="ignore", invalid="ignore"):
             return self.center + np.outer(np.cos(angle), self.x) + np.outer(np.sin(angle), self.y)
 
     def _turns(self, along: Array) -> Array:
-        """Angles at the ends and where a flattened arc turns back, in order."""
+        """Return the angles at the ends and where a flattened arc turns back, in order."""
         first = np.arctan2(self.y @ along, self.x @ along)
         low, high = sorted((self.start, self.start + self.sweep))
         inside = first + np.pi * np.arange(np.ceil((low - first) / np.pi), np.floor((high - first) / np.pi) + 1)
@@ -129,13 +129,13 @@ class EllipticArc:
 
 
 class Budget:
-    """Counts what a drawing holds: up to 2 000 000 lines, or 200 000 curves, each of which takes as long as ten."""
+    """A counter of the content of a drawing, up to 2 000 000 lines or 200 000 curves: a curve counts as ten lines."""
 
     def __init__(self) -> None:
         self._used = 0
 
     def take(self, pieces: Sequence[Piece]) -> None:
-        """Count more.
+        """Count more pieces.
 
         Raises:
             ToolpathError: it is too much.
@@ -148,14 +148,14 @@ class Budget:
 
 
 def _effort(piece: Piece) -> int:
-    """What a piece counts in the budget."""
+    """Return the count of a piece in the budget."""
     if isinstance(piece, Lines):
         return len(piece.points)
     return _CURVE * (len(piece.points) if isinstance(piece, Curves) else 1)
 
 
 def distinct(points: Array) -> Array:
-    """The points without those that lie within 1 nm of the one kept before."""
+    """Return the points without those that lie within 1 nm of the one kept before."""
     if (np.linalg.norm(np.diff(points, axis=0), axis=-1) > NOTHING).all():
         return points
     kept = [points[0]]
@@ -166,7 +166,7 @@ def distinct(points: Array) -> Array:
 
 
 def ends_of(segment: Segment) -> tuple[Array, Array]:
-    """First and last point of a segment [m], each (3,)."""
+    """Return the first and the last point of a segment [m], each (3,)."""
     if isinstance(segment, Polyline | Bezier):
         return segment.points[0], segment.points[-1]
     start, end = segment.point(np.array([0.0, 1.0]))
@@ -174,13 +174,13 @@ def ends_of(segment: Segment) -> tuple[Array, Array]:
 
 
 def contour_of(segments: Sequence[Segment], feed: float | None, name: str) -> Contour:
-    """A contour of segments of which each begins where the one before ends; closed if the last does so too."""
+    """Return a contour of segments in a row; it is closed if the last one ends where the first begins."""
     gap = np.linalg.norm(ends_of(segments[-1])[1] - ends_of(segments[0])[0])
     return Contour(tuple(_merged(segments)), closed=bool(gap <= NOTHING), feed=feed, name=name)
 
 
 def _merged(segments: Sequence[Segment]) -> list[Segment]:
-    """The segments with polylines that follow each other made one."""
+    """Return the segments with consecutive polylines merged."""
     merged: list[Segment] = []
     for straight, group in groupby(segments, lambda segment: isinstance(segment, Polyline)):
         run = list(group)

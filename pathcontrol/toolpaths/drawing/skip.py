@@ -1,4 +1,4 @@
-"""Kinds of things in drawings that are left out when asked, by the same names for SVG and DXF."""
+"""Kinds of elements of drawings that can be left out, with the same names for SVG and DXF."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The way through a DXF drawing: modelspace in its order, and the blocks inserted in it."""
+"""Traversal of a DXF drawing: modelspace in its order, and the blocks inserted in it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Drawn(NamedTuple):
 
 
 class Entities:
-    """Goes through the entities of a drawing.
+    """An iterator over the entities of a drawing, inserted blocks included.
 
     Args:
         source: the file, for errors.
@@ -52,7 +52,7 @@ class Entities:
 
     @contextmanager
     def at(self, entity: Any, layer: str) -> Iterator[None]:
-        """Errors inside say at which entity they arose."""
+        """Name the entity in errors that arise inside the block."""
         try:
             yield
         except Exception as error:  # ezdxf raises whatever its parts raise on malformed entities
@@ -75,7 +75,7 @@ class Entities:
                 yield from self._inserted(entity, matrix, layer, depth)
 
     def _inserted(self, insert: Any, matrix: Array, layer: str, depth: int) -> Iterator[Drawn]:
-        """The entities of the block, once for each place in the rows and columns of the insert."""
+        """Yield the entities of the block, once for each place in the rows and columns of the insert."""
         with self.at(insert, layer):
             block = self._block(insert, depth)
             places = _places(insert, vector(block.block, "base_point"))
@@ -103,7 +103,7 @@ class Entities:
 
 
 def _places(insert: Any, base: Array) -> Iterator[Array]:
-    """Maps of a block's coordinates to those it is inserted in, (4, 4) each."""
+    """Yield the maps of a block's coordinates to those it is inserted in, (4, 4) each."""
     axes, angle = object_axes(insert), np.radians(number(insert, "rotation"))
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     scale = [number(insert, f"{axis}scale") for axis in "xyz"]

@@ -1,4 +1,4 @@
-"""What the entities of DXF drawings draw, in the units of the drawing and in its world coordinates."""
+"""Conversion of DXF entities to pieces, in the units and world coordinates of the drawing."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _CLOSED = 1
 
 
 def pieces(entity: Any) -> list[Piece] | None:
-    """The pieces of an entity, one after another; None if it is nothing that could be cut.
+    """Return the pieces of an entity, one after another; None if it cannot be cut.
 
     Raises:
         ToolpathError: something is missing in it, or not finite.
@@ -42,7 +42,7 @@ def _arc(entity: Any) -> list[Piece]:
 
 
 def _around(entity: Any, start: float, end: float) -> EllipticArc:
-    """Counterclockwise from one angle to the other [°], once around if they are the same."""
+    """Return the counterclockwise arc from one angle to the other [°], a full turn if they are the same."""
     given(entity, "center", "radius")
     radius, axes = number(entity, "radius"), object_axes(entity)
     if radius <= 0:

@@ -14,7 +14,7 @@ _SOLID = ("continuous", "bylayer", "byblock", "")
 
 
 class Layers:
-    """Which layers of a drawing are read.
+    """The layers of a drawing, and the choice of those that are read.
 
     Args:
         document: the drawing.
@@ -45,18 +45,18 @@ class Layers:
 
     @property
     def listed(self) -> str:
-        """Their names, for errors."""
+        """The names of the layers, for errors."""
         names = [repr(name[:60]) for name in self.names.values()]
         return ", ".join(names[:_SHOWN] + ["…"] * (len(names) > _SHOWN))
 
     def frozen(self, layer: str) -> bool:
-        """Whether nothing on it is drawn; a layer that is asked for is read even so."""
+        """Return whether nothing on a layer is drawn; one that is asked for is read even so."""
         if self._chosen is not None or layer.lower() not in self._table:
             return False
         return bool(self._table[layer.lower()].is_frozen())
 
     def read(self, layer: str) -> bool:
-        """Whether what is on it is read."""
+        """Return whether the content of a layer is read."""
         if self._chosen is not None:
             return layer.lower() in self._chosen
         reason = self._unseen(layer.lower())
@@ -65,14 +65,14 @@ class Layers:
         return not reason
 
     def dashes(self, entity: Any, layer: str) -> str:
-        """Name of the line type that an entity is drawn with, empty where it is a solid line."""
+        """Return the name of the line type of an entity, empty for a solid line."""
         name = str(common(entity, "linetype", "ByLayer"))
         if name.lower() == "bylayer" and layer.lower() in self._table:
             name = str(self._table[layer.lower()].dxf.get("linetype", ""))
         return "" if name.lower() in _SOLID else name
 
     def _unseen(self, layer: str) -> str:
-        """Why nothing on a layer is seen, empty where it is."""
+        """Return the reason why a layer is invisible, empty if it is visible."""
         if layer == "defpoints":
             return "is never plotted"
         entry = self._table.get(layer)

@@ -1,4 +1,4 @@
-"""Polylines of DXF drawings: lines and, where they bulge, arcs."""
+"""Conversion of DXF polylines to lines and, where they bulge, arcs."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ _FRAME = 16  # a vertex that only steers a spline
 
 
 def light_polyline(entity: Any) -> list[Piece]:
-    """An LWPOLYLINE."""
+    """Return the pieces of an LWPOLYLINE."""
     points = np.array(entity.get_points("xyb"), dtype=np.float64).reshape(-1, 3)
     return _bulged(entity, points[:, :2], number(entity, "elevation"), points[:, 2], bool(entity.closed))
 
 
 def polyline(entity: Any) -> list[Piece] | None:
-    """A POLYLINE; None if it is a mesh."""
+    """Return the pieces of a POLYLINE; None if it is a mesh."""
     if not (entity.is_2d_polyline or entity.is_3d_polyline):
         return None
     vertices = [v for v in entity.vertices if not v.dxf.get("flags", 0) & _FRAME]
@@ -35,7 +35,7 @@ def polyline(entity: Any) -> list[Piece] | None:
 
 
 def _bulged(entity: Any, points: Array, elevation: float, bulges: Array, closed: bool) -> list[Piece]:
-    """A polyline in object coordinates; a bulge is tan(Δφ/4) of the arc to the next point."""
+    """Return a polyline in object coordinates; a bulge is tan(Δφ/4) of the arc to the next point."""
     if not (np.isfinite(points).all() and np.isfinite(bulges).all()):
         raise ToolpathError("it has a coordinate or a bulge that is not finite")
     to_world = np.eye(4)

@@ -58,7 +58,7 @@ def read_dxf(
     skip: str | Sequence[str] = (),
     gap: float | None = None,
 ) -> Toolpath:
-    """The contours of a DXF drawing's modelspace, in its order.
+    """Read the contours of a DXF drawing's modelspace, in its order.
 
     LINE, ARC, CIRCLE, ELLIPSE, LWPOLYLINE, POLYLINE, SPLINE and HELIX are read, and the blocks that INSERT places.
     Splines become exact Bézier curves, bulges arcs; arcs within 1e-4 rad of a whole turn are whole. Loose curves of one
@@ -108,7 +108,7 @@ def read_dxf(
 
 
 def _loaded(source: str, text: str) -> Any:
-    """The drawing, if it is small enough for ezdxf to read it in bounded time and memory."""
+    """Load the drawing, if it is small enough for ezdxf to read it in bounded time and memory."""
     from ezdxf.filemanagement import read
 
     lines = text.split("\n")
@@ -125,7 +125,7 @@ def _loaded(source: str, text: str) -> Any:
 
 @contextmanager
 def _readable(source: str) -> Iterator[None]:
-    """Name the file where ezdxf raises whatever its parts raise on a malformed one: also in entities, read late."""
+    """Name the file in whatever ezdxf raises on a malformed one, also later, while entities are read."""
     try:
         with np.errstate(all="ignore"):  # what is not finite is refused where it is drawn
             yield
@@ -139,7 +139,7 @@ def _readable(source: str) -> Iterator[None]:
 
 
 def _unit(source: str, unit: str | None, code: int) -> str:
-    """The unit's name, from the argument or else the file's $INSUNITS."""
+    """Return the unit's name, from the argument or else the file's $INSUNITS."""
     known = ", ".join(UNITS)
     if unit is not None:
         if unit not in UNITS:
@@ -152,7 +152,7 @@ def _unit(source: str, unit: str | None, code: int) -> str:
 
 
 def _strands(entities: Entities, layers: Layers, skip: frozenset[str], scale: Array, passed: Passed) -> list[Strand]:
-    """What each entity draws that has a length [m]."""
+    """Return the curves of each entity that has a length [m]."""
     strands: list[Strand] = []
     refused: Counter[tuple[str, str]] = Counter()
     budget = Budget()
@@ -183,7 +183,7 @@ def _strands(entities: Entities, layers: Layers, skip: frozenset[str], scale: Ar
 
 
 def _segments(entity: Any, matrix: Array, budget: Budget) -> list[Segment] | None:
-    """What an entity draws [m]; None if it cannot be cut."""
+    """Return the segments of an entity [m]; None if it cannot be cut."""
     found = pieces(entity)
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""Splines of DXF drawings as Bézier curves, exactly."""
+"""Exact conversion of DXF splines to Bézier curves."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SHORTEST_CHORD = 1e-13  # of the length through all fit points, which it is add
 
 
 def b_spline(degree: int, knots: Array, points: Array, weights: Array | None) -> list[Piece]:
-    """The Bézier curves between the knots of a B-spline.
+    """Return the Bézier curves between the knots of a B-spline.
 
     Args:
         degree: 1 to 15.
@@ -39,7 +39,7 @@ def b_spline(degree: int, knots: Array, points: Array, weights: Array | None) ->
 
 
 def through(points: Array, tangents: tuple[Array, Array] | None, closed: bool) -> list[Piece]:
-    """The cubic spline through fit points (m, 3), by chord length as CAD programs draw it.
+    """Return the cubic spline through fit points (m, 3), by chord length as CAD programs draw it.
 
     Its ends are straight (second derivative 0), have the given tangents, or go over into each other.
     """
@@ -66,7 +66,7 @@ def through(points: Array, tangents: tuple[Array, Array] | None, closed: bool) -
 
 
 def _bernstein(powers: Array) -> Array:
-    """Coefficients of 1, u, u², … (degree + 1, pieces, k) as control points (pieces, degree + 1, k)."""
+    """Convert coefficients of 1, u, u², … (degree + 1, pieces, k) to control points (pieces, degree + 1, k)."""
     n = len(powers) - 1
     i, k = np.arange(n + 1)[:, None], np.arange(n + 1)
     return np.einsum("ik,kpc->pic", comb(i, k) / comb(n, k), powers)

@@ -1,4 +1,4 @@
-"""Values of DXF entities, checked, and their coordinate systems."""
+"""Checked values of DXF entities, and their coordinate systems."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NO_ARC = 2e-6  # rad, a sweep up to this comes from ends a whole turn apart of 
 
 
 def common(entity: Any, name: str, default: Any) -> Any:
-    """What all entities have, such as a layer, also of those that ezdxf does not know."""
+    """Return an attribute that all entities have, such as a layer, also of those that ezdxf does not know."""
     if entity.dxf.is_supported(name):
         return entity.dxf.get(name, default)
     known: dict[str, Any] = entity.graphic_properties() if hasattr(entity, "graphic_properties") else {}
@@ -22,19 +22,19 @@ def common(entity: Any, name: str, default: Any) -> Any:
 
 
 def layer_of(entity: Any) -> str:
-    """Name of an entity's layer, ``"0"`` where it has none."""
+    """Return the name of an entity's layer, ``"0"`` where it has none."""
     return str(common(entity, "layer", "0"))
 
 
 def given(entity: Any, *names: str) -> None:
-    """An error for what the file leaves out, which would otherwise be read as a default."""
+    """Check that the file gives all required attributes, which would otherwise be read as defaults."""
     missing = [name for name in names if not entity.dxf.hasattr(name)]
     if missing:
         raise ToolpathError(f"it has no {' and no '.join(missing)}")
 
 
 def number(entity: Any, name: str) -> float:
-    """A number of an entity, which the file gives or the format has a default for."""
+    """Return a number of an entity, from the file or the default of the format."""
     value = entity.dxf.get_default(name)
     if value is None or not np.isfinite(value):
         raise ToolpathError(f"its {name} is {value}, expected a finite number")
@@ -42,7 +42,7 @@ def number(entity: Any, name: str) -> float:
 
 
 def turned(start: float, end: float) -> float:
-    """Sweep of an arc that runs counterclockwise from one angle to the other [rad], more than 0 up to 2π.
+    """Return the sweep of a counterclockwise arc from one angle to the other [rad], more than 0 up to 2π.
 
     Ends that are the same but for rounding are a whole turn apart: 0 and 6.2831855, 270° and 270°, 90° and 450.0001°.
     """
@@ -52,7 +52,7 @@ def turned(start: float, end: float) -> float:
 
 
 def vector(entity: Any, name: str) -> Array:
-    """A point or direction of an entity, (3,)."""
+    """Return a point or direction of an entity, (3,)."""
     value = entity.dxf.get_default(name)
     if value is None or not np.isfinite(tuple(value)).all():
         raise ToolpathError(f"its {name} is {value}, expected finite coordinates")
@@ -60,7 +60,7 @@ def vector(entity: Any, name: str) -> Array:
 
 
 def object_axes(entity: Any) -> Array:
-    """Axes of the object coordinate system in world coordinates, as columns (3, 3): the arbitrary axis algorithm."""
+    """Return the axes of the object coordinate system, as columns (3, 3), by the arbitrary axis algorithm."""
     normal = vector(entity, "extrusion")
     size = np.linalg.norm(normal)
     if not 0 < size < np.inf:
@@ -73,5 +73,5 @@ def object_axes(entity: Any) -> Array:
 
 
 def in_space(plane: Array) -> Array:
-    """Complex numbers x + iy as points (k, 3) with z = 0."""
+    """Return complex numbers x + iy as points (k, 3) with z = 0."""
     return np.column_stack([plane.real, plane.imag, np.zeros(len(plane))])

@@ -1,4 +1,4 @@
-"""Arcs of G-code: from a start to an end about a centre, which I J K or R give."""
+"""Arcs of G-code from a start to an end about a centre, given by I J K or R."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MOST_TURNS = 1000
 def arcs(
     start: Sequence[float], end: Sequence[float], words: Mapping[str, float], modes: Modes, *, clockwise: bool
 ) -> list[Arc]:
-    """The arc from ``start`` to ``end`` [m], (3,), a helix where they differ along the plane's normal, turn by turn.
+    """Return the arc from ``start`` to ``end`` [m], (3,), turn by turn; a helix if they differ along the normal.
 
     By I J K the radii at the ends may differ, since files are rounded: by 0.005 mm or 0.0005 in, or by 0.1 % of the
     radius up to a hundred times that (LinuxCNC, G-Codes, Center Format Arcs), or by the tolerance in ``modes``. The
@@ -61,7 +61,7 @@ def arcs(
 
 
 def _turns(words: Mapping[str, float]) -> int:
-    """How many turns an arc takes, the last of them the rest."""
+    """Return the number of turns of an arc, the last of which is the rest."""
     value = words.get("P", 1.0)
     if not 1 <= value <= _MOST_TURNS or value % 1:
         raise ToolpathError(f"P{value:g} is no number of turns of an arc, expected 1 to {_MOST_TURNS}")
@@ -69,7 +69,7 @@ def _turns(words: Mapping[str, float]) -> int:
 
 
 def _check_normal(start: float, end: float, words: Mapping[str, float], modes: Modes) -> None:
-    """Raise if I, J or K moves the centre along the normal of the plane, where the arc begins and ends [m]."""
+    """Check that I, J and K do not move the centre along the normal of the plane."""
     letter = "IJK"[PLANES[modes.plane][2]]
     value = modes.length(letter, words.get(letter, 0.0))
     allowed = (0.0, start, end) if modes.absolute_centers else (0.0,)
@@ -81,7 +81,7 @@ def _check_normal(start: float, end: float, words: Mapping[str, float], modes: M
 
 
 def _sweep(first: Sequence[float], last: Sequence[float], center: Sequence[float], clockwise: bool) -> float:
-    """Angle from the first to the last point about the centre [rad], counter-clockwise positive, never 0."""
+    """Return the angle from the first to the last point about the centre [rad], counter-clockwise positive, never 0."""
     begin = math.atan2(first[1] - center[1], first[0] - center[0])
     angle = math.atan2(last[1] - center[1], last[0] - center[0]) - begin
     sweep = (-angle if clockwise else angle) % math.tau
@@ -105,7 +105,7 @@ def _by_offsets(
 
 
 def _center(first: Sequence[float], words: Mapping[str, float], modes: Modes, absolute: bool) -> tuple[float, float]:
-    """The centre by I J K [m], absolute or relative to the start."""
+    """Return the centre by I J K [m], absolute or relative to the start."""
     a, b = (modes.length("IJK"[axis], words.get("IJK"[axis], 0.0)) for axis in PLANES[modes.plane][:2])
     return (a, b) if absolute else (first[0] + a, first[1] + b)
 
@@ -113,7 +113,7 @@ def _center(first: Sequence[float], words: Mapping[str, float], modes: Modes, ab
 def _check_radii(
     first: Sequence[float], last: Sequence[float], center: Sequence[float], words: Mapping[str, float], modes: Modes
 ) -> None:
-    """Raise if the centre is not as far from the start as from the end of the arc."""
+    """Check that the centre is as far from the start as from the end of the arc."""
     radii = math.dist(first, center), math.dist(last, center)
     if min(radii) < _LEAST_RADIUS:
         raise ToolpathError("the arc's centre is its start or its end, expected a radius greater than 0")
@@ -125,7 +125,7 @@ def _check_radii(
 
 
 def _equal(first: float, last: float, modes: Modes) -> bool:
-    """Whether the radii at the ends of an arc [m] are the same but for rounding."""
+    """Return whether the radii at the ends of an arc [m] are the same up to rounding."""
     error, unit = abs(first - last), modes.known_unit("the arc")
     if error <= max(unit.tolerance, modes.arc_tolerance or 0.0):
         return True
@@ -133,7 +133,7 @@ def _equal(first: float, last: float, modes: Modes) -> bool:
 
 
 def _unequal(first: float, last: float, modes: Modes, *, meant: bool) -> str:
-    """What to do about radii [m] that differ, given whether the centre is meant the other way."""
+    """Return advice about radii [m] that differ, and whether the centre may be meant the other way."""
     unit, error = modes.known_unit("the arc"), abs(first - last)
     if meant:
         advice = "as a centre relative to the start, G91.1, or an absolute one, G90.1, it would be: say which before it"
@@ -148,7 +148,7 @@ def _unequal(first: float, last: float, modes: Modes, *, meant: bool) -> str:
 
 
 def _rounded_up(length: float) -> str:
-    """A length with two digits, not below it."""
+    """Write a length with two digits, not below it."""
     step = 10.0 ** (math.floor(math.log10(length)) - 1)
     return f"{math.ceil(1.001 * length / step) * step:.3g}"
 

@@ -1,4 +1,4 @@
-"""Contours put together piece by piece, as the readers of files do."""
+"""A builder of contours, piece by piece."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NOTHING = 1e-9  # m, moves shorter than this are none
 
 
 class ContourBuilder:
-    """Collects the pieces of one contour; straight moves that follow each other become one polyline.
+    """A builder of one contour; consecutive straight moves become one polyline.
 
     Points are kept as tuples of numbers: programs of a hundred thousand lines are read several times faster so.
 
@@ -35,22 +35,22 @@ class ContourBuilder:
 
     @property
     def position(self) -> Array:
-        """Where the contour has come to [m], (3,)."""
+        """The current end of the contour [m], (3,)."""
         return np.array(self._corners[-1])
 
     @property
     def empty(self) -> bool:
-        """Whether nothing that has a length was added."""
+        """Whether the contour has no length yet."""
         return not self._segments and len(self._corners) == 1
 
     def line_to(self, point: Sequence[float] | Array) -> None:
-        """A straight move; one of no length is left out."""
+        """Add a straight move; one without length is left out."""
         target = _point("point", point)
         if math.dist(target, self._corners[-1]) > _NOTHING:
             self._corners.append(target)
 
     def lines_to(self, points: Array) -> None:
-        """Straight moves to finite points (k, 3), one after another; those of no length are left out."""
+        """Add straight moves to finite points (k, 3), one after another; those without length are left out."""
         steps = np.diff(np.concatenate([self._corners[-1:], points]), axis=0)
         targets = map(tuple, points.tolist())
         if (np.abs(steps) > _NOTHING).any(1).all():
@@ -60,18 +60,18 @@ class ContourBuilder:
             self.line_to(target)
 
     def add(self, segment: Segment) -> None:
-        """A curved piece, which begins where the contour has come to; a gap there is closed by a straight move."""
+        """Add a curved piece that begins at the current end; a gap there is closed by a straight move."""
         self.line_to(segment.first)
         self._end_polyline()
         self._segments.append(segment)
         self._corners = [_point("last", segment.last)]
 
     def close(self) -> None:
-        """A straight move back to the start."""
+        """Add a straight move back to the start."""
         self.line_to(self._start)
 
     def contour(self, **attributes: Any) -> Contour:
-        """The contour; ``attributes`` are those of :class:`Contour`, ``closed`` follows from the ends by default."""
+        """Return the contour, with ``attributes`` of :class:`Contour`; by default ``closed`` follows from the ends."""
         self._end_polyline()
         closed = bool(self._segments) and math.dist(self._corners[-1], self._start) <= _NOTHING
         return Contour(tuple(self._segments), **({"closed": closed} | attributes))
@@ -83,7 +83,7 @@ class ContourBuilder:
 
 
 def _point(name: str, point: Sequence[float] | Array) -> tuple[float, ...]:
-    """The three numbers of a point."""
+    """Check that a point has three finite numbers."""
     numbers = tuple(map(float, point))
     if not all(map(math.isfinite, numbers)) or len(numbers) != 3:
         raise InputError(f"{name} = {numbers}, expected three finite numbers")

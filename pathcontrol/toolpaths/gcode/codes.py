@@ -1,4 +1,4 @@
-"""The G and M codes that are understood, and why others are not."""
+"""The G and M codes that are understood, and the reasons why others are not."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ _LETTERS = {
 
 
 def groups(block: Block) -> dict[str, int]:
-    """The code of each modal group in the block.
+    """Return the code of each modal group in the block.
 
     Raises:
         ToolpathError: a code that is not supported, or two of one group.
@@ -86,12 +86,12 @@ def groups(block: Block) -> dict[str, int]:
 
 
 def moving_m(code: int) -> str | None:
-    """Why an M code cannot be passed over, or None if it moves nothing."""
+    """Return the reason why an M code cannot be passed over, or None if it moves nothing."""
     return _M_REASONS.get(code)
 
 
 def check_letters(block: Block, allowed: str) -> None:
-    """Raise if the block has a word that nothing in it uses; F, S and T stand anywhere."""
+    """Check that the block has no word that nothing in it uses; F, S and T may stand anywhere."""
     for letter in block.words:
         if letter not in "FST" and letter not in allowed:
             reason = _LETTERS.get(letter, "nothing in the line uses it")

@@ -1,4 +1,4 @@
-"""Drilling cycles of G-code, as the moves that they stand for."""
+"""Expansion of drilling cycles of G-code to moves."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MOST_REPEATS, _MOST_PECKS = 10_000, 10_000
 
 @dataclass
 class Drilling:
-    """The cycle in force: words stay in force from hole to hole (LinuxCNC, G-Codes, Canned Cycles).
+    """The drilling cycle in force; its words stay in force from hole to hole (LinuxCNC, G-Codes, Canned Cycles).
 
     Attributes:
         code: G73, G81, G82 or G83, times ten.
@@ -33,7 +33,7 @@ class Drilling:
     def moves(
         self, here: list[float], words: Mapping[str, float], modes: Modes
     ) -> Iterator[tuple[bool, tuple[float, float, float]]]:
-        """The moves of a line from ``here`` [m], (3,): whether each cuts, and where it leads.
+        """Yield the moves of a line from ``here`` [m], (3,): whether each cuts, and its end.
 
         Raises:
             ToolpathError: R, Z or Q is missing or no measure of a hole, L is no number of repetitions.
@@ -53,7 +53,7 @@ class Drilling:
             z = level
 
     def _levels(self, z: float, modes: Modes) -> tuple[float, float]:
-        """Where rapids end above the hole, and its bottom [m]."""
+        """Return the level above the hole at which rapids end, and its bottom [m]."""
         missing = [a for a in ("RZQ" if self.code in _PECKS else "RZ") if a not in self.words]
         if missing:
             raise ToolpathError(f"{DRILLING[self.code]} without {' and '.join(missing)}, expected it in the first line")
@@ -69,7 +69,7 @@ class Drilling:
         return clear, bottom
 
     def _hole(self, clear: float, bottom: float, level: float, modes: Modes) -> Iterator[tuple[bool, float]]:
-        """The moves up and down, from above the hole to the level after it: whether they cut, and z [m]."""
+        """Yield the moves down and up of one hole: whether each cuts, and its end z [m]."""
         yield False, clear
         for depth in self._pecks(clear, bottom, modes):
             yield True, depth
@@ -80,7 +80,7 @@ class Drilling:
         yield False, level
 
     def _pecks(self, clear: float, bottom: float, modes: Modes) -> Iterator[float]:
-        """Depths at which the drill comes out before it goes on [m]."""
+        """Yield the depths at which the drill comes out before it goes on [m]."""
         if self.code not in _PECKS:
             return
         step = modes.length("Q", self.words["Q"])
@@ -95,7 +95,7 @@ class Drilling:
 
 
 def _repeats(words: Mapping[str, float]) -> int:
-    """How often the line is carried out."""
+    """Return the number of times that the line is carried out."""
     value = words.get("L", 1.0)
     if not 1 <= value <= _MOST_REPEATS or value % 1:
         raise ToolpathError(f"L{value:g} is no number of repetitions, expected 1 to {_MOST_REPEATS}")

@@ -1,4 +1,4 @@
-"""What the coordinates of a G-code program refer to: an offset, a shift, rotary axes. They stay what they are."""
+"""The frame of the coordinates of a G-code program, which must not change: offset, shift, rotary axes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Frame:
         self._rotary: dict[str, float] = {}
 
     def select(self, system: int | None) -> None:
-        """Refer the coordinates to G54 to G59.3.
+        """Select one of the coordinate systems G54 to G59.3.
 
         Raises:
             ToolpathError: coordinates were used that refer to another.
@@ -49,7 +49,7 @@ class Frame:
         self._passed.tell(f"the coordinates are those of {_SYSTEMS[system]}")
 
     def shift(self, here: Sequence[float], place: Sequence[float], begun: bool) -> None:
-        """Call the place ``here`` [m], (3,), where axes may be NaN, ``place`` by G92.
+        """Name the position ``here`` [m], (3,), where axes may be NaN, ``place`` by G92.
 
         Raises:
             ToolpathError: it is another place, and there were moves.
@@ -63,7 +63,7 @@ class Frame:
         self._shifted = self._shifted or not same
 
     def unshift(self) -> None:
-        """Take G92 back, where there was none.
+        """Cancel G92, which is allowed where none was in force.
 
         Raises:
             ToolpathError: there was one.
@@ -72,7 +72,7 @@ class Frame:
             raise ToolpathError("G92.1 takes back a G92 and shifts the coordinates: refer the program to one origin")
 
     def without_rotary(self, block: Block, absolute: bool, begun: bool, line: int) -> Block:
-        """The block without rotary axes, A, B and C, that stay where they are.
+        """Return the block without rotary axes, A, B and C, that stay where they are.
 
         Raises:
             ToolpathError: one of them turns.

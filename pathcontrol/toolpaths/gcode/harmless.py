@@ -1,4 +1,4 @@
-"""Words of G-code that move nothing: those that are always passed over, and those that are on request.
+"""Removal of words of G-code that move nothing: those that never do, and those ignored on request.
 
 What could move the tool, shift its coordinates or change the order of lines is never passed over.
 """
@@ -21,7 +21,7 @@ _PLACES = frozenset("XYZIJK")
 
 
 def without_codes(block: Block, turning: bool, line: int, passed: Passed) -> Block:
-    """The block without G and M codes that move nothing, and the words that belong to them.
+    """Return the block without G and M codes that move nothing, and the words that belong to them.
 
     Args:
         block: the block.
@@ -55,7 +55,7 @@ def without_codes(block: Block, turning: bool, line: int, passed: Passed) -> Blo
 
 
 def without_letters(block: Block, line: int, passed: Passed) -> Block:
-    """The block without E, and without D and H that nothing in it uses.
+    """Return the block without E, and without D and H that nothing in it uses.
 
     Raises:
         ToolpathError: they are to be refused.
@@ -71,12 +71,12 @@ def without_letters(block: Block, line: int, passed: Passed) -> Block:
 
 
 def _smooths(code: int, block: Block) -> bool:
-    """Whether a G code is about smoothing: G5 and G5.1 are splines where there are places."""
+    """Return whether a G code is about smoothing: G5 and G5.1 are splines where there are coordinates."""
     return code not in (50, 51) or (_SMOOTHING[code][0] in block.words and _PLACES.isdisjoint(block.words))
 
 
 def _of_m(code: int, block: Block, line: int, passed: Passed) -> set[str]:
-    """The letters that belong to an M code which is passed over."""
+    """Return the letters that belong to an M code which is passed over."""
     if code in _OUTPUTS:
         passed.over(f"M{code}", line)
         return {*_OUTPUTS[code]}

@@ -1,4 +1,4 @@
-"""The modal state of a G-code program: what stays in force until something else is said."""
+"""The modal state of a G-code program: settings in force until others replace them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _UNIT_CODES = {200: UNITS["in"], 210: UNITS["mm"]}
 
 @dataclass
 class Modes:
-    """The modes in force, at the beginning those of RS274/NGC; unit, motion and feed are what the program says first.
+    """The modes in force, at first those of RS274/NGC; the program must set unit, motion and feed.
 
     Attributes:
         unit: unit of length, G20 or G21.
@@ -40,7 +40,7 @@ class Modes:
     arc_tolerance: float | None = None
 
     def update(self, block: Block, codes: dict[str, int]) -> None:
-        """Put into force what the block says, given its code of each group."""
+        """Put the modes of a block into force, given its code of each group."""
         before = self.unit
         self.unit = _UNIT_CODES[codes["unit"]] if "unit" in codes else before
         if "F" in block.words:
@@ -57,15 +57,15 @@ class Modes:
         self.absolute_centers = codes.get("arc centre", 901 if self.absolute_centers else 911) == 901
 
     def length(self, letter: str, value: float) -> float:
-        """The value of a word [m]."""
+        """Return the value of a word [m]."""
         return value * self.known_unit(f"{letter}{value:g}").scale
 
     def feed_of(self, value: float) -> float:
-        """The value of F [m/s]."""
+        """Return the value of F [m/s]."""
         return self.length("F", value) / 60
 
     def known_unit(self, needed_by: str) -> Unit:
-        """The unit in force, which must be known by now."""
+        """Return the unit in force; it is an error if there is none yet."""
         if self.unit is None:
             raise ToolpathError(
                 f"{needed_by} has no unit: write G20, inches, or G21, millimetres, before it, or read the file with "
@@ -74,7 +74,7 @@ class Modes:
         return self.unit
 
     def coordinate(self, letter: str, value: float, here: float) -> float:
-        """Where the value of an axis word leads on that axis from ``here`` [m]."""
+        """Return the end of an axis word on that axis, from ``here`` [m]."""
         target = self.length(letter, value) + (0.0 if self.absolute else here)
         if abs(target) > MAX_COORDINATE:
             raise ToolpathError(f"{letter}{value:g} leads further than {MAX_COORDINATE:g} m from the origin")

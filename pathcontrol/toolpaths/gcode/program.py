@@ -1,4 +1,4 @@
-"""What the blocks of a G-code program do: the position, and the moves."""
+"""Execution of the blocks of a G-code program: the position, and the moves."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SHIFT, _NO_SHIFT = 920, 921
 
 
 class Program:
-    """A machine that carries out blocks.
+    """An interpreter that carries out blocks.
 
     Args:
         modes: the modes in force at the beginning.
@@ -40,7 +40,7 @@ class Program:
         self._drilling: Drilling | None = None
 
     def carry_out(self, block: Block, line: int) -> bool:
-        """Do what the block in a line says, in the order of RS274/NGC; whether the program goes on after it.
+        """Carry out the block of a line, in the order of RS274/NGC; return whether the program goes on.
 
         Raises:
             ToolpathError: it is not understood.
@@ -65,7 +65,7 @@ class Program:
         return PROGRAM_END.isdisjoint(block.m)
 
     def follow(self, texts: Sequence[str], first: int) -> int:
-        """Carry out the lines from the index ``first`` on that only go on as the last move did; how many they are."""
+        """Carry out the lines from the index ``first`` on that continue the last move; return their number."""
         rapid, feed = self.modes.motion == _RAPID, self.modes.feed
         straight = rapid or (self.modes.motion == _LINE and feed is not None)
         if not straight or self._drilling or not self.strokes.goes_on(None if rapid else feed):
@@ -79,12 +79,12 @@ class Program:
         return count
 
     def _turning(self, block: Block) -> bool:
-        """Whether the motion of a block is an arc or a cycle."""
+        """Return whether the motion of a block is an arc or a cycle."""
         motion = next((code for code in block.g if code in (_RAPID, _LINE, 800)), self.modes.motion)
         return any(code in (_CLOCKWISE, _COUNTER_CLOCKWISE, *DRILLING) for code in (motion, *block.g))
 
     def _move(self, block: Block, codes: dict[str, int], line: int, name: str) -> None:
-        """The motion in force, if the block has words for it."""
+        """Carry out the motion in force, if the block has words for it."""
         motion = self._motion(block, line)
         letters = _letters(motion)
         options = ("PQ" if codes.get("path control") == 640 else "") + ("H" if codes.get("tool length") == 430 else "")
@@ -102,7 +102,7 @@ class Program:
             self._cut(block, motion, name)
 
     def _motion(self, block: Block, line: int) -> int | None:
-        """The motion in force; before the first, places are rapids, as grbl and others begin."""
+        """Return the motion in force; before the first, coordinates are rapids, as grbl and others begin."""
         motion = self.modes.motion
         if motion is None and not self.modes.stopped and not block.words.keys().isdisjoint("XYZ"):
             self._passed.tell(f"line {line}: it moves before G0 or G1 is said; that is taken for rapids, as grbl does")
@@ -120,7 +120,7 @@ class Program:
         self._position = target
 
     def _drill(self, block: Block, motion: int, name: str) -> None:
-        """The moves of a cycle."""
+        """Carry out the moves of a cycle."""
         if self.modes.plane != 170:
             raise ToolpathError(f"{DRILLING[motion]} is supported in the plane XY only, G17")
         self._check_cut(self._position)
@@ -139,7 +139,7 @@ class Program:
         return target
 
     def _rapid(self, target: list[float], name: str) -> None:
-        """A rapid, which is left out where its ends are not known."""
+        """Carry out a rapid, which is left out where its ends are not known."""
         if any(map(math.isnan, [*self._position, *target])):
             self.strokes.end()
         else:
@@ -147,7 +147,7 @@ class Program:
         self._position = target
 
     def _shift(self, block: Block, code: int) -> None:
-        """G92 says what the place of the tool is called."""
+        """Carry out G92, which names the position of the tool."""
         check_letters(block, "XYZ" if code == _SHIFT else "")
         if code == _NO_SHIFT:
             self._frame.unshift()
@@ -160,7 +160,7 @@ class Program:
         self._position = place
 
     def _leave(self, block: Block, codes: dict[str, int], name: str) -> None:
-        """G28, G30 and G53 lead to places of the machine: after them, its axes are where the file does not say."""
+        """Carry out G28, G30 or G53: the tool is at a place of the machine, unknown to the file."""
         check_letters(block, "XYZ")
         if codes["elsewhere"] == _MACHINE:
             if self.modes.motion not in (_RAPID, None) or self.modes.stopped:
@@ -175,7 +175,7 @@ class Program:
                 self._position[axis] = math.nan
 
     def _check_cut(self, target: Sequence[float]) -> None:
-        """Raise if it is not known where to cut, or how fast."""
+        """Check that the place and the feed of a cut are known."""
         ends = zip("XYZ", self._position, target, strict=True)
         unknown = [letter for letter, start, end in ends if math.isnan(start + end)]
         if unknown:
@@ -190,7 +190,7 @@ class Program:
 
 
 def _letters(motion: int | None) -> str:
-    """The letters that belong to a motion."""
+    """Return the letters that belong to a motion."""
     if motion is None:
         return ""
     if motion in DRILLING:
@@ -199,7 +199,7 @@ def _letters(motion: int | None) -> str:
 
 
 def _check_dwell(block: Block) -> None:
-    """Raise if G4 does not say how long: by P, or as Fanuc, Siemens and printers do by X, U or S."""
+    """Check that G4 says how long: by P, or as Fanuc, Siemens and printers do by X, U or S."""
     check_letters(block, "PXUS")
     times = [block.words[letter] for letter in "PXUS" if letter in block.words]
     if not times or min(times) < 0:

@@ -1,4 +1,4 @@
-"""Tool paths from G-code files."""
+"""Reader of tool paths in G-code files."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def read_gcode(
     arc_tolerance: float | None = None,
     unknown: str = "refuse",
 ) -> Toolpath:
-    """Contours from a G-code program, RS274/NGC as LinuxCNC and most CAM programs write it.
+    """Read contours from a G-code program, RS274/NGC as LinuxCNC and most CAM programs write it.
 
     Cuts (G1, G2 and G3, one after another, at one feed) and rapids (G0, straight) are contours, called by their first
     line: ``"N20"``, or ``"line 14"`` where it has no number. What is not understood is refused, never guessed.
@@ -82,7 +82,7 @@ def read_gcode(
 
 
 def _start(start: ArrayLike | None, texts: list[str]) -> list[float]:
-    """Position before the first move, NaN where it is not known."""
+    """Return the position before the first move, NaN where it is not known."""
     if start is None:
         named = [any(axis in text or axis.lower() in text for text in texts) for axis in "XYZ"]
         return [math.nan if known else 0.0 for known in named]
@@ -95,7 +95,7 @@ def _start(start: ArrayLike | None, texts: list[str]) -> list[float]:
 
 
 def _run(program: Program, texts: Sequence[str], passed: Passed) -> None:
-    """Carry out the lines, each an error by its number, until the program ends."""
+    """Carry out the lines until the program ends; errors name the line."""
     began, number = False, 0
     while number < len(texts):
         text, number = texts[number], number + 1

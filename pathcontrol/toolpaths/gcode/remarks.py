@@ -1,4 +1,4 @@
-"""What is written for people, or for the line to a machine, in ways that RS274/NGC does not know."""
+"""Removal of remarks and line protocols that RS274/NGC does not know."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _COMMENT = "a comment of G-code stands after ; or in ( )"
 
 
 def without_remarks(text: str, line: int, passed: Passed) -> str:
-    """The line without what is no G-code and moves nothing: a text in [ ], what follows //, a message, a checksum.
+    """Return the line without text in [ ], a remark after //, a message, or a checksum, which move nothing.
 
     Raises:
         ToolpathError: there is such a thing in it, and it is to be refused; or a line after // could be a block that a

@@ -1,4 +1,4 @@
-"""Runs of straight moves: most lines of most programs only say where the next one leads, and are carried out together.
+"""Runs of straight moves, the greater part of most programs, which are carried out together.
 
 A run changes nothing but the position of the tool, so it needs no interpreter: every line that says anything else, or
 cannot be carried out, ends it and is left to :class:`~pathcontrol.toolpaths.gcode.program.Program`.
@@ -20,7 +20,7 @@ _NONE = "nan"  # the text of a word that is not there
 
 
 def read_run(texts: Sequence[str], first: int, most: int, position: Sequence[float], modes: Modes) -> tuple[int, Array]:
-    """Return how many lines from ``first`` on only go on straight, and the points that they lead to [m], (k, 3).
+    """Return the number of lines from ``first`` on that only go on straight, and their end points [m], (k, 3).
 
     Args:
         texts: the lines of the program, without comments.
@@ -40,7 +40,7 @@ def read_run(texts: Sequence[str], first: int, most: int, position: Sequence[flo
 
 
 def _plain_rows(texts: Sequence[str], first: int, most: int, modes: Modes) -> list[tuple[str, ...]]:
-    """The words of the lines from ``first`` on that are plain and say no other motion or feed than those in force."""
+    """Return the words of the lines from ``first`` on that are plain and keep the motion and feed in force."""
     rows: list[tuple[str, ...]] = []
     motions, feeds = {None, _DIGITS[modes.motion or 0]}, {_NONE}
     for index in range(first, min(first + most, len(texts))):
@@ -57,7 +57,7 @@ def _plain_rows(texts: Sequence[str], first: int, most: int, modes: Modes) -> li
 
 
 def _places(lengths: Array, position: Sequence[float], *, absolute: bool) -> Array:
-    """Where words (k, 3) [m], NaN where there is none, lead one after another from a position [m], (k, 3)."""
+    """Return the points (k, 3) that words (k, 3) [m] lead to from a position [m]; NaN stands for no word."""
     if not absolute:
         with np.errstate(invalid="ignore"):  # the first place that is too far ends the run
             return np.cumsum([position, *np.where(np.isnan(lengths), 0.0, lengths)], axis=0)[1:]

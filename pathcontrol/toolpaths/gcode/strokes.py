@@ -1,4 +1,4 @@
-"""Moves one after another made into contours."""
+"""Collection of consecutive moves into contours."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathcontrol.toolpaths.text import MAX_CONTOURS, MAX_SEGMENTS
 
 
 class Strokes:
-    """Contours of moves that follow each other at one feed, or as rapids."""
+    """A collector of moves into contours, one for all that follow each other at one feed, or as rapids."""
 
     def __init__(self) -> None:
         self._contours: list[Contour] = []
@@ -29,21 +29,21 @@ class Strokes:
 
     @property
     def left(self) -> int:
-        """How many more moves there may be."""
+        """The number of moves that are still allowed."""
         return MAX_SEGMENTS - self._moves
 
     def goes_on(self, feed: float | None) -> bool:
-        """Whether the next move at ``feed`` [m/s], or None for a rapid, goes on with a contour that has a length."""
+        """Return whether a move at ``feed`` [m/s], or None for a rapid, continues a contour that has a length."""
         return self._builder is not None and not self._builder.empty and feed == self._feed
 
     def follow(self, points: Array) -> None:
-        """Go straight through points (k, 3) [m], as the last move did; they are at most :attr:`left`."""
+        """Add straight moves through points (k, 3) [m], like the last move; they are at most :attr:`left`."""
         assert self._builder is not None
         self._moves += len(points)
         self._builder.lines_to(points)
 
     def move(self, start: Sequence[float], way: Sequence[float] | Arc, feed: float | None, name: str) -> None:
-        """Go from ``start`` [m], (3,), along an arc or straight to a point at ``feed`` [m/s], or None for a rapid."""
+        """Add a move from ``start`` [m], (3,), along an arc or straight, at ``feed`` [m/s], or None for a rapid."""
         self._moves += 1
         if self._moves > MAX_SEGMENTS:
             raise ToolpathError(f"more than {MAX_SEGMENTS} moves; split the program")
@@ -58,7 +58,7 @@ class Strokes:
             self._builder.line_to(way)
 
     def end(self) -> None:
-        """The next move begins a new contour."""
+        """End the contour: the next move begins a new one."""
         if self._builder is not None and not self._builder.empty:
             if len(self._contours) == MAX_CONTOURS:
                 raise ToolpathError(f"more than {MAX_CONTOURS} changes between rapids and feeds; split the program")
@@ -67,6 +67,6 @@ class Strokes:
         self._builder = None
 
     def contours(self) -> tuple[Contour, ...]:
-        """All contours, in order."""
+        """Return all contours, in order."""
         self.end()
         return tuple(self._contours)

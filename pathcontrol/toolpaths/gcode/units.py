@@ -1,4 +1,4 @@
-"""Units of length of G-code."""
+"""The units of length of G-code."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Unit(NamedTuple):
     tolerance: float
 
     def text(self, length: float) -> str:
-        """A length [m] in this unit, for messages."""
+        """Write a length [m] in this unit, for messages."""
         return f"{length / self.scale:g} {self.name}"
 
 

@@ -1,4 +1,4 @@
-"""Words of G-code: a letter and a number each, the words of a line make up a block."""
+"""Words of G-code, a letter and a number each, which form the block of a line."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _REASONS = {
 
 
 class Block(NamedTuple):
-    """A line of a program.
+    """The words of a line of a program.
 
     Attributes:
         g: numbers of its G words times ten: 901 for G90.1.
@@ -63,17 +63,17 @@ class Block(NamedTuple):
 
 
 def without_comments(line: str) -> str:
-    """The line without what stands in parentheses or after a semicolon."""
+    """Return the line without the text in parentheses or after a semicolon."""
     return _COMMENT.sub(" ", line) if "(" in line or ";" in line else line
 
 
 def are_words(text: str) -> bool:
-    """Whether a text is nothing but words."""
+    """Return whether a text consists of words only."""
     return bool(_BLOCK.fullmatch(text))
 
 
 def parse(text: str) -> Block:
-    """The words of a line without comments.
+    """Parse the words of a line without comments.
 
     Raises:
         ToolpathError: something in it is no word, or a letter that must not is there twice.
@@ -101,7 +101,7 @@ def parse(text: str) -> Block:
 
 
 def _two_readings(word: str) -> str:
-    """What is wrong with a number that has an exponent, or is followed by a word E."""
+    """Return what is wrong with a number that has an exponent, or is followed by a word E."""
     return (
         f"{word[:30]} may be a number with an exponent, which G-code does not have, or two words, the second an "
         "extruder's: write the number out, or a blank before E"
@@ -109,7 +109,7 @@ def _two_readings(word: str) -> str:
 
 
 def _code(letter: str, digits: str, tenths: int) -> int:
-    """The number of a G or M word, times ten where tenths are allowed."""
+    """Return the number of a G or M word, times ten where tenths are allowed."""
     number = float(digits) * tenths
     if not 0 <= number < 10_000 or abs(number - round(number)) > 1e-3:
         raise ToolpathError(f"{letter}{digits[:20]} is not understood")
@@ -117,7 +117,7 @@ def _code(letter: str, digits: str, tenths: int) -> int:
 
 
 def _mistake(text: str) -> ToolpathError:
-    """What stands where a word is expected."""
+    """Return the error about a text where a word is expected."""
     good = _BLOCK.match(text)
     rest = text[good.end() if good else 0 :]
     culprit = rest[1:].lstrip()[:1] if rest[:1].isalpha() else rest[:1]

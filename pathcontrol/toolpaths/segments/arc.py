@@ -16,7 +16,7 @@ from pathcontrol.toolpaths.segments.base import Segment
 
 @dataclass(frozen=True, eq=False)
 class Arc(Segment):
-    """p(u) = c + cos φ x + sin φ y + u h,  φ = φ₀ + u Δφ.
+    """An arc p(u) = c + cos φ x + sin φ y + u h, φ = φ₀ + u Δφ, of a circle, an ellipse or a helix.
 
     With x ⟂ y of the same length it is an arc of a circle, with other vectors one of an ellipse, with h ≠ 0 a helix.
 
@@ -56,7 +56,7 @@ class Arc(Segment):
 
     @cached_property
     def _ends(self) -> Array:
-        """First and last point [m], (2, 3)."""
+        """The first and the last point [m], (2, 3)."""
         return readonly(self.point(np.array([0.0, 1.0])))
 
     @property
@@ -111,5 +111,5 @@ class Arc(Segment):
 
 
 def _parallelogram(x: list[float], y: list[float]) -> float:
-    """The area that two vectors span, ‖x × y‖; three numbers are faster without NumPy."""
+    """Return the area that two vectors span, ‖x × y‖; for three numbers this is faster without NumPy."""
     return math.hypot(x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])

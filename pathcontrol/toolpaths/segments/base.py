@@ -1,4 +1,4 @@
-"""Pieces of a contour: what a segment is, and the polyline."""
+"""The base class of the segments of a contour, and the polyline."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ class Segment(ABC):
 
     @abstractmethod
     def point(self, u: Array) -> Array:
-        """p(u) [m], (*batch, 3)."""
+        """Return p(u) [m], (*batch, 3)."""
 
     @abstractmethod
     def derivative(self, u: Array, order: int = 1) -> Array:
-        """dp/du or d²p/du² [m], (*batch, 3)."""
+        """Return dp/du or d²p/du² [m], (*batch, 3)."""
 
     @abstractmethod
     def placed(self, pose: Array) -> Segment:
-        """The segment moved by a homogeneous transform (4, 4)."""
+        """Return the segment moved by a homogeneous transform (4, 4)."""
 
     @abstractmethod
     def reversed(self) -> Segment:
-        """The same points from the end to the start."""
+        """Return the same points from the end to the start."""
 
     @property
     def first(self) -> Array:
@@ -56,7 +56,7 @@ class Segment(ABC):
 
     @cached_property
     def arc_length(self) -> ArcLength:
-        """Arc length as a function of u, which it is inverted from."""
+        """The arc length as a function of u, and its inverse."""
         return ArcLength(self.derivative)
 
     @cached_property
@@ -65,12 +65,12 @@ class Segment(ABC):
         return self.arc_length.total
 
     def distance(self, x: ArrayLike) -> Array:
-        """Distance from points x (*batch, 3) to the segment [m], (*batch,)."""
+        """Return the distance from points x (*batch, 3) to the segment [m], (*batch,)."""
         x = as_array("x", x)
         return np.linalg.norm(self.point(self._closest_point(x)) - x, axis=-1)
 
     def _least(self, sign: float) -> Array:
-        """Least value of each coordinate times ``sign`` [m], (3,): at samples, and again between those next to them."""
+        """Return the least value of each coordinate times ``sign`` [m], (3,), searched in samples and between them."""
         u = np.linspace(0.0, 1.0, _SAMPLES)
         near = u[(sign * self.point(u)).argmin(0)]
         finer = np.clip(near + np.linspace(-1.0, 1.0, 129)[:, None] / (_SAMPLES - 1), 0.0, 1.0)
@@ -84,7 +84,7 @@ class Segment(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Polyline(Segment):
-    """Straight edges through points (k + 1, 3) [m]; u runs in proportion to the arc length.
+    """A polyline through points (k + 1, 3) [m]; u is proportional to the arc length.
 
     Raises:
         InputError: fewer than two points, values that are not finite, or an edge no longer than 0.1 nm.
@@ -170,13 +170,13 @@ class Polyline(Segment):
         return BoxHierarchy(np.minimum(start, end), np.maximum(start, end))
 
     def _to_edges(self, x: Array, edge: Array) -> Array:
-        """Distance from each x (N, 3) to the edge of the index ``edge`` (N,) [m]."""
+        """Return the distance from each x (N, 3) to the edge of the index ``edge`` (N,) [m]."""
         offset, direction = x - self.points[edge], self.directions[edge]
         along = np.clip((offset * direction).sum(-1), 0.0, self.edges[edge])
         return np.linalg.norm(offset - along[:, None] * direction, axis=-1)
 
     def _locate(self, u: Array) -> tuple[Array, Array]:
-        """The edge that u lies on, and how far along it [m]."""
+        """Return the edge that u lies on, and the length along it [m]."""
         s = np.asarray(u) * self.length
         edge = np.clip(np.searchsorted(self.stations, s, side="right") - 1, 0, len(self.edges) - 1)
         return edge, s - self.stations[edge]

@@ -1,4 +1,4 @@
-"""Bézier curves, polynomial and rational: what splines of drawings consist of."""
+"""Bézier curves, polynomial and rational, of which splines of drawings consist."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pathcontrol.toolpaths.segments.base import Segment
 
 @dataclass(frozen=True, eq=False)
 class Bezier(Segment):
-    """p(u) = Σ Bᵢ(u) wᵢ pᵢ / Σ Bᵢ(u) wᵢ with Bernstein polynomials Bᵢ of any degree.
+    """A Bézier curve p(u) = Σ Bᵢ(u) wᵢ pᵢ / Σ Bᵢ(u) wᵢ with Bernstein polynomials Bᵢ of any degree.
 
     Attributes:
         points: control points pᵢ [m], (degree + 1, 3).
@@ -40,7 +40,7 @@ class Bezier(Segment):
 
     @classmethod
     def of_each(cls, points: Array) -> list[Bezier]:
-        """Make a polynomial curve of each of the control points (k, degree + 1, 3), which are known to be good."""
+        """Make a polynomial curve of each of the valid control points (k, degree + 1, 3), without checks."""
         points, curves = readonly(points), []
         for row in points:
             curve = object.__new__(cls)
@@ -79,7 +79,7 @@ class Bezier(Segment):
 
     @cached_property
     def _homogeneous(self) -> list[BPoly]:
-        """(w p, w) as a polynomial, and its two derivatives."""
+        """The polynomial (w p, w), and its two derivatives."""
         weights = np.ones(len(self.points)) if self.weights is None else self.weights
         coefficients = np.concatenate([self.points * weights[:, None], weights[:, None]], axis=1)
         curve = BPoly(coefficients[:, None], [0.0, 1.0])

@@ -1,4 +1,4 @@
-"""Many Bézier curves at once: boxes, lengths and tangents of polynomial ones, by columns of control points.
+"""Boxes, lengths and tangents of many polynomial Bézier curves at once, by columns of control points.
 
 What one curve would work out when it is asked is worked out for all of a contour together, and kept in each of them.
 """
@@ -22,21 +22,21 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
 def measure_lengths(segments: Sequence[Segment]) -> None:
-    """Work out the lengths of all segments that do not know theirs yet."""
+    """Compute the lengths of all segments that do not have them yet."""
     for rows, points in _columns(segments, "length", _HIGHEST_DEGREE):
         for row, length in zip(rows, _lengths(points).tolist(), strict=True):
             segments[row].__dict__["length"] = length
 
 
 def measure_bounds(segments: Sequence[Segment]) -> None:
-    """Work out the bounding boxes of all segments that do not know theirs yet."""
+    """Compute the bounding boxes of all segments that do not have them yet."""
     for rows, points in _columns(segments, "bounds", _HIGHEST_DEGREE):
         for row, low, high in zip(rows, *boxes(points), strict=True):
             segments[row].__dict__["bounds"] = low, high
 
 
 def end_tangents(segments: Sequence[Segment]) -> tuple[Array, Array]:
-    """Unit tangents at the starts and the ends of segments, each (k, 3), also where u stands still there."""
+    """Return unit tangents at starts and ends of segments, each (k, 3), also where the derivative vanishes."""
     near = np.array([0.0, 1e-6, 1e-4, 1e-2])
     found = np.empty((2, len(segments), 3))
     others = set(range(len(segments)))
@@ -52,7 +52,7 @@ def end_tangents(segments: Sequence[Segment]) -> tuple[Array, Array]:
 
 
 def boxes(points: Array) -> tuple[Array, Array]:
-    """Lower and upper corners, each (k, 3), of the boxes around curves of degree 1 to 3, (k, degree + 1, 3)."""
+    """Return lower and upper corners, each (k, 3), of boxes around curves of degree 1 to 3, (k, degree + 1, 3)."""
     a, b, c = _hodograph(points)  # a u² + b u + c is a third or so of the derivative
     with np.errstate(divide="ignore", invalid="ignore"):
         q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4 * a * c, 0.0)), b))
@@ -65,7 +65,7 @@ def boxes(points: Array) -> tuple[Array, Array]:
 
 
 def _columns(segments: Sequence[Segment], unless: str, highest: int) -> Iterator[tuple[list[int], Array]]:
-    """Places of polynomial curves without the attribute ``unless``, and their control points (k, degree + 1, 3)."""
+    """Yield indices of polynomial curves without the attribute ``unless``, with control points (k, degree + 1, 3)."""
     groups: dict[int, tuple[list[int], list[Array]]] = {}
     for place, segment in enumerate(segments):
         if isinstance(segment, Bezier) and segment.weights is None and unless not in segment.__dict__:
@@ -78,7 +78,7 @@ def _columns(segments: Sequence[Segment], unless: str, highest: int) -> Iterator
 
 
 def _hodograph(points: Array) -> tuple[Array, Array, Array]:
-    """Coefficients of the derivative divided by the degree, a u² + b u + c, each (k, 3)."""
+    """Return the coefficients of the derivative divided by the degree, a u² + b u + c, each (k, 3)."""
     steps = np.diff(points, axis=1)
     zero = np.zeros_like(steps[:, 0])
     if steps.shape[1] == 3:
@@ -87,7 +87,7 @@ def _hodograph(points: Array) -> tuple[Array, Array, Array]:
 
 
 def _lengths(points: Array) -> Array:
-    """Arc lengths of curves (k, degree + 1, 3) [m], (k,), as :class:`ArcLength` finds that of each."""
+    """Return the arc lengths of curves (k, degree + 1, 3) [m], (k,), by the method of :class:`ArcLength`."""
     powers = np.stack([p.T for p in _hodograph(points)]) * (points.shape[1] - 1)  # (3, 3, k), the highest first
     powers = powers[:, powers.any((0, 2))]  # a drawing lies in a plane
     ends = np.linspace(0.0, 1.0, _FIRST_CELLS + 1)
@@ -107,26 +107,26 @@ def _lengths(points: Array) -> Array:
 
 
 def _gauss(powers: Array, a: Array, b: Array) -> Array:
-    """Length over cells from a to b (k,) [m], (k,)."""
+    """Return the length over cells from a to b (k,) [m], (k,)."""
     half = 0.5 * (b - a)[:, None]
     derivative = _derivative(powers, 0.5 * (a + b)[:, None] + half * _NODES)
     return half[:, 0] * (np.sqrt((derivative * derivative).sum(0)) @ _WEIGHTS)
 
 
 def _turns(ends: Array) -> Array:
-    """Whether the directions at the ends of cells, (c, k, 2), differ too much for quadrature, (k,)."""
+    """Return whether the directions at the ends of cells, (c, k, 2), differ too much for quadrature, (k,)."""
     before, after = np.moveaxis(ends / np.maximum(np.sqrt((ends * ends).sum(0)), np.finfo(float).tiny), -1, 0)
     return ((after - before) ** 2).sum(0) > _TURN**2
 
 
 def _derivative(powers: Array, u: Array) -> Array:
-    """Values of polynomials with coefficients (3, c, k) at u (k, m), (c, k, m); coordinates first, which is fast."""
+    """Evaluate polynomials with coefficients (3, c, k) at u (k, m), (c, k, m); coordinates come first, for speed."""
     a, b, c = powers[..., None]
     return (a * u + b) * u + c
 
 
 def _unit(derivatives: Array) -> Array:
-    """Of derivatives (k, m, 3) the direction of the first that does not vanish, (k, 3); zero where all do."""
+    """Return the direction of the first of the derivatives (k, m, 3) that does not vanish, (k, 3); zero if all do."""
     speed = np.linalg.norm(derivatives, axis=-1)
     first = np.argmax(speed > 1e-9 * speed.max(-1, keepdims=True), axis=-1)
     row = np.arange(len(derivatives))
@@ -134,7 +134,7 @@ def _unit(derivatives: Array) -> Array:
 
 
 def _bernstein(degree: int, u: Array) -> Array:
-    """Bernstein polynomials at u (*batch,), (*batch, degree + 1)."""
+    """Return the Bernstein polynomials at u (*batch,), (*batch, degree + 1)."""
     i = np.arange(degree + 1)
     u = np.asarray(u)[..., None]
     return comb(degree, i) * u**i * (1 - u) ** (degree - i)

@@ -1,4 +1,4 @@
-"""Places where a Bézier curve stands still: turning points of straight ones, cusps of curved ones.
+"""Points where the derivative of a Bézier curve vanishes: turning points of straight ones, cusps of curved ones.
 
 With the curve written as A(u)/w(u), its derivative vanishes where the polynomials A' w − A w' all do.
 """
@@ -16,7 +16,7 @@ _INSIDE = 1e-6  # how far from 0 and 1 a parameter lies inside
 
 
 def straight_turns(points: Array, weights: Array | None, tolerance: float) -> Array | None:
-    """The ends and turning points (m, 3), in order, of a curve on a straight line; None where it is none.
+    """Return the ends and turning points (m, 3), in order, of a straight curve; None if it is not straight.
 
     Args:
         points: control points, (degree + 1, 3).
@@ -36,7 +36,7 @@ def straight_turns(points: Array, weights: Array | None, tolerance: float) -> Ar
 
 
 def is_plain(points: Array, tolerance: float) -> Array:
-    """Which curves (k, degree + 1, 3), polynomial, are surely neither straight nor stand still anywhere, (k,).
+    """Return which polynomial curves (k, degree + 1, 3) surely are neither straight nor have a cusp, (k,).
 
     Those of a degree above 3 are not looked at.
     """
@@ -55,7 +55,7 @@ def is_plain(points: Array, tolerance: float) -> Array:
 
 
 def _may_stand_still(steps: Array) -> Array:
-    """Whether the derivatives, with Bernstein coefficients ``steps`` (k, 2 or 3, 3), might vanish in (0, 1), (k,)."""
+    """Return whether derivatives with Bernstein coefficients ``steps`` (k, 2 or 3, 3) may vanish in (0, 1), (k,)."""
     row, size = np.arange(len(steps)), np.abs(steps).max(1)
     of = steps[row, :, np.argmax(size, axis=1)]  # the coordinate that changes most
     a = of[:, 0] - 2 * of[:, 1] + of[:, 2] if of.shape[1] == 3 else np.zeros(len(of))
@@ -70,7 +70,7 @@ def _may_stand_still(steps: Array) -> Array:
 
 
 def without_cusps(points: Array, weights: Array | None) -> list[tuple[Array, Array | None]]:
-    """The curve cut at its cusps, as control points and weights of its parts."""
+    """Cut the curve at its cusps; return control points and weights of its parts."""
     legs = points[1:] - points[:-1]
     sizes = np.sqrt((legs * legs).sum(-1))
     ahead = legs @ (legs / np.maximum(sizes, 1e-300)[:, None]).sum(0)
@@ -86,7 +86,7 @@ def without_cusps(points: Array, weights: Array | None) -> list[tuple[Array, Arr
 
 
 def _standstills(points: Array, weights: Array | None) -> list[float]:
-    """Parameters in (0, 1) where the derivative vanishes, increasing."""
+    """Return the parameters in (0, 1) where the derivative vanishes, increasing."""
     hodograph = _hodograph(points - points[0], weights)
     sizes = np.abs(hodograph).max(1)
     candidates = _roots(hodograph[np.argmax(sizes)])
@@ -94,7 +94,7 @@ def _standstills(points: Array, weights: Array | None) -> list[float]:
 
 
 def _hodograph(values: Array, weights: Array | None) -> Array:
-    """A' w − A w' for each column of values (degree + 1, k), in powers of u, the highest first, (k, m)."""
+    """Return A' w − A w' for each column of values (degree + 1, k), in powers of u, the highest first, (k, m)."""
     if weights is None:
         return _powers(np.diff(values, axis=0)).T
     w, columns = _powers(weights[:, None])[:, 0], _powers(values * weights[:, None]).T
@@ -102,7 +102,7 @@ def _hodograph(values: Array, weights: Array | None) -> Array:
 
 
 def _powers(coefficients: Array) -> Array:
-    """Bernstein coefficients (n + 1, k) in powers of u, the highest first: Δʲb₀ (n over j) uʲ."""
+    """Convert Bernstein coefficients (n + 1, k) to powers of u, the highest first: Δʲb₀ (n over j) uʲ."""
     n = len(coefficients) - 1
     differences = [coefficients]
     for _ in range(n):
@@ -111,7 +111,7 @@ def _powers(coefficients: Array) -> Array:
 
 
 def _roots(coefficients: Array) -> list[float]:
-    """Real roots inside (0, 1), increasing; double ones, which rounding makes complex, once."""
+    """Return the real roots inside (0, 1), increasing; double ones, which rounding makes complex, once."""
     size = np.abs(coefficients).max()
     if size == 0:
         return []
@@ -122,12 +122,12 @@ def _roots(coefficients: Array) -> list[float]:
 
 
 def _homogeneous(points: Array, weights: Array | None) -> Array:
-    """Points and weights in one array (degree + 1, 4)."""
+    """Return points and weights in one array (degree + 1, 4)."""
     return np.column_stack([points, np.ones(len(points)) if weights is None else weights])
 
 
 def _split(curve: Array, u: float) -> tuple[Array, Array]:
-    """De Casteljau's algorithm: the parts (degree + 1, 4) before and after u, points and weights."""
+    """Split a curve at u by de Casteljau's algorithm; return the parts (degree + 1, 4), points and weights."""
     rows = [np.column_stack([curve[:, :3] * curve[:, 3:], curve[:, 3]])]
     while len(rows[-1]) > 1:
         rows.append((1 - u) * rows[-1][:-1] + u * rows[-1][1:])

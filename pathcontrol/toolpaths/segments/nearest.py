@@ -1,4 +1,4 @@
-"""The nearest point on many Bézier curves at once, by one search over all of them."""
+"""The nearest point on many Bézier curves, by one search over all of them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def is_cubic(segment: Segment) -> bool:
 
 
 class Cubics:
-    """Polynomials of degree 3 at most as one curve, p(i + u) = pᵢ(u), whose tangent and place may jump at each i.
+    """Polynomials of degree 3 at most as one curve, p(i + u) = pᵢ(u), which may jump at each i.
 
     Args:
         segments: k segments that :func:`is_cubic` holds for.
@@ -35,12 +35,12 @@ class Cubics:
         self._nearest = ClosestPoint(self._curve, 0.0, knots[-1], closed=False, knots=knots, kinks=knots[1:-1])
 
     def distance(self, x: Array) -> Array:
-        """Distance from each row of x (N, 3) to the nearest of the segments [m], (N,); NaN where x is not finite."""
+        """Return the distance from each row of x (N, 3) to the nearest segment [m], (N,); NaN where x is not finite."""
         return np.linalg.norm(self._curve.p(self._nearest(x)) - x, axis=-1)
 
 
 def _raised(points: Array) -> Array:
-    """Control points (4, 3) of the cubic that is the curve of the points (degree + 1, 3)."""
+    """Return the control points (4, 3) of a curve given by (degree + 1, 3), raised to degree 3."""
     while len(points) <= _DEGREE:
         share = np.arange(1, len(points))[:, None] / len(points)
         inner = share * points[:-1] + (1 - share) * points[1:]

@@ -1,1 +1,1 @@
-"""From contours with corners to curves that a tool can follow without stopping."""
+"""Smoothing of contours with corners to curves that a tool can follow without stopping."""

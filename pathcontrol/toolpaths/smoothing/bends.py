@@ -1,4 +1,4 @@
-"""Curved segments that bend more sharply than a tolerance, as polylines within it."""
+"""Replacement of segments that bend more sharply than a tolerance by polylines within it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TINY = np.finfo(float).tiny
 
 
 def regular(segment: Segment, tolerance: float) -> tuple[Segment, float]:
-    """The segment itself, or if it turns by more than 0.2 rad within ``tolerance`` [m] a polyline so near to it.
+    """Return the segment itself, or a polyline within ``tolerance`` [m] if it turns by more than 0.2 rad within that.
 
     Cusps and loops smaller than the tolerance become corners of the polyline. The second value is how far apart they
     are [m].
@@ -61,12 +61,12 @@ class _Pieces(NamedTuple):
         return cls(u, np.where(np.diff(u) > _NARROWEST, size, 0.0), turn, np.maximum(sagitta, size * turn / 8))
 
     def halved(self, segment: Segment, chosen: Array) -> _Pieces:
-        """With the ``chosen`` pieces halved."""
+        """Return the pieces with the ``chosen`` ones halved."""
         return _Pieces.of(segment, np.sort(np.append(self.u, 0.5 * (self.u[:-1] + self.u[1:])[chosen])))
 
 
 def _apart(points: Array, least: float) -> Array:
-    """The first and last point, and of those between some that are ``least`` [m] apart."""
+    """Return the first and last point, and of those between some that are ``least`` [m] apart."""
     kept = [points[0]]
     for point in points[1:-1]:
         if np.linalg.norm(point - kept[-1]) > least:

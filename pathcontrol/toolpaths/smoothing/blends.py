@@ -1,4 +1,4 @@
-"""How far before and after a junction a quintic blend begins and ends.
+"""The trims of quintic blends: how far before and after a junction they begin and end.
 
 A blend is the quintic that meets the contour a distance d before and after the junction with its tangent and
 curvature there. It leaves the contour by less than a tolerance, which bounds d.
@@ -29,13 +29,13 @@ _TANGENT = 92.0  # where only the curvature jumps a blend deviates by 1/93 of d�
 
 
 def blend_length(chord: Array, turn: Array) -> Array:
-    """The length [m] of the arc of a circle with this chord [m] and turn [rad]: the parameter length of a blend."""
+    """Return the length [m] of the arc of a circle with this chord [m] and turn [rad], as parameter of a blend."""
     half = 0.5 * np.asarray(turn)
     return np.where(half > 1e-6, chord * half / np.sin(np.maximum(half, 1e-6)), chord)
 
 
 def straight_trims(turns: Array, tolerance: float) -> Array:
-    """d [m] for corners between straight edges that turn by ``turns`` [rad], (k,).
+    """Return d [m] for corners between straight edges that turn by ``turns`` [rad], (k,).
 
     The blend passes the corner at e = d sin(θ/2)(1 − (5/16)θ cot(θ/2)), which is nowhere farther from the edges.
     """
@@ -45,14 +45,14 @@ def straight_trims(turns: Array, tolerance: float) -> Array:
 
 
 class Junction(NamedTuple):
-    """A blend at a junction: d [m], and how far it and the contour are apart [m]; zeros for none."""
+    """A blend at a junction: its trim d [m] and its distance from the contour [m]; zeros for none."""
 
     trim: float
     deviation: float
 
     @classmethod
     def of(cls, before: Arm, after: Arm, longest: float, tolerance: float) -> Junction:
-        """The longest one of all with d up to ``longest``, or none where tangent and curvature go through."""
+        """Return the longest blend with d up to ``longest``, or none where tangent and curvature are continuous."""
         zero = np.array(0.0)
         (_, t_a, k_a), (_, t_b, k_b) = before(zero), after(zero)
         turn, jump = float(angles(t_a, t_b)), float(np.linalg.norm(k_b - k_a))
@@ -67,7 +67,7 @@ class Junction(NamedTuple):
 
 
 class Blends(NamedTuple):
-    """Quintics, sampled evenly.
+    """Quintic blends, sampled evenly.
 
     Attributes:
         points: p [m], (*batch, n, 3).
@@ -79,13 +79,13 @@ class Blends(NamedTuple):
 
     @classmethod
     def between(cls, start: CurvePoint, end: CurvePoint, length: Array, samples: int) -> Blends:
-        """From ``start`` to ``end`` (*batch, 3) over the parameter ``length`` (*batch,) [m]."""
+        """Return the blends from ``start`` to ``end`` (*batch, 3) over the parameter ``length`` (*batch,) [m]."""
         control = quintic_points(length, np.stack(start, axis=-2), np.stack(end, axis=-2))
         slopes = 5 * np.diff(control, axis=-2) / length[..., None, None]
         return cls(_bernstein(5, samples) @ control, np.linalg.norm(_bernstein(4, samples) @ slopes, axis=-1))
 
     def deviation(self, before: Array, after: Array) -> Array:
-        """Hausdorff distance from two arms sampled at (*batch, m, 3) [m], (*batch,); ∞ where ‖p'‖ is far from 1."""
+        """Return the Hausdorff distance from arms sampled at (*batch, m, 3) [m], (*batch,); ∞ if ‖p'‖ is far from 1."""
         there = np.minimum(_distance(self.points, before), _distance(self.points, after)).max(-1)
         back = np.maximum(_distance(before, self.points).max(-1), _distance(after, self.points).max(-1))
         even = (self.speed.min(-1) >= _SLOWEST) & (self.speed.max(-1) <= _FASTEST)
@@ -93,7 +93,7 @@ class Blends(NamedTuple):
 
 
 def _deviation(before: Arm, after: Arm, d: float) -> float:
-    """Deviation of the blend over d [m] on either side [m]."""
+    """Return the deviation of the blend over d [m] on either side [m]."""
     ways = np.linspace(0.0, d, _SAMPLES)
     a, b = before(ways), after(ways)
     start, end = CurvePoint(*(value[-1] for value in a)), CurvePoint(*(value[-1] for value in b))
@@ -105,7 +105,7 @@ def _deviation(before: Arm, after: Arm, d: float) -> float:
 
 
 def _distance(x: Array, curve: Array) -> Array:
-    """Distance from x (*batch, n, 3) to a curve sampled at (*batch, m, 3), (*batch, n).
+    """Return the distance from x (*batch, n, 3) to a curve sampled at (*batch, m, 3), (*batch, n).
 
     Through the squares of the distances from the nearest sample and its neighbours goes a parabola; it is exact for
     straight lines.
@@ -120,6 +120,6 @@ def _distance(x: Array, curve: Array) -> Array:
 
 @cache
 def _bernstein(degree: int, samples: int) -> Array:
-    """Bernstein polynomials of a degree at even parameters, (samples, degree + 1)."""
+    """Return the Bernstein polynomials of a degree at even parameters, (samples, degree + 1)."""
     u, k = np.linspace(0.0, 1.0, samples)[:, None], np.arange(degree + 1)
     return comb(degree, k) * u**k * (1 - u) ** (degree - k)

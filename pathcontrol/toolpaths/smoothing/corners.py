@@ -1,4 +1,4 @@
-"""Where a contour turns sharply, and its pieces between such corners."""
+"""The corners of a contour, and its pieces between them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Corner(NamedTuple):
 
 
 def corners(contour: Contour, angle: float = SHARP) -> list[Corner]:
-    """The corners that turn by more than ``angle`` [rad], in order; that of a closed contour's start comes last."""
+    """Return the corners that turn by more than ``angle`` [rad], in order, that of a closed contour's start last."""
     found, station = [], 0.0
     measure_lengths(contour.segments)
     starts, ends = end_tangents(contour.segments)
@@ -53,7 +53,7 @@ def corners(contour: Contour, angle: float = SHARP) -> list[Corner]:
 
 
 def split(contour: Contour, angle: float) -> list[Contour]:
-    """The contour cut at the corners that turn by more than ``angle`` [rad].
+    """Cut the contour at the corners that turn by more than ``angle`` [rad].
 
     A closed contour with such corners becomes open pieces from where it begins to where it ends.
     """
@@ -75,22 +75,22 @@ def split(contour: Contour, angle: float) -> list[Contour]:
 
 
 def start_tangent(segment: Segment) -> Array:
-    """Unit tangent at the start, (3,), also where the parameter stands still there."""
+    """Return the unit tangent at the start, (3,), also where the derivative vanishes there."""
     return _tangent(segment, np.array([0.0, 1e-6, 1e-4, 1e-2]))
 
 
 def end_tangent(segment: Segment) -> Array:
-    """Unit tangent at the end, (3,)."""
+    """Return the unit tangent at the end, (3,)."""
     return _tangent(segment, 1.0 - np.array([0.0, 1e-6, 1e-4, 1e-2]))
 
 
 def angles(a: Array, b: Array) -> Array:
-    """Angle between unit vectors (*batch, 3) [rad], (*batch,)."""
+    """Return the angle between unit vectors (*batch, 3) [rad], (*batch,)."""
     return 2 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
 
 
 class _Piece:
-    """A contour under way while another is split."""
+    """A piece of a contour under construction."""
 
     def __init__(self, whole: Contour) -> None:
         self._whole = whole
@@ -107,7 +107,7 @@ class _Piece:
 
 
 def _parts(segment: Segment, vertices: list[int]) -> list[tuple[Segment, int, int]]:
-    """A polyline cut at ``vertices``, with its first and last point; 0 for the last point of the whole."""
+    """Cut a polyline at ``vertices``; return the parts with their first and last index, 0 for the end of the whole."""
     if not vertices:
         return [(segment, 0, 0)]
     assert isinstance(segment, Polyline)

@@ -1,4 +1,4 @@
-"""Segments by arc length, and the Hermite data (p, p', p'') from which smooth curves are made."""
+"""Segments by arc length, and their Hermite data (p, p', p''), from which smooth curves are made."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Knots(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """What stands for a segment, or a part of it.
+    """The Hermite data of a segment, or of a part of it.
 
     Attributes:
         knots: Hermite data.
@@ -45,7 +45,7 @@ class Stretch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ByLength:
-    """A curved segment with its arc length [m] for parameter.
+    """A curved segment with its arc length [m] as parameter.
 
     Where its own parameter stands still, which it may at its ends, the curvature may have no bound; it is 0 here.
     """
@@ -53,7 +53,7 @@ class ByLength:
     segment: Segment
 
     def at(self, length: ArrayLike) -> CurvePoint:
-        """Position and derivatives with respect to arc length, at ``length`` (*batch,) from the start [m]."""
+        """Return position and derivatives by arc length, at ``length`` (*batch,) from the start [m]."""
         u = self.segment.arc_length.parameter(length)
         first, second = self.segment.derivative(u), self.segment.derivative(u, 2)
         speed = np.linalg.norm(first, axis=-1, keepdims=True)
@@ -68,7 +68,7 @@ class ByLength:
 
 
 def curved(segment: Segment, start: float, end: float) -> Stretch:
-    """Hermite data of a curved segment between the arc lengths ``start`` and ``end`` [m], accurate to 1 nm.
+    """Return Hermite data of a curved segment between arc lengths ``start`` and ``end`` [m], accurate to 1 nm.
 
     Raises:
         InputError: the segment is so far away, or bends so sharply, that 1 nm cannot be resolved.

@@ -1,4 +1,4 @@
-"""Hermite data of one smooth curve that stands for a contour: segments, and blends where they meet."""
+"""Hermite data of one smooth curve in place of a contour: segments, and blends where they meet."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pathcontrol.toolpaths.smoothing.polylines import rounded
 
 
 class SmoothKnots(NamedTuple):
-    """Knots of one smooth curve that stands for a contour.
+    """The knots of one smooth curve in place of a contour.
 
     Attributes:
         knots: Hermite data of the curve.
@@ -53,7 +53,7 @@ def smooth_knots(contour: Contour, tolerance: float) -> SmoothKnots:
 
 
 def _stretch(segment: Segment, before: float, after: float, tolerance: float) -> Stretch:
-    """What stands for a segment of which so much [m] is cut off at either end."""
+    """Return Hermite data of a segment trimmed by lengths [m] at either end."""
     if isinstance(segment, Polyline):
         return rounded(segment, before, after, tolerance)
     return curved(segment, before, segment.length - after)
@@ -65,12 +65,12 @@ def _junction(before: Segment, after: Segment, tolerance: float) -> Junction:
 
 
 def _room(segment: Segment, edge: int) -> float:
-    """The most that may be cut off at the start (0) or the end (-1) of a segment [m]."""
+    """Return the most that may be cut off at the start (0) or the end (-1) of a segment [m]."""
     return 0.5 * (float(segment.edges[edge]) if isinstance(segment, Polyline) else segment.length)
 
 
 def _arm(segment: Segment, sign: int) -> Arm:
-    """The segment seen from its start (1) or its end (-1), by the distance from there."""
+    """Return the segment seen from its start (1) or its end (-1), by the distance from there."""
     curve = _Straight(segment) if isinstance(segment, Polyline) else ByLength(segment)
     length = segment.length
     return curve.at if sign > 0 else lambda way: curve.at(length - np.asarray(way))
@@ -78,7 +78,7 @@ def _arm(segment: Segment, sign: int) -> Arm:
 
 @dataclass(frozen=True, eq=False)
 class _Straight:
-    """The first and last edge of a polyline by arc length."""
+    """The first or last edge of a polyline by arc length."""
 
     polyline: Polyline
 
@@ -90,7 +90,7 @@ class _Straight:
 
 
 def _gap(before: Knots, after: Knots, junction: Junction) -> float:
-    """Parameter length of the blend between two parts [m]; 0 where there is none."""
+    """Return the parameter length of the blend between two parts [m]; 0 where there is none."""
     if junction.trim == 0:
         return 0.0
     chord = np.asarray(np.linalg.norm(after.p[0] - before.p[-1]))
@@ -98,7 +98,7 @@ def _gap(before: Knots, after: Knots, junction: Junction) -> float:
 
 
 def _ring(parts: Sequence[Knots], gaps: Sequence[float]) -> Knots:
-    """The knots of a closed curve, from the middle of its last blend."""
+    """Return the knots of a closed curve, from the middle of its last blend."""
     first, last, gap = parts[0], parts[-1], gaps[-1]
     if gap == 0:
         return _chain([*parts, Knots(*(column[:1] for column in first))], gaps)
@@ -109,7 +109,7 @@ def _ring(parts: Sequence[Knots], gaps: Sequence[float]) -> Knots:
 
 
 def _chain(parts: Sequence[Knots], gaps: Sequence[float]) -> Knots:
-    """The knots of parts one after another; where there is no gap, the last of one is the first of the next."""
+    """Return the knots of parts in a row; without a gap, the last knot of one is the first of the next."""
     begin, shifted = 0.0, []
     for part, gap in zip(parts, [*gaps, np.inf], strict=True):
         upto = len(part.s) if gap > 0 else -1

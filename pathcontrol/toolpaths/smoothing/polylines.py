@@ -1,4 +1,4 @@
-"""Polylines with their corners blended, or rounded to the smooth curve that their points are samples of."""
+"""Polylines with blended corners, or rounded to the smooth curve that their points are samples of."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _BLOCK = 1 << 13  # blends looked at at once
 
 
 def rounded(polyline: Polyline, before: float, after: float, tolerance: float) -> Stretch:
-    """Hermite data of a polyline of which so much [m] is cut off at either end."""
+    """Return Hermite data of a polyline trimmed by lengths [m] at either end."""
     edges = _Edges.of(polyline, before, after, tolerance)
     bend, deviation = _bends(polyline, edges, tolerance)
     steps = np.stack([np.append(0.0, edges.gaps), edges.left], axis=1).reshape(-1)
@@ -34,7 +34,7 @@ def rounded(polyline: Polyline, before: float, after: float, tolerance: float) -
 
 
 class _Edges(NamedTuple):
-    """What the blends leave of each edge: begin and end (k, 3), the length (k,), and those of the blends (k − 1,)."""
+    """The edges that the blends leave: begin and end (k, 3), length (k,), and lengths of the blends (k − 1,)."""
 
     begin: Array
     end: Array
@@ -55,7 +55,7 @@ class _Edges(NamedTuple):
 
 
 def _bends(polyline: Polyline, edges: _Edges, tolerance: float) -> tuple[Array, float]:
-    """Curvature vector [1/m] in the middle of edges, (k, 3), and the deviation that the blends come to [m].
+    """Return the curvature vector [1/m] in the middle of edges, (k, 3), and the deviation of the blends [m].
 
     Where an edge is blended from end to end and turns on the same way at both ends, its points sample a smooth curve,
     whose curvature it takes unless the blends beside it would leave the tolerance.
@@ -76,7 +76,7 @@ def _bends(polyline: Polyline, edges: _Edges, tolerance: float) -> tuple[Array, 
 
 
 def _deviations(polyline: Polyline, edges: _Edges, bend: Array, i: Array) -> Array:
-    """Deviation of the blends at the inner points i + 1 [m], (N,)."""
+    """Return the deviation of the blends at the inner points i + 1 [m], (N,)."""
     start = CurvePoint(edges.end[i], polyline.directions[i], bend[i])
     end = CurvePoint(edges.begin[i + 1], polyline.directions[i + 1], bend[i + 1])
     corner = polyline.points[i + 1]
@@ -85,7 +85,7 @@ def _deviations(polyline: Polyline, edges: _Edges, bend: Array, i: Array) -> Arr
 
 
 def _sampled_curvature(polyline: Polyline, edges: _Edges) -> Array:
-    """Curvature vector [1/m] that the turns at both ends of an edge give for it, (k, 3); 0 where they do not."""
+    """Return the curvature vector [1/m] of edges from the turns at both ends, (k, 3); 0 where they disagree."""
     t = polyline.directions
     turn, bend = np.diff(t, axis=0), np.zeros_like(t)
     mean = turn / np.maximum(edges.gaps, _TINY)[:, None]

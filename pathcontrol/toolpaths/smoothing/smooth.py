@@ -1,4 +1,4 @@
-"""From a contour with corners to curves that a tool can follow without stopping in between."""
+"""Smoothing of a contour with corners to curves that a tool can follow without stopping in between."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SHARE = 0.1  # of the tolerance, for polylines that stand for segments with sha
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """Smooth curves that stand for a contour.
+    """The smooth curves in place of a contour.
 
     Attributes:
         curves: one after another; more than one where the tool stops at corners.
@@ -40,7 +40,7 @@ class Smoothed:
 
 
 def smooth(contour: Contour, tolerance: float = 1e-4, corner: Corners = "blend") -> Smoothed:
-    """Curves with continuous tangent and curvature within ``tolerance`` of a contour.
+    """Return curves with continuous tangent and curvature within ``tolerance`` of a contour.
 
     Junctions where the tangent or the curvature jumps are replaced by quintic blends. Corners that turn by more than
     5° are blended as well, or else end one curve and begin the next; those that turn by more than 150° always do.
@@ -76,7 +76,7 @@ _Piece = tuple[ToolCurve, float, tuple[Array, Array] | None]
 
 
 def _pieces(contour: Contour, tolerance: float) -> Iterator[_Piece]:
-    """Smooth curves for a contour that may still turn back inside its segments."""
+    """Yield smooth curves for a contour that may still turn back inside its segments."""
     segments, apart = zip(*(regular(segment, _SHARE * tolerance) for segment in contour.segments), strict=True)
     used = max(apart)
     for piece in split(replace(contour, segments=segments), TURN_BACK):

@@ -1,3 +1,3 @@
-"""SVG drawings."""
+"""Reading of SVG drawings."""
 
 from pathcontrol.toolpaths.svg.reader import read_svg as read_svg

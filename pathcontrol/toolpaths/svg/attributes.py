@@ -1,4 +1,4 @@
-"""Numbers, lengths and transforms as attributes of SVG write them."""
+"""Parsers of numbers, lengths and transforms in SVG attributes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _TAKES = {"matrix": (6,), "translate": (1, 2), "scale": (1, 2), "rotate": (1, 3)
 
 
 def number(text: str) -> float:
-    """A number of a size with which one can calculate."""
+    """Parse a number, whose size must allow calculation."""
     value = float(text)
     if not abs(value) <= _LARGEST:
         raise ToolpathError(f"the number {text} is too large, expected at most {_LARGEST:g}")
@@ -35,7 +35,7 @@ def number(text: str) -> float:
 
 
 def numbers(text: str, what: str) -> list[float]:
-    """Numbers separated by blanks or commas."""
+    """Parse numbers separated by blanks or commas."""
     if not (_STRANGE.search(text) or _BARE_COMMA.search(text)):
         with suppress(ValueError):  # two of them without a separator, as in 1-2, or none
             found = [float(figure) for figure in text.replace(",", " ").split()]
@@ -45,7 +45,7 @@ def numbers(text: str, what: str) -> list[float]:
 
 
 def _scanned(text: str, what: str) -> list[float]:
-    """Numbers of any form, one after another."""
+    """Parse numbers of any form, one after another."""
     start = _START.match(text)
     assert start is not None
     found, at, comma = [], start.end(), ""
@@ -61,7 +61,7 @@ def _scanned(text: str, what: str) -> list[float]:
 
 
 def arcs(text: str, what: str) -> list[float]:
-    """The seven numbers of each arc in path data; its flags need nothing between them: ``1 1 0 0110 10``."""
+    """Parse the seven numbers of each arc in path data, whose flags need no separators: ``1 1 0 0110 10``."""
     start = _START.match(text)
     assert start is not None
     found, at, comma = [], start.end(), ""
@@ -78,14 +78,14 @@ def arcs(text: str, what: str) -> list[float]:
 
 
 def _excerpt(text: str, at: int) -> str:
-    """What comes from a place on, shortened; the end of the text where that is nothing."""
+    """Return the text from a position on, shortened; the end of the text if nothing follows."""
     rest = text[at : at + 21]
     return repr(rest[:20] or text[-20:]) + ("…" if len(rest) > 20 else "")
 
 
 @dataclass(frozen=True)
 class Viewport:
-    """What lengths refer to.
+    """The reference of lengths: the size of the viewport.
 
     Attributes:
         width: of the viewport in user units, 100 % of horizontal lengths.
@@ -98,7 +98,7 @@ class Viewport:
     ppi: float
 
     def length(self, text: str, what: str) -> float:
-        """A length in user units.
+        """Return a length in user units.
 
         Args:
             text: a number with a unit.
@@ -122,7 +122,7 @@ class Viewport:
 
 
 def transform(text: str) -> Array:
-    """The affine map of a transform attribute, (4, 4); of several, the last is applied first."""
+    """Parse a transform attribute to its affine map, (4, 4); of several, the last is applied first."""
     total, end = np.eye(4), 0
     if text.strip() in ("", "none"):
         return total
@@ -140,7 +140,7 @@ def transform(text: str) -> Array:
 
 
 def _matrix(name: str, v: list[float]) -> tuple[float, ...]:
-    """(a, b, c, d, e, f) as in matrix(…)."""
+    """Return (a, b, c, d, e, f) as in matrix(…)."""
     if name == "matrix":
         return tuple(v)
     if name == "translate":
@@ -156,7 +156,7 @@ def _matrix(name: str, v: list[float]) -> tuple[float, ...]:
 
 
 def _cos_sin(degrees: float) -> tuple[float, float]:
-    """Exact at right angles, which drawings are full of."""
+    """Return cosine and sine, exact at right angles, which are frequent in drawings."""
     quarter, rest = divmod(degrees, 90.0)
     cos, sin = (float(f(np.radians(rest))) for f in (np.cos, np.sin))
     return [(cos, sin), (-sin, cos), (-cos, -sin), (sin, -cos)][int(quarter) % 4]

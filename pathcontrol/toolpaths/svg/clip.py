@@ -1,4 +1,4 @@
-"""Clip paths and masks of SVG that cut nothing off, such as those that are the page."""
+"""Clip paths and masks of SVG that clip nothing, such as those of the page."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _CLIPS = frozenset({"clip-path", "mask"})
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Convex polygons that a clip path lets things be seen through.
+    """Convex polygons through which a clip path shows its elements.
 
     Attributes:
         polygons: corners of each [m], (k, 2), counterclockwise.
@@ -37,12 +37,12 @@ class Region:
     polygons: tuple[Array, ...]
 
     def holds(self, segments: Sequence[Segment]) -> bool:
-        """Whether all of the segments lie in one of the polygons."""
+        """Return whether all of the segments lie in one of the polygons."""
         return any(_contains(polygon, segments) for polygon in self.polygons)
 
 
 class Clips:
-    """Looks up what clips elements.
+    """A look-up of the clip paths and masks of elements.
 
     Args:
         document: the drawing.
@@ -52,7 +52,7 @@ class Clips:
         self._document = document
 
     def of(self, element: Any, matrix: Array, viewport: Viewport) -> tuple[Region, ...]:
-        """The regions outside of which nothing of an element is seen; none where nothing is cut off for sure.
+        """Return the regions outside of which an element is invisible; none if nothing is clipped for sure.
 
         Args:
             element: with the properties ``clip-path`` or ``mask``.
@@ -82,7 +82,7 @@ class Clips:
                 ) from error
 
     def _linked(self, name: str, clip: Any, matrix: Array, viewport: Viewport, depth: int) -> Iterator[Region]:
-        """The regions of one clipPath or mask element."""
+        """Yield the regions of one clipPath or mask element."""
         expected = "clipPath" if name == "clip-path" else "mask"
         if tag_of(clip) != expected:
             raise ToolpathError(f"it refers to {tag_of(clip)}, expected {expected}")
@@ -121,14 +121,14 @@ class Clips:
                 yield from _convex(drawn[0].pieces, place)
 
     def _lets_through(self, mask: Any, child: Any) -> bool:
-        """Whether what lies behind a shape of a mask is seen at all."""
+        """Return whether a shape of a mask shows what lies behind it at all."""
         paint = Paint().inside(self._document.style(mask)).inside(self._document.style(child))
         alpha = "alpha" in (mask.get("mask-type") or "") or re.search(r"mask-type\s*:\s*alpha", mask.get("style") or "")
         return paint.fills and bool(alpha or not is_black(paint.fill))
 
 
 def _mask_region(get: Any, matrix: Array, viewport: Viewport) -> Iterator[Region]:
-    """The box of a mask; by default it is larger than what is masked."""
+    """Yield the box of a mask; by default it is larger than what is masked."""
     names, defaults = ("x", "y", "width", "height"), ("-10%", "-10%", "120%", "120%")
     texts = [get(name) or default for name, default in zip(names, defaults, strict=True)]
     if get("maskUnits") == "userSpaceOnUse":
@@ -142,7 +142,7 @@ def _mask_region(get: Any, matrix: Array, viewport: Viewport) -> Iterator[Region
 
 
 def _convex(pieces: Sequence[Piece], matrix: Array) -> Iterator[Array]:
-    """The polygon (k, 2), counterclockwise, inside an outline of pieces, if it is convex."""
+    """Yield the polygon (k, 2), counterclockwise, inside an outline of pieces, if it is convex."""
     points = np.concatenate([_outline(piece) for piece in pieces])
     plane = (points @ matrix[:3, :3].T + matrix[:3, 3])[:, :2]
     if not np.isfinite(plane).all():
@@ -170,7 +170,7 @@ def _outline(piece: Piece) -> Array:
 
 
 def _contains(polygon: Array, segments: Sequence[Segment]) -> bool:
-    """Whether segments lie in a convex polygon (k, 2), up to a millionth of its size."""
+    """Return whether segments lie in a convex polygon (k, 2), up to a millionth of its size."""
     edges = np.roll(polygon, -1, axis=0) - polygon
     outward = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
     most = (outward * polygon).sum(1) + _NEAR * float(np.ptp(polygon, axis=0).max())
@@ -178,7 +178,7 @@ def _contains(polygon: Array, segments: Sequence[Segment]) -> bool:
 
 
 def _reach(segment: Segment, outward: Array, most: Array) -> Array:
-    """How far a segment reaches in each direction (k, 2), or a bound that is within ``most`` (k,) [m], (k,)."""
+    """Return the extent of a segment in each direction (k, 2) [m], (k,), or a bound that is within ``most`` (k,)."""
     if isinstance(segment, Polyline | Bezier):
         hull = (outward @ segment.points[:, :2].T).max(1)
         if isinstance(segment, Polyline) or (hull <= most).all():

@@ -1,4 +1,4 @@
-"""SVG documents: parsed without reading anything but the file, and looked things up in."""
+"""SVG documents, parsed without reading any other file, with look-up of elements and styles."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _HREF = ("href", "{http://www.w3.org/1999/xlink}href")
 
 
 class Document:
-    """An SVG file.
+    """A parsed SVG file.
 
     Attributes:
         path: its name, for errors.
@@ -52,7 +52,7 @@ class Document:
 
     @contextmanager
     def at(self, element: Any) -> Iterator[None]:
-        """Errors inside say at which element they arose."""
+        """Name the element in errors that arise inside the block."""
         try:
             yield
         except (InputError, ToolpathError) as error:
@@ -62,7 +62,7 @@ class Document:
             ) from error
 
     def style(self, element: Any) -> dict[str, str]:
-        """The properties of an element that have a say in the geometry."""
+        """Return the properties of an element that affect the geometry."""
         if element not in self._styles:
             style = self._sheet.of(element)
             painted = {name: self._paint(style[name]) for name in ("fill", "stroke") if name in style}
@@ -70,22 +70,22 @@ class Document:
         return self._styles[element]
 
     def attributes(self, element: Any) -> Attributes:
-        """Its attributes, or what its style gives instead."""
+        """Return the attributes of an element, or the values of its style in their place."""
         style = self.style(element)
         return lambda name: style.get(name, element.get(name))
 
     def target(self, element: Any) -> Any:
-        """The element that a use element refers to."""
+        """Return the element that a use element refers to."""
         return self.linked(next((element.get(name) for name in _HREF if element.get(name) is not None), ""))
 
     def linked(self, link: str) -> Any:
-        """The element of this file that ``#id`` stands for."""
+        """Return the element of this file that ``#id`` stands for."""
         if link.startswith("#") and link[1:] in self._targets:
             return self._targets[link[1:]]
         raise ToolpathError(f"it refers to {link[:60]!r}, expected # and the id of an element in this file")
 
     def _paint(self, value: str) -> str:
-        """A paint; of one that refers to nothing in this file what is written behind it, or none."""
+        """Return a paint; a reference to nothing in this file is replaced by its fallback, or none."""
         found = _SERVER.fullmatch(value.strip())
         if found is None or not found["link"].startswith("#") or found["link"][1:] in self._targets:
             return value
@@ -113,7 +113,7 @@ class Document:
 
 
 def _refusal(message: str) -> str:
-    """What the parser of XML says, in terms of what can be changed in a drawing."""
+    """Rephrase an error of the XML parser in terms of the drawing."""
     if "depth" in message:
         return "has elements nested more than 256 deep; ungroup them"
     if "XML_PARSE_HUGE" in message:
@@ -124,7 +124,7 @@ def _refusal(message: str) -> str:
 
 
 def tag_of(element: Any) -> str | None:
-    """The name of an SVG element; None for comments and for what other programs keep in the file."""
+    """Return the name of an SVG element; None for comments and for data of other programs."""
     if not isinstance(element.tag, str):
         return None
     namespace, _, name = element.tag.removeprefix("{").rpartition("}")
@@ -132,6 +132,6 @@ def tag_of(element: Any) -> str | None:
 
 
 def label_of(element: Any) -> str:
-    """An element's tag and its id, if it has one, for messages."""
+    """Return an element's tag and its id, if it has one, for messages."""
     identity = element.get("id")
     return f"{tag_of(element)}" if identity is None else f"{tag_of(element)} {identity[:60]!r}"

@@ -1,4 +1,4 @@
-"""Choice of layers and groups of an SVG drawing."""
+"""The choice of layers and groups of an SVG drawing."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _SHOWN = 20
 
 
 class Chosen:
-    """Which elements of a drawing are read: all, or those with some names and what is inside them.
+    """The elements of a drawing that are read: all, or those with given names and their content.
 
     A name is the label of a layer, as Inkscape and Illustrator write it, or the id of any element.
 
@@ -37,12 +37,12 @@ class Chosen:
             self._elements.update(found)
 
     def named(self, element: Any) -> bool:
-        """Whether an element itself was asked for."""
+        """Return whether an element itself was asked for."""
         return element in self._elements
 
 
 def layer_name(element: Any) -> str:
-    """Return the name of a layer of Inkscape, empty where the element is none."""
+    """Return the name of a layer of Inkscape, empty if the element is none."""
     if element.get(f"{_INKSCAPE}groupmode") != "layer":
         return ""
     return element.get(f"{_INKSCAPE}label") or element.get("id") or ""
@@ -56,7 +56,7 @@ def _names(element: Any) -> list[str | None]:
 
 
 def _known(document: Document) -> str:
-    """Names of the layers and groups, for errors; of all elements where there are none."""
+    """Return the names of the layers and groups, for errors; of all elements where there are none."""
     elements = [element for element in document.root.iter("*") if tag_of(element) is not None]
     groups = [element for element in elements if tag_of(element) == "g"] or elements
     names = {element: [name for name in _names(element)[::-1] if name] for element in groups}

@@ -1,4 +1,4 @@
-"""Whether anything is seen of an SVG shape: its fill, its stroke and their opacities, inherited as CSS says."""
+"""The visibility of an SVG shape: its fill, its stroke and their opacities, inherited as CSS says."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _AMOUNT = re.compile(r"([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)
 
 @dataclass(frozen=True)
 class Paint:
-    """What an element hands down to those inside it.
+    """The painting properties that an element hands down to those inside it.
 
     Attributes:
         fill: its paint.
@@ -43,7 +43,7 @@ class Paint:
     opacity: float = 1.0
 
     def inside(self, style: dict[str, str]) -> Paint:
-        """Return the paint of an element inside, with these properties of its own."""
+        """Return the paint of an element inside, given its own properties."""
         given = {name: style[name].strip() for name in PAINT.intersection(style)}
         if not given:
             return self
@@ -54,23 +54,23 @@ class Paint:
 
     @property
     def fills(self) -> bool:
-        """Whether the fill is seen."""
+        """Whether the fill is visible."""
         return self.opacity > 0 and self.fill_opacity > 0 and self._is_seen(self.fill)
 
     @property
     def strokes(self) -> bool:
-        """Whether the stroke is seen."""
+        """Whether the stroke is visible."""
         seen = self.stroke_opacity > 0 and self.stroke_width > 0 and self._is_seen(self.stroke)
         return self.opacity > 0 and seen
 
     @property
     def seen(self) -> bool:
-        """Whether the fill or the stroke is seen."""
+        """Whether the fill or the stroke is visible."""
         return self.fills or self.strokes
 
     @property
     def dashed(self) -> bool:
-        """Whether the stroke is seen and dashed."""
+        """Whether the stroke is visible and dashed."""
         lengths = [float(match[1]) for match in _AMOUNT.finditer(self.stroke_dasharray)]
         return self.strokes and any(lengths)
 
@@ -89,7 +89,7 @@ class Paint:
 
 
 def is_valid(name: str, value: str) -> bool:
-    """Whether a declaration is valid; one that is not counts as if it were not there."""
+    """Return whether a declaration is valid; an invalid one is ignored."""
     if name not in PAINT or value.strip().lower() in _KEYWORDS or "(" in value:
         return True
     if name in _PAINTS:
@@ -101,14 +101,14 @@ def is_valid(name: str, value: str) -> bool:
 
 
 def is_black(paint: str) -> bool:
-    """Whether a paint is plain black, which in a mask lets nothing through."""
+    """Return whether a paint is plain black, which hides everything in a mask."""
     color = parse_color(paint) if "(" not in paint else None
     return color is not None and color != "currentcolor" and not any(color[:3])
 
 
 @lru_cache(maxsize=4096)
 def opacity_of(paint: str) -> float | None:
-    """Return how opaque a paint is, 0 to 1; None for the current colour, −1 where it is no paint.
+    """Return the opacity of a paint, 0 to 1; None for the current colour, −1 where it is no paint.
 
     Gradients, patterns and what is computed in ways that are not known here count as opaque.
     """

@@ -1,4 +1,4 @@
-"""Path data of SVG: all commands, by the grammar of https://www.w3.org/TR/SVG2/paths.html."""
+"""A parser of path data of SVG: all commands, by the grammar of https://www.w3.org/TR/SVG2/paths.html."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7
 
 
 def parse_path(data: str) -> list[Subpath]:
-    """The subpaths of the d attribute of a path.
+    """Return the subpaths of the d attribute of a path.
 
     Raises:
         ToolpathError: it does not follow the grammar; nothing is drawn up to the mistake.
@@ -31,7 +31,7 @@ def parse_path(data: str) -> list[Subpath]:
 
 
 def _draw(pen: Pen, letter: str, arguments: str) -> None:
-    """One command with all its arguments."""
+    """Draw one command with all its arguments."""
     name, relative = letter.upper(), letter.islower()
     if name == "Z":
         if arguments.strip():

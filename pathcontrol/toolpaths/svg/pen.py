@@ -1,4 +1,4 @@
-"""Subpaths of SVG, drawn stroke by stroke in user units."""
+"""A pen that draws subpaths of SVG, stroke by stroke in user units."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _SHALLOW = 1e-3  # half chord over radius, below which the centre of an arc is t
 
 
 class Subpath(NamedTuple):
-    """What is drawn without lifting the pen, in user units."""
+    """A line drawn without lifting the pen, in user units."""
 
     pieces: list[Piece]
     closed: bool
 
 
 class Pen:
-    """Draws subpaths; points are complex numbers x + iy in user units."""
+    """A pen that draws subpaths; points are complex numbers x + iy in user units."""
 
     def __init__(self) -> None:
         self.at = self._start = 0j
@@ -43,16 +43,16 @@ class Pen:
         self._line = [point]
 
     def line(self, point: complex) -> None:
-        """A straight line."""
+        """Draw a straight line."""
         self._go(point)
         self._line.append(point)
 
     def curve(self, *points: complex) -> None:
-        """A quadratic or cubic Bézier curve."""
+        """Draw a quadratic or cubic Bézier curve."""
         self.curves(np.array([points]))
 
     def curves(self, points: Array, relative: bool = False) -> None:
-        """Bézier curves one after another by their points but the first, (k, 2 or 3), from their starts if relative."""
+        """Draw Bézier curves in a row by their points but the first, (k, 2 or 3), from their starts if relative."""
         starts = np.concatenate([[self.at], points[:-1, -1]])
         if relative:
             starts = np.cumsum(starts)
@@ -66,7 +66,7 @@ class Pen:
         self._handle = ("Q" if points.shape[1] == 2 else "C", complex(points[-1, -2]))
 
     def lines(self, points: Array, relative: bool = False) -> None:
-        """Straight lines one after another to points (k, 1), from each one's start if relative."""
+        """Draw straight lines in a row to points (k, 1), from each one's start if relative."""
         ends = points[:, 0]
         if relative:
             ends = np.cumsum(np.concatenate([[self.at], ends]))[1:]
@@ -74,7 +74,7 @@ class Pen:
         self._line += ends.tolist()
 
     def arc(self, rx: float, ry: float, rotation: float, large: float, sweep: float, point: complex) -> None:
-        """An arc of an ellipse; ``rotation`` is in degrees, ``large`` and ``sweep`` are 0 or 1."""
+        """Draw an arc of an ellipse; ``rotation`` is in degrees, ``large`` and ``sweep`` are 0 or 1."""
         if point == self.at:
             self._handle = ("", 0j)
         elif min(abs(rx), abs(ry)) <= _NO_RADIUS:
@@ -83,22 +83,22 @@ class Pen:
             self._add(_arc(self.at, abs(rx), abs(ry), rotation, large > 0, sweep > 0, point), point)
 
     def close(self) -> None:
-        """A straight line to where the subpath began."""
+        """Draw a straight line to the start of the subpath."""
         if self.at != self._start:
             self.line(self._start)
         self._finish(closed=True)
 
     def reflection(self, kind: str) -> complex:
-        """The last control point mirrored at the end of its curve, if that was of this kind."""
+        """Return the last control point mirrored at the end of its curve, if that was of this kind."""
         return 2 * self.at - self._handle[1] if self._handle[0] == kind else self.at
 
     def subpaths(self) -> list[Subpath]:
-        """All that was drawn."""
+        """Return all that was drawn."""
         self._finish(closed=False)
         return self._subpaths
 
     def _go(self, point: complex, strokes: int = 1) -> None:
-        """The end of a line or a curve, or of several."""
+        """Move the pen to the end of strokes."""
         self.at, self._handle = point, ("", 0j)
         self._strokes += strokes
         if self._strokes > MAX_SEGMENTS:
@@ -134,7 +134,7 @@ class Pen:
 
 
 def _arc(start: complex, rx: float, ry: float, rotation: float, large: bool, sweep: bool, end: complex) -> Piece:
-    """From end points to a centre, https://www.w3.org/TR/SVG2/implnote.html#ArcConversionEndpointToCenter.
+    """Return the arc with these ends, https://www.w3.org/TR/SVG2/implnote.html#ArcConversionEndpointToCenter.
 
     On the unit circle that the ellipse is the image of: the chord runs from u to −u about its middle, and the centre
     lies at ±iu √(1/|u|² − 1) from there. Radii that are too small are enlarged to |u| = 1.
@@ -162,6 +162,6 @@ def _arc(start: complex, rx: float, ry: float, rotation: float, large: bool, swe
 
 
 def _space(points: list[complex]) -> Array:
-    """Complex numbers as points (k, 3) with z = 0."""
+    """Return complex numbers as points (k, 3) with z = 0."""
     plane = np.array(points)
     return np.column_stack([plane.real, plane.imag, np.zeros(len(plane))])

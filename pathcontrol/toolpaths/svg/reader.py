@@ -35,7 +35,7 @@ def read_svg(
     skip: str | Sequence[str] = (),
     gap: float | None = None,
 ) -> Toolpath:
-    """The outlines that an SVG file draws, in its order: a contour for each subpath, named after the element's id.
+    """Read the outlines that an SVG file draws, in its order: a contour for each subpath, named after the id.
 
     Lengths are those on the page, by its width and height (mm, cm, in, pt, pc, Q, px) and its viewBox. The drawing
     stands upright, x to the right and y up from the page's lower left corner, z = 0. Everything that is seen is cut,

@@ -1,4 +1,4 @@
-"""Basic shapes of SVG as subpaths, begun and drawn as https://www.w3.org/TR/SVG2/shapes.html says."""
+"""Basic shapes of SVG as subpaths, as defined in https://www.w3.org/TR/SVG2/shapes.html."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Attributes = Callable[[str], str | None]
 
 
 def subpaths(tag: str, get: Attributes, viewport: Viewport) -> list[Subpath]:
-    """What a shape element draws, in user units; nothing where its size is 0.
+    """Return the subpaths of a shape element, in user units; none if its size is 0.
 
     Args:
         tag: ``"path"``, ``"rect"``, ``"circle"``, ``"ellipse"``, ``"line"``, ``"polyline"`` or ``"polygon"``.
@@ -40,7 +40,7 @@ SHAPES = frozenset({"path", "rect", "circle", "ellipse", "line", "polyline", "po
 
 
 class _Lengths:
-    """Lengths among the attributes of an element."""
+    """The lengths among the attributes of an element."""
 
     def __init__(self, get: Attributes, viewport: Viewport) -> None:
         self._get, self._viewport = get, viewport
@@ -50,7 +50,7 @@ class _Lengths:
         return 0.0 if text is None else self._viewport.length(text, name)
 
     def size(self, name: str) -> float | None:
-        """A length that must not be negative; None where it is ``auto`` or missing."""
+        """Return a length that must not be negative; None where it is ``auto`` or missing."""
         text = self._get(name)
         if text is None or text.strip() == "auto":
             return None

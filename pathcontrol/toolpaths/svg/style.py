@@ -1,4 +1,4 @@
-"""Style of SVG as far as it decides what is drawn and where: attributes, style attributes and style sheets.
+"""The style of SVG, as far as it affects geometry: attributes, style attributes and style sheets.
 
 tinycss2 parses the sheets and cssselect2 matches their selectors. Both are bounded here, for a hostile sheet of a few
 kilobytes could keep them busy for hours.
@@ -43,7 +43,7 @@ _ATTRIBUTE, _INLINE = (-1,), (9,)  # below and above the specificity of all sele
 
 
 class StyleSheet:
-    """The rules of all style elements as far as they decide what is drawn.
+    """The rules of all style elements that affect the geometry.
 
     Raises:
         ToolpathError: a rule cannot be told to apply or not, or stands in a sheet to be fetched; there is too much.
@@ -78,7 +78,7 @@ class StyleSheet:
                 _overlay(found, {name: ((rank[0], specificity, order), v) for name, (rank, v) in payload.items()})
 
     def of(self, element: Any) -> dict[str, str]:
-        """The properties that matter of an element, as attributes, sheets and its own style give them."""
+        """Return the relevant properties of an element, from attributes, sheets and its own style."""
         given = element.attrib
         names = [name for name in given if name in _ATTRIBUTES and is_valid(name, given[name])]
         found: Declarations = {name: ((False, _ATTRIBUTE, 0), given[name]) for name in names}
@@ -129,7 +129,7 @@ class StyleSheet:
 
 
 class _Matcher(Matcher):
-    """A matcher that stops when it has tried too many selectors."""
+    """A matcher of selectors that stops when it has tried too many."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -180,7 +180,7 @@ def _refuse_if_deciding(text: str, head: str) -> None:
 
 
 def _text(nodes: Any) -> str:
-    """Write parsed CSS out again."""
+    """Write parsed CSS as text."""
     try:
         return tinycss2.serialize([node for node in nodes if node.type != "error"])
     except RecursionError as error:
@@ -209,7 +209,7 @@ def _declarations(text: str) -> Declarations:
 
 
 def _parsed(content: Any) -> Declarations:
-    """The declarations that matter of the content of a rule."""
+    """Return the relevant declarations in the content of a rule."""
     found: Declarations = {}
     for node in tinycss2.parse_blocks_contents(content, skip_comments=True, skip_whitespace=True):
         if node.type == "declaration" and all(token.type != "error" for token in node.value):

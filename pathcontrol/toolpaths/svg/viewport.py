@@ -1,4 +1,4 @@
-"""Where the drawing of an SVG element with a viewport lies: width, height, viewBox and preserveAspectRatio."""
+"""The viewport of an SVG element: width, height, viewBox and preserveAspectRatio."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _INCH = 0.0254  # m
 
 
 class View(NamedTuple):
-    """A viewport and the map from what is drawn in it to what it stands in, (4, 4)."""
+    """A viewport and the map from its content to the surrounding coordinates, (4, 4)."""
 
     viewport: Viewport
     matrix: Array
 
 
 def page(get: Attributes, ppi: float) -> View:
-    """The outermost element: its map leads to metres, y up, from the lower left corner of the page."""
+    """Return the view of the outermost element, in metres, y up, from the lower left corner of the page."""
     box = _view_box(get)
     width, height = _page_size(get, box, ppi)
     inner = _fitted(box, Viewport(width, height, ppi), get)
@@ -35,7 +35,7 @@ def page(get: Attributes, ppi: float) -> View:
 
 
 def nested(get: Attributes, outer: Viewport, size: Attributes) -> View:
-    """An svg or symbol element inside another; ``size`` says its width and height, 100 % where it does not."""
+    """Return the view of an inner svg or symbol element; ``size`` gives width and height, by default 100 %."""
     place = np.eye(4)
     place[:2, 3] = [outer.length(get(name) or "0", name) for name in ("x", "y")]
     width, height = (outer.length(_sized(size, name) or "100%", name) for name in ("width", "height"))
@@ -46,7 +46,7 @@ def nested(get: Attributes, outer: Viewport, size: Attributes) -> View:
 
 
 def page_unit(get: Attributes) -> str:
-    """The unit that the size of the page is given in."""
+    """Return the unit that the size of the page is given in."""
     for name in ("width", "height"):
         unit = (_sized(get, name) or "").strip().lstrip("+-.0123456789eE").strip()
         if unit and unit != "%":
@@ -55,7 +55,7 @@ def page_unit(get: Attributes) -> str:
 
 
 def _page_size(get: Attributes, box: list[float] | None, ppi: float) -> tuple[float, float]:
-    """Width and height in px; what is missing follows from the viewBox, as browsers do it."""
+    """Return width and height in px; missing ones follow from the viewBox, as in browsers."""
     sizes = [_sized(get, name) for name in ("width", "height")]
     sizes = [None if size is None or size.strip().endswith("%") else size for size in sizes]
     unknown = Viewport(0.0, 0.0, ppi)
@@ -96,7 +96,7 @@ def _view_box(get: Attributes) -> list[float] | None:
 
 
 def _fitted(box: list[float] | None, viewport: Viewport, get: Attributes) -> View:
-    """The viewBox fitted into a viewport, https://www.w3.org/TR/SVG2/coords.html#ComputingAViewportsTransform."""
+    """Fit the viewBox into a viewport, https://www.w3.org/TR/SVG2/coords.html#ComputingAViewportsTransform."""
     matrix = np.eye(4)
     if box is None:
         return View(viewport, matrix)

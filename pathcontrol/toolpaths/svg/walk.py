@@ -1,4 +1,4 @@
-"""The way through an SVG document, shape by shape."""
+"""Traversal of an SVG document, shape by shape."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _MOST_ELEMENTS = 200_000
 
 
 class _Place(NamedTuple):
-    """Where and how an element is drawn.
+    """The place of an element: the map, the viewport and the style that it inherits.
 
     Attributes:
         matrix: map from its user space to the workpiece [m], (4, 4).
@@ -56,7 +56,7 @@ class _Place(NamedTuple):
 
 
 class Walk:
-    """The way through a document, depth first, entering what use elements refer to as if it stood there.
+    """A traversal of a document, depth first, which enters referenced elements at the place of their use.
 
     Args:
         document: the drawing.
@@ -72,7 +72,7 @@ class Walk:
         self._shapes, self._count, self._budget = 0, 0, Budget()
 
     def strands(self, ppi: float) -> Iterator[Strand]:
-        """Go through all that is drawn; there is a strand for each subpath that has a length."""
+        """Traverse all that is drawn; return a strand for each subpath that has a length."""
         root = self._document.root
         with self._document.at(root):
             if "transform" in self._document.style(root):
@@ -91,7 +91,7 @@ class Walk:
         )
 
     def _visit(self, element: Any, place: _Place, sized: Attributes | None = None) -> list[Strand]:
-        """Return the strands of a shape; what is inside a group goes on the stack.
+        """Return the strands of a shape; the content of a group is put on the stack.
 
         A use element enters the symbol or svg element that it refers to with its own ``sized``, width and height.
         """
@@ -114,7 +114,7 @@ class Walk:
         return self._entered(element, style, place, sized)
 
     def _seen(self, element: Any, style: dict[str, str], place: _Place) -> _Place:
-        """Return the place with what decides whether an element is seen."""
+        """Return the place with the properties that decide whether an element is visible."""
         visible = {"visible": True, "hidden": False, "collapse": False}.get(style.get("visibility", ""), place.visible)
         named = self._chosen.named(element)
         return place._replace(
@@ -125,7 +125,7 @@ class Walk:
         )
 
     def _entered(self, element: Any, style: dict[str, str], place: _Place, sized: Attributes | None) -> list[Strand]:
-        """Return the strands of a shape in its own user space, or go on with what is inside a group."""
+        """Return the strands of a shape in its own user space, or go on with the content of a group."""
         _refuse(style, element)
         if "transform" in style:
             place = place._replace(matrix=place.matrix @ transform(style["transform"]))
@@ -144,7 +144,7 @@ class Walk:
         return []
 
     def _is_painted(self, element: Any, place: _Place) -> bool:
-        """Whether anything is seen of a shape; what is not, and what is dashed, is noted."""
+        """Return whether a shape is visible; one that is not, or is dashed, is noted."""
         if not place.visible:
             self._passed.over("a hidden element", self._where(element))
         elif not place.paint.seen:
@@ -202,7 +202,7 @@ class Walk:
 
 
 def _refuse(style: dict[str, str], element: Any) -> None:
-    """Raise for what would make what is seen something else than what is cut."""
+    """Refuse a style that makes the visible drawing differ from what is cut."""
     if element.get("systemLanguage") is not None:
         raise ToolpathError("systemLanguage decides whether it is drawn; take that attribute away")
     for name in sorted(REFUSED & style.keys()):
@@ -215,12 +215,12 @@ def _refuse(style: dict[str, str], element: Any) -> None:
 
 
 def _has_words(element: Any, place: _Place) -> bool:
-    """Whether anything is seen of a text, which drawing programs leave behind empty."""
+    """Return whether a text is visible; drawing programs leave empty ones behind."""
     return place.paint.seen and bool("".join(element.itertext()).strip())
 
 
 def _flat(matrix: Array) -> bool:
-    """Whether a map has no inverse."""
+    """Return whether a map has no inverse."""
     a, c, b, d = matrix[:2, :2].ravel().tolist()
     return a * d == b * c
 
