@@ -52,7 +52,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def writing(target: Path) -> Iterator[None]:
-    """Say of which file or folder the operating system speaks where it does not take what the block writes.
+    """Name the file or folder in errors of the operating system that arise while the block writes.
 
     Raises:
         InputError: ``target`` is below a file.

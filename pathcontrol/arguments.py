@@ -1,4 +1,4 @@
-"""What the arguments of a class are, said in its annotations: their units and what may be given.
+"""Annotations of the arguments of a class: their units and the forms they may have in a file.
 
 A file is read by them: ``speed: Annotated[float, Form.POSITIVE, Unit("m/s")]`` may be given as ``"50 mm/s"`` there.
 """
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 
 class Form(Enum):
-    """What a file may give for an argument; the value says it in words."""
+    """The form of an argument in a file; the value says it in words."""
 
     TEXT = "a text in quotes"
     TEXTS = "a list of texts in quotes"
@@ -86,12 +86,12 @@ class Parameter(NamedTuple):
 
     @property
     def unit(self) -> Unit | None:
-        """Its unit, if it says one."""
+        """The unit of the argument, if it has one."""
         return next((mark for mark in self.marks if isinstance(mark, Unit)), None)
 
     @property
     def form(self) -> Form | None:
-        """What may be given, if it says so."""
+        """The form of the argument, if it states one."""
         return next((mark for mark in self.marks if isinstance(mark, Form)), None)
 
 

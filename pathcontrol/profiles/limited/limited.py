@@ -81,7 +81,7 @@ def limited_motion(
     points: int = 1000,
     start_rate: Rate | None = None,
 ) -> TabulatedProfile:
-    """As :func:`limited`, with one :class:`MotionLimit` on the joints, or on a frame of the arm, as files have it.
+    """Return the profile of :func:`limited` with a single :class:`MotionLimit`, given by its parts.
 
     Args:
         robot: the arm.
