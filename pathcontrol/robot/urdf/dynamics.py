@@ -52,19 +52,20 @@ def dynamics(arm: Arm, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _add_link(M: np.ndarray, g: np.ndarray, inertial: Inertial, placed: _Placed, link: np.ndarray) -> None:
-    """Add the contribution of one link to M and g."""
+    """Add the contribution of one link to M and g, in the rows and columns of the joints that move it."""
     centre = link if inertial.origin is None else link @ inertial.origin
-    count, n = g.shape
-    J_v, J_w = np.zeros((count, 3, n)), np.zeros((count, 3, n))
-    for i, origin, axis in placed.moved_by:
+    count, joints = len(g), [i for i, _, _ in placed.moved_by]
+    J_v, J_w = np.zeros((count, 3, len(joints))), np.zeros((count, 3, len(joints)))
+    for k, (_, origin, axis) in enumerate(placed.moved_by):
         if origin.size:
-            J_w[:, :, i] = axis
-            J_v[:, :, i] = np.cross(axis, centre[:, :3, 3] - origin)
+            J_w[:, :, k] = axis
+            J_v[:, :, k] = np.cross(axis, centre[:, :3, 3] - origin)
         else:
-            J_v[:, :, i] = axis
+            J_v[:, :, k] = axis
     turned = centre[:, :3, :3].swapaxes(1, 2) @ J_w
-    M += inertial.mass * J_v.swapaxes(1, 2) @ J_v + turned.swapaxes(1, 2) @ inertial.inertia @ turned
-    g += inertial.mass * GRAVITY * J_v[:, 2]
+    of_link = inertial.mass * J_v.swapaxes(1, 2) @ J_v + turned.swapaxes(1, 2) @ inertial.inertia @ turned
+    M[np.ix_(range(count), joints, joints)] += of_link
+    g[:, joints] += inertial.mass * GRAVITY * J_v[:, 2]
 
 
 def _place_bodies(arm: Arm, q: np.ndarray) -> Iterator[_Placed]:
