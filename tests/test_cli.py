@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from patience import PATIENCE, wait_until
 
 from pathcontrol.cli import main
@@ -117,7 +118,7 @@ def test_errors_are_one_message_without_a_traceback(arguments, words):
     assert done.stdout == ""
 
 
-def test_run_prints_metrics_and_writes_beside_its_name(tmp_path):
+def test_run_prints_metrics_and_writes_beside_its_name(tmp_path, monkeypatch):
     text = call("run", "--example").stdout.replace("duration = 10.0", "duration = 0.2")
     (tmp_path / "mine.toml").write_text(text)
     done = call("run", "mine.toml", "--json", cwd=tmp_path)
@@ -125,7 +126,8 @@ def test_run_prints_metrics_and_writes_beside_its_name(tmp_path):
     report = json.loads(done.stdout)
     assert report["metrics"]["e_p_peak"][0] > 0
     assert (tmp_path / report["written"]["data"]).parent == tmp_path / "results" / "mine"
-    again = call("run", "mine.toml", cwd=tmp_path)
+    monkeypatch.chdir(tmp_path)
+    again = CliRunner().invoke(main, ["run", "mine.toml"])
     assert "settling_time" in again.stdout
     peak = re.search(r"e_p_peak +([\d.]+) deg", again.stdout)[1]
     assert float(peak) == pytest.approx(np.rad2deg(report["metrics"]["e_p_peak"][0]), rel=1e-3)

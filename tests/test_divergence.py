@@ -215,7 +215,8 @@ def test_continuous_time_goes_on_without_it(ideal_arm):
         simulate(controller, q[0], duration=0.5, loop=ContinuousTime(), progress=False)
 
 
-def test_a_report_says_so(arm, circle, tmp_path):
+def test_a_report_says_so(arm, circle, tmp_path, monkeypatch):
+    monkeypatch.setattr("pathcontrol.view.report.sections.pictures", lambda runs: [])  # they take most of the time
     run = simulate(law("plan", arm, circle, gains(True, False)), states(2), duration=0.4, progress=False)
     page = report(run, tmp_path / "report.html")  # with a film of rollout 0 until it diverged
     assert "2 rollouts, 1 diverged" in page.read_text(encoding="utf-8")

@@ -7,6 +7,7 @@ import pytest
 from drawings import MM_PAGE, svg, write
 
 from pathcontrol.errors import InputError, ToolpathError, UnknownNameError
+from pathcontrol.toolpaths.svg import style
 from pathcontrol.toolpaths.svg.reader import read_svg
 
 SEEN = '<path id="seen" d="M0 0H10" stroke="black"/>'
@@ -144,8 +145,9 @@ def test_what_is_dashed_or_hidden_is_told(read):
     assert any("hidden element" in note and "g 'old'" in note for note in hidden.notes)
 
 
-def test_many_rules_and_elements_take_a_moment(read):
+def test_many_rules_and_elements_take_a_moment(read, monkeypatch):
     """Every selector that walks through ancestors or siblings is bounded."""
+    monkeypatch.setattr(style, "_MOST_STEPS", 1_000_000)
     deep = "<g>" * 200 + '<rect width="1" height="1"/>' * 200 + "</g>" * 200
     with pytest.raises(ToolpathError, match="takes too long"):
         read("<style>x " + "* " * 12 + f"rect{{fill:none}}</style>{deep}")

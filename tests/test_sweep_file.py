@@ -12,10 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from patience import PATIENCE, wait_until
 
 import pathcontrol as pc
+from pathcontrol.cli import main
 from pathcontrol.errors import ExperimentError, InputError
 from pathcontrol.experiments.build import build
 from pathcontrol.experiments.schema import Experiment
@@ -198,11 +200,11 @@ def test_the_command_writes_a_table_and_tells_it(experiment, tmp_path):
     assert told["status"] == {"running": 9}
     assert told["metrics"]["e_p_peak"]["largest"] == table["e_p_peak"].max()
     assert [int(i) for i in told["histories"]] == sorted(np.argsort(-table["e_p_peak"].to_numpy())[:2])
-    again = subprocess.run([*COMMAND, file, "--out", tmp_path / "out"], capture_output=True, text=True)
-    assert again.returncode == 2
-    assert "holds a sweep already; resume it" in again.stderr
-    resumed = subprocess.run([*COMMAND, file, "--out", tmp_path / "out", "--resume"], capture_output=True, text=True)
-    assert resumed.returncode == 0
+    again = ["sweep", str(file), "--out", str(tmp_path / "out")]
+    refused, resumed = (CliRunner().invoke(main, [*again, *more]) for more in ([], ["--resume"]))
+    assert refused.exit_code == 2
+    assert "holds a sweep already; resume it" in refused.stderr
+    assert resumed.exit_code == 0
     assert "9 running" in resumed.stdout
 
 

@@ -177,7 +177,7 @@ def contour(seed: int, size: float, closed: bool) -> Contour:
     return builder.contour()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(SEEDS, st.sampled_from([0.01, 0.2, 5.0]), st.sampled_from([1e-5, 1e-4, 1e-3]), st.booleans(), st.booleans())
 def test_smooth_curves_keep_the_tolerance_on_both_sides(seed, size, tolerance, closed, stop):
     given_contour = contour(seed, size, closed)
