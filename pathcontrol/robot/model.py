@@ -197,11 +197,11 @@ class RobotModel:
 
     def frame_poses(self, q: ArrayLike, frames: Sequence[str]) -> Array:
         """Return the poses of several frames in the base frame [m], (*batch, len(frames), 4, 4) homogeneous."""
-        ids = [self._frame_id(frame) for frame in frames]
+        model, data, ids = self.pinocchio_model, self._data, [self._frame_id(frame) for frame in frames]
 
         def poses(qi: Array) -> list[Array]:
-            pin.framesForwardKinematics(self.pinocchio_model, self._data, qi)
-            return [self._data.oMf[i].homogeneous for i in ids]
+            pin.forwardKinematics(model, data, qi)
+            return [pin.updateFramePlacement(model, data, i).homogeneous for i in ids]
 
         return self._each(q, (len(ids), 4, 4), poses)
 
