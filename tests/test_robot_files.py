@@ -11,9 +11,9 @@ import trimesh
 
 from pathcontrol import known_robots, load_robot
 from pathcontrol.errors import UrdfError
+from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.robot.catalogue import find_urdf, own_urdf
 from pathcontrol.robot.meshes import load_parts
-from pathcontrol.robot.model import UrdfSource
 from pathcontrol.robot.urdf import check_urdf
 from pathcontrol.view.bodies.meshes import MOST_TRIANGLES, read_mesh
 from pathcontrol.view.bodies.thinning import clustered

@@ -16,8 +16,8 @@ from strategies import floats
 
 from pathcontrol import Coulomb, FrictionLaw, InputError, Stribeck, UrdfError, Viscous, load_robot
 from pathcontrol.robot.actuation import Actuation, Limits
+from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.robot.friction import no_friction, rebuild_law
-from pathcontrol.robot.model import UrdfSource
 from pathcontrol.robot.recipe import recipe_of, robot_of
 
 FINGERS = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.02}

@@ -12,7 +12,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pathcontrol.robot.model import UrdfSource
+from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.view.bodies.links import reach
 from pathcontrol.view.bodies.shapes import Box, Cylinder, Mesh, Sphere
 from pathcontrol.view.bodies.sticks import stick_figure

@@ -12,7 +12,7 @@ import yourdfpy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pathcontrol.robot.model import UrdfSource
+from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.robot.urdf import parse_urdf
 from pathcontrol.view.bodies.shapes import Box, Cylinder
 from pathcontrol.view.bodies.visuals import UNPAINTED, link_visuals

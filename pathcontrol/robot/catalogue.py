@@ -9,7 +9,7 @@ from typing import Any
 
 from pathcontrol._files import read_bounded
 from pathcontrol.errors import MissingExtraError, UnknownNameError, UrdfError
-from pathcontrol.robot.model import UrdfSource
+from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.robot.urdf.xml.encoding import decode
 from pathcontrol.robot.urdf.xml.parse import MAX_BYTES
 

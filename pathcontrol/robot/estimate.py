@@ -12,9 +12,9 @@ from lxml import etree
 
 from pathcontrol._arrays import LARGEST, SMALLEST, Array
 from pathcontrol.errors import PathControlWarning, UrdfError
+from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.robot.lump import Lump, ball, combine
 from pathcontrol.robot.meshes import load_parts
-from pathcontrol.robot.model import UrdfSource
 from pathcontrol.robot.urdf.checks.finding import quote
 from pathcontrol.robot.urdf.checks.form import check_form
 from pathcontrol.robot.urdf.mesh_files import find_mesh

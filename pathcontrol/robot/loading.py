@@ -13,9 +13,10 @@ from lxml import etree
 from pathcontrol._arrays import LARGEST, Array, quantity, readonly
 from pathcontrol.errors import PathControlWarning, UrdfError
 from pathcontrol.robot.actuation import Actuation, Limits
+from pathcontrol.robot.arm_dynamics import UrdfSource, build_model
 from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Viscous
-from pathcontrol.robot.model import RobotModel, UrdfSource, build_model, lock_joints
+from pathcontrol.robot.model import RobotModel, lock_joints
 from pathcontrol.robot.urdf import UrdfReport, check_urdf, parse_urdf
 from pathcontrol.robot.urdf.checks.extension import extension_values
 from pathcontrol.robot.urdf.locking import locked_angles, locked_beyond_limits

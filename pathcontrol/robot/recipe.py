@@ -13,10 +13,11 @@ import numpy as np
 from pathcontrol._arrays import Array, readonly
 from pathcontrol.errors import InputError, MissingExtraError, PathControlError, PathControlWarning, UnknownNameError
 from pathcontrol.robot.actuation import Actuation, Limits
+from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.friction import FrictionLaw, no_friction, rebuild_law
 from pathcontrol.robot.loading import build_checked_model
-from pathcontrol.robot.model import RobotModel, UrdfSource, lock_joints
+from pathcontrol.robot.model import RobotModel, lock_joints
 
 _METHODS = ("reduced", "with_payload", "with_frame", "with_armature", "with_masses")
 _LIMITS = {"lower": -np.inf, "upper": np.inf, "velocity": np.inf, "effort": np.inf}  # null stands for these

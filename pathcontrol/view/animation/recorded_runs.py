@@ -21,7 +21,7 @@ from pathcontrol.view.bodies.visuals import LinkVisual, link_visuals
 from pathcontrol.view.tool import with_tool
 
 if TYPE_CHECKING:
-    from pathcontrol.robot.model import UrdfSource
+    from pathcontrol.robot.arm_dynamics import UrdfSource
 
 FINENESS = 1.5e-4  # of the arm's reach: where a picture shows it whole, a small part of a pixel
 

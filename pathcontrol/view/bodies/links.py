@@ -10,7 +10,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.robot.urdf import parse_urdf
 
 if TYPE_CHECKING:
-    from pathcontrol.robot.model import UrdfSource
+    from pathcontrol.robot.arm_dynamics import UrdfSource
 
 
 def reach(source: UrdfSource) -> float:

@@ -15,7 +15,7 @@ from pathcontrol.view.bodies.shapes import Box, Color, Cylinder, Sphere
 from pathcontrol.view.bodies.visuals import LinkVisual
 
 if TYPE_CHECKING:
-    from pathcontrol.robot.model import UrdfSource
+    from pathcontrol.robot.arm_dynamics import UrdfSource
 
 STICK: Color = (0.62, 0.65, 0.69, 1.0)
 KNOB: Color = (0.27, 0.29, 0.32, 1.0)

@@ -19,7 +19,7 @@ from pathcontrol.view.bodies.links import reach
 from pathcontrol.view.bodies.shapes import Box, Color, Cylinder, Shape, Sphere
 
 if TYPE_CHECKING:
-    from pathcontrol.robot.model import UrdfSource
+    from pathcontrol.robot.arm_dynamics import UrdfSource
 
 UNPAINTED: Color = (0.72, 0.74, 0.77, 1.0)
 
