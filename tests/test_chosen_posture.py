@@ -10,7 +10,7 @@ import pytest
 import pathcontrol as pc
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.continuation import Stop, Trail
-from pathcontrol.cartesian.ik.preference import by_preference
+from pathcontrol.cartesian.ik.preference import sort_by_preference
 from pathcontrol.cartesian.orientation import FreeOrientation
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.toolpaths.gcode.builder import ContourBuilder
@@ -76,10 +76,10 @@ def test_trails_are_preferred_above_then_comfortable_then_elbow_up():
         return Trail([0.0], [np.array([q_1, 0.3])], comfort, Stop.NONE)
 
     up, down, uncomfortable, poor = trail(2.5, 0.5), trail(0.5, 0.9), trail(3.0, 0.4), trail(2.9, 0.1)
-    ranked = by_preference(constraint, [poor, down, uncomfortable, up])
+    ranked = sort_by_preference(constraint, [poor, down, uncomfortable, up])
     assert [id(one) for one in ranked] == [id(one) for one in (up, down, uncomfortable, poor)]
     for sign in (1, -1):  # the mirrored arm is as high: nothing else counts
-        assert by_preference(constraint, [down, trail(sign * 2.5, 0.6)])[0].q[0][0] == sign * 2.5
+        assert sort_by_preference(constraint, [down, trail(sign * 2.5, 0.6)])[0].q[0][0] == sign * 2.5
 
 
 def square(x: float, y: float) -> pc.Contour:

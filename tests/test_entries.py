@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol import Contour, RobotModel, Toolpath, ToolpathTask, load_robot, read_gcode, smooth
-from pathcontrol.cartesian.links import linked
+from pathcontrol.cartesian.links import link_contours
 from pathcontrol.toolpaths.gcode.builder import ContourBuilder
 from pathcontrol.toolpaths.segments.base import Polyline
 
@@ -84,7 +84,7 @@ def ends(smoothed) -> np.ndarray:
 
 
 def assert_as_programmed(toolpath: Toolpath, corner: str) -> None:
-    whole = linked(toolpath.contours, CLEARANCE, UP, TOLERANCE, corner)
+    whole = link_contours(toolpath.contours, CLEARANCE, UP, TOLERANCE, corner)
     # nothing is put in: the tool is lifted where the program lifts it, and nowhere else
     assert [contour for contour, _ in whole] == list(toolpath.contours)
     tracks = [ends(smoothed) for _, smoothed in whole]
@@ -127,7 +127,7 @@ def test_a_lead_in_in_the_middle_of_an_edge_is_kept(corners, lead, corner):
     entry = (1 - lead) * points[0] + lead * points[1]
     round_trip = np.array([entry, *points[1:], points[0], entry])
     contour = Contour((Polyline(round_trip),), closed=True, feed=0.01)
-    track = ends(linked([contour], CLEARANCE, UP, TOLERANCE, corner)[0][1])
+    track = ends(link_contours([contour], CLEARANCE, UP, TOLERANCE, corner)[0][1])
     assert np.abs(track[[0, -1], [0, 1]] - entry).max() < 1e-12
     smoothed = smooth(contour, TOLERANCE, corner)
     assert np.abs(ends(smoothed)[0, 0] - entry).max() < 1e-12
@@ -143,7 +143,7 @@ def test_between_the_contours_of_a_drawing_rapids_end_where_the_drawing_begins(s
             builder.line_to(np.append(rng.uniform(-0.1, 0.1, 2), 0.0))
         builder.close()
         contours.append(builder.contour(feed=0.01))
-    whole = linked(contours, CLEARANCE, UP, TOLERANCE, corner)
+    whole = link_contours(contours, CLEARANCE, UP, TOLERANCE, corner)
     for (before, track), (after, following) in itertools.pairwise((c, ends(s)) for c, s in whole):
         assert np.abs(track[-1, 1] - following[0, 0]).max() < 1e-9
         if before.rapid:

@@ -26,7 +26,7 @@ from pathcontrol import (
 )
 from pathcontrol.profiles.limited.limited import limited
 from pathcontrol.profiles.limited.motion_limit import MotionLimit
-from pathcontrol.profiles.limited.two_pass import Lines, largest
+from pathcontrol.profiles.limited.two_pass import Lines, largest_sequence
 from pathcontrol.profiles.motion import JointMotion, ToolMotion
 from pathcontrol.profiles.tool_speed import ToolSpeed
 
@@ -276,7 +276,7 @@ def test_the_sweeps_find_the_optimum_of_the_linear_program(seed, closed):
             b.append(offset)
     ring = {"A_eq": np.eye(cells + 1)[:1] - np.eye(cells + 1)[-1:], "b_eq": [0.0]} if closed else {}
     best = linprog(-np.ones(cells + 1), np.concatenate(A), np.concatenate(b), bounds=[(0, c) for c in ceiling], **ring)
-    assert np.allclose(largest(ceiling, up, down, closed), best.x, rtol=1e-6, atol=1e-8)
+    assert np.allclose(largest_sequence(ceiling, up, down, closed), best.x, rtol=1e-6, atol=1e-8)
 
 
 def test_velocity_limits_alone_are_met_by_the_slowest_joint():

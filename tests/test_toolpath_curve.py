@@ -13,8 +13,8 @@ from strategies import floats
 from pathcontrol import InputError, ToolCurve
 from pathcontrol.toolpaths.segments.arc import Arc
 from pathcontrol.toolpaths.segments.base import Polyline
-from pathcontrol.toolpaths.smoothing.bends import regular
-from pathcontrol.toolpaths.smoothing.hermite_data import ByLength, curved
+from pathcontrol.toolpaths.smoothing.bends import regularize
+from pathcontrol.toolpaths.smoothing.hermite_data import ByLength, curved_stretch
 
 X, Y, Z = np.eye(3)
 T = np.linspace(0.0, 1.0, 501)
@@ -152,10 +152,10 @@ def test_curves_for_segments_are_within_a_nanometre_and_of_unit_speed(kind, seed
     """Between any two arc lengths; all but segments that bend within a hair's breadth, which are not followed so."""
     rng, size = np.random.default_rng(seed), 10**exponent
     one = segment(kind, rng, size, size * rng.normal(size=3), unit(rng.normal(size=3)), planar=False)
-    if regular(one, 1e-7)[0] is not one:
+    if regularize(one, 1e-7)[0] is not one:
         return
     start, end = one.length * np.sort(rng.choice([0.0, 1.0, *rng.uniform(size=2)], 2, replace=False))
-    stretch = curved(one, start, end)
+    stretch = curved_stretch(one, start, end)
     curve = ToolCurve(*stretch.knots)
     s = np.concatenate([samples(curve), (curve.knots[:-1] + np.outer([0.25, 0.5, 0.75], np.diff(curve.knots))).ravel()])
     p, dp, _ = curve.at(s)
@@ -187,7 +187,7 @@ def test_by_its_length_a_helix_is_its_closed_form(seed, radius, sweep, rise):
 def test_what_bends_too_sharply_becomes_a_polyline_as_near_as_said(kind, seed, exponent):
     rng, tolerance = np.random.default_rng(seed), 10**exponent
     one = segment(kind, rng, 0.1, rng.normal(size=3), unit(rng.normal(size=3)), planar=False)
-    other, apart = regular(one, tolerance)
+    other, apart = regularize(one, tolerance)
     if other is one:
         assert apart == 0
         return
@@ -203,7 +203,7 @@ def test_what_bends_too_sharply_becomes_a_polyline_as_near_as_said(kind, seed, e
 def test_a_segment_too_far_away_for_a_nanometre_is_named():
     far = Arc(np.array([1e9, 0, 0]), X, Y, 0.0, 1.0)
     with pytest.raises(InputError, match=r"a Arc of length 1 m at .* cannot be followed to 1 nm.*too far from"):
-        curved(far, 0.0, far.length)
+        curved_stretch(far, 0.0, far.length)
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ from pathcontrol import (
     tool_deviation,
     toolpath_metrics,
 )
-from pathcontrol.cartesian.links import linked
+from pathcontrol.cartesian.links import link_contours
 from pathcontrol.toolpaths.gcode.builder import ContourBuilder
 from pathcontrol.toolpaths.segments.arc import Arc
 
@@ -73,7 +73,7 @@ def tool(arm, path, count=2001):
 @given(st.lists(st.tuples(*[floats(-1, 1)] * 6), min_size=1, max_size=6), floats(0.0, 0.3))
 def test_linked_contours_meet_and_keep_the_files(ends, clearance):
     contours = [drawn([np.array(e[:3]), np.array(e[3:]) + 3.0], feed=1.0) for e in ends]
-    whole = linked(contours, clearance, np.array([0.0, 0.0, 1.0]), 1e-4, "blend")
+    whole = link_contours(contours, clearance, np.array([0.0, 0.0, 1.0]), 1e-4, "blend")
     assert [contour for contour, _ in whole if not contour.rapid] == contours
     for (before, _), (after, _) in itertools.pairwise(whole):
         assert np.linalg.norm(before.end - after.start) <= 1e-6
@@ -86,7 +86,9 @@ def test_linked_contours_meet_and_keep_the_files(ends, clearance):
 
 def test_contours_that_meet_need_no_link():
     contours = [drawn([[0, 0, 0], [1, 0, 0]]), drawn([[1, 0, 0], [1, 1, 0]])]
-    assert [contour for contour, _ in linked(contours, 0.1, np.array([0.0, 0.0, 1.0]), 1e-4, "blend")] == contours
+    assert [
+        contour for contour, _ in link_contours(contours, 0.1, np.array([0.0, 0.0, 1.0]), 1e-4, "blend")
+    ] == contours
 
 
 def test_a_sharp_tip_that_is_stopped_at_may_be_anywhere_on_a_closed_contour(arm):

@@ -15,29 +15,29 @@ from pathcontrol.toolpaths.smoothing.smooth import Corners, Smoothed, smooth
 _MEET = 1e-7  # m
 
 
-def linked(
+def link_contours(
     contours: Sequence[Contour], clearance: float, up: Array, tolerance: float, corner: Corners
 ) -> list[tuple[Contour, Smoothed]]:
     """Return the contours with the curves that stand for them, and rapids between those that do not meet.
 
-    Each begins and ends as :func:`from_end_to_end` says, so that the tool is not lifted where contours meet. A rapid
+    Each begins and ends as :func:`smooth_open` says, so that the tool is not lifted where contours meet. A rapid
     goes ``clearance`` [m] above the higher of its ends, along ``up``, across and down again; straight where the
     clearance is 0, for arms that move in a plane.
     """
     done: list[tuple[Contour, Smoothed]] = []
     for contour in contours:
-        curves = from_end_to_end(contour, tolerance, corner)
+        curves = smooth_open(contour, tolerance, corner)
         if done:
             last, first = done[-1][1].curves[-1], curves.curves[0]
-            way = _way(last.position(last.s_end), first.position(first.s0), clearance, up)
+            way = _rapid_points(last.position(last.s_end), first.position(first.s0), clearance, up)
             if way is not None:
                 rapid = Contour((Polyline(way),), rapid=True, name=f"rapid to {contour.name or 'the next contour'}")
-                done.append((rapid, from_end_to_end(rapid, tolerance, corner)))
+                done.append((rapid, smooth_open(rapid, tolerance, corner)))
         done.append((contour, curves))
     return done
 
 
-def from_end_to_end(contour: Contour, tolerance: float, corner: Corners) -> Smoothed:
+def smooth_open(contour: Contour, tolerance: float, corner: Corners) -> Smoothed:
     """Smooth a contour to curves with exactly its ends, a closed one too: the arm rests there.
 
     The corner of a closed contour at its start is not blended: where the tool enters and leaves the material is up to
@@ -46,7 +46,7 @@ def from_end_to_end(contour: Contour, tolerance: float, corner: Corners) -> Smoo
     return smooth(replace(contour, closed=False), tolerance, corner)
 
 
-def _way(start: Array, end: Array, clearance: float, up: Array) -> Array | None:
+def _rapid_points(start: Array, end: Array, clearance: float, up: Array) -> Array | None:
     """Return the points (k, 3) of a rapid, None where its ends are the same."""
     if np.linalg.norm(end - start) < _MEET:
         return None

@@ -48,7 +48,7 @@ class Orientation(ABC):
         z, towards = rotation[..., :, 2], wanted[..., :, 2]
         across = wanted[..., :, :2].swapaxes(-1, -2)
         axis, cosine = np.cross(towards, z), (towards * z).sum(-1)
-        turn = _scaled(axis, cosine)
+        turn = _scale_axis(axis, cosine)
         opposite = (np.linalg.norm(axis, axis=-1) <= _NO_SINE) & (cosine < 0)
         turn[opposite] = np.pi * wanted[opposite, :, 0]  # half a turn, about any axis across z
         return (across @ turn[..., None])[..., 0], across
@@ -136,7 +136,7 @@ class NormalOrientation(Orientation):
         self.reference = None if reference is None else readonly(_direction("reference", reference))
         self.rows = 2 if reference is None else 3
         self.at = None if at is None else readonly(finite("at", as_array("at", at)))
-        self._normals = normals if callable(normals) else _interpolated(as_array("normals", normals), self.at)
+        self._normals = normals if callable(normals) else _interpolate(as_array("normals", normals), self.at)
 
     def frames(self, curve: ToolCurve, s: Array) -> Array:
         self._check_cover(curve)
@@ -155,7 +155,7 @@ class NormalOrientation(Orientation):
             )
 
 
-def _interpolated(normals: Array, at: Array | None) -> Callable[[Array], Array]:
+def _interpolate(normals: Array, at: Array | None) -> Callable[[Array], Array]:
     """Return the normals as a function of s."""
     finite("normals", normals)
     if normals.shape == (3,):
@@ -211,7 +211,7 @@ def _rotation_vector(rotation: Array) -> Array:
     skew = 0.5 * (rotation - rotation.swapaxes(-1, -2))
     axis = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
     cosine = 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1)
-    turn = _scaled(axis, cosine)
+    turn = _scale_axis(axis, cosine)
     wide = cosine < _WIDE
     if wide.any():
         turn[wide] = _wide_turn(rotation[wide], axis[wide], cosine[wide])
@@ -233,7 +233,7 @@ def _wide_turn(rotation: Array, axis: Array, cosine: Array) -> Array:
     return (sign * angle)[:, None] * direction
 
 
-def _scaled(axis: Array, cosine: Array) -> Array:
+def _scale_axis(axis: Array, cosine: Array) -> Array:
     """Return the rotation vector of an axis (N, 3) whose length is the sine of the angle, given its ``cosine``."""
     sine = np.linalg.norm(axis, axis=-1)
     factor = np.divide(np.arctan2(sine, cosine), sine, out=np.ones_like(sine), where=sine > _NO_SINE)

@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array, as_array, readonly, scalar
 from pathcontrol._expect import expect
 from pathcontrol.arguments import Form, Length, Points, Unit
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
-from pathcontrol.cartesian.ik.solve import posture, solve
+from pathcontrol.cartesian.ik.solve import check_posture, solve
 from pathcontrol.cartesian.orientation import FixedOrientation, FreeOrientation, Orientation
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.errors import InputError
@@ -91,7 +91,7 @@ class CartesianPath(SplinePath):
         self.tolerance = scalar("tolerance", tolerance, least=_FINEST)
         self.angle_tolerance = scalar("angle_tolerance", angle_tolerance, least=_FINEST)
         speed, closed = scalar("speed", speed, positive=True), _closed(self.curve, closed)
-        carried, first = Tool(robot, frame, tool), None if start is None else posture(robot, start)
+        carried, first = Tool(robot, frame, tool), None if start is None else check_posture(robot, start)
         self._question(speed, carried)
         self.orientation = _orientation(orientation, carried, first)
         _check_closing(self.curve, self.orientation, closed)

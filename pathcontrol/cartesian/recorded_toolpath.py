@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pathcontrol._arrays import Array, rigid
-from pathcontrol.cartesian.links import from_end_to_end
+from pathcontrol.cartesian.links import smooth_open
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
@@ -74,4 +74,4 @@ class RecordedToolpath(ToolpathTask):
     @cached_property
     def smoothed(self) -> tuple[Smoothed, ...]:  # type: ignore[override]
         """The smooth curves of each contour."""
-        return tuple(from_end_to_end(contour, self.tolerance, self.corner) for contour in self._placed)
+        return tuple(smooth_open(contour, self.tolerance, self.corner) for contour in self._placed)

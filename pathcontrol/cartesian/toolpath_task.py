@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, rigid, scalar
 from pathcontrol._expect import expect
 from pathcontrol.cartesian.contour_paths import ContourPaths, Held, rotations_of
-from pathcontrol.cartesian.links import linked
+from pathcontrol.cartesian.links import link_contours
 from pathcontrol.cartesian.orientation import Orientation
 from pathcontrol.errors import InputError
 from pathcontrol.robot.extent import question_length
@@ -91,7 +91,7 @@ class ToolpathTask(PathSequence):
         height = scalar("clearance", clearance, least=0.0)
         question_length("clearance", height, robot, frame, share=1.0)
         question_length("tolerance", self.tolerance, robot, frame, share=0.1)
-        whole = linked(toolpath.placed(pose).contours, height, pose[:3, 2], self.tolerance, corner)
+        whole = link_contours(toolpath.placed(pose).contours, height, pose[:3, 2], self.tolerance, corner)
         self.smoothed = tuple(smoothed for _, smoothed in whole)
         back = np.linalg.inv(pose)
         self.drawing = Toolpath(tuple(contour.placed(back) for contour, _ in whole), toolpath.source, toolpath.unit)

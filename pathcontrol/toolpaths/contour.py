@@ -94,7 +94,7 @@ class Contour:
             best = np.minimum(best, cubics.distance(flat))
         if others and flat.size:
             measure_bounds(others)
-            boxes = np.stack([_to_box(flat, *segment.bounds) for segment in others])
+            boxes = np.stack([_distance_to_box(flat, *segment.bounds) for segment in others])
             for rank in np.argsort(boxes.min(1)):
                 near = boxes[rank] < best
                 if near.any():
@@ -148,7 +148,7 @@ class Toolpath:
     def __repr__(self) -> str:
         rapids = [contour for contour in self.contours if contour.rapid]
         kinds = [("cut", self.cuts), ("rapid", rapids)]
-        counted = [_counted(name, contours) for name, contours in kinds if contours]
+        counted = [_count(name, contours) for name, contours in kinds if contours]
         return f"Toolpath({'; '.join([repr(self.source), *counted, f'file in {self.unit}'])})"
 
     def __iter__(self) -> Iterator[Contour]:
@@ -181,13 +181,13 @@ class Toolpath:
         return np.min([contour.distance(x) for contour in chosen], axis=0)
 
 
-def _counted(name: str, contours: Sequence[Contour]) -> str:
+def _count(name: str, contours: Sequence[Contour]) -> str:
     """Write number and length of contours: ``"2 cuts, 0.19 m"``."""
     length = sum(contour.length for contour in contours)
     return f"{len(contours)} {name}{'s' * (len(contours) > 1)}, {length:.4g} m"
 
 
-def _to_box(x: Array, lower: Array, upper: Array) -> Array:
+def _distance_to_box(x: Array, lower: Array, upper: Array) -> Array:
     """Return the distance from x (N, 3) to a box [m], (N,), rounded down a little: bounds of curves are sampled."""
     outside = np.linalg.norm(np.maximum(np.maximum(lower - x, x - upper), 0.0), axis=-1)
     return outside - 1e-5 * float(np.linalg.norm(upper - lower))

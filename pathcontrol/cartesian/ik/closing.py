@@ -15,7 +15,7 @@ _LEFT = 3.0  # rad, what may be taken back; half a turn and more would change th
 _PACE = 0.1  # rad, taken back at a time
 
 
-def closed_lap(constraint: ToolConstraint, s: Array, q: Array) -> Array | None:
+def close_lap(constraint: ToolConstraint, s: Array, q: Array) -> Array | None:
     """Close a lap: change postures q (K, n) at s (K,) so that the last is the first; None if that fails.
 
     Where there is a choice of postures, the difference that a lap of least motion leaves is taken back little by little

@@ -11,7 +11,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.correction import Corrected, branch_at, correct
-from pathcontrol.cartesian.ik.joint_range import outside, share_to_limits
+from pathcontrol.cartesian.ik.joint_range import is_outside, share_to_limits
 from pathcontrol.cartesian.ik.redundancy import PostureCost
 
 _PIECES = 8  # a step is at most this part of the curve, …
@@ -142,7 +142,7 @@ class _Walk:
 
 def verdicts(constraint: ToolConstraint, found: Corrected) -> Array:
     """Return the fault of each corrected posture, an array of :class:`Stop`, (N,)."""
-    beyond = outside(constraint.tool.robot, found.q)
+    beyond = is_outside(constraint.tool.robot, found.q)
     conditions = [~found.converged, beyond, found.conditioning < SINGULAR]
     return np.select(conditions, [Stop.LOST, Stop.LIMIT, Stop.SINGULAR], Stop.NONE)
 

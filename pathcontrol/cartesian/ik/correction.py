@@ -57,7 +57,7 @@ def correct(constraint: ToolConstraint, cost: PostureCost, q: Array, s: Array) -
     out = Corrected(q.copy(), np.zeros(len(q), dtype=bool), np.zeros(len(q)), bases)
     moving = np.arange(len(q))
     for _ in range(_STEPS):
-        linear = _linearised(constraint, out.q[moving], s[moving])
+        linear = _linearise(constraint, out.q[moving], s[moving])
         step = -(linear.inverse @ linear.f[..., None])[..., 0]
         if constraint.freedom:
             step += _null_step(constraint, cost.rows(moving), out.q[moving], s[moving], linear, step)
@@ -73,7 +73,7 @@ def correct(constraint: ToolConstraint, cost: PostureCost, q: Array, s: Array) -
     return out
 
 
-def _linearised(constraint: ToolConstraint, q: Array, s: Array) -> _Linear:
+def _linearise(constraint: ToolConstraint, q: Array, s: Array) -> _Linear:
     f, slope = constraint.at(q, s)
     u, values, v = np.linalg.svd(slope)
     rank = constraint.rank
@@ -84,7 +84,7 @@ def _linearised(constraint: ToolConstraint, q: Array, s: Array) -> _Linear:
 
 def branch_at(constraint: ToolConstraint, q: Array, s: Array) -> Branch:
     """Return the side of singularities on which postures q (N, n) at s (N,) are."""
-    return _linearised(constraint, q, s).branch
+    return _linearise(constraint, q, s).branch
 
 
 def _null_step(

@@ -24,7 +24,7 @@ _NOTHING = 1e-3  # share of a displacement that is not worth saying
 _NEXT = 4  # of those ahead; out of reach in one of them is why the arm does not go on
 
 
-def refusal(constraint: ToolConstraint, trail: Trail, tries: int = 1) -> TaskError:
+def trail_error(constraint: ToolConstraint, trail: Trail, tries: int = 1) -> TaskError:
     """Return the error for a trail that stops, the best of those from ``tries`` start postures."""
     s = trail.s[-1]
     along = 100 * (s - constraint.curve.s0) / constraint.curve.length
@@ -37,7 +37,7 @@ def refusal(constraint: ToolConstraint, trail: Trail, tries: int = 1) -> TaskErr
     )
 
 
-def unreached(constraint: ToolConstraint, start: Array | None = None) -> TaskError:
+def first_point_error(constraint: ToolConstraint, start: Array | None = None) -> TaskError:
     """Return the error for a first point that is not reached from ``start`` (n,), or from anywhere."""
     seeds = constraint.seeds(_SEEDS) if start is None else start[None]
     whence = "from any posture" if start is None else "from this start posture"
@@ -49,14 +49,14 @@ def unreached(constraint: ToolConstraint, start: Array | None = None) -> TaskErr
     )
 
 
-def not_closing(constraint: ToolConstraint, trail: Trail) -> TaskError:
+def closing_error(constraint: ToolConstraint, trail: Trail) -> TaskError:
     """Return the error for a trail round a closed curve that does not come back to its beginning."""
     robot, change = constraint.tool.robot, trail.q[-1] - trail.q[0]
     i = int(np.argmax(np.abs(change)))
     return TaskError(
         f"{_tool(constraint)} follows the closed curve, but at {place(constraint, trail.s[-1])}, one lap on, "
         f"{robot.joint_names[i]} is {change[i]:+.6g} {robot.position_units[i]} from where it began, so the path of the "
-        f"joints does not close; closed=False makes one lap an open path{_also_freedom(constraint)}",
+        f"joints does not close; closed=False makes one lap an open path{_advise_freedom(constraint)}",
         joint=robot.joint_names[i],
         value=float(change[i]),
         s=float(trail.s[-1]),
@@ -101,7 +101,7 @@ def _limit(constraint: ToolConstraint, beyond: Array) -> str:
     i, side, value = _passed_limit(robot, beyond)
     return (
         f"there {robot.joint_names[i]} is at its {side} limit, {value:.6g} {robot.position_units[i]}; give another "
-        f"start posture or move the curve{_also_freedom(constraint)}"
+        f"start posture or move the curve{_advise_freedom(constraint)}"
     )
 
 
@@ -119,11 +119,11 @@ def _stuck(constraint: ToolConstraint, trail: Trail) -> str:
     return (
         f"there the arm comes to a singularity (smallest singular value {values[rank - 1]:.1e}), in which "
         f"{' and '.join(joints)} can move without moving the tool; give another start posture, or move or tilt the "
-        f"curve{_also_freedom(constraint)}"
+        f"curve{_advise_freedom(constraint)}"
     )
 
 
-def _also_freedom(constraint: ToolConstraint) -> str:
+def _advise_freedom(constraint: ToolConstraint) -> str:
     """Return advice for tools whose rotation is fully prescribed."""
     free = "; or leave the rotation about the tool axis free (NormalOrientation without reference)"
     return free if constraint.orientation.rows == 3 else ""
@@ -150,14 +150,14 @@ def _gap(constraint: ToolConstraint, seeds: Array, s: float) -> str:
         position, _ = _miss(replace(constraint, orientation=FreeOrientation()), seeds, s)
         if np.linalg.norm(position) <= constraint.tolerance[0]:
             return (
-                f"{text}, but the position alone is in reach: {_unfrozen(constraint)}turn the tool, leave its "
+                f"{text}, but the position alone is in reach: {_advise_frozen(constraint)}turn the tool, leave its "
                 "orientation (partly) free, or move the curve"
             )
     x, y, z = np.where(np.abs(position) > _NOTHING * np.linalg.norm(position), position, 0.0)
-    return f"{text}; {_unfrozen(constraint)}move the curve by ({x:.3g}, {y:.3g}, {z:.3g}) m there, or more"
+    return f"{text}; {_advise_frozen(constraint)}move the curve by ({x:.3g}, {y:.3g}, {z:.3g}) m there, or more"
 
 
-def _unfrozen(constraint: ToolConstraint) -> str:
+def _advise_frozen(constraint: ToolConstraint) -> str:
     """Return advice for arms with joints that have no room to move."""
     robot = constraint.tool.robot
     held = [

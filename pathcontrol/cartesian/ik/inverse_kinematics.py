@@ -13,7 +13,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.continuation import Stop, follow, verdicts
 from pathcontrol.cartesian.ik.correction import branch_at, correct
-from pathcontrol.cartesian.ik.failure import refusal
+from pathcontrol.cartesian.ik.failure import trail_error
 from pathcontrol.cartesian.ik.redundancy import PostureCost
 
 _NEAR = 0.2  # rad, largest correction of an interpolated posture; more may be another branch
@@ -76,5 +76,5 @@ class InverseKinematics:
         before = int(np.searchsorted(known.s, s)) - 1
         trail = follow(self.constraint, known.q[before][None], float(known.s[before]), float(s), self.rest)[0]
         if trail.stop is not Stop.NONE:
-            raise refusal(self.constraint, trail)
+            raise trail_error(self.constraint, trail)
         return known.with_more(np.array(trail.s[1:]), np.array(trail.q[1:]))

@@ -32,14 +32,14 @@ def one_turn(robot: RobotModel) -> tuple[Array, Array]:
     return np.maximum(lower, middle - np.pi), np.minimum(upper, middle + np.pi)
 
 
-def unwound(robot: RobotModel, q: Array) -> Array:
+def unwind(robot: RobotModel, q: Array) -> Array:
     """Return the same postures q (N, n) without whole turns, where the limits allow a turn and more."""
     lower, upper = one_turn(robot)
     turns = (np.array(robot.position_units) == "rad") & (upper - lower > 2 * np.pi - 1e-9)
     return np.where(turns, lower + np.mod(q - lower, 2 * np.pi), q)
 
 
-def outside(robot: RobotModel, q: Array) -> Array:
+def is_outside(robot: RobotModel, q: Array) -> Array:
     """Return whether a joint of postures q (*batch, n) is outside its limits by more than rounding, (*batch,)."""
     return np.asarray((distance_to_limits(robot, q) < -_ROUNDING).any(-1))
 

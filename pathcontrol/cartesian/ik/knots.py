@@ -12,17 +12,17 @@ _GRADING = 3.0  # largest ratio of neighbouring intervals; interpolation by quin
 def first_mesh(knots: Array, longest: float) -> Array:
     """Return the knots of a curve, graded, with intervals of at most ``longest``."""
     pieces = np.maximum(1, np.ceil(np.diff(knots) / longest - 1e-9)).astype(int)
-    return graded(subdivided(knots, pieces))
+    return grade(subdivide(knots, pieces))
 
 
-def subdivided(mesh: Array, pieces: Array) -> Array:
+def subdivide(mesh: Array, pieces: Array) -> Array:
     """Cut each interval of a mesh (K,) into equal ``pieces`` (K − 1,)."""
     left, step = np.repeat(mesh[:-1], pieces), np.repeat(np.diff(mesh) / pieces, pieces)
     rank = np.arange(len(left)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     return np.append(left + rank * step, mesh[-1])
 
 
-def graded(mesh: Array) -> Array:
+def grade(mesh: Array) -> Array:
     """Halve intervals of a mesh until none is much longer than its neighbour."""
     while True:
         steps = np.diff(mesh)
@@ -30,9 +30,9 @@ def graded(mesh: Array) -> Array:
         coarse = steps > _GRADING * beside
         if not coarse.any():
             return mesh
-        mesh = subdivided(mesh, 1 + coarse)
+        mesh = subdivide(mesh, 1 + coarse)
 
 
-def between(mesh: Array, fractions: Array) -> Array:
+def points_between(mesh: Array, fractions: Array) -> Array:
     """Return the points at ``fractions`` (k,) of each interval, (K − 1, k)."""
     return mesh[:-1, None] + np.diff(mesh)[:, None] * fractions

@@ -10,7 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.joint_range import distance_to_limits
-from pathcontrol.cartesian.ik.preference import PLANE, lowest
+from pathcontrol.cartesian.ik.preference import PLANE, find_lowest
 from pathcontrol.cartesian.ik.refinement import Refined
 from pathcontrol.cartesian.ik.spline_deviation import deviations
 
@@ -63,7 +63,7 @@ class CartesianReport:
     lowest_height: float
 
 
-def measured(constraint: ToolConstraint, refined: Refined, start_postures: int, searched: bool) -> CartesianReport:
+def measure(constraint: ToolConstraint, refined: Refined, start_postures: int, searched: bool) -> CartesianReport:
     """Measure a refined spline, whose start posture was ``searched`` or given."""
     robot, spline, found, s = constraint.tool.robot, refined.spline, refined.deviations, refined.checks
 
@@ -73,11 +73,11 @@ def measured(constraint: ToolConstraint, refined: Refined, start_postures: int, 
     def distance(s: Array) -> Array:
         return distance_to_limits(robot, spline(s)).min(-1)
 
-    singular_at = _lowest(conditioning, refined, found.conditioning)
-    limit_at = _lowest(distance, refined, distance(s))
+    singular_at = _search_least(conditioning, refined, found.conditioning)
+    limit_at = _search_least(distance, refined, distance(s))
     distances = distance_to_limits(robot, spline(limit_at))
     joint = int(np.argmin(distances))
-    lowest_joint, lowest_height = lowest(constraint, spline(s[:: -(-len(s) // _HEIGHTS)]))
+    lowest_joint, lowest_height = find_lowest(constraint, spline(s[:: -(-len(s) // _HEIGHTS)]))
     return CartesianReport(
         position_deviation=float(found.position.max()),
         angle_deviation=float(found.angle.max()),
@@ -107,7 +107,7 @@ def _posture(start_postures: int, searched: bool, lowest_joint: str, lowest_heig
     return f"{choice}, {lowest_joint} down to {-lowest_height:.3g} m below the base plane"
 
 
-def _lowest(function: Callable[[Array], Array], refined: Refined, values: Array) -> float:
+def _search_least(function: Callable[[Array], Array], refined: Refined, values: Array) -> float:
     """Return the least value of a function of s (N,), searched around the least of its ``values`` at the checks."""
     s, ends = refined.checks, (refined.mesh[0], refined.mesh[-1])
     padded = np.concatenate([[np.inf], values, [np.inf]])

@@ -20,7 +20,7 @@ def heights(constraint: ToolConstraint, q: Array) -> Array:
     return constraint.tool.robot.frame_poses(q, _movers(constraint))[..., 2, 3]
 
 
-def lowest(constraint: ToolConstraint, q: Array) -> tuple[str, float]:
+def find_lowest(constraint: ToolConstraint, q: Array) -> tuple[str, float]:
     """Return the joint that comes lowest in postures q (N, n), and its height above the base plane [m]."""
     least = heights(constraint, q).min(0)
     return _movers(constraint)[int(np.argmin(least))], float(least.min())
@@ -31,13 +31,13 @@ def above_base(constraint: ToolConstraint, q: Array) -> Array:
     return np.asarray((heights(constraint, q) >= -PLANE).all(-1))
 
 
-def by_preference(constraint: ToolConstraint, trails: Sequence[Trail]) -> list[Trail]:
+def sort_by_preference(constraint: ToolConstraint, trails: Sequence[Trail]) -> list[Trail]:
     """Return the trails, the preferred first.
 
     Those that stay above the base plane come before others; then those at least half as comfortable as the best, the
     higher their joints on average the sooner; then the others by comfort.
     """
-    height = [heights(constraint, _some(trail)) for trail in trails]
+    height = [heights(constraint, _sample(trail)) for trail in trails]
     above = np.array([(h >= -PLANE).all() for h in height], dtype=bool)
     comfort = np.array([trail.comfort for trail in trails])
     best = np.array([comfort[above == side].max() for side in above])
@@ -53,7 +53,7 @@ def _movers(constraint: ToolConstraint) -> list[str]:
     return [name for name, moves in zip(names, constraint.moving, strict=True) if moves]
 
 
-def _some(trail: Trail) -> Array:
+def _sample(trail: Trail) -> Array:
     """Return postures of a trail from its beginning to its end, (k, n)."""
     chosen = np.unique(np.linspace(0, len(trail.q) - 1, _SAMPLES).astype(int))
     return np.array(trail.q)[chosen]

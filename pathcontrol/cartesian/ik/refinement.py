@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.failure import place
 from pathcontrol.cartesian.ik.inverse_kinematics import InverseKinematics, Samples
-from pathcontrol.cartesian.ik.knots import between, first_mesh, graded, subdivided
+from pathcontrol.cartesian.ik.knots import first_mesh, grade, points_between, subdivide
 from pathcontrol.cartesian.ik.spline_deviation import VELOCITY, Deviations, deviations
 from pathcontrol.errors import TaskError
 
@@ -66,7 +66,7 @@ def refine(kinematics: InverseKinematics, known: Samples, closed: bool) -> Refin
             if (worst <= 1).all():
                 return Refined(spline, mesh, rounds, checks, found)
         _refuse_endless(constraint, mesh, worst)
-        mesh, rounds = graded(subdivided(mesh, np.select([worst > _QUARTER, worst > 1], [4, 2], 1))), rounds + 1
+        mesh, rounds = grade(subdivide(mesh, np.select([worst > _QUARTER, worst > 1], [4, 2], 1))), rounds + 1
 
 
 def _interpolant(known: Samples, closed: bool) -> BSpline:
@@ -80,7 +80,7 @@ def _worst(
     constraint: ToolConstraint, spline: BSpline, mesh: Array, fractions: Array
 ) -> tuple[Array, Array, Deviations]:
     """Return the largest deviation of each interval as a multiple of what is allowed, its place, and all deviations."""
-    s = between(mesh, fractions)
+    s = points_between(mesh, fractions)
     found = deviations(constraint, spline, s.ravel())
     position, angle = constraint.tolerance
     excess = np.maximum.reduce([found.position / position, found.angle / angle, found.velocity / VELOCITY])

@@ -7,17 +7,17 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
 from pathcontrol._arrays import Array, finite, joint_array
-from pathcontrol.cartesian.ik.closing import closed_lap
+from pathcontrol.cartesian.ik.closing import close_lap
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.continuation import SINGULAR, Stop, Trail, follow
-from pathcontrol.cartesian.ik.failure import not_closing, refusal
+from pathcontrol.cartesian.ik.failure import closing_error, trail_error
 from pathcontrol.cartesian.ik.inverse_kinematics import InverseKinematics, Samples
-from pathcontrol.cartesian.ik.joint_range import distance_to_limits, outside
-from pathcontrol.cartesian.ik.path_report import CartesianReport, measured
-from pathcontrol.cartesian.ik.preference import by_preference
+from pathcontrol.cartesian.ik.joint_range import distance_to_limits, is_outside
+from pathcontrol.cartesian.ik.path_report import CartesianReport, measure
+from pathcontrol.cartesian.ik.preference import sort_by_preference
 from pathcontrol.cartesian.ik.redundancy import rest_curve
 from pathcontrol.cartesian.ik.refinement import Refined, refine
-from pathcontrol.cartesian.ik.start_posture import moved_start, rewound_starts, search_starts
+from pathcontrol.cartesian.ik.start_posture import move_start, rewind_starts, search_starts
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 
@@ -30,38 +30,38 @@ def solve(constraint: ToolConstraint, start: Array | None, closed: bool) -> tupl
     Raises:
         TaskError: the curve cannot be followed, or a closed path does not close.
     """
-    trails = _searched(constraint) if start is None else _followed(constraint, moved_start(constraint, start))
-    lap = _best(constraint, trails, closed)
+    trails = _search_trails(constraint) if start is None else _follow(constraint, move_start(constraint, start))
+    lap = _choose_trail(constraint, trails, closed)
     kinematics = InverseKinematics(constraint, rest_curve(lap.s, lap.q, closed))
     refined = refine(kinematics, lap, closed)
-    report = measured(constraint, refined, len(trails), searched=start is None)
+    report = measure(constraint, refined, len(trails), searched=start is None)
     _check_between(constraint, refined, report)
     return refined.spline, report
 
 
-def _searched(constraint: ToolConstraint) -> list[Trail]:
+def _search_trails(constraint: ToolConstraint) -> list[Trail]:
     """Return trails from searched start postures, a whole turn back where none gets along otherwise."""
-    latest = _followed(constraint, search_starts(constraint))
+    latest = _follow(constraint, search_starts(constraint))
     trails = list(latest)
     for _ in range(_REWINDS):
-        starts = rewound_starts(constraint, latest)
+        starts = rewind_starts(constraint, latest)
         if any(trail.stop is Stop.NONE for trail in trails) or not len(starts):
             break
-        latest = _followed(constraint, starts)
+        latest = _follow(constraint, starts)
         trails += latest
     return trails
 
 
-def _followed(constraint: ToolConstraint, starts: Array) -> list[Trail]:
+def _follow(constraint: ToolConstraint, starts: Array) -> list[Trail]:
     return follow(constraint, starts, constraint.curve.s0, constraint.curve.s_end)
 
 
-def posture(robot: RobotModel, start: ArrayLike) -> Array:
+def check_posture(robot: RobotModel, start: ArrayLike) -> Array:
     """Check that ``start`` is a posture (n,) within the joint limits."""
     q = finite("start", joint_array("start", start, robot.n, robot.joint_names))
     if q.shape != (robot.n,):
         raise InputError(f"start has shape {q.shape}, expected one posture ({robot.n},)")
-    if outside(robot, q):
+    if is_outside(robot, q):
         i = int(np.argmin(distance_to_limits(robot, q)))
         low, high = robot.limits.lower[i], robot.limits.upper[i]
         raise InputError(
@@ -74,22 +74,22 @@ def posture(robot: RobotModel, start: ArrayLike) -> Array:
     return np.clip(q, robot.limits.lower, robot.limits.upper)
 
 
-def _best(constraint: ToolConstraint, trails: list[Trail], closed: bool) -> Samples:
+def _choose_trail(constraint: ToolConstraint, trails: list[Trail], closed: bool) -> Samples:
     """Return the preferred trail of those that go all the way, and come back if they have to."""
     complete = [trail for trail in trails if trail.stop is Stop.NONE]
-    for trail in by_preference(constraint, complete):
+    for trail in sort_by_preference(constraint, complete):
         s, q = np.array(trail.s), np.array(trail.q)
-        lap = closed_lap(constraint, s, q) if closed else q
+        lap = close_lap(constraint, s, q) if closed else q
         if lap is not None:
             return Samples(s, lap)
     if complete:
-        raise not_closing(constraint, complete[0])
-    raise refusal(constraint, max(trails, key=lambda trail: trail.s[-1]), len(trails))
+        raise closing_error(constraint, complete[0])
+    raise trail_error(constraint, max(trails, key=lambda trail: trail.s[-1]), len(trails))
 
 
 def _check_between(constraint: ToolConstraint, refined: Refined, report: CartesianReport) -> None:
     """Check limits and singularities between the knots, where Newton's method has not been."""
-    if outside(constraint.tool.robot, refined.spline(report.limit_at)):
+    if is_outside(constraint.tool.robot, refined.spline(report.limit_at)):
         raise _refused_at(constraint, refined, report.limit_at, Stop.LIMIT)
     if report.smallest_singular_value < SINGULAR:
         raise _refused_at(constraint, refined, report.singular_at, Stop.SINGULAR)
@@ -97,4 +97,4 @@ def _check_between(constraint: ToolConstraint, refined: Refined, report: Cartesi
 
 def _refused_at(constraint: ToolConstraint, refined: Refined, s: float, stop: Stop) -> Exception:
     q = refined.spline(s)
-    return refusal(constraint, Trail([s], [q], stop=stop, beyond=q))
+    return trail_error(constraint, Trail([s], [q], stop=stop, beyond=q))

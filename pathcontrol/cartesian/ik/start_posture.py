@@ -8,8 +8,8 @@ from pathcontrol._arrays import Array
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.continuation import Stop, Trail, comforts, verdicts
 from pathcontrol.cartesian.ik.correction import KEPT, Corrected, correct
-from pathcontrol.cartesian.ik.failure import refusal, unreached
-from pathcontrol.cartesian.ik.joint_range import distance_to_limits, unwound
+from pathcontrol.cartesian.ik.failure import first_point_error, trail_error
+from pathcontrol.cartesian.ik.joint_range import distance_to_limits, unwind
 from pathcontrol.cartesian.ik.nearest_posture import reach
 from pathcontrol.cartesian.ik.preference import above_base
 from pathcontrol.cartesian.ik.redundancy import PostureCost
@@ -31,17 +31,17 @@ def search_starts(constraint: ToolConstraint) -> Array:
     Raises:
         TaskError: the first point was not reached from any of them, or only where the arm is singular.
     """
-    reached = _reached(constraint, constraint.seeds(_SEEDS))
-    found = _placed(constraint, unwound(constraint.tool.robot, reached))
+    reached = _approach(constraint, constraint.seeds(_SEEDS))
+    found = _correct_nearby(constraint, unwind(constraint.tool.robot, reached))
     stops = verdicts(constraint, found)
     fit = stops == Stop.NONE
     if not fit.any():
         raise _no_start(constraint, found)
     comfort = comforts(constraint, found) * np.where(above_base(constraint, found.q), 1.0, _BELOW)
-    return found.q[_comfortable_and_different(found.q, np.where(fit, comfort, 0.0))]
+    return found.q[_select_diverse(found.q, np.where(fit, comfort, 0.0))]
 
 
-def rewound_starts(constraint: ToolConstraint, trails: list[Trail]) -> Array:
+def rewind_starts(constraint: ToolConstraint, trails: list[Trail]) -> Array:
     """Return the starts (N, n) of trails that met a joint limit, with that joint a whole turn back if possible."""
     robot, starts = constraint.tool.robot, []
     for trail in trails:
@@ -59,37 +59,37 @@ def _no_start(constraint: ToolConstraint, found: Corrected, start: Array | None 
     s = np.full(len(found.q), constraint.curve.s0)
     there = np.flatnonzero(constraint.excess(constraint.at(found.q, s)[0]) <= KEPT)
     if not there.size:
-        return unreached(constraint, start)
-    return refusal(constraint, Trail([constraint.curve.s0], [found.q[there[0]]], stop=Stop.SINGULAR))
+        return first_point_error(constraint, start)
+    return trail_error(constraint, Trail([constraint.curve.s0], [found.q[there[0]]], stop=Stop.SINGULAR))
 
 
-def moved_start(constraint: ToolConstraint, start: Array) -> Array:
+def move_start(constraint: ToolConstraint, start: Array) -> Array:
     """Return the posture ``start`` (n,) moved onto the first point, (1, n).
 
     Raises:
         TaskError: it does not get there, or is singular.
     """
-    found = _placed(constraint, _reached(constraint, start[None]))
+    found = _correct_nearby(constraint, _approach(constraint, start[None]))
     stop = Stop(verdicts(constraint, found)[0])
     if stop is Stop.LOST:
         raise _no_start(constraint, found, start)
     if stop is not Stop.NONE:
-        raise refusal(constraint, Trail([constraint.curve.s0], [found.q[0]], stop=stop, beyond=found.q[0]))
+        raise trail_error(constraint, Trail([constraint.curve.s0], [found.q[0]], stop=stop, beyond=found.q[0]))
     return found.q
 
 
-def _reached(constraint: ToolConstraint, q: Array) -> Array:
+def _approach(constraint: ToolConstraint, q: Array) -> Array:
     """Return postures q (N, n) moved as near to the first point as possible."""
     return reach(constraint, q, np.full(len(q), constraint.curve.s0))
 
 
-def _placed(constraint: ToolConstraint, q: Array) -> Corrected:
+def _correct_nearby(constraint: ToolConstraint, q: Array) -> Corrected:
     """Correct postures q (N, n) that are nearly on the first point to be exactly on it."""
     cost = PostureCost.nearest(q, constraint.tool.robot.limits)
     return correct(constraint, cost, q, np.full(len(q), constraint.curve.s0))
 
 
-def _comfortable_and_different(q: Array, comfort: Array) -> list[int]:
+def _select_diverse(q: Array, comfort: Array) -> list[int]:
     """Return indices of postures (N, n), each the best by comfort times distance to those before it."""
     chosen: list[int] = []
     worth = comfort.copy()

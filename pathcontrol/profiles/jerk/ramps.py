@@ -46,14 +46,14 @@ class Course(NamedTuple):
     def ramps(self, rise: Callable[[Any], Curve], fall: Callable[[Any], Curve]) -> tuple[Ramp, Ramp]:
         """Return the first and the last ramp, up to the profile's speed, or on a short path up to where they meet."""
         total = self.distance(self.s[-1])
-        first = self._meeting(self.s, self.distance, rise)
-        last = self._meeting(self.s[::-1], lambda s: total - self.distance(s), fall)
+        first = self._meeting_speed(self.s, self.distance, rise)
+        last = self._meeting_speed(self.s[::-1], lambda s: total - self.distance(s), fall)
         highest = np.inf
         if rise(first).length + fall(last).length > total:
-            highest = _root(lambda v: rise(v).length + fall(v).length - total)
+            highest = _find_root(lambda v: rise(v).length + fall(v).length - total)
         return _ramp(rise, first, highest), _ramp(fall, last, highest)
 
-    def _meeting(self, s: Array, distance: Callable[[Array], Array], curve: Callable[[Any], Curve]) -> float:
+    def _meeting_speed(self, s: Array, distance: Callable[[Array], Array], curve: Callable[[Any], Curve]) -> float:
         """Return the profile's speed where a ramp up to it first fits into the distance; ``inf`` if nowhere."""
 
         def spare(s: Array) -> Array:
@@ -71,7 +71,7 @@ def _ramp(curve: Callable[[Any], Curve], speed: float, highest: float) -> Ramp:
     return Ramp(met, float(met.length) if speed <= highest else np.inf)
 
 
-def _root(function: Callable[[Any], Array]) -> float:
+def _find_root(function: Callable[[Any], Array]) -> float:
     """Return the root of an increasing function of a speed."""
     most = 1.0
     while function(np.asarray(most)) < 0:

@@ -26,7 +26,7 @@ class Demands:
         self, path: Path, limits: Sequence[MotionLimit], velocity: ArrayLike | None, start_rate: float | None
     ) -> None:
         self.path, self.limits = path, limits
-        self.velocity = _checked_velocity(velocity, path.dq_d(np.asarray(path.s0)).shape[-1])
+        self.velocity = _check_velocity(velocity, path.dq_d(np.asarray(path.s0)).shape[-1])
         self.first, self.last = np.inf, np.inf
         if path.period is None:
             first = self._rate_after(_START, path.s0)
@@ -60,7 +60,7 @@ class Demands:
             return min((float(limit.largest * time / limit.length[0, 0]) for limit in limits), default=np.inf)
 
 
-def _checked_velocity(velocity: ArrayLike | None, n: int) -> Array:
+def _check_velocity(velocity: ArrayLike | None, n: int) -> Array:
     """Check the velocity limits of the joints, (n,); ``inf`` for none."""
     fastest = joint_array("velocity", np.full(n, np.inf) if velocity is None else velocity, n)
     if not (fastest > 0).all():

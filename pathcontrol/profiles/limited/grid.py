@@ -37,7 +37,7 @@ def quarters(edges: Array) -> Array:
     return edges[:-1, None] + np.diff(edges)[:, None] * _SHARES
 
 
-def refined(resolved: Callable[[Array], NDArray[np.bool_]], edges: Array) -> Array:
+def refine(resolved: Callable[[Array], NDArray[np.bool_]], edges: Array) -> Array:
     """Halve cells, at most 12 times, until their points (cells, 5) are ``resolved``; return all edges."""
     left, right, kept = edges[:-1], edges[1:], []
     for _ in range(_HALVINGS):
@@ -48,25 +48,25 @@ def refined(resolved: Callable[[Array], NDArray[np.bool_]], edges: Array) -> Arr
     return np.append(np.sort(np.concatenate([*kept, left])), edges[-1])
 
 
-def below(values: Array) -> Array:
+def keep_below(values: Array) -> Array:
     """Return values at the edges, (cells + 1,), not above a function known at the ``quarters`` (cells, 5).
 
     They are lowered where a chord would exceed the function at a quarter.
     """
-    cells = _without_peaks(values)
+    cells = _cut_peaks(values)
     cells = cells / np.maximum(excess(values), 1.0)[:, None]
     return np.minimum(np.append(cells[:, 0], np.inf), np.append(np.inf, cells[:, -1]))
 
 
 def excess(values: Array) -> Array:
     """Return the largest ratio of the chord between the ends to the ``values`` (cells, 5), (cells,)."""
-    values = _without_peaks(values)
+    values = _cut_peaks(values)
     with np.errstate(invalid="ignore"):
         chord = values[:, :1] + (values[:, -1:] - values[:, :1]) * _SHARES
         # an end is infinite only where all is
         return np.where(np.isfinite(chord), chord / values, 1.0).max(-1)
 
 
-def _without_peaks(values: Array) -> Array:
+def _cut_peaks(values: Array) -> Array:
     """Lower ends far above the values inside, so that no lone peak lowers the other end of its cell."""
     return np.minimum(values, _PEAK * values[:, 1:-1].min(-1, keepdims=True))

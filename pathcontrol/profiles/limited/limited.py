@@ -12,10 +12,10 @@ from pathcontrol._expect import expect
 from pathcontrol.arguments import Form, Rate, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.limited.demands import Demands
-from pathcontrol.profiles.limited.grid import below, edges, quarters, refined
+from pathcontrol.profiles.limited.grid import edges, keep_below, quarters, refine
 from pathcontrol.profiles.limited.motion_limit import MotionLimit
 from pathcontrol.profiles.limited.tangential import all_steps
-from pathcontrol.profiles.limited.two_pass import largest
+from pathcontrol.profiles.limited.two_pass import largest_sequence
 from pathcontrol.profiles.motion import JointMotion, ToolMotion
 from pathcontrol.profiles.tabulated import TabulatedProfile
 from pathcontrol.profiles.topp.joint_limits import VelocityLimit, joint_values
@@ -59,9 +59,9 @@ def limited(
         expect(f"limits[{i}]", limit, MotionLimit)
     cells = edges(path, int(scalar("points", points, least=1)))
     demands = Demands(path, limits, velocity, start_rate)
-    s = refined(demands.resolved, cells)
+    s = refine(demands.resolved, cells)
     ceiling, tangential = demands.at(quarters(s))
-    squared = largest(below(ceiling), *all_steps(tangential, len(s) - 1), closed=path.period is not None)
+    squared = largest_sequence(keep_below(ceiling), *all_steps(tangential, len(s) - 1), closed=path.period is not None)
     if not np.isfinite(squared).all():
         raise InputError(f"nothing limits the speed at s = {s[np.argmax(squared)]:g}; give a MotionLimit with a speed")
     return TabulatedProfile(s, squared, path.period)

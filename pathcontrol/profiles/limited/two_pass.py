@@ -18,7 +18,7 @@ class Lines(NamedTuple):
     offset: Array
 
 
-def largest(ceiling: Array, up: Lines, down: Lines, closed: bool) -> Array:
+def largest_sequence(ceiling: Array, up: Lines, down: Lines, closed: bool) -> Array:
     """Return the largest x ≤ ``ceiling`` (m,) with x_{i+1} ≤ up_i(x_i) and x_i ≤ down_i(x_{i+1}) for all lines and i.
 
     If two sequences keep the bounds, so does their element-wise maximum; hence there is one largest sequence. The
@@ -46,18 +46,18 @@ def _reachable(up: Lines, down: Lines) -> Array:
 
 def _sweep(ceiling: Array, lines: Lines, closed: bool) -> Array:
     """Sweep once, or round a closed path until the values repeat."""
-    values = _one_sweep(ceiling, lines)
+    values = _sweep_once(ceiling, lines)
     for _ in range(_MAX_LAPS):
         if not closed or values[-1] >= (1 - 1e-12) * values[0]:
             break
         ceiling = np.concatenate([values[-1:], ceiling[1:-1], values[-1:]])
-        values = _one_sweep(ceiling, lines)
+        values = _sweep_once(ceiling, lines)
     if closed:
         values[0] = values[-1]
     return values
 
 
-def _one_sweep(ceiling: Array, lines: Lines) -> Array:
+def _sweep_once(ceiling: Array, lines: Lines) -> Array:
     """Sweep once, in plain floats: a loop over arrays of one or two lines would take ten times as long."""
     x, *ceilings = ceiling.tolist()
     values = [x]

@@ -21,7 +21,7 @@ class Binding(NamedTuple):
     shares: Array
 
 
-def binding(limits: JointLimits, samples: Samples, cells: Cells, x: Array) -> Binding:
+def find_binding(limits: JointLimits, samples: Samples, cells: Cells, x: Array) -> Binding:
     """Return the most used limit at each knot, on either side of it, for ṡ² = x (N + 1,)."""
     used, m = cells.used(x), len(limits.rows)
     knots = np.full((len(x), m + len(limits.velocity)), -np.inf)
@@ -33,7 +33,7 @@ def binding(limits: JointLimits, samples: Samples, cells: Cells, x: Array) -> Bi
     return Binding(np.array(kinds)[row], np.array(joints)[row], np.take_along_axis(knots, row[:, None], -1)[:, 0])
 
 
-def refuse_static_overload(limits: JointLimits, samples: Samples, torques: Torques) -> None:
+def check_static_load(limits: JointLimits, samples: Samples, torques: Torques) -> None:
     """Check that the arm can pass every posture of the path slowly.
 
     Raises:
@@ -56,7 +56,7 @@ def refuse_static_overload(limits: JointLimits, samples: Samples, torques: Torqu
     )
 
 
-def refuse_rate(limits: JointLimits, samples: Samples, cells: Cells, name: str, rate: float | None, x: Array) -> None:
+def check_rate(limits: JointLimits, samples: Samples, cells: Cells, name: str, rate: float | None, x: Array) -> None:
     """Check that the ``rate`` [1/s] at an end of the path is not above that of the profile x, (N + 1,).
 
     Raises:
@@ -65,7 +65,7 @@ def refuse_rate(limits: JointLimits, samples: Samples, cells: Cells, name: str, 
     knot = 0 if name == "start_rate" else -1
     if rate is None or rate**2 <= x[knot] * (1 + 1e-9):
         return
-    used = binding(limits, samples, cells, x)
+    used = find_binding(limits, samples, cells, x)
     limit = limits.text(str(used.kinds[knot]), int(used.joints[knot]))
     raise TaskError(
         f"{name} = {rate:g} 1/s is too fast: at s = {samples.s[knot]:.6g}, posture {_text(samples.q[knot])}, the arm "

@@ -47,7 +47,7 @@ def steps_of(cells: Cells, most: Array, scale: Array) -> Steps:
     return Steps(np.concatenate([D, z], -1), B, most)
 
 
-def swept(steps: Steps, start: float, ceiling: Array) -> Array:
+def sweep(steps: Steps, start: float, ceiling: Array) -> Array:
     """Return the largest x ≤ ``ceiling`` (N,) from ``start`` on, each the x' of the next cell, (N + 1,)."""
     x, values, powers, rows = start, [start], np.ones(3), steps.B.shape[-1]
     both, zero = np.empty(2 * rows), np.zeros(rows)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.profiles.topp.cells import Cells
-from pathcontrol.profiles.topp.one_pass import steps_of, swept
+from pathcontrol.profiles.topp.one_pass import steps_of, sweep
 
 _FIRST_INSTANT = 2.5e-3  # s
 _LAPS = 100
@@ -31,47 +31,47 @@ class Allowed(NamedTuple):
     enter: Array
 
 
-def across(allowed: Allowed, widths: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
+def traverse_open(allowed: Allowed, widths: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
     """Return the largest ṡ² at the knots of an open path from which its end can be reached, and the fastest, (N + 1,).
 
     ``start`` and ``end`` are the rates ṡ [1/s] at the ends; ``None`` for what the arm reaches from rest in a first
     instant, 2.5 ms, of the acceleration it is then capable of.
     """
     cells = allowed.cells
-    last = _from_rest(cells.some(-1), widths[-1]) if end is None else end
-    largest = _backwards(allowed, min(last**2, allowed.leave[-1]))
-    first = _from_rest(cells.swapped().some(0), widths[0]) if start is None else start
-    return largest, _forwards(allowed, largest, min(first**2, largest[0]))
+    last = _rate_from_rest(cells.some(-1), widths[-1]) if end is None else end
+    largest = _sweep_backwards(allowed, min(last**2, allowed.leave[-1]))
+    first = _rate_from_rest(cells.swapped().some(0), widths[0]) if start is None else start
+    return largest, _sweep_forwards(allowed, largest, min(first**2, largest[0]))
 
 
-def around(allowed: Allowed) -> Array:
+def traverse_closed(allowed: Allowed) -> Array:
     """Return ṡ² at the knots of the fastest periodic traversal of a closed path, (N + 1,)."""
-    largest = _repeated(lambda x: _backwards(allowed, x)[::-1], allowed.leave[-1])[::-1]
-    fastest = _repeated(lambda x: _forwards(allowed, largest, x), largest[0])
+    largest = _repeat_laps(lambda x: _sweep_backwards(allowed, x)[::-1], allowed.leave[-1])[::-1]
+    fastest = _repeat_laps(lambda x: _sweep_forwards(allowed, largest, x), largest[0])
     fastest[0] = fastest[-1]
     return fastest
 
 
-def _from_rest(cell: Cells, width: float) -> float:
+def _rate_from_rest(cell: Cells, width: float) -> float:
     """Return the ṡ [1/s] that the arm reaches from rest in a first instant, in one cell of ``width`` Δs."""
     A, C = cell.A[:-1], cell.C[:-1]  # without the row of velocity
     largest = np.where(A > 0, -C / A, np.inf).min(initial=np.inf)
     return float(largest) / (2 * width) * _FIRST_INSTANT
 
 
-def _backwards(allowed: Allowed, last: float) -> Array:
+def _sweep_backwards(allowed: Allowed, last: float) -> Array:
     """Return the largest ṡ² at the knots from which ``last`` can be reached."""
     cells, speed, leave, enter = allowed
-    return swept(steps_of(cells, leave, enter).reversed(), last, speed[-2::-1])[::-1]
+    return sweep(steps_of(cells, leave, enter).reversed(), last, speed[-2::-1])[::-1]
 
 
-def _forwards(allowed: Allowed, largest: Array, first: float) -> Array:
+def _sweep_forwards(allowed: Allowed, largest: Array, first: float) -> Array:
     """Return the fastest ṡ² at the knots that begins with ``first`` and stays below ``largest``."""
     scale = np.minimum(largest[1:], allowed.leave)
-    return swept(steps_of(allowed.cells.swapped(), largest[:-1], scale), first, largest[1:])
+    return sweep(steps_of(allowed.cells.swapped(), largest[:-1], scale), first, largest[1:])
 
 
-def _repeated(lap: Callable[[float], Array], first: float) -> Array:
+def _repeat_laps(lap: Callable[[float], Array], first: float) -> Array:
     """Repeat laps, each begun as the last one ended, until one ends as it began; they only become slower."""
     for _ in range(_LAPS):
         values = lap(first)

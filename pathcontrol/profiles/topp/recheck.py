@@ -36,7 +36,7 @@ class Excess(NamedTuple):
         return self.inside.any(-1) | self.ends.any(-1) | (self.velocity > 0)
 
 
-def excess(limits: JointLimits, samples: Samples, torques: Torques, cells: Cells, x: Array) -> Excess:
+def find_excess(limits: JointLimits, samples: Samples, torques: Torques, cells: Cells, x: Array) -> Excess:
     """Return the excess of ṡ² = x at the knots (N + 1,), by inverse dynamics at the samples."""
     rows, velocity = _inside(limits, samples, torques, x)
     first, last = np.split(cells.used(x)[:, :-1], 2, axis=-1)
@@ -49,7 +49,7 @@ def excess(limits: JointLimits, samples: Samples, torques: Torques, cells: Cells
     )
 
 
-def tightened(allowed: Allowed, cells: Cells, over: Excess, x: Array) -> Allowed:
+def tighten(allowed: Allowed, cells: Cells, over: Excess, x: Array) -> Allowed:
     """Tighten the constraints of cells where ṡ² = x is too much, but never so far that rest is not allowed."""
     slower = np.where(over.velocity > 0, (1 + over.velocity) ** -2, np.inf)
     speed = np.minimum(allowed.speed, x * np.minimum(np.append(slower, np.inf), np.append(np.inf, slower)))

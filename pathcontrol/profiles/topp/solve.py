@@ -8,14 +8,14 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
-from pathcontrol.profiles.topp.binding import Binding, binding, refuse_rate, refuse_static_overload
+from pathcontrol.profiles.topp.binding import Binding, check_rate, check_static_load, find_binding
 from pathcontrol.profiles.topp.cells import cells_of
 from pathcontrol.profiles.topp.dynamics import Samples, Torques
 from pathcontrol.profiles.topp.fastest_pair import fastest_pair
 from pathcontrol.profiles.topp.joint_limits import JointLimits
-from pathcontrol.profiles.topp.passes import Allowed, across, around
-from pathcontrol.profiles.topp.recheck import excess, tightened
-from pathcontrol.profiles.topp.velocity_limits import end_limit, endless_speed, refuse_endless, speed_limit
+from pathcontrol.profiles.topp.passes import Allowed, traverse_closed, traverse_open
+from pathcontrol.profiles.topp.recheck import find_excess, tighten
+from pathcontrol.profiles.topp.velocity_limits import check_bounded, end_limit, endless_speed, speed_limit
 
 _ROUNDS = 12
 
@@ -46,21 +46,21 @@ def fastest(demand: Demand) -> tuple[Array, Binding]:
         TaskError: the demand cannot be met; the message names the joint, the limit and s.
     """
     limits, samples, torques = demand.limits, demand.samples, demand.torques
-    refuse_static_overload(limits, samples, torques)
+    check_static_load(limits, samples, torques)
     endless = endless_speed(limits, samples, torques)
     speed = speed_limit(limits, samples, endless)
     if demand.end_time is not None:
         speed = np.minimum(speed, end_limit(samples, demand.end_time))
-    refuse_endless(samples, np.where(np.isinf(speed), speed, 0.0), endless)
+    check_bounded(samples, np.where(np.isinf(speed), speed, 0.0), endless)
     cells = cells_of(limits, samples, torques, speed)
     allowed = Allowed(cells, speed, *fastest_pair(cells, speed[1:]))
     for _ in range(_ROUNDS):
         x = _traversal(demand, allowed)
-        over = excess(limits, samples, torques, cells, x)
+        over = find_excess(limits, samples, torques, cells, x)
         if not over.cells.any():
-            refuse_endless(samples, x, endless)
-            return x, binding(limits, samples, cells, x)
-        allowed = tightened(allowed, cells, over, x)
+            check_bounded(samples, x, endless)
+            return x, find_binding(limits, samples, cells, x)
+        allowed = tighten(allowed, cells, over, x)
     where = samples.knots.s[over.cells.argmax()]
     raise TaskError(
         f"{len(x)} points do not resolve the path near s = {where:.6g}: limits are exceeded between them; give more",
@@ -71,8 +71,8 @@ def fastest(demand: Demand) -> tuple[Array, Binding]:
 def _traversal(demand: Demand, allowed: Allowed) -> Array:
     limits, samples, _, closed, start_rate, end_rate, end_time = demand
     if closed:
-        return around(allowed)
-    largest, x = across(allowed, samples.widths, start_rate, end_rate if end_time is None else np.inf)
-    refuse_rate(limits, samples, allowed.cells, "start_rate", start_rate, largest)
-    refuse_rate(limits, samples, allowed.cells, "end_rate", end_rate, x)
+        return traverse_closed(allowed)
+    largest, x = traverse_open(allowed, samples.widths, start_rate, end_rate if end_time is None else np.inf)
+    check_rate(limits, samples, allowed.cells, "start_rate", start_rate, largest)
+    check_rate(limits, samples, allowed.cells, "end_rate", end_rate, x)
     return x

@@ -29,7 +29,7 @@ def endless_speed(limits: JointLimits, samples: Samples, torques: Torques) -> fl
     return float(_ENDLESS * samples.widths.sum() / strength)
 
 
-def refuse_endless(samples: Samples, x: Array, endless: float) -> None:
+def check_bounded(samples: Samples, x: Array, endless: float) -> None:
     """Check that a limit bounds ṡ² everywhere.
 
     Raises:

@@ -48,10 +48,10 @@ class Columns:
         header = Header.of(rows)
         names = _names(rows, header, chosen, flat=flat)
         places = {name: k for k, name in enumerate(names) if name}
-        if (mistake := _mistake(names, places, flat=flat)) is not None:
+        if (mistake := _find_mistake(names, places, flat=flat)) is not None:
             there = reprlib.repr(" ".join(name.text for name in header.names) or " ".join(names))
             raise ToolpathError(f"line {header.line}: columns {there}, {mistake}", line=int(header.line))
-        _tell(_called(header, chosen), places, passed)
+        _note_unused(_name_columns(header, chosen), places, passed)
         rows.trim(header.width)
         return cls(places, header.width, header.unit(places))
 
@@ -67,7 +67,7 @@ class Columns:
         return unit or self.unit or "m"
 
 
-def checked_choice(chosen: Any) -> Chosen | None:
+def check_choice(chosen: Any) -> Chosen | None:
     """Check ``columns`` of a caller: names in order, or a place for each name; a text lists either.
 
     Raises:
@@ -75,7 +75,7 @@ def checked_choice(chosen: Any) -> Chosen | None:
     """
     if chosen is None:
         return None
-    given = _listed(chosen) if isinstance(chosen, str) else chosen
+    given = _split_names(chosen) if isinstance(chosen, str) else chosen
     if isinstance(given, Mapping) and given and all(isinstance(name, str) and Name.of(name).name for name in given):
         if all(isinstance(at, str) or (isinstance(at, int) and not isinstance(at, bool)) for at in given.values()):
             return {Name.of(name).name: at for name, at in given.items()}
@@ -88,7 +88,7 @@ def checked_choice(chosen: Any) -> Chosen | None:
     )
 
 
-def _listed(text: str) -> list[str] | dict[str, int | str]:
+def _split_names(text: str) -> list[str] | dict[str, int | str]:
     """Split ``x,y,z`` into names, ``x=0,y=Pos Y,z=2`` into places."""
     if "=" not in text:
         return [name for name in re.split(r"[,;\s]+", text) if name]
@@ -127,7 +127,7 @@ _UNNAMED = (
 )
 
 
-def _mistake(names: list[str], places: Mapping[str, int], *, flat: bool) -> str | None:
+def _find_mistake(names: list[str], places: Mapping[str, int], *, flat: bool) -> str | None:
     """Return the reason why columns form no points, or None."""
     once = len(places) == sum(map(bool, names))
     point = {"x", "y"} | (set() if flat else {"z"})
@@ -146,7 +146,7 @@ def _mistake(names: list[str], places: Mapping[str, int], *, flat: bool) -> str 
     )
 
 
-def _called(header: Header, chosen: Chosen | None) -> list[str]:
+def _name_columns(header: Header, chosen: Chosen | None) -> list[str]:
     """Return the name of each column: by the file, else by the caller, else by its number."""
     if header.names:
         return [name.text for name in header.names]
@@ -154,7 +154,7 @@ def _called(header: Header, chosen: Chosen | None) -> list[str]:
     return [said[k] if k < len(said) and said[k].strip("_- ") else str(k) for k in range(header.width)]
 
 
-def _tell(texts: Sequence[str], places: Mapping[str, int], passed: Passed) -> None:
+def _note_unused(texts: Sequence[str], places: Mapping[str, int], passed: Passed) -> None:
     """Note the columns that are passed over."""
     unread = [text for k, text in enumerate(texts) if k not in places.values()]
     if unread:

@@ -62,10 +62,10 @@ class Name(NamedTuple):
         plain = text.lower().replace(" ", "")
         if len(plain) > _LONGEST:
             return cls(text, "", None)
-        if name := _known(plain):
+        if name := _match_known(plain):
             return cls(text, name, None)
         found = _COLUMN.fullmatch(plain)
-        name = _known(found[1]) if found else ""
+        name = _match_known(found[1]) if found else ""
         unit = next(filter(None, found.groups()[1:]), None) if found else None
         unit = None if unit is None else _UNIT_ALIASES.get(unit, unit)
         if name in POINT:
@@ -80,7 +80,7 @@ class Name(NamedTuple):
         return self.text.lower().replace(" ", "")
 
 
-def _known(plain: str) -> str:
+def _match_known(plain: str) -> str:
     """Return the known name that a text is another spelling of, or an empty string."""
     if plain in KNOWN:
         return plain

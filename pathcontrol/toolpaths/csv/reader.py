@@ -11,7 +11,7 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Contour, Toolpath
-from pathcontrol.toolpaths.csv.columns import Columns, checked_choice
+from pathcontrol.toolpaths.csv.columns import Columns, check_choice
 from pathcontrol.toolpaths.csv.names import CONTOUR, UNITS, hint_of_unit
 from pathcontrol.toolpaths.csv.rows import Rows
 from pathcontrol.toolpaths.csv.table import Table, decimal_mark
@@ -65,7 +65,7 @@ def read_csv(
         InputError: an argument is none of these.
         ToolpathError: the file cannot be used; the message says in which line and why.
     """
-    passed, chosen = Passed(unknown), checked_choice(columns)
+    passed, chosen = Passed(unknown), check_choice(columns)
     _check_choice("unit", unit, [*UNITS])
     _check_choice("decimal", decimal, [".", ","])
     feed = None if feed is None else scalar("feed", feed, positive=True)
@@ -74,7 +74,7 @@ def read_csv(
     try:
         rows = Rows.of(lines, decimal)
         found = Columns.of(rows, chosen, passed, flat=z is not None)
-        unit = found.unit_with(unit) if unit or found.unit else _assumed(rows, passed)
+        unit = found.unit_with(unit) if unit or found.unit else _assume_metres(rows, passed)
         table = Table.of(rows, found, UNITS[unit], decimal or _decimal(rows, found, passed), z)
         contours = [_contour(table, first, end, feed) for first, end in table.parts]
     except ToolpathError as error:
@@ -89,7 +89,7 @@ def _check_choice(name: str, value: str | None, choices: list[str]) -> None:
         raise InputError(f"{name} = {value!r}, expected one of {', '.join(choices)}, or None")
 
 
-def _assumed(rows: Rows, passed: Passed) -> str:
+def _assume_metres(rows: Rows, passed: Passed) -> str:
     """Return metres, with a note if a comment hints at another unit."""
     for line, comment in rows.comments:
         if (word := hint_of_unit(comment)) is not None:
@@ -111,7 +111,7 @@ def _decimal(rows: Rows, columns: Columns, passed: Passed) -> str:
 def _contour(table: Table, first: int, end: int, feed: float | None) -> Contour:
     """Return the contour of the rows from ``first`` to before ``end``."""
     points = table.points[first:end]
-    kept = _distinct(points)
+    kept = _distinct_indices(points)
     if len(kept) < 2:
         raise ToolpathError(
             f"line {table.lines[first]}: the contour that begins here is one point, expected at least two that differ; "
@@ -129,7 +129,7 @@ def _contour(table: Table, first: int, end: int, feed: float | None) -> Contour:
     return Contour((Polyline(points[kept]),), closed, feed, name=name, normals=axes)
 
 
-def _distinct(points: Array) -> Array:
+def _distinct_indices(points: Array) -> Array:
     """Return the indices of the points that do not repeat the last one kept before them."""
     places, kept = points.tolist(), [0]
     for index, place in enumerate(places):

@@ -75,13 +75,13 @@ class Rows:
             return
         for row, text in enumerate(self.texts):
             if text.endswith(self.separator):
-                self.texts[row] = _trimmed(text, self.separator, width)
+                self.texts[row] = _trim(text, self.separator, width)
 
     def _separate(self, separator: str | None) -> None:
         """Split lines at a separator; quotes are replaced by another separator that is in no value."""
         self.separator, self.between = separator, SEPARATORS[separator]
         if any('"' in text for text in self.texts):
-            self.texts = [_unquoted(line, text, separator) for line, text in zip(self.lines, self.texts, strict=True)]
+            self.texts = [_unquote(line, text, separator) for line, text in zip(self.lines, self.texts, strict=True)]
             self.separator = _INSIDE
 
 
@@ -109,7 +109,7 @@ def _without_comment(content: str) -> str:
     return content.partition("#")[0].strip(" ")
 
 
-def _unquoted(line: int, text: str, separator: str | None) -> str:
+def _unquote(line: int, text: str, separator: str | None) -> str:
     """Return the values of a line with quotes, between unit separators."""
     if separator is None:
         values = [value.strip('"') for value in _QUOTED_OR_WORD.findall(text)]
@@ -121,7 +121,7 @@ def _unquoted(line: int, text: str, separator: str | None) -> str:
     return _INSIDE.join(value.strip().replace(_INSIDE, " ") for value in values)
 
 
-def _trimmed(text: str, separator: str, width: int) -> str:
+def _trim(text: str, separator: str, width: int) -> str:
     """Return the line without the empty values at its end beyond ``width``."""
     core, there = text.rstrip(separator + " "), text.count(separator)
     at_end, too_many = there - core.count(separator), there - (width - 1)

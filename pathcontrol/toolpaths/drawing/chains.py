@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.drawing.pieces import NOTHING, contour_of, distinct, ends_of
+from pathcontrol.toolpaths.drawing.pieces import NOTHING, contour_of, drop_repeated, ends_of
 from pathcontrol.toolpaths.passed import Passed
 from pathcontrol.toolpaths.segments.arc import Arc
 from pathcontrol.toolpaths.segments.base import Polyline, Segment
@@ -72,7 +72,7 @@ def checked_gap(gap: float | None) -> float | None:
     return gap
 
 
-def chained(strands: Sequence[Strand], gap: float | None, passed: Passed) -> list[Strand]:
+def chain_strands(strands: Sequence[Strand], gap: float | None, passed: Passed) -> list[Strand]:
     """Join the strands whose ends meet, each chain in the place and direction of its first strand.
 
     Ends meet if they lie within the gap of each other and of no third one. Where they do not coincide both are moved
@@ -98,11 +98,11 @@ def chained(strands: Sequence[Strand], gap: float | None, passed: Passed) -> lis
         else:
             done.append(strand)
     chains = [chain for layer in loose.values() for chain in _chains(layer, tolerance)]
-    _tell_gaps(chains, tolerance, passed)
+    _note_gaps(chains, tolerance, passed)
     return sorted([*done, *chains], key=lambda strand: strand.place)
 
 
-def _tell_gaps(chains: Sequence[Strand], tolerance: float, passed: Passed) -> None:
+def _note_gaps(chains: Sequence[Strand], tolerance: float, passed: Passed) -> None:
     """Note the gaps, up to 50 µm, that are left open, with the option that closes them."""
     layers: dict[str, list[Strand]] = {}
     for chain in chains:
@@ -149,9 +149,9 @@ def _chains(strands: Sequence[Strand], tolerance: float) -> list[Strand]:
         if not taken[first]:
             order, closed = _chain(meets, first)
             taken[[end // 2 for end in order]] = True
-            chain = [_entered(strands[end // 2], backwards=bool(end % 2)) for end in order]
+            chain = [_enter(strands[end // 2], backwards=bool(end % 2)) for end in order]
             name = strands[first].name + (f" + {len(chain) - 1}" if len(chain) > 1 else "")
-            chains.append(Strand(name, strands[first].layer, strands[first].place, _joined(chain, closed)))
+            chains.append(Strand(name, strands[first].layer, strands[first].place, _join(chain, closed)))
     return chains
 
 
@@ -192,20 +192,20 @@ def _follow(meets: Array, leaving: int) -> list[int]:
     return entered
 
 
-def _entered(strand: Strand, backwards: bool) -> list[Segment]:
+def _enter(strand: Strand, backwards: bool) -> list[Segment]:
     """Return the segments of a strand in the direction in which it is passed."""
     return [segment.reversed() for segment in reversed(strand.segments)] if backwards else list(strand.segments)
 
 
-def _joined(parts: list[list[Segment]], closed: bool) -> list[Segment]:
+def _join(parts: list[list[Segment]], closed: bool) -> list[Segment]:
     """Return the segments of a chain, with the ends that meet moved together."""
     for i in range(len(parts) if closed else len(parts) - 1):
         before, after = parts[i], parts[(i + 1) % len(parts)]
         end, start = ends_of(before[-1])[1], ends_of(after[0])[0]
         if np.linalg.norm(end - start) > NOTHING:
             middle = 0.5 * (end + start)
-            before[-1] = _shifted(before[-1], np.zeros(3), middle - end)
-            after[0] = _shifted(after[0], middle - start, np.zeros(3))
+            before[-1] = _shift(before[-1], np.zeros(3), middle - end)
+            after[0] = _shift(after[0], middle - start, np.zeros(3))
     return [segment for part in parts for segment in part]
 
 
@@ -222,13 +222,13 @@ def _frame(segment: Segment) -> Array:
     return segment.points
 
 
-def _shifted(segment: Segment, start: Array, end: Array) -> Segment:
+def _shift(segment: Segment, start: Array, end: Array) -> Segment:
     """Return the segment with its start and its end moved."""
     if isinstance(segment, Polyline):
         points = segment.points.copy()
         points[0] += start
         points[-1] += end
-        points = distinct(points)
+        points = drop_repeated(points)
         return Polyline(points) if len(points) > 1 else segment  # whose gap the contour then refuses by name
     if isinstance(segment, Arc):
         return replace(segment, center=segment.center + start, rise=segment.rise + end - start)

@@ -19,7 +19,7 @@ _OFFSET = 0.3127  # of a cell, so that round coordinates lie inside cells
 _MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
 
 
-def tell_doubled(contours: Sequence[Contour], passed: Passed) -> None:
+def note_doubled(contours: Sequence[Contour], passed: Passed) -> None:
     """Note the edges, arcs and curves that were drawn before, in either direction."""
     owners, marks = [], []
     for of, first, middle, last in _features(contours):
@@ -51,11 +51,11 @@ def _features(contours: Sequence[Contour]) -> Iterator[tuple[Array, Array, Array
             middle = np.einsum("i,kic->kc", comb(kind - 1, np.arange(kind)) / 2.0 ** (kind - 1), points)
             yield owner, points[:, 0], middle, points[:, -1]
         else:
-            points = np.array([_three(segment) for _, segment in found])
+            points = np.array([_three_points(segment) for _, segment in found])
             yield owner, points[:, 0], points[:, 1], points[:, 2]
 
 
-def _three(segment: Segment) -> Array:
+def _three_points(segment: Segment) -> Array:
     """Return first, middle and last point (3, 3); those of a whole circle do not depend on its start."""
     if isinstance(segment, Arc) and segment.circular and abs(abs(segment.sweep) - 2 * np.pi) < 1e-9:
         on = segment.center + np.linalg.norm(segment.x) * np.array([1.0, 0.0, 0.0])

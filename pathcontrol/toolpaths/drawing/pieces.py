@@ -46,10 +46,10 @@ class Lines:
     points: Array
 
     def mapped(self, matrix: Array) -> Lines:
-        return Lines(_mapped(self.points, matrix))
+        return Lines(_map(self.points, matrix))
 
     def segments(self) -> list[Segment]:
-        points = distinct(_near(self.points))
+        points = drop_repeated(_near(self.points))
         return [Polyline(points)] if len(points) > 1 else []
 
 
@@ -61,7 +61,7 @@ class Curve:
     weights: Array | None = None
 
     def mapped(self, matrix: Array) -> Curve:
-        return replace(self, points=_mapped(self.points, matrix))
+        return replace(self, points=_map(self.points, matrix))
 
     def segments(self) -> list[Segment]:
         straight = straight_turns(_near(self.points), self.weights, NOTHING)
@@ -77,7 +77,7 @@ class Curves:
     points: Array
 
     def mapped(self, matrix: Array) -> Curves:
-        return Curves(_mapped(self.points, matrix))
+        return Curves(_map(self.points, matrix))
 
     def segments(self) -> list[Segment]:
         plain = is_plain(_near(self.points), NOTHING)
@@ -104,7 +104,7 @@ class EllipticArc:
     def mapped(self, matrix: Array) -> EllipticArc:
         with np.errstate(over="ignore", invalid="ignore"):  # segments() refuses what is not finite
             x, y = matrix[:3, :3] @ self.x, matrix[:3, :3] @ self.y
-        return replace(self, center=_mapped(self.center, matrix), x=x, y=y)
+        return replace(self, center=_map(self.center, matrix), x=x, y=y)
 
     def segments(self) -> list[Segment]:
         _near(self.at(self.start + self.sweep * np.linspace(0.0, 1.0, 9)))
@@ -154,7 +154,7 @@ def _effort(piece: Piece) -> int:
     return _CURVE * (len(piece.points) if isinstance(piece, Curves) else 1)
 
 
-def distinct(points: Array) -> Array:
+def drop_repeated(points: Array) -> Array:
     """Return the points without those that lie within 1 nm of the one kept before."""
     if (np.linalg.norm(np.diff(points, axis=0), axis=-1) > NOTHING).all():
         return points
@@ -176,10 +176,10 @@ def ends_of(segment: Segment) -> tuple[Array, Array]:
 def contour_of(segments: Sequence[Segment], feed: float | None, name: str) -> Contour:
     """Return a contour of segments in a row; it is closed if the last one ends where the first begins."""
     gap = np.linalg.norm(ends_of(segments[-1])[1] - ends_of(segments[0])[0])
-    return Contour(tuple(_merged(segments)), closed=bool(gap <= NOTHING), feed=feed, name=name)
+    return Contour(tuple(_merge(segments)), closed=bool(gap <= NOTHING), feed=feed, name=name)
 
 
-def _merged(segments: Sequence[Segment]) -> list[Segment]:
+def _merge(segments: Sequence[Segment]) -> list[Segment]:
     """Return the segments with consecutive polylines merged."""
     merged: list[Segment] = []
     for straight, group in groupby(segments, lambda segment: isinstance(segment, Polyline)):
@@ -191,7 +191,7 @@ def _merged(segments: Sequence[Segment]) -> list[Segment]:
     return merged
 
 
-def _mapped(points: Array, matrix: Array) -> Array:
+def _map(points: Array, matrix: Array) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):  # segments() refuses what is not finite
         return points @ matrix[:3, :3].T + matrix[:3, 3]
 

@@ -49,7 +49,7 @@ def names_of(option: str, names: str | Sequence[str] | None) -> tuple[str, ...] 
     return found
 
 
-def skipped(names: str | Sequence[str] | None, known: Iterable[str]) -> frozenset[str]:
+def kinds_to_skip(names: str | Sequence[str] | None, known: Iterable[str]) -> frozenset[str]:
     """Return the kinds, in lower case, that these names stand for.
 
     Args:

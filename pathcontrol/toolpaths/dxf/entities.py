@@ -11,8 +11,8 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.drawing.pieces import EllipticArc, Lines, Piece
 from pathcontrol.toolpaths.dxf.polylines import light_polyline, polyline
-from pathcontrol.toolpaths.dxf.splines import b_spline, through
-from pathcontrol.toolpaths.dxf.values import given, number, object_axes, turned, vector
+from pathcontrol.toolpaths.dxf.splines import b_spline, interpolate
+from pathcontrol.toolpaths.dxf.values import check_given, number, object_axes, sweep_between, vector
 
 _CLOSED = 1
 
@@ -28,35 +28,37 @@ def pieces(entity: Any) -> list[Piece] | None:
 
 
 def _line(entity: Any) -> list[Piece]:
-    given(entity, "start", "end")
+    check_given(entity, "start", "end")
     return [Lines(np.stack([vector(entity, "start"), vector(entity, "end")]))]
 
 
 def _circle(entity: Any) -> list[Piece]:
-    return [_around(entity, 0.0, 360.0)]
+    return [_arc_between(entity, 0.0, 360.0)]
 
 
 def _arc(entity: Any) -> list[Piece]:
-    given(entity, "start_angle", "end_angle")
-    return [_around(entity, number(entity, "start_angle"), number(entity, "end_angle"))]
+    check_given(entity, "start_angle", "end_angle")
+    return [_arc_between(entity, number(entity, "start_angle"), number(entity, "end_angle"))]
 
 
-def _around(entity: Any, start: float, end: float) -> EllipticArc:
+def _arc_between(entity: Any, start: float, end: float) -> EllipticArc:
     """Return the counterclockwise arc from one angle to the other [°], a full turn if they are the same."""
-    given(entity, "center", "radius")
+    check_given(entity, "center", "radius")
     radius, axes = number(entity, "radius"), object_axes(entity)
     if radius <= 0:
         raise ToolpathError(f"its radius is {radius:g}, expected more than 0")
     center, first = axes @ vector(entity, "center"), float(np.radians(start))
-    return EllipticArc(center, radius * axes[:, 0], radius * axes[:, 1], first, turned(first, float(np.radians(end))))
+    return EllipticArc(
+        center, radius * axes[:, 0], radius * axes[:, 1], first, sweep_between(first, float(np.radians(end)))
+    )
 
 
 def _ellipse(entity: Any) -> list[Piece]:
-    given(entity, "center", "major_axis", "ratio")
+    check_given(entity, "center", "major_axis", "ratio")
     major, ratio = vector(entity, "major_axis"), number(entity, "ratio")
     minor = ratio * np.cross(object_axes(entity)[:, 2], major)
     start, end = number(entity, "start_param"), number(entity, "end_param")
-    return [EllipticArc(vector(entity, "center"), major, minor, start, turned(start, end))]
+    return [EllipticArc(vector(entity, "center"), major, minor, start, sweep_between(start, end))]
 
 
 def _spline(entity: Any) -> list[Piece]:
@@ -73,7 +75,7 @@ def _spline(entity: Any) -> list[Piece]:
         tangents = (vector(entity, "start_tangent"), vector(entity, "end_tangent"))
         if not all(np.linalg.norm(t) > 0 for t in tangents):
             tangents = None
-    return through(fit, tangents, closed)
+    return interpolate(fit, tangents, closed)
 
 
 _DRAW: dict[str, Callable[[Any], list[Piece] | None]] = {

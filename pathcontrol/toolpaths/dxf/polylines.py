@@ -18,7 +18,7 @@ _FRAME = 16  # a vertex that only steers a spline
 def light_polyline(entity: Any) -> list[Piece]:
     """Return the pieces of an LWPOLYLINE."""
     points = np.array(entity.get_points("xyb"), dtype=np.float64).reshape(-1, 3)
-    return _bulged(entity, points[:, :2], number(entity, "elevation"), points[:, 2], bool(entity.closed))
+    return _convert(entity, points[:, :2], number(entity, "elevation"), points[:, 2], bool(entity.closed))
 
 
 def polyline(entity: Any) -> list[Piece] | None:
@@ -31,10 +31,10 @@ def polyline(entity: Any) -> list[Piece] | None:
     if entity.is_3d_polyline:
         return [Lines(np.concatenate([points, points[:1]]) if closed else points)] if len(points) else []
     bulges = np.array([number(v, "bulge") for v in vertices])
-    return _bulged(entity, points[:, :2], float(vector(entity, "elevation")[2]), bulges, closed)
+    return _convert(entity, points[:, :2], float(vector(entity, "elevation")[2]), bulges, closed)
 
 
-def _bulged(entity: Any, points: Array, elevation: float, bulges: Array, closed: bool) -> list[Piece]:
+def _convert(entity: Any, points: Array, elevation: float, bulges: Array, closed: bool) -> list[Piece]:
     """Return a polyline in object coordinates; a bulge is tan(Δφ/4) of the arc to the next point."""
     if not (np.isfinite(points).all() and np.isfinite(bulges).all()):
         raise ToolpathError("it has a coordinate or a bulge that is not finite")

@@ -18,10 +18,10 @@ import numpy as np
 from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import PathControlError, ToolpathError, UnknownNameError
 from pathcontrol.toolpaths.contour import Toolpath
-from pathcontrol.toolpaths.drawing.chains import Strand, chained, checked_gap
-from pathcontrol.toolpaths.drawing.doubled import tell_doubled
+from pathcontrol.toolpaths.drawing.chains import Strand, chain_strands, checked_gap
+from pathcontrol.toolpaths.drawing.doubled import note_doubled
 from pathcontrol.toolpaths.drawing.pieces import Budget
-from pathcontrol.toolpaths.drawing.skip import names_of, skipped
+from pathcontrol.toolpaths.drawing.skip import kinds_to_skip, names_of
 from pathcontrol.toolpaths.dxf.blocks import Entities
 from pathcontrol.toolpaths.dxf.entities import DRAWN, pieces
 from pathcontrol.toolpaths.dxf.layers import Layers
@@ -91,23 +91,23 @@ def read_dxf(
     text = read_text(path, "a DXF drawing")
     source = os.fspath(path)
     with _readable(source):
-        document = _loaded(source, text)
+        document = _load(source, text)
         unit = _unit(source, unit, document.units if "$INSUNITS" in text else 0)
         found = Layers(document, names, passed)
-        left_out = skipped(skip, [*DRAWN, *found.types])
+        left_out = kinds_to_skip(skip, [*DRAWN, *found.types])
         entities = Entities(source, document, found.frozen, passed)
         strands = _strands(entities, found, left_out, np.diag([UNITS[unit]] * 3 + [1.0]), passed)
-        contours = [strand.contour(source, feed) for strand in chained(strands, gap, passed)] if strands else []
+        contours = [strand.contour(source, feed) for strand in chain_strands(strands, gap, passed)] if strands else []
         if not contours:
             raise ToolpathError(
                 f"{source} draws no outline on the layers read; its layers are {found.listed}"
                 + "".join(f"; {note}" for note in passed.notes)
             )
-        tell_doubled(contours, passed)
+        note_doubled(contours, passed)
     return Toolpath(tuple(contours), source, unit, passed.notes)
 
 
-def _loaded(source: str, text: str) -> Any:
+def _load(source: str, text: str) -> Any:
     """Load the drawing, if it is small enough for ezdxf to read it in bounded time and memory."""
     from ezdxf.filemanagement import read
 

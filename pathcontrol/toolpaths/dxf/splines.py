@@ -38,7 +38,7 @@ def b_spline(degree: int, knots: Array, points: Array, weights: Array | None) ->
     return [Curve(piece[:, :3] / piece[:, 3:], piece[:, 3]) for piece in pieces]
 
 
-def through(points: Array, tangents: tuple[Array, Array] | None, closed: bool) -> list[Piece]:
+def interpolate(points: Array, tangents: tuple[Array, Array] | None, closed: bool) -> list[Piece]:
     """Return the cubic spline through fit points (m, 3), by chord length as CAD programs draw it.
 
     Its ends are straight (second derivative 0), have the given tangents, or go over into each other.

@@ -26,7 +26,7 @@ def layer_of(entity: Any) -> str:
     return str(common(entity, "layer", "0"))
 
 
-def given(entity: Any, *names: str) -> None:
+def check_given(entity: Any, *names: str) -> None:
     """Check that the file gives all required attributes, which would otherwise be read as defaults."""
     missing = [name for name in names if not entity.dxf.hasattr(name)]
     if missing:
@@ -41,7 +41,7 @@ def number(entity: Any, name: str) -> float:
     return float(value)
 
 
-def turned(start: float, end: float) -> float:
+def sweep_between(start: float, end: float) -> float:
     """Return the sweep of a counterclockwise arc from one angle to the other [rad], more than 0 up to 2π.
 
     Ends that are the same but for rounding are a whole turn apart: 0 and 6.2831855, 270° and 270°, 90° and 450.0001°.

@@ -85,7 +85,7 @@ def groups(block: Block) -> dict[str, int]:
     return found
 
 
-def moving_m(code: int) -> str | None:
+def reason_to_refuse(code: int) -> str | None:
     """Return the reason why an M code cannot be passed over, or None if it moves nothing."""
     return _M_REASONS.get(code)
 

@@ -6,7 +6,7 @@ What could move the tool, shift its coordinates or change the order of lines is 
 from __future__ import annotations
 
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.gcode.codes import KNOWN_G, KNOWN_M, moving_m
+from pathcontrol.toolpaths.gcode.codes import KNOWN_G, KNOWN_M, reason_to_refuse
 from pathcontrol.toolpaths.gcode.words import Block
 from pathcontrol.toolpaths.passed import Passed
 
@@ -80,7 +80,7 @@ def _of_m(code: int, block: Block, line: int, passed: Passed) -> set[str]:
     if code in _OUTPUTS:
         passed.over(f"M{code}", line)
         return {*_OUTPUTS[code]}
-    if (reason := moving_m(code)) is not None:
+    if (reason := reason_to_refuse(code)) is not None:
         raise ToolpathError(f"M{code} is not understood: {reason}")
     if code in _PRINTERS and not block.g:
         letters = {*block.words}

@@ -46,7 +46,7 @@ class Program:
             ToolpathError: it is not understood.
         """
         name = block.label or f"line {line}"
-        block = without_codes(block, self._turning(block), line, self._passed)
+        block = without_codes(block, self._is_turning(block), line, self._passed)
         codes = groups(block)
         block = without_letters(block, line, self._passed)
         self.modes.update(block, codes)
@@ -78,7 +78,7 @@ class Program:
             self._position = points[-1].tolist()
         return count
 
-    def _turning(self, block: Block) -> bool:
+    def _is_turning(self, block: Block) -> bool:
         """Return whether the motion of a block is an arc or a cycle."""
         motion = next((code for code in block.g if code in (_RAPID, _LINE, 800)), self.modes.motion)
         return any(code in (_CLOCKWISE, _COUNTER_CLOCKWISE, *DRILLING) for code in (motion, *block.g))

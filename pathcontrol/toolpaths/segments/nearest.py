@@ -28,7 +28,7 @@ class Cubics:
     """
 
     def __init__(self, segments: Sequence[Segment]) -> None:
-        points = np.array([_raised(segment.points) for segment in segments if isinstance(segment, Bezier)])
+        points = np.array([_raise_degree(segment.points) for segment in segments if isinstance(segment, Bezier)])
         knots = np.arange(len(points) + 1.0)
         p = PPoly.from_bernstein_basis(BPoly(np.moveaxis(points, 1, 0), knots))
         self._curve = Curve(p, p.derivative(), p.derivative(2))
@@ -39,7 +39,7 @@ class Cubics:
         return np.linalg.norm(self._curve.p(self._nearest(x)) - x, axis=-1)
 
 
-def _raised(points: Array) -> Array:
+def _raise_degree(points: Array) -> Array:
     """Return the control points (4, 3) of a curve given by (degree + 1, 3), raised to degree 3."""
     while len(points) <= _DEGREE:
         share = np.arange(1, len(points))[:, None] / len(points)

@@ -18,7 +18,7 @@ _NOTHING = 1e-9  # m, points nearer than this are one
 _TINY = np.finfo(float).tiny
 
 
-def regular(segment: Segment, tolerance: float) -> tuple[Segment, float]:
+def regularize(segment: Segment, tolerance: float) -> tuple[Segment, float]:
     """Return the segment itself, or a polyline within ``tolerance`` [m] if it turns by more than 0.2 rad within that.
 
     Cusps and loops smaller than the tolerance become corners of the polyline. The second value is how far apart they
@@ -34,7 +34,7 @@ def regular(segment: Segment, tolerance: float) -> tuple[Segment, float]:
     while (coarse := (pieces.sagitta > tolerance) & (pieces.size > tolerance)).any():
         pieces = pieces.halved(segment, coarse)
     least = max(_NOTHING, min(0.1 * tolerance, 0.01 * segment.length))
-    polyline = Polyline(_apart(segment.point(pieces.u), least))
+    polyline = Polyline(_thin_out(segment.point(pieces.u), least))
     shares = np.linspace(0.0, 1.0, _BETWEEN, endpoint=False)[:, None]
     between = segment.point(pieces.u[:-1] + np.diff(pieces.u) * shares)
     return polyline, float(polyline.distance(between).max())
@@ -65,7 +65,7 @@ class _Pieces(NamedTuple):
         return _Pieces.of(segment, np.sort(np.append(self.u, 0.5 * (self.u[:-1] + self.u[1:])[chosen])))
 
 
-def _apart(points: Array, least: float) -> Array:
+def _thin_out(points: Array, least: float) -> Array:
     """Return the first and last point, and of those between some that are ``least`` [m] apart."""
     kept = [points[0]]
     for point in points[1:-1]:

@@ -67,7 +67,7 @@ class ByLength:
         return CurvePoint(self.segment.point(u), tangent, np.where(moves, across / speed**2, 0.0))
 
 
-def curved(segment: Segment, start: float, end: float) -> Stretch:
+def curved_stretch(segment: Segment, start: float, end: float) -> Stretch:
     """Return Hermite data of a curved segment between arc lengths ``start`` and ``end`` [m], accurate to 1 nm.
 
     Raises:

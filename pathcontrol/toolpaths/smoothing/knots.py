@@ -14,8 +14,8 @@ from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.smoothing.blends import Arm, Junction, blend_length
 from pathcontrol.toolpaths.smoothing.corners import angles
-from pathcontrol.toolpaths.smoothing.hermite_data import ByLength, Knots, Stretch, curved
-from pathcontrol.toolpaths.smoothing.polylines import rounded
+from pathcontrol.toolpaths.smoothing.hermite_data import ByLength, Knots, Stretch, curved_stretch
+from pathcontrol.toolpaths.smoothing.polylines import round_polyline
 
 
 class SmoothKnots(NamedTuple):
@@ -55,8 +55,8 @@ def smooth_knots(contour: Contour, tolerance: float) -> SmoothKnots:
 def _stretch(segment: Segment, before: float, after: float, tolerance: float) -> Stretch:
     """Return Hermite data of a segment trimmed by lengths [m] at either end."""
     if isinstance(segment, Polyline):
-        return rounded(segment, before, after, tolerance)
-    return curved(segment, before, segment.length - after)
+        return round_polyline(segment, before, after, tolerance)
+    return curved_stretch(segment, before, segment.length - after)
 
 
 def _junction(before: Segment, after: Segment, tolerance: float) -> Junction:

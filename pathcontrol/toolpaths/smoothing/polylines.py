@@ -20,7 +20,7 @@ _SAMPLES = 33
 _BLOCK = 1 << 13  # blends looked at at once
 
 
-def rounded(polyline: Polyline, before: float, after: float, tolerance: float) -> Stretch:
+def round_polyline(polyline: Polyline, before: float, after: float, tolerance: float) -> Stretch:
     """Return Hermite data of a polyline trimmed by lengths [m] at either end."""
     edges = _Edges.of(polyline, before, after, tolerance)
     bend, deviation = _bends(polyline, edges, tolerance)

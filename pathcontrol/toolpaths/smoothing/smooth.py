@@ -11,7 +11,7 @@ from pathcontrol._expect import expect
 from pathcontrol.errors import UnknownNameError
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.curve import ToolCurve
-from pathcontrol.toolpaths.smoothing.bends import regular
+from pathcontrol.toolpaths.smoothing.bends import regularize
 from pathcontrol.toolpaths.smoothing.corners import SHARP, TURN_BACK, Corner, corners, split
 from pathcontrol.toolpaths.smoothing.knots import smooth_knots
 
@@ -77,7 +77,7 @@ _Piece = tuple[ToolCurve, float, tuple[Array, Array] | None]
 
 def _pieces(contour: Contour, tolerance: float) -> Iterator[_Piece]:
     """Yield smooth curves for a contour that may still turn back inside its segments."""
-    segments, apart = zip(*(regular(segment, _SHARE * tolerance) for segment in contour.segments), strict=True)
+    segments, apart = zip(*(regularize(segment, _SHARE * tolerance) for segment in contour.segments), strict=True)
     used = max(apart)
     for piece in split(replace(contour, segments=segments), TURN_BACK):
         knots, deviation, normals = smooth_knots(piece, tolerance - used)

@@ -41,10 +41,10 @@ def numbers(text: str, what: str) -> list[float]:
             found = [float(figure) for figure in text.replace(",", " ").split()]
             if max(map(abs, found), default=0.0) <= _LARGEST:
                 return found
-    return _scanned(text, what)
+    return _scan(text, what)
 
 
-def _scanned(text: str, what: str) -> list[float]:
+def _scan(text: str, what: str) -> list[float]:
     """Parse numbers of any form, one after another."""
     start = _START.match(text)
     assert start is not None

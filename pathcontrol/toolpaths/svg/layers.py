@@ -32,7 +32,7 @@ class Chosen:
             found = [element for element in document.root.iter("*") if name in _names(element)]
             if not found:
                 raise UnknownNameError(
-                    f"layers: there is no layer or id {str(name)[:60]!r}, expected some of {_known(document)}"
+                    f"layers: there is no layer or id {str(name)[:60]!r}, expected some of {_list_names(document)}"
                 )
             self._elements.update(found)
 
@@ -55,7 +55,7 @@ def _names(element: Any) -> list[str | None]:
     return names
 
 
-def _known(document: Document) -> str:
+def _list_names(document: Document) -> str:
     """Return the names of the layers and groups, for errors; of all elements where there are none."""
     elements = [element for element in document.root.iter("*") if tag_of(element) is not None]
     groups = [element for element in elements if tag_of(element) == "g"] or elements

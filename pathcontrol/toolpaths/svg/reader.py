@@ -15,9 +15,9 @@ from collections.abc import Sequence
 from pathcontrol._arrays import scalar
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.contour import Toolpath
-from pathcontrol.toolpaths.drawing.chains import chained, checked_gap
-from pathcontrol.toolpaths.drawing.doubled import tell_doubled
-from pathcontrol.toolpaths.drawing.skip import names_of, skipped
+from pathcontrol.toolpaths.drawing.chains import chain_strands, checked_gap
+from pathcontrol.toolpaths.drawing.doubled import note_doubled
+from pathcontrol.toolpaths.drawing.skip import kinds_to_skip, names_of
 from pathcontrol.toolpaths.passed import Passed
 from pathcontrol.toolpaths.svg.document import Document, tag_of
 from pathcontrol.toolpaths.svg.layers import Chosen
@@ -66,14 +66,16 @@ def read_svg(
     passed, names = Passed(unknown), names_of("layers", layers)
     document = Document(path)
     tags = {tag for element in document.root.iter("*") if (tag := tag_of(element))} if skip else set()
-    walk = Walk(document, Chosen(document, names), skipped(skip, tags | SHAPES), passed)
+    walk = Walk(document, Chosen(document, names), kinds_to_skip(skip, tags | SHAPES), passed)
     strands = list(walk.strands(ppi))
     if not strands:
         raise ToolpathError(
             f"{document.path} draws no outline; expected paths or shapes that are seen"
             + "".join(f"; {note}" for note in passed.notes)
         )
-    contours = [s.contour(document.path, feed) for s in (strands if gap is None else chained(strands, gap, passed))]
-    tell_doubled(contours, passed)
+    contours = [
+        s.contour(document.path, feed) for s in (strands if gap is None else chain_strands(strands, gap, passed))
+    ]
+    note_doubled(contours, passed)
     unit = page_unit(document.attributes(document.root))
     return Toolpath(tuple(contours), document.path, unit, passed.notes)

@@ -109,7 +109,7 @@ class StyleSheet:
             _refuse_if_deciding(_text(rule.content), head)
 
     def _add_rule(self, rule: Any) -> None:
-        given = _parsed(rule.content)
+        given = _parse_rule(rule.content)
         if not given:
             return
         head = _text(rule.prelude).strip()
@@ -199,28 +199,28 @@ def _overlay(found: Declarations, more: Declarations) -> None:
 def _declarations(text: str) -> Declarations:
     """Parse a style attribute."""
     if not _PLAIN.fullmatch(text):
-        return _parsed(text)
+        return _parse_rule(text)
     pairs = (part.partition(":") for part in text.split(";"))
     found: Declarations = {}
     for name, colon, value in pairs:
         if colon:
-            _overlay(found, _kept(name.strip().lower(), value.strip(), False))
+            _overlay(found, _keep(name.strip().lower(), value.strip(), False))
     return found
 
 
-def _parsed(content: Any) -> Declarations:
+def _parse_rule(content: Any) -> Declarations:
     """Return the relevant declarations in the content of a rule."""
     found: Declarations = {}
     for node in tinycss2.parse_blocks_contents(content, skip_comments=True, skip_whitespace=True):
         if node.type == "declaration" and all(token.type != "error" for token in node.value):
             value = _text([token for token in node.value if token.type != "comment"])
-            _overlay(found, _kept(node.lower_name, value.strip(), node.important))
+            _overlay(found, _keep(node.lower_name, value.strip(), node.important))
         elif node.type in ("qualified-rule", "at-rule") and node.content is not None:
             _refuse_if_deciding(_text(node.content), _text(node.prelude).strip())
     return found
 
 
-def _kept(name: str, value: str, important: bool) -> Declarations:
+def _keep(name: str, value: str, important: bool) -> Declarations:
     if name not in _PROPERTIES or not is_valid(name, value):
         return {}
     return {name: ((important, _INLINE, 0), value)}

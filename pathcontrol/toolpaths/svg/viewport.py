@@ -24,31 +24,31 @@ class View(NamedTuple):
     matrix: Array
 
 
-def page(get: Attributes, ppi: float) -> View:
+def page_view(get: Attributes, ppi: float) -> View:
     """Return the view of the outermost element, in metres, y up, from the lower left corner of the page."""
     box = _view_box(get)
     width, height = _page_size(get, box, ppi)
-    inner = _fitted(box, Viewport(width, height, ppi), get)
+    inner = _fit(box, Viewport(width, height, ppi), get)
     scale = _INCH / ppi
     metres = np.array([[scale, 0, 0, 0], [0, -scale, 0, scale * height], [0, 0, 1, 0], [0, 0, 0, 1]])
     return View(inner.viewport, metres @ inner.matrix)
 
 
-def nested(get: Attributes, outer: Viewport, size: Attributes) -> View:
+def nested_view(get: Attributes, outer: Viewport, size: Attributes) -> View:
     """Return the view of an inner svg or symbol element; ``size`` gives width and height, by default 100 %."""
     place = np.eye(4)
     place[:2, 3] = [outer.length(get(name) or "0", name) for name in ("x", "y")]
-    width, height = (outer.length(_sized(size, name) or "100%", name) for name in ("width", "height"))
+    width, height = (outer.length(_size_view(size, name) or "100%", name) for name in ("width", "height"))
     if width < 0 or height < 0:
         raise ToolpathError(f"width = {width:g}, height = {height:g}, expected lengths not below 0")
-    inner = _fitted(_view_box(get), Viewport(width, height, outer.ppi), get)
+    inner = _fit(_view_box(get), Viewport(width, height, outer.ppi), get)
     return View(inner.viewport, place @ inner.matrix)
 
 
 def page_unit(get: Attributes) -> str:
     """Return the unit that the size of the page is given in."""
     for name in ("width", "height"):
-        unit = (_sized(get, name) or "").strip().lstrip("+-.0123456789eE").strip()
+        unit = (_size_view(get, name) or "").strip().lstrip("+-.0123456789eE").strip()
         if unit and unit != "%":
             return unit
     return "px"
@@ -56,7 +56,7 @@ def page_unit(get: Attributes) -> str:
 
 def _page_size(get: Attributes, box: list[float] | None, ppi: float) -> tuple[float, float]:
     """Return width and height in px; missing ones follow from the viewBox, as in browsers."""
-    sizes = [_sized(get, name) for name in ("width", "height")]
+    sizes = [_size_view(get, name) for name in ("width", "height")]
     sizes = [None if size is None or size.strip().endswith("%") else size for size in sizes]
     unknown = Viewport(0.0, 0.0, ppi)
     width, height = (
@@ -80,7 +80,7 @@ def _page_size(get: Attributes, box: list[float] | None, ppi: float) -> tuple[fl
     return width, height
 
 
-def _sized(get: Attributes, name: str) -> str | None:
+def _size_view(get: Attributes, name: str) -> str | None:
     text = get(name)
     return None if text is None or text.strip() == "auto" else text
 
@@ -95,7 +95,7 @@ def _view_box(get: Attributes) -> list[float] | None:
     return box
 
 
-def _fitted(box: list[float] | None, viewport: Viewport, get: Attributes) -> View:
+def _fit(box: list[float] | None, viewport: Viewport, get: Attributes) -> View:
     """Fit the viewBox into a viewport, https://www.w3.org/TR/SVG2/coords.html#ComputingAViewportsTransform."""
     matrix = np.eye(4)
     if box is None:

@@ -19,7 +19,7 @@ from pathcontrol.toolpaths.svg.layers import Chosen, layer_name
 from pathcontrol.toolpaths.svg.paint import Paint
 from pathcontrol.toolpaths.svg.shapes import SHAPES, Attributes, subpaths
 from pathcontrol.toolpaths.svg.style import REFUSED
-from pathcontrol.toolpaths.svg.viewport import nested, page
+from pathcontrol.toolpaths.svg.viewport import nested_view, page_view
 
 _GROUPS = frozenset({"g", "a", "svg", "switch", "use"})
 _WORDS = frozenset({"text", "flowRoot", "tspan"})
@@ -77,7 +77,7 @@ class Walk:
         with self._document.at(root):
             if "transform" in self._document.style(root):
                 raise ToolpathError("transform of the outermost element is not read; put it on a group inside")
-            view = page(self._document.attributes(root), ppi)
+            view = page_view(self._document.attributes(root), ppi)
         self._ahead = [(root, _Place(view.matrix, view.viewport, self._chosen.all))]
         for _ in range(_MOST_ELEMENTS):
             if not self._ahead:
@@ -169,7 +169,7 @@ class Walk:
     def _enter(self, element: Any, place: _Place, sized: Attributes | None) -> None:
         if tag_of(element) in ("svg", "symbol") and element is not self._document.root:
             get = self._document.attributes(element)
-            view = nested(get, place.viewport, sized or get)
+            view = nested_view(get, place.viewport, sized or get)
             place = place._replace(matrix=place.matrix @ view.matrix, viewport=view.viewport)
         inside = list(element)
         if tag_of(element) == "switch":
