@@ -25,7 +25,7 @@ from pathcontrol import (
     tool_figure,
     toolpath_figure,
 )
-from pathcontrol.view.figures.style import dressed, new_figure, style
+from pathcontrol.view.figures.style import apply_style, new_figure, style
 
 MINUS = "−"  # as figures write it
 
@@ -117,7 +117,7 @@ def panel(low, high):
     """A panel from ``low`` to ``high`` both ways."""
     with style():
         figure = new_figure(3.0, 3.0)
-        axes = dressed(figure.add_subplot())
+        axes = apply_style(figure.add_subplot())
         axes.set(xlim=(low, high), ylim=(low, high))
     return figure, axes
 

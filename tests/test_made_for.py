@@ -10,7 +10,7 @@ from pathcontrol.analysis.deviation import tool_positions
 from pathcontrol.simulation.storage.array_store import ArrayStore
 from pathcontrol.simulation.storage.task_recipes import task_of, task_recipe
 from pathcontrol.tasks.laps import Laps
-from pathcontrol.view.animation.recorded_runs import cast_takes
+from pathcontrol.view.animation.recorded_runs import make_recordings
 from pathcontrol.view.tool import default_tool, with_tool
 
 TIP = np.array([0.0, 0.02, -0.1])
@@ -80,7 +80,7 @@ def test_film_figure_and_metrics_of_a_run_show_what_follows_the_curve(arm, path,
     run = pc.simulate(law, path.start_posture, velocity, duration=0.5, progress=False)
     curve, loaded = path.curve, pc.Run.load(run.save(tmp_path / "run.nc"))
     for one in (run, loaded):
-        (take,) = cast_takes(one, None, None, 0, None)
+        (take,) = make_recordings(one, None, None, 0, None)
         assert curve.distance(take.desired_positions).max() < 1e-5
         assert curve.distance(take.tool_positions).max() < 1e-4
         positions = tool_positions(one)[0]

@@ -26,7 +26,7 @@ from pathcontrol.view.report.pictures import pictures
 from pathcontrol.view.report.report import report
 from pathcontrol.view.report.sections import _section
 from pathcontrol.view.report.settings import settings as groups_of
-from pathcontrol.view.report.summary import Row, measured, rows
+from pathcontrol.view.report.summary import Row, measure, rows
 
 HOSTILE = "</script><img src=x onerror=alert(1)>&amp;\"'<b>"
 SI = {"deg": np.pi / 180, "deg/s": np.pi / 180, "s": 1.0, "N m": 1.0, "N m/rad": 1.0, "": 1.0, "mm": 1e-3, "µm": 1e-6}
@@ -323,7 +323,7 @@ def test_a_run_without_a_path_has_the_metrics_that_need_none(runs, arm):
     run = runs["plan"]
     arrays = {name: run.array(name) for name in run.data.data_vars}
     alone = Run.from_arrays(run.time, {"joint_1": "rad", "joint_2": "rad"}, arrays, {}, robot=arm)
-    found, full = measured(alone), measured(run)
+    found, full = measure(alone), measure(run)
     assert found.items() <= full.items()
     assert found.keys() >= {"e_p_peak", "e_v_rms", "tau_demand_peak"}
 

@@ -7,7 +7,7 @@ import pytest
 
 import pathcontrol as pc
 from pathcontrol.analysis.readable import readable_number
-from pathcontrol.view.report.summary import measured, rows
+from pathcontrol.view.report.summary import measure, rows
 
 ARM = pc.load_robot("cicese_2dof")
 
@@ -29,10 +29,10 @@ def row_of(runs, numbers, key):
 
 
 def test_the_lag_of_the_projection_law_is_none(runs):
-    values = {name: measured(run)["lag_error_peak"] for name, run in runs.items()}
+    values = {name: measure(run)["lag_error_peak"] for name, run in runs.items()}
     assert 0 < values["projection"][0] < 1e-12
     assert values["plan"][0] > 1e-6
-    found = {row.label: row for row in rows(runs, {name: measured(run) for name, run in runs.items()})}
+    found = {row.label: row for row in rows(runs, {name: measure(run) for name, run in runs.items()})}
     cells = [row.cells for label, row in found.items() if "lag" in label]
     assert cells
     for plan, projection in cells:

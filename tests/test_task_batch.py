@@ -390,17 +390,17 @@ def test_the_record_of_a_run_stays_short():
 
 def test_figures_films_and_reports_show_the_path_of_their_rollout():
     pytest.importorskip("matplotlib")
-    from pathcontrol.view.animation.recorded_runs import cast_takes
+    from pathcontrol.view.animation.recorded_runs import make_recordings
     from pathcontrol.view.figures.shown import shown
     from pathcontrol.view.report.reproduction import script
-    from pathcontrol.view.report.summary import facts, measured
+    from pathcontrol.view.report.summary import facts, measure
 
     tasks = ALIKE["circles"]
     run = ran(LAWS["plan"](TaskBatch(tasks)), begin(tasks))
     assert shown(run, rollout=2)[0].task is tasks[2]
     assert shown(run, task=TaskBatch(tasks), rollout=3)[0].task is tasks[3]
-    assert cast_takes(run, None, None, 1, None)[0].task is tasks[1]
-    np.testing.assert_equal(measured(run), metrics(run))  # NaN, as of laps that no rollout finished, equals NaN
+    assert make_recordings(run, None, None, 1, None)[0].task is tasks[1]
+    np.testing.assert_equal(measure(run), metrics(run))  # NaN, as of laps that no rollout finished, equals NaN
     assert {row.label: row.cells[0].text for row in facts({"run": run})}["path"] == "5 tasks, Circle"
     assert "saved.task" in script("run", run)
 

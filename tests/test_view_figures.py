@@ -26,7 +26,7 @@ from pathcontrol import (
 )
 from pathcontrol.experiments.schema import Output
 from pathcontrol.view.figures.errors import quantiles
-from pathcontrol.view.figures.lines import cells_kept, columns_kept
+from pathcontrol.view.figures.lines import select_by_cell, select_by_column
 from pathcontrol.view.figures.run import run_figure
 from pathcontrol.view.figures.style import RUN_COLOURS
 
@@ -161,17 +161,17 @@ def test_quantiles_are_those_of_what_is_a_number():
 def test_long_lines_keep_their_peaks_and_gaps():
     values = np.random.default_rng(2).normal(size=300_000)
     values[123_456], values[222_222], values[50_000:50_500] = 50.0, -60.0, np.nan
-    kept = columns_kept(values)
+    kept = select_by_column(values)
     assert len(kept) < 15_000
     assert {0, 123_456, 222_222, len(values) - 1} <= set(kept.tolist())
     assert np.isnan(values[kept]).any()
-    assert np.array_equal(columns_kept(values[:5000]), np.arange(5000))
+    assert np.array_equal(select_by_column(values[:5000]), np.arange(5000))
 
 
 def test_long_curves_keep_their_shape():
     s = np.linspace(0, 20 * np.pi, 1_000_000)
     x, y = np.cos(s), np.sin(2 * s)
-    kept = cells_kept(x, y)
+    kept = select_by_cell(x, y)
     assert len(kept) < len(s)
     at = np.searchsorted(kept, np.arange(len(s)))
     assert np.hypot(x - x[kept[at]], y - y[kept[at]]).max() < 2e-3

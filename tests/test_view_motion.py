@@ -16,7 +16,7 @@ from pathcontrol.view.animation.scene.ground import ground_grid
 from pathcontrol.view.animation.scene.keyframes import line_keys
 from pathcontrol.view.animation.scene.trace import FRAME, MOST_RINGS, trace
 from pathcontrol.view.animation.scene.tracks import Track, continuous_quaternions
-from pathcontrol.view.animation.scene.tube import SIDES, dashes, distinct, joined, simplified, tube
+from pathcontrol.view.animation.scene.tube import SIDES, dashes, distinct, join_meshes, simplify, tube
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -112,18 +112,18 @@ def test_quaternions_are_unit_keep_their_sign_and_mean_the_rotation(seed: int) -
 @given(seeds, st.floats(1e-3, 10))
 def test_a_simplified_line_is_nowhere_farther_than_the_tolerance(seed: int, tolerance: float) -> None:
     points = wandering(seed)
-    line = simplified(points, tolerance)
+    line = simplify(points, tolerance)
     assert to_polyline(points, line).max() <= tolerance * (1 + 1e-9)
     np.testing.assert_array_equal(line[[0, -1]], points[[0, -1]])
 
 
 @given(seeds)
 def test_a_simplified_line_has_no_more_segments_than_allowed(seed: int) -> None:
-    assert len(simplified(wandering(seed), 1e-9, most=40)) <= 41
+    assert len(simplify(wandering(seed), 1e-9, most=40)) <= 41
 
 
 def test_a_straight_line_is_one_segment() -> None:
-    assert len(simplified(np.linspace([0, 0, 0], [1, 2, 3], 500), 1e-9)) == 2
+    assert len(simplify(np.linspace([0, 0, 0], [1, 2, 3], 500), 1e-9)) == 2
 
 
 @given(seeds, st.integers(3, 9))
@@ -163,7 +163,7 @@ def test_every_other_piece_of_a_line_is_a_dash(seed: int, length: float) -> None
 @given(seeds, st.integers(0, 5))
 def test_joined_meshes_are_all_there(seed: int, extra: int) -> None:
     parts = [tube(wandering(seed + i, 5), 0.1) for i in range(extra + 1)]
-    whole = joined(parts)
+    whole = join_meshes(parts)
     triangles = np.concatenate([part.vertices[part.faces] for part in parts])
     np.testing.assert_array_equal(whole.vertices[whole.faces], triangles)
 

@@ -1,4 +1,4 @@
-"""``pathcontrol check``."""
+"""The command ``pathcontrol check``."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def command(
     from pathcontrol.robot.urdf import check_urdf
 
     urdf = find_urdf(file, package_dir)
-    locked = _locked(urdf.text, lock, keep, tip)
+    locked = _select_locked(urdf.text, lock, keep, tip)
     report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=locked)
     if as_json:
         click.echo(json.dumps(report.as_dict()))
@@ -49,8 +49,8 @@ def command(
     sys.exit(0 if report.ok else 1)
 
 
-def _locked(text: str, lock: tuple[str, ...], keep: tuple[str, ...], tip: str | None) -> tuple[str, ...]:
-    """The joints that will be locked; where they are does not matter here."""
+def _select_locked(text: str, lock: tuple[str, ...], keep: tuple[str, ...], tip: str | None) -> tuple[str, ...]:
+    """Return the joints that will be locked; their values do not matter here."""
     from pathcontrol.robot.urdf import parse_urdf
     from pathcontrol.robot.urdf.locking import locked_angles
 

@@ -1,4 +1,4 @@
-"""What all commands share: errors as one message, Ctrl-C at any time, and options that mean the same everywhere."""
+"""The shared parts of all commands: errors as one message, Ctrl-C at any time, and common options."""
 
 from __future__ import annotations
 
@@ -34,24 +34,24 @@ class Group(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            with warnings_in_one_line(lambda: _chosen(ctx)):
+            with warnings_in_one_line(lambda: _find_command(ctx)):
                 return super().invoke(ctx)
         except PathControlError as error:
-            click.echo(f"error: {printable(in_options(str(error), _chosen(ctx)))}", err=True)
+            click.echo(f"error: {printable(in_options(str(error), _find_command(ctx)))}", err=True)
             sys.exit(2)
         except KeyboardInterrupt:
             click.echo("interrupted; no half-written file is left behind", err=True)
             sys.exit(130)
 
 
-def _chosen(ctx: click.Context) -> click.Command | None:
-    """The command that is run."""
+def _find_command(ctx: click.Context) -> click.Command | None:
+    """Return the command that is run."""
     group = ctx.command
     return group.get_command(ctx, ctx.invoked_subcommand or "") if isinstance(group, click.Group) else None
 
 
 def in_options(message: str, command: click.Command | None) -> str:
-    """Return a message of the library in the options of a ``command``; advice that it has no option for is left out."""
+    """Translate a message of the library into the options of a ``command``; drop advice without an option."""
     if command is None:
         return message
     options = {param.name: param for param in command.params if isinstance(param, click.Option)}
@@ -60,14 +60,14 @@ def in_options(message: str, command: click.Command | None) -> str:
         option = options.get(name)
         if option is None:
             return None
-        return option.opts[0] if option.is_flag or not value or value == "…" else _typed(option, value)
+        return option.opts[0] if option.is_flag or not value or value == "…" else _format_option(option, value)
 
     return reword_setting(reword_advice(message, speak), speak)
 
 
-def _typed(option: click.Option, value: str) -> str:
-    """An option with a value as one types it: ``(x, y, z)`` as three, a call of Python as the name of a file."""
-    flag, items = option.opts[0], _items(value)
+def _format_option(option: click.Option, value: str) -> str:
+    """Return an option with a value as one types it: ``(x, y, z)`` as three, a call of Python as a file name."""
+    flag, items = option.opts[0], _split_items(value)
     if re.fullmatch(r"\w+\(.*\)", value):
         return f"{flag} FILE"
     if option.multiple:
@@ -75,8 +75,8 @@ def _typed(option: click.Option, value: str) -> str:
     return f"{flag} {(' ' if option.nargs > 1 else ',').join(items)}"
 
 
-def _items(value: str) -> list[str]:
-    """The words of a value that is written as in Python, without the quotes around a single text."""
+def _split_items(value: str) -> list[str]:
+    """Return the words of a value written as in Python, without the quotes around a single text."""
     try:
         literal = ast.literal_eval(value) if value[:1] in ("(", "[") else value
     except (ValueError, SyntaxError):  # as it is: (x, y, z)
@@ -85,7 +85,7 @@ def _items(value: str) -> list[str]:
 
 
 def printable(message: str) -> str:
-    """``message`` without the control characters that a file may have put into it, which a terminal would obey."""
+    """Return ``message`` without control characters from a file, which a terminal would obey."""
     return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in message)
 
 
@@ -111,7 +111,7 @@ def warnings_in_one_line(command: Callable[[], click.Command | None] = lambda: N
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Holds Ctrl-C back until the block is over: compiled modules do not survive it while they are imported."""
+    """Hold Ctrl-C back until the block is over: compiled modules do not survive it while they are imported."""
     pressed: list[int] = []
     before = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
     try:
@@ -123,7 +123,7 @@ def uninterrupted() -> Iterator[None]:
 
 
 def import_all() -> None:
-    """Everything that a command which simulates or draws will need."""
+    """Import everything that a command which simulates or draws will need."""
     with uninterrupted():
         import pathcontrol.experiments.reproduce
         import pathcontrol.experiments.runner
@@ -148,7 +148,7 @@ package_option = click.option(
 
 
 def open_page(path: Path) -> None:
-    """Show a page in the default browser; where there is none, say which file to open."""
+    """Show a page in the default browser; without one, print the file to open."""
     import webbrowser
 
     if not webbrowser.open(path.resolve().as_uri()):

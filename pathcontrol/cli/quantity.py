@@ -30,8 +30,8 @@ class QuantityType(click.ParamType):
             self.fail(f"{value!r}: {error}", param, ctx)
 
 
-def questioned_feed(feed: float | None) -> float | None:
-    """Return the feed of an option [m/s]; one that no arm can keep is questioned."""
+def check_feed(feed: float | None) -> float | None:
+    """Return the feed of an option [m/s]; warn of one that no arm can keep."""
     if feed is not None and feed > _FASTEST:
         warnings.warn(
             f"--feed {feed:g} is {feed:g} m/s, faster than arms are; did you mean --feed '{feed:g} mm/s'?",

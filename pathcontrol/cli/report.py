@@ -1,4 +1,4 @@
-"""``pathcontrol report``."""
+"""The command ``pathcontrol report``."""
 
 from __future__ import annotations
 

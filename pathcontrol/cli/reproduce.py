@@ -1,4 +1,4 @@
-"""``pathcontrol reproduce``."""
+"""The command ``pathcontrol reproduce``."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def command(out: Path, sensitivity: bool, samples: int | None, opened: bool, as_
 
 
 def _import_all(sensitivity: bool) -> None:
-    """Load what the runs, their files, and a sweep will need; a missing extra is told before anything is simulated."""
+    """Import what the runs, their files, and a sweep will need; a missing extra is reported before any simulation."""
     with uninterrupted():
         import pathcontrol.experiments.reproduce
         import pathcontrol.simulation.storage.netcdf
@@ -58,6 +58,7 @@ def _import_all(sensitivity: bool) -> None:
 
 
 def _vary(out: Path, samples: int | None, as_json: bool) -> dict[str, Any]:
+    """Vary the uncertain numbers and write the page about it."""
     from pathcontrol.experiments.sensitivity import SAMPLES
     from pathcontrol.experiments.sensitivity_page import sensitivity as vary
     from pathcontrol.experiments.sensitivity_page import sentences
@@ -75,6 +76,7 @@ def _vary(out: Path, samples: int | None, as_json: bool) -> dict[str, Any]:
 
 
 def _tell(summary: dict[str, Any], out: Path) -> None:
+    """Print the summary."""
     from rich.console import Console
 
     from pathcontrol.cli.tables import peaks_table
@@ -86,7 +88,7 @@ def _tell(summary: dict[str, Any], out: Path) -> None:
 
 
 def _engine_line(compared: dict[str, Any]) -> str:
-    """Say how far the compiled engine is from these numbers, which are the reference's."""
+    """Return the sentence on how far the compiled engine is from these numbers, which are the reference's."""
     if "missing" in compared:
         return f"These are Pinocchio's; they could not be compared: {compared['missing']}"
     q = max(values["q_rad"] for values in compared.values())

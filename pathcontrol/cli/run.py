@@ -1,4 +1,4 @@
-"""``pathcontrol run``."""
+"""The command ``pathcontrol run``."""
 
 from __future__ import annotations
 
@@ -46,12 +46,14 @@ def command(
 
 
 def _animation(done: Outcome, out: Path) -> Path:
+    """Write the animation."""
     from pathcontrol.view.animation.record import record
 
     return record(done.run).save(out / "run.html")
 
 
 def _tell(done: Outcome, as_json: bool) -> None:
+    """Print the results."""
     from rich import print as rich_print
 
     from pathcontrol.analysis.remarks import remarks

@@ -1,4 +1,4 @@
-"""The runs that a command line names: files or folders, and what to call them."""
+"""The saved runs that a command line names, with their names."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ worst_option = click.option(
 def load_runs(
     paths: Sequence[Path], robot: str | None, worst: int | None = None, package_dirs: Sequence[Path] | None = None
 ) -> dict[str, Run]:
-    """The runs by the shortest names that tell them apart: of their files, or of the folders of files ``run.nc``.
+    """Load the runs by the shortest names that tell them apart: of their files, or of the folders of ``run.nc``.
 
     Of a sweep, alone, its ``worst`` histories, by their samples and parameters. Where ``package_dirs``, the folders of
     its meshes, are given, a URDF or a known robot may take the place of a run: its joints move in turn.
@@ -53,13 +53,13 @@ def load_runs(
     arm = None if robot is None else load_robot(robot)
     called = dict(zip(names(files), files, strict=True))
     return {
-        name: _tour(file, package_dirs) if is_robot(file) else _with_robot(Run.load(file), file, arm)
+        name: _make_tour(file, package_dirs) if is_robot(file) else _add_robot(Run.load(file), file, arm)
         for name, file in called.items()
     }
 
 
 def sweep_of(paths: Sequence[Path]) -> SweepResult | None:
-    """The sweep whose folder is named, if one is.
+    """Return the sweep whose folder is named, if one is.
 
     Raises:
         InputError: something else is named beside it.
@@ -74,7 +74,7 @@ def sweep_of(paths: Sequence[Path]) -> SweepResult | None:
 
 
 def check_out(out: Path | None, paths: Sequence[Path]) -> None:
-    """Check that what is written is a page, and not what is read.
+    """Check that the output is a page, and none of the inputs.
 
     Raises:
         InputError: ``out`` is the file of one of the runs, or its name is that of another format.
@@ -89,7 +89,7 @@ def check_out(out: Path | None, paths: Sequence[Path]) -> None:
 
 
 def run_file(path: Path) -> Path:
-    """The file of a run, which may be named by its folder.
+    """Return the file of a run, which may be named by its folder.
 
     Raises:
         InputError: the folder holds no run, or several and none of them is called ``run.nc``.
@@ -100,12 +100,12 @@ def run_file(path: Path) -> Path:
     if not found:
         raise InputError(f"the folder {str(path)!r} holds no run; expected a file run.nc, as `pathcontrol run` writes")
     if len(found) > 1:
-        raise InputError(f"the folder {str(path)!r} holds several runs; name those you mean: {_listed(found)}")
+        raise InputError(f"the folder {str(path)!r} holds several runs; name those you mean: {_list_files(found)}")
     return found[0]
 
 
 def names(files: Sequence[Path]) -> list[str]:
-    """What to call each run: the name of its file, with as many folders before it as tell it from the others."""
+    """Return a name for each run: that of its file, with as many folders as tell it from the others."""
     parts = [_parts(file.resolve()) for file in files]
     depths = [1] * len(files)
     while True:
@@ -118,19 +118,20 @@ def names(files: Sequence[Path]) -> list[str]:
 
 
 def _parts(file: Path) -> tuple[str, ...]:
+    """Return the parts of the name of a run."""
     folders = file.parent.parts[1:]
     return folders if file.name == _DEFAULT and folders else (*folders, file.stem)
 
 
 def is_robot(file: Path) -> bool:
-    """Whether what is named is a URDF or a known robot, and not a run."""
+    """Return whether a URDF or a known robot is named, and not a run."""
     from pathcontrol.robot.catalogue import known_robots
 
     return file.suffix.lower() in (".urdf", ".xacro") or (not file.exists() and str(file) in known_robots())
 
 
-def _tour(file: Path, package_dirs: Sequence[Path] | None) -> Run:
-    """A run in which the joints of a robot move in turn; those that mimic each other stay where they are."""
+def _make_tour(file: Path, package_dirs: Sequence[Path] | None) -> Run:
+    """Return a run in which the joints of a robot move in turn; those that mimic each other do not move."""
     from pathcontrol.robot.catalogue import find_urdf
     from pathcontrol.robot.loading import load_robot
     from pathcontrol.view.tour import joints_to_show, tour
@@ -142,8 +143,8 @@ def _tour(file: Path, package_dirs: Sequence[Path] | None) -> Run:
     return tour(load_robot(source, keep=joints_to_show(find_urdf(source, folders).text), package_dirs=folders))
 
 
-def _with_robot(run: Run, file: Path, robot: RobotModel | None) -> Run:
-    """The run, with ``robot`` if it does not know its own; errors name its file."""
+def _add_robot(run: Run, file: Path, robot: RobotModel | None) -> Run:
+    """Return the run, with ``robot`` if it does not know its own; errors name its file."""
     from pathcontrol.view.animation.rollout import check_filmed
 
     try:
@@ -159,5 +160,6 @@ def _with_robot(run: Run, file: Path, robot: RobotModel | None) -> Run:
     return run
 
 
-def _listed(files: Sequence[Path]) -> str:
+def _list_files(files: Sequence[Path]) -> str:
+    """Return files in words."""
     return ", ".join(str(file) for file in files)

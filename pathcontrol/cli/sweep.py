@@ -1,4 +1,4 @@
-"""``pathcontrol sweep``."""
+"""The command ``pathcontrol sweep``."""
 
 from __future__ import annotations
 
@@ -69,6 +69,7 @@ def command(
 
 
 def _tell(result: SweepResult, as_json: bool) -> None:
+    """Print the results."""
     from pathcontrol.analysis.run_metrics import UNITS
 
     table = result.table()
@@ -93,7 +94,7 @@ def _tell(result: SweepResult, as_json: bool) -> None:
 
 
 def _spread(values: Any) -> dict[str, float | None]:
-    """Least, median and largest of the values that are finite, and how many are infinite: what never settles."""
+    """Return least, median and largest of the finite values, and the number of infinite ones, which never settled."""
     import numpy as np
 
     known, never = values[np.isfinite(values)], int(np.isinf(values).sum())

@@ -1,4 +1,4 @@
-"""What the commands print for a person to read."""
+"""The tables that the commands print for a person to read."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MOST_ROWS = 50
 
 
 def peaks_table(summary: dict[str, Any]) -> Table:
-    """Steady-state peaks, measured beside the paper's."""
+    """Return the table of steady-state peaks, beside the paper's."""
     table = Table(title="Steady-state peaks: measured here, and in the paper")
     for column in ("experiment", r"‖e_p‖ \[deg]", "paper", "", r"‖e_v‖ \[deg/s]", "paper", ""):
         table.add_column(column, justify="left" if column == "experiment" else "right")
@@ -36,7 +36,7 @@ def peaks_table(summary: dict[str, Any]) -> Table:
 
 
 def metric_lines(metrics: dict[str, Any], run: Run) -> list[str]:
-    """A line for each metric, with a value for each rollout; null, of what is not finite, is a dash."""
+    """Return a line for each metric, with a value for each rollout; null, for values not finite, is a dash."""
     from pathcontrol.analysis.limit_shares import RATIOS, is_passed
     from pathcontrol.analysis.readable import readable_number, unit_of
 
@@ -52,19 +52,19 @@ def metric_lines(metrics: dict[str, Any], run: Run) -> list[str]:
 
 
 def remark_lines(run: Run) -> list[str]:
-    """What must not be overlooked in a run, in red: limits that were passed, and an arm that did not get there."""
+    """Return red lines on what must not be overlooked: limits passed, and an arm that did not get there."""
     from pathcontrol.analysis.remarks import remarks
 
     return [red(printable(sentence)) for sentence in remarks(run)]
 
 
 def red(text: str) -> str:
-    """``text`` in red on a terminal."""
+    """Return ``text`` in red on a terminal."""
     return click.style(text, fg="red")
 
 
 def contour_lines(run: Run) -> list[Table]:
-    """What became of each contour of a toolpath, or of each lap; nothing of another run."""
+    """Return the table of contours of a toolpath, or of laps; empty for another run."""
     from pathcontrol.analysis.contours import contour_table
     from pathcontrol.analysis.laps import lap_table
 
@@ -80,7 +80,7 @@ def contour_lines(run: Run) -> list[Table]:
 
 
 def toolpath_table(content: dict[str, Any]) -> list[Text | Table]:
-    """What is in a toolpath, from its summary: a line on the whole, and a row for each contour. Millimetres."""
+    """Return the content of a toolpath from its summary, in millimetres: a line, and a row for each contour."""
     contours = content["contours"]
     size = " × ".join(f"{1e3 * (b - a):.6g}" for a, b in zip(*content["bounds_m"], strict=True))
     cuts, rapids = (f"{1e3 * content[key]:.6g}" for key in ("cut_length_m", "rapid_length_m"))
@@ -98,6 +98,7 @@ def toolpath_table(content: dict[str, Any]) -> list[Text | Table]:
 
 
 def _contour_row(contour: dict[str, Any]) -> list[Text | str]:
+    """Return the row of a contour."""
     return [
         Text(contour["name"]),
         "rapid" if contour["rapid"] else "closed" if contour["closed"] else "open",
@@ -110,4 +111,5 @@ def _contour_row(contour: dict[str, Any]) -> list[Text | str]:
 
 
 def _counted(number: int, word: str) -> str:
+    """Return a number of things in words."""
     return f"{number} {word}{'' if number == 1 else 's'}"

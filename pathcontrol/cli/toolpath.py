@@ -1,4 +1,4 @@
-"""``pathcontrol toolpath``."""
+"""The command ``pathcontrol toolpath``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import click
 
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.cli.group import json_option, uninterrupted
-from pathcontrol.cli.quantity import QuantityType, questioned_feed
+from pathcontrol.cli.quantity import QuantityType, check_feed
 
 
 @click.command("toolpath")
@@ -70,7 +70,7 @@ def command(file: Path, plot: Path | None, as_json: bool, **options: Any) -> Non
     if plot is not None:
         refuse_suffix(plot, "a figure", ".svg", ".png", ".pdf")
     given = {name: value for name, value in options.items() if value not in (None, ())}
-    questioned_feed(options["feed"])
+    check_feed(options["feed"])
     read = read_toolpath(file, **given)
     content = summary(read)
     if plot is not None:

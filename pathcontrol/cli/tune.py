@@ -1,4 +1,4 @@
-"""``pathcontrol tune``."""
+"""The command ``pathcontrol tune``."""
 
 from __future__ import annotations
 
@@ -47,6 +47,7 @@ def command(file: Path, out: Path | None, resume: bool, chunk: int, engine: Engi
 
 
 def _content(tuning: Tuning) -> dict[str, Any]:
+    """Return the result as JSON has it."""
     front = tuning.front()["sample"].to_numpy().tolist()
     return {
         "candidates": tuning.table().sizes["sample"],
@@ -59,7 +60,7 @@ def _content(tuning: Tuning) -> dict[str, Any]:
 
 
 def _plain(one: Candidate | None) -> dict[str, Any] | None:
-    """A candidate as JSON has it: what is not finite is null."""
+    """Return a candidate as JSON has it; values that are not finite are null."""
     if one is None:
         return None
     parameters = {name: value.tolist() for name, value in one.parameters.items()}

@@ -1,4 +1,4 @@
-"""``pathcontrol view``."""
+"""The command ``pathcontrol view``."""
 
 from __future__ import annotations
 
@@ -85,11 +85,12 @@ def command(
 
 
 def one_or_all(runs: Mapping[str, Run]) -> Run | Mapping[str, Run]:
-    """The only run as itself: it needs no name."""
+    """Return the only run by itself, as it needs no name, or all of them."""
     return next(iter(runs.values())) if len(runs) == 1 else runs
 
 
 def _default(runs: tuple[Path, ...]) -> Path:
+    """Return the default file of the page."""
     if sweep_of(runs) is not None:
         return runs[0] / "histories.html"
     first = run_file(runs[0])
@@ -97,7 +98,7 @@ def _default(runs: tuple[Path, ...]) -> Path:
 
 
 def tell(runs: Mapping[str, Run], written: Mapping[str, Path], as_json: bool) -> None:
-    """Say which runs were shown, what must not be overlooked in them, and which files were written."""
+    """Print which runs were shown, what must not be overlooked in them, and which files were written."""
     from pathcontrol.analysis.remarks import remarks
     from pathcontrol.cli.tables import remark_lines
 

@@ -1,4 +1,4 @@
-"""Which frame of an arm is its tool, unless somebody says."""
+"""The default tool frame of an arm."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def default_tool(robot: RobotModel, task: PathTask | None = None) -> str:
 
 
 def with_tool(robot: RobotModel, task: PathTask | None, tool: str | None) -> tuple[RobotModel, str]:
-    """Return the robot and the frame that is shown: ``tool``, or what follows the path.
+    """Return the robot and the frame that is shown: ``tool``, or the frame that follows the path.
 
     A tool that a path was made for need be no frame of the robot; then the robot that is returned has one more.
     """
@@ -45,14 +45,14 @@ def with_tool(robot: RobotModel, task: PathTask | None, tool: str | None) -> tup
 
 
 def _moved_joints(task: PathTask) -> Array:
-    """Which joints the path moves, (n,); all where it stands still."""
+    """Return which joints the path moves, (n,); all where it stands still."""
     q = task.q_d(np.linspace(*task.sampled_interval, _SAMPLES))
     moved = np.ptp(q, axis=0) > _MOVES
     return moved if moved.any() else ~moved
 
 
 def _movers(robot: RobotModel, frame: str) -> Array:
-    """Which joints move a frame, (n,)."""
+    """Return which joints move a frame, (n,)."""
     limits = robot.limits
     q = np.clip(0.5 + 0.1 * np.arange(robot.n), limits.lower, limits.upper)  # nothing lines up there
     return np.abs(robot.frame_jacobian(q, frame)).max(0) > _MOVES

@@ -1,4 +1,4 @@
-"""An arm that moves each of its joints in turn, to look at it without a simulation."""
+"""The motion of each joint of an arm in turn, to look at the arm without a simulation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SWING = (np.pi / 3, 0.2)  # rad and m, at most, to either side
 
 
 def tour(robot: RobotModel) -> Run:
-    """A run of kinematics alone: each joint swings to both sides of its rest, one after another.
+    """Return a run of kinematics alone: each joint swings to both sides of its rest, one after another.
 
     A joint rests at 0, or where that is outside its limits in their middle, and swings by 60 deg or 0.2 m at most.
     """
@@ -40,7 +40,7 @@ def tour(robot: RobotModel) -> Run:
 
 
 def joints_to_show(text: str) -> list[str]:
-    """The joints of a URDF that neither follow another nor lead one, which can move alone."""
+    """Return the joints of a URDF that neither follow another nor lead one, and so can move alone."""
     root = parse_urdf(text)
     movable = [joint for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES]
     bound = {mimic.get("joint") for mimic in root.iterfind("joint/mimic")}
@@ -48,7 +48,7 @@ def joints_to_show(text: str) -> list[str]:
 
 
 def _swing(rest: Array, i: int, phase: Array, limits: tuple[float, float], most: float) -> Array:
-    """Postures in which joint ``i`` goes up, down and back within its limits, (samples, n)."""
+    """Return postures in which joint ``i`` goes up, down and back within its limits, (samples, n)."""
     q = np.tile(rest, (len(phase), 1))
     room = np.where(np.sin(phase) > 0, limits[1] - rest[i], rest[i] - limits[0])
     q[:, i] += np.sin(phase) * np.minimum(room, most)

@@ -1,4 +1,4 @@
-"""An animation as a video: a browser on this machine draws the frames, FFmpeg joins them."""
+"""The video of an animation: a browser on this machine draws the frames, FFmpeg joins them."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def save_video(
     fps: float = 30.0,
     speed: float = 1.0,
 ) -> Path:
-    """Write an animation as a video (H.264 in MP4), whole or not at all: the picture and the legend, without controls.
+    """Write an animation as a video (H.264 in MP4), whole or not at all: picture and legend, without controls.
 
     Needs the extra ``video`` and Chromium, Chrome or Edge, which is looked for by the usual names; the environment
     variable ``PATHCONTROL_BROWSER`` names another program.
@@ -90,7 +90,7 @@ def save_video(
     with whole_file(path) as video, scratch_folder("pathcontrol-film-") as folder, ThreadPoolExecutor(1) as pool:
         page = animation.save(folder / "film.html")
         # in a thread: there is no loop of asyncio that playwright would trip over, and Ctrl-C does not hit it halfway
-        work = pool.submit(_shoot, page, video, clip, program, stop)
+        work = pool.submit(_write_frames, page, video, clip, program, stop)
         try:
             work.result()
         finally:
@@ -99,7 +99,7 @@ def save_video(
 
 
 def find_browser() -> str:
-    """The program that draws the frames.
+    """Return the program that draws the frames.
 
     Raises:
         InputError: the environment names one that does not exist.
@@ -116,6 +116,8 @@ def find_browser() -> str:
 
 
 class _NoBrowserError(MissingExtraError):
+    """The browser to draw the frames is missing."""
+
     def __init__(self) -> None:
         ImportError.__init__(
             self,
@@ -125,6 +127,7 @@ class _NoBrowserError(MissingExtraError):
 
 
 def _clip(duration: float, size: tuple[int, int], fps: float, speed: float) -> _Clip:
+    """Return the frames of the video."""
     if len(size) != 2 or any(not isinstance(n, int) or n < 2 or n % 2 for n in size):
         raise InputError(f"size = {size!r}, expected width and height in pixels, two even numbers such as (1280, 720)")
     step = scalar("speed", speed, positive=True) / fps
@@ -132,15 +135,15 @@ def _clip(duration: float, size: tuple[int, int], fps: float, speed: float) -> _
     return _Clip(size, fps, tuple(k * step for k in range(frames)))
 
 
-def _shoot(page: Path, video: Path, clip: _Clip, program: str, stop: Event) -> None:
+def _write_frames(page: Path, video: Path, clip: _Clip, program: str, stop: Event) -> None:
     """Draw and write all frames, unless ``stop`` is set."""
     from playwright.sync_api import Error
 
     count = len(clip.moments)
     try:
         with (
-            _drawn(page, clip, program) as camera,
-            _encoder(video, clip) as write,
+            _open_painter(page, clip, program) as camera,
+            _open_encoder(video, clip) as write,
             progress_bar("filming", count) as say,
         ):
             for k, moment in enumerate(clip.moments):
@@ -155,8 +158,8 @@ def _shoot(page: Path, video: Path, clip: _Clip, program: str, stop: Event) -> N
 
 
 @contextmanager
-def _drawn(page: Path, clip: _Clip, program: str) -> Iterator[Any]:
-    """A function from a moment [s] to its picture, a PNG."""
+def _open_painter(page: Path, clip: _Clip, program: str) -> Iterator[Any]:
+    """Give a function from a moment [s] to its picture, a PNG."""
     from playwright.sync_api import sync_playwright
 
     width, height = clip.size
@@ -177,8 +180,8 @@ def _drawn(page: Path, clip: _Clip, program: str) -> Iterator[Any]:
 
 
 @contextmanager
-def _encoder(video: Path, clip: _Clip) -> Iterator[Any]:
-    """A function that takes one picture after another."""
+def _open_encoder(video: Path, clip: _Clip) -> Iterator[Any]:
+    """Give a function that takes one picture after another."""
     from imageio_ffmpeg import get_ffmpeg_exe  # type: ignore[import-untyped]
 
     command = [get_ffmpeg_exe(), *_INPUT, "-framerate", f"{clip.fps:g}", "-i", "-", *_CODEC, *_COLOURS, str(video)]

@@ -1,1 +1,1 @@
-"""A run as a film: the arms, the paths, and how they move, ready for a page."""
+"""The animation of runs: arms, paths and their motion, ready for a page."""

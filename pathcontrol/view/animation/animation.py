@@ -1,4 +1,4 @@
-"""A film that can be looked at: as a page, as a file, in a browser or in a notebook."""
+"""An animation that can be shown: as a page, as a file, in a browser or in a notebook."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NOTEBOOK_HEIGHT = 640  # px
 
 @dataclass(frozen=True, eq=False)
 class Animation:
-    """A recorded scene that moves; made by :func:`record`.
+    """A scene that moves; made by :func:`record`.
 
     Attributes:
         film: all that the page shows; see :class:`pathcontrol.view.animation.payload.Film`.
@@ -30,16 +30,16 @@ class Animation:
 
     @property
     def title(self) -> tuple[str, ...]:
-        """Robot, controllers and duration, in words."""
+        """The robot, the controllers and the duration, in words."""
         return tuple(self.film.header["title"])
 
     @property
     def duration(self) -> float:
-        """How long it lasts [s]."""
+        """The duration [s]."""
         return float(self.film.header["duration"])
 
     def html(self) -> str:
-        """The page: it plays from ``file://``, needs no network, and fetches nothing."""
+        """Return the page: it plays from ``file://`` and needs no network."""
         from pathcontrol.view.page.html import page
 
         return page(self.film, self.title)
@@ -62,7 +62,7 @@ class Animation:
         return path
 
     def _repr_html_(self) -> str:
-        """The page inside a notebook, in a frame of its own."""
+        """Return the page for a notebook, in a frame of its own."""
         return (
             f'<iframe srcdoc="{html.escape(self.html())}" title="{html.escape(" - ".join(self.title))}" '
             f'style="width: 100%; height: {_NOTEBOOK_HEIGHT}px; border: 0"></iframe>'

@@ -1,4 +1,4 @@
-"""How far the arm was from its path: what the tool's line is coloured by."""
+"""The distance of the arm from its path, which colours the line of the tool."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathcontrol.analysis.deviation import tool_deviation
 from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.analysis.run_metrics import contour_error
 from pathcontrol.errors import TaskError
-from pathcontrol.view.animation.rollout import Take
+from pathcontrol.view.animation.rollout import Recording
 
 if TYPE_CHECKING:
     from pathcontrol.cartesian.toolpath_task import ToolpathTask
@@ -43,7 +43,7 @@ class PathError:
 
     @property
     def top(self) -> float:
-        """A top of the scale that the start, from off the path, does not spoil.
+        """The top of the scale, which a start off the path does not stretch.
 
         The largest of the second half, or what nine tenths of the time stay below if that is more; the largest of all
         if that is only a little more.
@@ -55,26 +55,28 @@ class PathError:
         return self.largest if self.largest <= _LITTLE_MORE * top else top
 
 
-def path_error(take: Take) -> PathError | None:
-    """The error that a take is judged by, or None without a path that it could be measured against.
+def path_error(recording: Recording) -> PathError | None:
+    """Return the error to judge a rollout by, or None without a path to measure it against.
 
     On a toolpath the distance of the tool from the drawing, of cuts only; else the contour error, the distance
     from the path in joint space.
     """
-    if take.task is None:
+    if recording.task is None:
         return None
-    if take.toolpath is not None:
-        return PathError("distance from the drawing", "mm", MILLIMETRE * _deviation(take, take.toolpath))
+    if recording.toolpath is not None:
+        return PathError(
+            "distance from the drawing", "mm", MILLIMETRE * _measure_deviation(recording, recording.toolpath)
+        )
     try:
-        error = contour_error(take.run, take.task)[0]
+        error = contour_error(recording.run, recording.task)[0]
     except TaskError:  # an endless path has no nearest point
         return None
-    values, unit = in_degrees(error, take.run.unit("q"))
+    values, unit = in_degrees(error, recording.run.unit("q"))
     return PathError("contour error", unit, values)
 
 
 def in_fitting_units(errors: Sequence[PathError | None]) -> list[PathError | None]:
-    """The same errors, those in millimetres all in micrometres if none of them reaches one."""
+    """Return the same errors, those in millimetres all in micrometres if none of them reaches one."""
     lengths = [error for error in errors if error is not None and error.unit == "mm"]
     if not lengths or max(error.top for error in lengths) >= 1.0:
         return list(errors)
@@ -82,10 +84,10 @@ def in_fitting_units(errors: Sequence[PathError | None]) -> list[PathError | Non
     return [replace(e, unit="µm", values=scale * e.values) if e in lengths else e for e in errors]
 
 
-def _deviation(take: Take, task: ToolpathTask) -> Array:
-    """Distance of the tool from the contour it should be on [m], (k,); NaN on rapids."""
-    cutting = np.array([not contour.rapid for contour in task.contours])[take.run.array("path_index")]
+def _measure_deviation(recording: Recording, task: ToolpathTask) -> Array:
+    """Return the distance of the tool from its contour [m], (k,); NaN on rapids."""
+    cutting = np.array([not contour.rapid for contour in task.contours])[recording.run.array("path_index")]
     deviation = np.full(len(cutting), np.nan)
     if cutting.any():
-        deviation[cutting] = tool_deviation(take.run, take.robot, task.frame, task.contours)[0, cutting]
+        deviation[cutting] = tool_deviation(recording.run, recording.robot, task.frame, task.contours)[0, cutting]
     return deviation

@@ -1,4 +1,4 @@
-"""A film as a page reads it: a header that says what is there, and the numbers in binary behind it."""
+"""A film in the form that a page reads: a header that describes it, and binary numbers behind it."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ class Film:
         return reference
 
     def packed(self) -> bytes:
-        """All of it, zipped; the same film gives the same bytes."""
+        """Return all of it, compressed; the same film gives the same bytes."""
         header = json.dumps(self.header, allow_nan=False).encode()
         header += b" " * (-(4 + len(header)) % _ALIGNMENT)
         whole = b"".join([len(header).to_bytes(4, "little"), header, *self._blocks])
         return gzip.compress(whole, compresslevel=6, mtime=0)
 
     def text(self) -> str:
-        """All of it in base64, in which no markup can be."""
+        """Return all of it in base64, which can contain no markup."""
         return base64.b64encode(self.packed()).decode()

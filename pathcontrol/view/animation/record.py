@@ -1,4 +1,4 @@
-"""Runs as a film: the arms, the paths their tools should take and the ones they took, in one HTML file."""
+"""The recording of runs as a film: arms, desired paths and tool paths, in one HTML file."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from pathcontrol.errors import UnknownNameError
 from pathcontrol.view.animation.animation import Animation
 from pathcontrol.view.animation.charts.plane import plane
 from pathcontrol.view.animation.charts.quantities import charts
-from pathcontrol.view.animation.drawn_rollout import Shot, shots_of
+from pathcontrol.view.animation.drawn_rollout import DrawnRollout, draw_rollouts
 from pathcontrol.view.animation.payload import Film
-from pathcontrol.view.animation.recorded_runs import cast_takes, film_title
+from pathcontrol.view.animation.recorded_runs import film_title, make_recordings
 from pathcontrol.view.animation.scene.builder import Stage
 from pathcontrol.view.animation.scene.camera import Camera, view_direction
 from pathcontrol.view.animation.scene.layout import Layout, shifts
@@ -39,7 +39,7 @@ def record(
     layout: Layout = "beside",
     tool: str | None = None,
 ) -> Animation:
-    """Film one rollout of a run, or of several runs together; no server, no browser and no network take part.
+    """Animate one rollout of a run, or of several runs together, without a server, a browser or the network.
 
     The line that the tool draws is coloured by the contour error, on a toolpath by the distance from the drawing;
     ghosts draw in the colours of their runs. Links are nowhere farther than 5e-5 m from where they were at the samples
@@ -62,41 +62,47 @@ def record(
     """
     if layout not in get_args(Layout):
         raise UnknownNameError(f"layout = {layout!r}, expected one of {', '.join(map(repr, get_args(Layout)))}")
-    takes = cast_takes(run, robot, task, rollout, tool)
-    shots, film = shots_of(takes), Film()
-    ghosted = layout == "ghosted" and len(takes) > 1
+    recordings = make_recordings(run, robot, task, rollout, tool)
+    drawn_rollouts, film = draw_rollouts(recordings), Film()
+    ghosted = layout == "ghosted" and len(recordings) > 1
     film.header = {
         "version": 1,
-        "title": film_title(takes, rollout),
-        "duration": max(take.duration for take in takes),
-        "runs": [{"name": take.name, "color": list(take.color[:3])} for take in takes],
-        "legend": legend(shots, ghosted),
-        **_picture(film, shots, layout, ghosted),
-        "charts": [chart.header(film) for chart in charts(shots)],
-        "plane": plane(shots).header(film, shots),
-        "tables": tables(takes),
+        "title": film_title(recordings, rollout),
+        "duration": max(recording.duration for recording in recordings),
+        "runs": [{"name": recording.name, "color": list(recording.color[:3])} for recording in recordings],
+        "legend": legend(drawn_rollouts, ghosted),
+        **_picture(film, drawn_rollouts, layout, ghosted),
+        "charts": [chart.header(film) for chart in charts(drawn_rollouts)],
+        "plane": plane(drawn_rollouts).header(film, drawn_rollouts),
+        "tables": tables(recordings),
     }
     return Animation(film)
 
 
-def _picture(film: Film, shots: Sequence[Shot], layout: Layout, ghosted: bool) -> dict[str, Any]:
-    """Everything that is seen in the scene, and from where."""
-    direction = view_direction(_all(shot.sight for shot in shots), _all(shot.body for shot in shots))
-    moved = shifts([shot.seen for shot in shots], direction, layout)
-    whole = _all(shot.seen + shift for shot, shift in zip(shots, moved, strict=True))
-    stage, width = Stage(film), max(shot.line_width for shot in shots)
+def _picture(film: Film, drawn_rollouts: Sequence[DrawnRollout], layout: Layout, ghosted: bool) -> dict[str, Any]:
+    """Return everything visible in the scene, and the camera."""
+    direction = view_direction(
+        _all(drawn_rollout.sight for drawn_rollout in drawn_rollouts),
+        _all(drawn_rollout.body for drawn_rollout in drawn_rollouts),
+    )
+    moved = shifts([drawn_rollout.seen for drawn_rollout in drawn_rollouts], direction, layout)
+    whole = _all(drawn_rollout.seen + shift for drawn_rollout, shift in zip(drawn_rollouts, moved, strict=True))
+    stage, width = Stage(film), max(drawn_rollout.line_width for drawn_rollout in drawn_rollouts)
     stage.add_ground(whole)
-    for i, (shot, shift) in enumerate(zip(shots, moved, strict=True)):
-        stage.add_arm(i, shot.take, shift, ghost=ghosted and i > 0)
-    add_lines(stage, shots, moved, width, ghosted)
-    add_markers(stage, shots, moved, width)
-    labelled = 1 < len(shots) <= (MOST_GHOSTS if ghosted else len(shots))
-    names = labels(shots, ghosted) if labelled else []
+    for i, (drawn_rollout, shift) in enumerate(zip(drawn_rollouts, moved, strict=True)):
+        stage.add_arm(i, drawn_rollout.recording, shift, ghost=ghosted and i > 0)
+    add_lines(stage, drawn_rollouts, moved, width, ghosted)
+    add_markers(stage, drawn_rollouts, moved, width)
+    labelled = 1 < len(drawn_rollouts) <= (MOST_GHOSTS if ghosted else len(drawn_rollouts))
+    names = labels(drawn_rollouts, ghosted) if labelled else []
     above = [shift + name["offset"] for shift, name in zip(moved, names, strict=False)]
     camera = Camera.framing(np.concatenate([whole, *np.reshape(above, (-1, 1, 3))]), direction)
-    near = Camera.framing(_all(shot.sight + shift for shot, shift in zip(shots, moved, strict=True)), direction)
+    near = Camera.framing(
+        _all(drawn_rollout.sight + shift for drawn_rollout, shift in zip(drawn_rollouts, moved, strict=True)), direction
+    )
     return stage.header() | {"camera": camera.seen_from_near(near, width), "labels": names}
 
 
 def _all(parts: Iterable[Array]) -> Array:
+    """Return all points of several parts."""
     return np.concatenate(list(parts))

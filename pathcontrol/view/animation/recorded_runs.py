@@ -1,4 +1,4 @@
-"""Which arm, path and tool belong to the runs that are filmed."""
+"""The choice of arm, path and tool for the runs that are animated."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.batch.task_batch import select_rows
 from pathcontrol.tasks.task import PathTask
-from pathcontrol.view.animation.rollout import Take
+from pathcontrol.view.animation.rollout import Recording
 from pathcontrol.view.animation.scene.palette import run_color
 from pathcontrol.view.bodies.sticks import stick_figure
 from pathcontrol.view.bodies.visuals import LinkVisual, link_visuals
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 FINENESS = 1.5e-4  # of the arm's reach: where a picture shows it whole, a small part of a pixel
 
 
-def cast_takes(
+def make_recordings(
     run: Run | Mapping[str, Run],
     robot: RobotModel | None,
     task: PathTask | None,
     rollout: int,
     tool: str | None,
-) -> list[Take]:
-    """One rollout of each run, with the robot, task and tool that are given, or else its own.
+) -> list[Recording]:
+    """Return one rollout of each run, with the given robot, task and tool, or else its own.
 
     Raises:
         InputError: there is no run, or run, robot and task do not belong together.
@@ -48,7 +48,7 @@ def cast_takes(
     if task is not None:
         expect("task", task, PathTask)
     looks: dict[UrdfSource, list[LinkVisual]] = {}
-    takes = []
+    recordings = []
     for i, (name, one) in enumerate(runs.items()):
         part = one.rollout(rollout)
         arm = part.robot if robot is None else robot
@@ -57,24 +57,28 @@ def cast_takes(
             looks[arm.source] = link_visuals(arm.source, FINENESS) or stick_figure(arm.source)
         path = path if "s" in one else None  # where on it the arm should be is not known
         arm, frame = with_tool(arm, path, tool)
-        part, visuals = _until_it_diverged(part), looks[arm.source]
-        takes.append(Take(str(name), part, arm, path, frame, visuals, run_color(i), one.rollouts))
-    return takes
+        part, visuals = _cut_at_divergence(part), looks[arm.source]
+        recordings.append(Recording(str(name), part, arm, path, frame, visuals, run_color(i), one.rollouts))
+    return recordings
 
 
-def _until_it_diverged(run: Run) -> Run:
-    """All of a rollout, or what there is of it."""
+def _cut_at_divergence(run: Run) -> Run:
+    """Return all of a rollout up to its divergence."""
     known = np.isfinite(run.array("q")).all((0, 2))
     return run.with_data(run.data.isel(time=known)) if run.status[0] == "diverged" and known.any() else run
 
 
 def controller_name(run: Run) -> str:
-    """What a run is called that has no other name: its controller."""
+    """Return the name of a run that has no other name: its controller."""
     return str(table(run.config, "controller").get("controller", "unknown controller"))
 
 
-def film_title(takes: Sequence[Take], rollout: int) -> list[str]:
-    """Robots, controllers or the names of the runs, and the duration, in words."""
-    robots = ", ".join(dict.fromkeys(take.robot.name for take in takes))
-    words = [robots, ", ".join(take.name for take in takes), f"{max(take.duration for take in takes):.4g} s"]
-    return [*words, f"rollout {rollout}"] if any(take.rollouts > 1 for take in takes) else words
+def film_title(recordings: Sequence[Recording], rollout: int) -> list[str]:
+    """Return robots, controllers or the names of the runs, and the duration, in words."""
+    robots = ", ".join(dict.fromkeys(recording.robot.name for recording in recordings))
+    words = [
+        robots,
+        ", ".join(recording.name for recording in recordings),
+        f"{max(recording.duration for recording in recordings):.4g} s",
+    ]
+    return [*words, f"rollout {rollout}"] if any(recording.rollouts > 1 for recording in recordings) else words

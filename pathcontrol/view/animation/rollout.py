@@ -1,4 +1,4 @@
-"""One rollout to be filmed: what happened, to which arm, on which path."""
+"""A rollout for an animation, with its arm, path and tool."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _AT_ONCE = 20_000  # samples, so that memory for long runs is not needed twice
 
 
 @dataclass(frozen=True, eq=False)
-class Take:
+class Recording:
     """A rollout with its arm, path and tool, and the poses that follow from them.
 
     Attributes:
@@ -55,22 +55,22 @@ class Take:
 
     @cached_property
     def time(self) -> Array:
-        """Times of the samples from the start of the film [s], (k,), as a film counts them: in single precision."""
+        """The times of the samples from the start of the film [s], (k,), in single precision, as the film has them."""
         return (self.run.time - self.run.time[0]).astype(np.float32).astype(np.float64)
 
     @property
     def duration(self) -> float:
-        """How long it lasts [s]."""
+        """The duration [s]."""
         return float(self.run.time[-1] - self.run.time[0])
 
     @property
     def q(self) -> Array:
-        """Joint positions [rad], (k, n)."""
+        """The joint positions [rad], (k, n)."""
         return self.run.array("q")[0]
 
     @cached_property
     def s(self) -> Array:
-        """Path parameter within the path, (k,)."""
+        """The path parameter within the path, (k,)."""
         s = self.run.array("s")[0]
         return s if self.task is None else np.clip(s, *self._domain(self.task))
 
@@ -81,7 +81,7 @@ class Take:
 
     @cached_property
     def poses(self) -> dict[str, Array]:
-        """Poses of the links that are seen, and of the tool, at all samples [m], (k, 4, 4) each."""
+        """The poses of the visible links, and of the tool, at all samples [m], (k, 4, 4) each."""
         frames = list(dict.fromkeys([*(visual.link for visual in self.visuals), self.tool]))
         parts = np.array_split(self.q, -(-len(self.q) // _AT_ONCE))
         stacked = np.concatenate([self.robot.frame_poses(part, frames) for part in parts])
@@ -89,25 +89,26 @@ class Take:
 
     @property
     def tool_positions(self) -> Array:
-        """Where the tool was [m], (k, 3)."""
+        """The positions of the tool [m], (k, 3)."""
         return self.poses[self.tool][:, :3, 3]
 
     @cached_property
     def desired_positions(self) -> Array | None:
-        """Where the tool should have been, at q_d(s(t)) [m], (k, 3); None without a path."""
+        """The desired positions of the tool, at q_d(s(t)) [m], (k, 3); None without a path."""
         return None if self.task is None else self.tool_at(self.task.q_d(self.s))
 
     def tool_at(self, q: Array) -> Array:
-        """Positions of the tool [m], (k, 3), at joint positions (k, n)."""
+        """Return positions of the tool [m], (k, 3), at joint positions (k, n)."""
         return self.robot.frame_pose(q, self.tool)[..., :3, 3]
 
     @staticmethod
     def _domain(task: PathTask) -> tuple[float, float]:
+        """Return the interval of s that is drawn."""
         return (-np.inf, np.inf) if task.closed else (task.s0, task.s_end)
 
 
 def check_filmed(run: Run, robot: RobotModel, task: PathTask | None) -> None:
-    """Run, robot and task belong together, and the run can be shown.
+    """Check that run, robot and task belong together, and that the run can be shown.
 
     Raises:
         InputError: they do not, or the times or the joint positions of the run make no film.

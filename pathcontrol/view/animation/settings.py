@@ -1,4 +1,4 @@
-"""What a run was made with, in words."""
+"""The settings of a run, in words."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pathcontrol.simulation.config import laws, table
-from pathcontrol.view.animation.rollout import Take
+from pathcontrol.view.animation.rollout import Recording
 
 _NAMES = {
     "friction": "friction compensation",
@@ -22,31 +22,32 @@ _NAMES = {
 _ELSEWHERE = {"controller", "robot", "task", "sequence"}
 
 
-def settings(take: Take) -> dict[str, str]:
-    """Robot, controller, gains, plant, loop, duration and versions of a run, by their names."""
-    config = take.run.config
+def settings(recording: Recording) -> dict[str, str]:
+    """Return robot, controller, gains, plant, loop, duration and versions of a run, by their names."""
+    config = recording.run.config
     chosen = {name: value for name, value in laws(config)[0].items() if name not in _ELSEWHERE}
     versions = ", ".join(f"{name} {number}" for name, number in table(config, "versions").items())
     found: dict[str, Any] = {
-        "robot": take.robot.name,
+        "robot": recording.robot.name,
         "controller": table(config, "controller").get("controller"),
-        "task": None if take.task is None else table({"of": take.task.describe()}, "of").get("task"),
+        "task": None if recording.task is None else table({"of": recording.task.describe()}, "of").get("task"),
         **{_NAMES.get(name, name): value for name, value in chosen.items()},
         "friction of the plant": _friction(table(config, "plant")),
         **{_NAMES.get(name, name): value for name, value in table(config, "loop").items()},
-        "duration": f"{take.duration:g} s, {len(take.time)} samples",
-        "rollout": f"{_rollout(take)} of {take.rollouts}" if take.rollouts > 1 else None,
+        "duration": f"{recording.duration:g} s, {len(recording.time)} samples",
+        "rollout": f"{_rollout(recording)} of {recording.rollouts}" if recording.rollouts > 1 else None,
         "versions": versions or None,
     }
     return {name: _words(value) for name, value in found.items() if value is not None}
 
 
-def _rollout(take: Take) -> int:
-    return int(take.run.array("rollout")[0])
+def _rollout(recording: Recording) -> int:
+    """Return the number of the rollout."""
+    return int(recording.run.array("rollout")[0])
 
 
 def _friction(plant: Mapping[str, Any]) -> str | None:
-    """Names of the laws that the friction law of the plant is made of."""
+    """Return the names of the laws that the friction of the plant consists of."""
     law = table(plant, "friction")
     terms = law["terms"] if isinstance(law.get("terms"), list) else [law]
     names = [str(term.get("law", "")) for term in terms if isinstance(term, Mapping)]
@@ -54,6 +55,7 @@ def _friction(plant: Mapping[str, Any]) -> str | None:
 
 
 def _words(value: Any) -> str:
+    """Return a value in words."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

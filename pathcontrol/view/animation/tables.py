@@ -1,4 +1,4 @@
-"""The tables of a film: what was measured, and what it was made with; a column for each run."""
+"""The tables of a film: metrics and settings, with a column for each run."""
 
 from __future__ import annotations
 
@@ -15,88 +15,97 @@ from pathcontrol.analysis.readable import readable_number, unit_of
 from pathcontrol.analysis.remarks import remarks
 from pathcontrol.analysis.run_metrics import LABELS, metrics
 from pathcontrol.analysis.window import describe_window
-from pathcontrol.view.animation.rollout import Take
+from pathcontrol.view.animation.rollout import Recording
 from pathcontrol.view.animation.settings import settings
 
 _NEEDED = {"qd", "s", "e_p", "e_v", "sdot", "tau_demand"}
 
 
-def tables(takes: Sequence[Take]) -> list[dict[str, Any]]:
-    """Metrics, contours and settings as the header of a film has them; rows beyond a limit are ``marked``."""
-    names, numbers = [take.name for take in takes], [_numbers(take) for take in takes]
-    rows = _rows([_measured(take, found) for take, found in zip(takes, numbers, strict=True)])
+def tables(recordings: Sequence[Recording]) -> list[dict[str, Any]]:
+    """Return metrics, contours and settings for the header of a film; rows beyond a limit are ``marked``."""
+    names, numbers = [recording.name for recording in recordings], [_numbers(recording) for recording in recordings]
+    rows = _rows([_format_metrics(recording, found) for recording, found in zip(recordings, numbers, strict=True)])
     beyond = {LABELS[name] for name in RATIOS for found in numbers if is_passed(found.get(name, [0.0])[0])}
     found = [
-        {"title": "Metrics", "columns": [_meant(takes), *names], "rows": rows},
-        *_contours(takes),
-        *_laps(takes),
-        {"title": "Settings", "columns": ["", *names], "rows": _rows([settings(take) for take in takes])},
+        {"title": "Metrics", "columns": [_describe_window(recordings), *names], "rows": rows},
+        *_contours(recordings),
+        *_laps(recordings),
+        {
+            "title": "Settings",
+            "columns": ["", *names],
+            "rows": _rows([settings(recording) for recording in recordings]),
+        },
     ]
     found[0]["marked"] = [i for i, row in enumerate(rows) if row[0] in beyond]
-    return [table for table in _mind(takes) + found if table["rows"]]
+    return [table for table in _list_remarks(recordings) + found if table["rows"]]
 
 
-def _mind(takes: Sequence[Take]) -> list[dict[str, Any]]:
-    """What must not be overlooked, all of it marked."""
+def _list_remarks(recordings: Sequence[Recording]) -> list[dict[str, Any]]:
+    """Return what must not be overlooked, all of it marked."""
     rows = [
-        [take.name, sentence]
-        for take in takes
-        if not _idle(take)
-        for sentence in remarks(take.run.with_robot(take.robot))
+        [recording.name, sentence]
+        for recording in recordings
+        if not _idle(recording)
+        for sentence in remarks(recording.run.with_robot(recording.robot))
     ]
     return [{"title": "To be noted", "columns": ["", ""], "rows": rows, "marked": list(range(len(rows)))}]
 
 
-def _contours(takes: Sequence[Take]) -> list[dict[str, Any]]:
-    """What became of each contour, of a single take: several have tables too large to be compared."""
-    if len(takes) > 1 or takes[0].toolpath is None or _idle(takes[0]) or not _measurable(takes[0]):
+def _contours(recordings: Sequence[Recording]) -> list[dict[str, Any]]:
+    """Return the table of contours of a single rollout; the tables of several are too large to be compared."""
+    if len(recordings) > 1 or recordings[0].toolpath is None or _idle(recordings[0]) or not _measurable(recordings[0]):
         return []
-    heads, *rows = contour_table(takes[0].run, takes[0].robot) or [[]]
+    heads, *rows = contour_table(recordings[0].run, recordings[0].robot) or [[]]
     return [{"title": "Contours", "columns": heads, "rows": rows}]
 
 
-def _laps(takes: Sequence[Take]) -> list[dict[str, Any]]:
-    """How long each lap of a closed path took, of a single take."""
-    if len(takes) > 1 or takes[0].task is None or takes[0].task is not takes[0].run.task:
+def _laps(recordings: Sequence[Recording]) -> list[dict[str, Any]]:
+    """Return the table of laps of a single rollout on a closed path."""
+    if len(recordings) > 1 or recordings[0].task is None or recordings[0].task is not recordings[0].run.task:
         return []
-    heads, *rows = lap_table(takes[0].run) or [[]]
+    heads, *rows = lap_table(recordings[0].run) or [[]]
     return [{"title": "Laps", "columns": heads, "rows": rows}]
 
 
-def _meant(takes: Sequence[Take]) -> str:
-    """Of which time the errors are: the charts beside them show all of it."""
-    drawn = [take.toolpath is not None for take in takes]
+def _describe_window(recordings: Sequence[Recording]) -> str:
+    """Return the time window of the errors, in words; the charts beside them show the whole time."""
+    drawn = [recording.toolpath is not None for recording in recordings]
     cuts, late = "over the cuts", f"of {describe_window()}"
     return f"peaks and RMS {cuts if all(drawn) else f'{late}, of toolpaths {cuts}' if any(drawn) else late}"
 
 
 def _rows(columns: Sequence[Mapping[str, str]]) -> list[list[str]]:
+    """Return the rows of some columns."""
     names = dict.fromkeys(name for column in columns for name in column)
     return [[name, *(column.get(name, "–") for column in columns)] for name in names]
 
 
-def _measured(take: Take, numbers: Mapping[str, Any]) -> dict[str, str]:
+def _format_metrics(recording: Recording, numbers: Mapping[str, Any]) -> dict[str, str]:
+    """Return metrics in words."""
     return {
-        LABELS[name]: readable_number(numbers[name][0], unit_of(name, take.run)) for name in LABELS if name in numbers
+        LABELS[name]: readable_number(numbers[name][0], unit_of(name, recording.run))
+        for name in LABELS
+        if name in numbers
     }
 
 
-def _idle(take: Take) -> bool:
-    """Whether nothing was cut, so that there is nothing to be measured."""
-    if take.toolpath is None:
+def _idle(recording: Recording) -> bool:
+    """Return whether nothing was cut, so that there is nothing to measure."""
+    if recording.toolpath is None:
         return False
-    followed = np.unique(take.run.array("path_index"))
-    return all(take.toolpath.contours[i].rapid for i in followed)
+    followed = np.unique(recording.run.array("path_index"))
+    return all(recording.toolpath.contours[i].rapid for i in followed)
 
 
-def _measurable(take: Take) -> bool:
-    """Whether the run has what metrics are made of."""
-    return all(name in take.run for name in _NEEDED)
+def _measurable(recording: Recording) -> bool:
+    """Return whether the run has the variables that metrics need."""
+    return all(name in recording.run for name in _NEEDED)
 
 
-def _numbers(take: Take) -> dict[str, Any]:
-    if take.task is None or not _measurable(take) or _idle(take):
+def _numbers(recording: Recording) -> dict[str, Any]:
+    """Return the metrics of a rollout."""
+    if recording.task is None or not _measurable(recording) or _idle(recording):
         return {}
-    if take.toolpath is not None:
-        return toolpath_metrics(take.run, take.robot, take.toolpath)
-    return metrics(take.run.with_robot(take.robot), take.task)
+    if recording.toolpath is not None:
+        return toolpath_metrics(recording.run, recording.robot, recording.toolpath)
+    return metrics(recording.run.with_robot(recording.robot), recording.task)

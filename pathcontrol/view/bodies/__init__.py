@@ -1,1 +1,1 @@
-"""What an arm looks like: the visuals of its URDF, their meshes, or sticks in their place."""
+"""The shapes of an arm: the visuals of its URDF, their meshes, or sticks in their place."""

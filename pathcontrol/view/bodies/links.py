@@ -1,4 +1,4 @@
-"""How the links of a URDF hang together."""
+"""The chain of links of a URDF."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def reach(source: UrdfSource) -> float:
-    """Length of the longest chain of links, from joint to joint [m]."""
+    """Return the length of the longest chain of links, from joint to joint [m]."""
     carrying = {joint.find("child").get("link"): joint for joint in parse_urdf(source.text).iterchildren("joint")}
     longest = 0.0
     for joint in carrying.values():
@@ -27,6 +27,6 @@ def reach(source: UrdfSource) -> float:
 
 
 def joint_offset(joint: Any) -> Array:
-    """Where a ``<joint>`` is in the frame of its parent [m], (3,)."""
+    """Return the position of a ``<joint>`` in the frame of its parent [m], (3,)."""
     origin = joint.find("origin")
     return np.zeros(3) if origin is None else np.array(origin.get("xyz", "0 0 0").split(), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""What is in the mesh files of a robot, as it is drawn."""
+"""The meshes of a robot's files, as they are drawn."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SHARP = np.deg2rad(40.0)  # faces that meet at more than this show an edge
 
 
 def read_mesh(path: Path, scale: ArrayLike = 1.0, detail: float = 0.0) -> list[tuple[Mesh, Color | None]]:
-    """The triangles of a mesh file [m], one mesh for each colour in it; the colour is None where it has none.
+    """Read the triangles of a mesh file [m], one mesh for each colour in it; the colour is None where it has none.
 
     Args:
         path: an STL, OBJ, PLY, Collada or glTF file.
@@ -34,16 +34,16 @@ def read_mesh(path: Path, scale: ArrayLike = 1.0, detail: float = 0.0) -> list[t
     found: dict[Color | None, list[Part]] = {}
     for part in load_parts(path):
         found.setdefault(part.color, []).append(part)
-    joined = [(color, _joined(found[color], factor)) for color in sorted(found, key=lambda color: color or ())]
-    meshes = [(_shaded(mesh, detail), color) for color, mesh in joined]
+    joined = [(color, _join(found[color], factor)) for color in sorted(found, key=lambda color: color or ())]
+    meshes = [(_split_sharp_edges(mesh, detail), color) for color, mesh in joined]
     meshes = [(mesh, color) for mesh, color in meshes if len(mesh.faces)]
     if not meshes:
         raise UrdfError("it has no triangles")
     return meshes
 
 
-def _joined(parts: Sequence[Part], factor: np.ndarray) -> Mesh:
-    """Parts of one colour as one mesh."""
+def _join(parts: Sequence[Part], factor: np.ndarray) -> Mesh:
+    """Return parts of one colour as one mesh."""
     offsets = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     faces = [part.faces + offset for part, offset in zip(parts, offsets, strict=True)]
     vertices = np.concatenate([part.vertices for part in parts]) * factor
@@ -52,8 +52,8 @@ def _joined(parts: Sequence[Part], factor: np.ndarray) -> Mesh:
     return Mesh(vertices, np.concatenate(faces))
 
 
-def _shaded(mesh: Mesh, detail: float) -> Mesh:
-    """A mesh with vertices shared across smooth edges only, so that averaged normals keep the sharp ones."""
+def _split_sharp_edges(mesh: Mesh, detail: float) -> Mesh:
+    """Return a mesh that shares vertices across smooth edges only, so that averaged normals keep sharp ones."""
     few = clustered(mesh, MOST_TRIANGLES)
     whole = trimesh.Trimesh(few.vertices[few.faces].reshape(-1, 3), np.arange(few.faces.size).reshape(-1, 3))
     whole.update_faces(whole.nondegenerate_faces())

@@ -1,4 +1,4 @@
-"""The shapes a scene is made of, in metres, each centred on or given in a frame of its own."""
+"""The shapes of a scene, in metres, each in a frame of its own."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array
 
 
 def directions(count: int) -> Array:
-    """Unit vectors spread evenly, (count, 3), on a golden spiral."""
+    """Return evenly spread unit vectors, (count, 3), on a golden spiral."""
     height = 1 - (2 * np.arange(count) + 1) / count
     turn = np.pi * (1 + np.sqrt(5)) * np.arange(count)
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1) * np.sqrt(1 - height**2)[:, None]
@@ -29,12 +29,12 @@ class Box:
 
     @property
     def bounds(self) -> Array:
-        """Lower and upper corner [m], (2, 3)."""
+        """The lower and upper corner [m], (2, 3)."""
         return np.outer([-0.5, 0.5], self.size)
 
     @property
     def outline(self) -> Array:
-        """Its corners [m], (8, 3)."""
+        """The corners [m], (8, 3)."""
         return np.stack(np.meshgrid(*self.bounds.T), axis=-1).reshape(8, 3)
 
 
@@ -47,12 +47,12 @@ class Cylinder:
 
     @property
     def bounds(self) -> Array:
-        """Lower and upper corner [m], (2, 3)."""
+        """The lower and upper corner [m], (2, 3)."""
         return np.outer([-1.0, 1.0], [self.radius, self.radius, self.length / 2])
 
     @property
     def outline(self) -> Array:
-        """Points of both rims [m], (32, 3)."""
+        """The points of both rims [m], (32, 3)."""
         angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
         rim = self.radius * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         return np.concatenate([np.insert(rim, 2, end, axis=1) for end in (-self.length / 2, self.length / 2)])
@@ -66,12 +66,12 @@ class Sphere:
 
     @property
     def bounds(self) -> Array:
-        """Lower and upper corner [m], (2, 3)."""
+        """The lower and upper corner [m], (2, 3)."""
         return np.outer([-1.0, 1.0], np.full(3, self.radius))
 
     @property
     def outline(self) -> Array:
-        """Points all over it [m], (k, 3)."""
+        """Points all over the sphere [m], (k, 3)."""
         return self.radius * _DIRECTIONS
 
 
@@ -84,12 +84,12 @@ class Mesh:
 
     @property
     def bounds(self) -> Array:
-        """Lower and upper corner [m], (2, 3)."""
+        """The lower and upper corner [m], (2, 3)."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     @property
     def outline(self) -> Array:
-        """Its outermost vertices [m], (k, 3)."""
+        """The outermost vertices [m], (k, 3)."""
         return self.vertices[np.unique((_DIRECTIONS @ self.vertices.T).argmax(axis=1))]
 
 

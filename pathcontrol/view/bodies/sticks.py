@@ -1,4 +1,4 @@
-"""An arm of sticks, for a robot whose URDF shows nothing: no visuals, or meshes that are not here."""
+"""A stick figure of an arm, for a robot whose URDF has no visuals, or whose meshes are not here."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _RAIL = 0.6  # radius of a rail, of that of a stick
 
 
 def stick_figure(source: UrdfSource) -> list[LinkVisual]:
-    """A stick from each link's origin to the joints it carries, and a knob at each joint that turns.
+    """Return a stick from each link's origin to the joints it carries, and a knob at each joint that turns.
 
     A joint that slides is a block on a rail, which is as long as the joint can go, so that they stay together.
     """
@@ -48,7 +48,7 @@ def stick_figure(source: UrdfSource) -> list[LinkVisual]:
 
 
 def _rail(joint: Any, x: Array) -> tuple[Array, Array]:
-    """The ends of what a sliding joint at ``x`` slides along, zero and limits included, in the frame of its parent."""
+    """Return the ends of the rail of a sliding joint at ``x``, zero and limits included, in its parent's frame."""
     origin, axis = joint.find("origin"), joint.find("axis")
     rpy = None if origin is None else read_numbers(origin.get("rpy", "0 0 0"), 3)
     along = None if axis is None else read_numbers(axis.get("xyz", ""), 3)
@@ -59,13 +59,14 @@ def _rail(joint: Any, x: Array) -> tuple[Array, Array]:
 
 
 def _limit(joint: Any, name: str) -> float:
+    """Return a limit of a joint."""
     limit = joint.find("limit")
     values = None if limit is None else read_numbers(limit.get(name, ""), 1)
     return 0.0 if values is None else float(np.clip(values[0], -_LONGEST_RAIL, _LONGEST_RAIL))
 
 
 def _stick(link: str, name: str, start: Array, end: Array, radius: float) -> list[LinkVisual]:
-    """A stick between two points [m], or none where they are as good as one."""
+    """Return a stick between two points [m], or none where they coincide up to rounding."""
     length = float(np.linalg.norm(end - start))
     if length <= radius / 10:
         return []

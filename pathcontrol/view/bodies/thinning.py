@@ -1,4 +1,4 @@
-"""Meshes with fewer triangles, to look at from a distance."""
+"""The reduction of meshes to fewer triangles, to be seen from a distance."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _ROUNDING = 1 / 16  # of the detail: far below a pixel, and numbers with fewer d
 
 
 def clustered(mesh: Mesh, most: int) -> Mesh:
-    """A mesh with at most ``most`` triangles, in time and memory proportional to those that it has.
+    """Return a mesh with at most ``most`` triangles, in time and memory proportional to the given ones.
 
     Vertices in one cell of a grid become their mean, and triangles that lose their area go (Rossignac and Borrel,
     1993); the cells are doubled in size until few enough are left. A mesh that has no more is left alone.
@@ -21,12 +21,12 @@ def clustered(mesh: Mesh, most: int) -> Mesh:
     extent = float(np.ptp(mesh.vertices, axis=0).max())
     cell = extent / np.sqrt(most)
     while cell and len(mesh.faces) > most:
-        mesh, cell = _in_cells(mesh, cell), 2 * cell
+        mesh, cell = _merge_cells(mesh, cell), 2 * cell
     return mesh
 
 
-def _in_cells(mesh: Mesh, cell: float) -> Mesh:
-    """A mesh whose vertices in one cell of a grid are one."""
+def _merge_cells(mesh: Mesh, cell: float) -> Mesh:
+    """Merge the vertices of a mesh in each cell of a grid."""
     index = np.floor((mesh.vertices - mesh.vertices.min(axis=0)) / cell).astype(np.int64)
     key = np.ravel_multi_index(tuple(index.T), tuple(index.max(axis=0) + 1))
     _, which, count = np.unique(key, return_inverse=True, return_counts=True)
@@ -37,7 +37,7 @@ def _in_cells(mesh: Mesh, cell: float) -> Mesh:
 
 
 def thinned(mesh: Mesh, detail: float) -> Mesh:
-    """A mesh that shares its vertices, with fewer triangles: its surface moves by no more than ``detail`` [m].
+    """Return a mesh with shared vertices and fewer triangles: its surface moves by at most ``detail`` [m].
 
     Edges are collapsed while the sum of the squared distances from the planes of all triangles that a vertex
     stands for is less than the square of the detail (quadric error metric; Garland and Heckbert, SIGGRAPH
@@ -56,7 +56,7 @@ def thinned(mesh: Mesh, detail: float) -> Mesh:
 
 
 def rounded(mesh: Mesh, detail: float) -> Mesh:
-    """A mesh whose coordinates are multiples of a power of two, a small part of the ``detail`` [m]."""
+    """Return a mesh whose coordinates are multiples of a power of two, a small part of the ``detail`` [m]."""
     if detail <= 0:
         return mesh
     step = 2.0 ** np.floor(np.log2(_ROUNDING * detail))

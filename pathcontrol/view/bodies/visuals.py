@@ -1,4 +1,4 @@
-"""What the links of a robot look like, from the ``<visual>`` elements of its URDF."""
+"""The visuals of a robot's links, from the ``<visual>`` elements of its URDF."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ class LinkVisual:
 
     @cached_property
     def outline(self) -> Array:
-        """The outermost of its points in the frame of the link [m], (k, 3)."""
+        """The outermost points in the frame of the link [m], (k, 3)."""
         return self.shape.outline @ self.origin[:3, :3].T + self.origin[:3, 3]
 
 
 def link_visuals(source: UrdfSource, fineness: float = 0.0) -> list[LinkVisual]:
-    """The visuals of every link, in the order of the URDF; collision shapes are left out.
+    """Return the visuals of every link, in the order of the URDF, without collision shapes.
 
     Meshes are thinned out where that moves their surface by no more than ``fineness`` times the reach of the arm.
 
@@ -66,7 +66,7 @@ def link_visuals(source: UrdfSource, fineness: float = 0.0) -> list[LinkVisual]:
 
 
 def leaf_links(source: UrdfSource) -> set[str]:
-    """Names of the links that carry no other link: tools, fingers, marker frames."""
+    """Return the names of the links that carry no other link: tools, fingers, marker frames."""
     root = parse_urdf(source.text)
     parents = {parent.get("link") for parent in root.iterfind("joint/parent")}
     return {link.get("name", "") for link in root.iterchildren("link")} - parents
@@ -75,6 +75,7 @@ def leaf_links(source: UrdfSource) -> set[str]:
 def _visuals(
     link: str, element: Any, palette: dict[str, Color], source: UrdfSource, detail: float
 ) -> Iterator[LinkVisual]:
+    """Yield the visuals of one element."""
     try:
         pose = read_pose(element.find("origin"))
         shapes = _shapes(next(element.iterfind("geometry/*"), None), source, detail)
@@ -90,7 +91,7 @@ def _visuals(
 
 
 def _shapes(shape: Any, source: UrdfSource, detail: float) -> list[tuple[Shape, Color | None]]:
-    """The shapes of an element inside ``<geometry>``, those of a mesh with their own colours."""
+    """Return the shapes of an element inside ``<geometry>``, those of a mesh with their own colours."""
     if shape is None:
         raise UrdfError("it has no geometry")
     if shape.tag == "mesh":
@@ -108,12 +109,12 @@ def _shapes(shape: Any, source: UrdfSource, detail: float) -> list[tuple[Shape, 
 
 
 def _numbers(text: str) -> Array:
-    """Numbers with spaces or commas between."""
+    """Return numbers with spaces or commas between."""
     return np.array(text.replace(",", " ").split(), dtype=np.float64)
 
 
 def _palette(root: Any) -> dict[str, Color]:
-    """Colours by the name of their material; the first definition of a name counts."""
+    """Return colours by the name of their material; the first definition of a name counts."""
     found: dict[str, Color] = {}
     for material in [*root.iterchildren("material"), *root.iterfind("link/visual/material")]:
         rgba = material.find("color")
@@ -123,7 +124,7 @@ def _palette(root: Any) -> dict[str, Color]:
 
 
 def _color(material: Any, palette: dict[str, Color]) -> Color:
-    """The colour that a ``<material>`` has, or that others of its name have."""
+    """Return the colour of a ``<material>``, or of another one with its name."""
     if material is None:
         return UNPAINTED
     if (own := material.find("color")) is not None:
@@ -132,6 +133,7 @@ def _color(material: Any, palette: dict[str, Color]) -> Color:
 
 
 def _rgba(values: Any) -> Color:
+    """Return a colour from its values."""
     try:
         red, green, blue, opacity = np.clip(np.asarray(values, dtype=np.float64), 0.0, 1.0).tolist()
     except ValueError:

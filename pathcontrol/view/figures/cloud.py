@@ -1,4 +1,4 @@
-"""Clouds of pairs of numbers around those that were published."""
+"""Scatter plots of pairs of numbers around published values."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.figures.style import BLUE, DASHED, GREY, INK, ORANGE, PAGE, Look, dressed, new_figure, style
+from pathcontrol.view.figures.style import BLUE, DASHED, GREY, INK, ORANGE, PAGE, Look, apply_style, new_figure, style
 from pathcontrol.view.figures.words import legend
 
 _OTHER: Look = {"marker": "o", "linestyle": "none", "markersize": 2.4, "color": GREY, "alpha": 0.6, "mew": 0}
@@ -42,7 +42,7 @@ class Panel(NamedTuple):
 
 
 def cloud_figure(panels: Sequence[Panel], near: NDArray[np.bool_], share: float, words: tuple[str, str]) -> Figure:
-    """Panels beside one another, a point in each for every sample, and what was published with a box around it.
+    """Draw panels beside one another, with a point for every sample, and the published value in a box.
 
     Args:
         panels: the planes.
@@ -53,7 +53,7 @@ def cloud_figure(panels: Sequence[Panel], near: NDArray[np.bool_], share: float,
     with style():
         figure = new_figure(PAGE, 2.75)
         for axes, panel in zip(figure.subplots(1, len(panels)), panels, strict=True):
-            _draw(dressed(axes), panel, near, share)
+            _draw(apply_style(axes), panel, near, share)
         box = Line2D([], [], color=ORANGE, linewidth=0.8, linestyle=DASHED)
         handles = [Line2D([], [], **look) for look in (_OTHER, _NEAR, _OURS, _PUBLISHED)]
         names = ("a combination", *words, "the paper", f"±{100 * share:.0f} % of it")
@@ -62,6 +62,7 @@ def cloud_figure(panels: Sequence[Panel], near: NDArray[np.bool_], share: float,
 
 
 def _draw(axes: Axes, panel: Panel, near: NDArray[np.bool_], share: float) -> None:
+    """Draw one panel."""
     right, up = panel.points
     axes.plot(right[~near], up[~near], **_OTHER)
     axes.plot(right[near], up[near], **_NEAR)

@@ -1,4 +1,4 @@
-"""Columns of a sweep's table, as figures show them."""
+"""The columns of a sweep's table, as figures show them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _DECADES = 30.0  # ratio of the largest to the smallest value from which a scale
 
 
 def table_of(sweep: SweepResult | xr.Dataset) -> xr.Dataset:
-    """The table of a sweep, or itself.
+    """Return the table of a sweep, or the table itself.
 
     Raises:
         InputError: it is something else, or empty.
@@ -37,7 +37,7 @@ def table_of(sweep: SweepResult | xr.Dataset) -> xr.Dataset:
 
 
 def column_of_parameter(table: xr.Dataset, name: str) -> Array:
-    """A parameter that is a number, (sample,); of a vector one component, as ``q[0]``.
+    """Return a parameter that is a number, (sample,); from a vector one component, as ``q[0]``.
 
     Raises:
         UnknownNameError: there is no such parameter.
@@ -53,7 +53,7 @@ def column_of_parameter(table: xr.Dataset, name: str) -> Array:
 
 
 def readable_metric(table: xr.Dataset, name: str) -> tuple[Array, str]:
-    """A metric (sample,), NaN where it is not finite, in the unit in which a person reads it, and that unit.
+    """Return a metric (sample,) in the unit in which a person reads it, NaN where not finite, and that unit.
 
     Raises:
         UnknownNameError: there is no such metric.
@@ -64,35 +64,35 @@ def readable_metric(table: xr.Dataset, name: str) -> tuple[Array, str]:
 
 
 def readable_factor(table: xr.Dataset, name: str) -> tuple[float, str]:
-    """What a metric is multiplied by for a person to read it, and its unit then."""
+    """Return the factor of a metric to the unit in which a person reads it, and that unit."""
     return reading(table[name].attrs.get("units", ""), goals.metric(table, name))
 
 
 def never(table: xr.Dataset, metric: str) -> Array:
-    """Samples whose metric is infinite, as the settling time of what never settles, (sample,)."""
+    """Return the samples whose metric is infinite, as the settling time of what never settles, (sample,)."""
     return np.isinf(goals.metric(table, metric))
 
 
 def wide(values: Array) -> bool:
-    """Whether a scale of these values is logarithmic."""
+    """Return whether a scale of these values is logarithmic."""
     known = values[np.isfinite(values)]
     return bool(known.size and known.min() > 0 and known.max() > _DECADES * known.min())
 
 
 def set_scales(axes: Axes, right: Array, up: Array) -> None:
-    """Scales of both axes for these values: logarithmic where they are :func:`wide`."""
+    """Set the scales of both axes for these values: logarithmic where they are :func:`wide`."""
     axes.set(**{f"{letter}scale": "log" if wide(values) else "linear" for letter, values in (("x", right), ("y", up))})
     for axis in (axes.xaxis, axes.yaxis):
         label_plainly(axis)
 
 
 def colour_bar(figure: Figure, points: Any, axes: Axes, words: str) -> None:
-    """What the colours of ``points`` stand for, beside the axes."""
+    """Draw the scale of the colours of ``points`` beside the axes."""
     bar = figure.colorbar(points, ax=axes, label=words)
     bar.outline.set_visible(False)
     label_plainly(bar.ax.yaxis)
 
 
 def label(metric: str, unit: str) -> str:
-    """What a metric is called on an axis."""
+    """Return the label of a metric on an axis."""
     return LABELS.get(metric, metric) + (f" [{unit}]" if unit else "")

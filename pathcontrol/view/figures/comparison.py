@@ -1,4 +1,4 @@
-"""Runs side by side on the same axes."""
+"""The figure of several runs side by side on the same axes."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from pathcontrol.view.figures.errors import draw_norm, norm_label, norms
 from pathcontrol.view.figures.inset import later
 from pathcontrol.view.figures.limits import aspect, extent, over_time
 from pathcontrol.view.figures.lines import series
-from pathcontrol.view.figures.path import chosen_pair, draw_path, label_plane, plane_limits
-from pathcontrol.view.figures.shown import Shown, of_one_arm, shown
+from pathcontrol.view.figures.path import choose_pair, draw_path, label_plane, plane_limits
+from pathcontrol.view.figures.shown import Shown, check_joints, shown
 from pathcontrol.view.figures.speed import PROFILE, SPEED_LABEL, draw_speed, speed_limits
-from pathcontrol.view.figures.style import COLUMN, LIMIT_LOOK, PAGE, PROFILE_LOOK, SMALL, dressed, new_figure, style
+from pathcontrol.view.figures.style import COLUMN, LIMIT_LOOK, PAGE, PROFILE_LOOK, SMALL, apply_style, new_figure, style
 from pathcontrol.view.figures.torque import torque_limits, torque_share
 from pathcontrol.view.figures.words import legend, plain
 
@@ -54,7 +54,7 @@ def comparison_figure(
     limits: ArrayLike | None = None,
     rollout: int = 0,
 ) -> Figure:
-    """A column for each run, a row for each quantity, and the same axes all along a row.
+    """Draw a column for each run, a row for each quantity, and the same axes all along a row.
 
     The path in the plane of two joints, ‖e_p‖, ‖e_v‖, the rate σ̇ beside ϑ(σ), and the largest torque of all joints as
     a share of its limit. Where the first tenth of the time dwarfs the rest in all columns, the axis ends above the
@@ -71,13 +71,13 @@ def comparison_figure(
         InputError: the runs are of different joints, there is no such rollout, or runs and task do not belong together.
     """
     runs = shown(run, task, rollout)
-    pair = chosen_pair(runs, joints) if len(of_one_arm(runs)) > 1 else None
+    pair = choose_pair(runs, joints) if len(check_joints(runs)) > 1 else None
     rows, width = _rows(runs, limits), COLUMN if len(runs) == 1 else max(PAGE, _COLUMN * len(runs))
     heights = ([] if pair is None else [_plane_height(runs, pair, width)]) + [_HEIGHT] * len(rows)
     with style():
         figure = new_figure(width, 0.7 + sum(heights) + 0.12 * len(heights))
         places = figure.add_gridspec(len(heights), len(runs), height_ratios=heights)
-        grid = [[dressed(figure.add_subplot(places[r, c])) for c in range(len(runs))] for r in range(len(heights))]
+        grid = [[apply_style(figure.add_subplot(places[r, c])) for c in range(len(runs))] for r in range(len(heights))]
         entries = {} if pair is None else _draw_planes(grid[0], runs, pair)
         for row, axes in zip(rows, grid[-len(rows) :], strict=True):
             _draw_row(row, axes, runs)
@@ -93,6 +93,7 @@ _SPEED = 3  # rows without that of the torques
 
 
 def _rows(runs: Sequence[Shown], limits: ArrayLike | None) -> list[_Row]:
+    """Return the rows of the figure."""
     rows = [_norm_row(runs[0], name) for name in ("e_p", "e_v")]
     rows.append(_Row(SPEED_LABEL, draw_speed, speed_limits))
     largest = [torque_limits(one, limits) for one in runs]
@@ -113,6 +114,7 @@ def _rows(runs: Sequence[Shown], limits: ArrayLike | None) -> list[_Row]:
 
 
 def _norm_row(one: Shown, name: str) -> _Row:
+    """Return the row of an error norm."""
     return _Row(
         norm_label(name, norms(one, name)[1]),
         lambda axes, one: draw_norm(axes, one, name),
@@ -121,6 +123,7 @@ def _norm_row(one: Shown, name: str) -> _Row:
 
 
 def _draw_row(row: _Row, axes: Sequence[Axes], runs: Sequence[Shown]) -> None:
+    """Draw a row."""
     drawn = [row.draw(panel, one) for panel, one in zip(axes, runs, strict=True)]
     rest = [values[:, later(one.run.time, _BEGINNING)] for values, one in zip(drawn, runs, strict=True)]
     (low, high), (least, most) = row.limits(drawn), row.limits(rest)
@@ -129,18 +132,19 @@ def _draw_row(row: _Row, axes: Sequence[Axes], runs: Sequence[Shown]) -> None:
     for panel, values in zip(axes, drawn, strict=True):
         panel.set_ylim(low, high)
         over_time(panel, [one.run.time for one in runs])
-        _say_beyond(panel, values)
+        _label_excess(panel, values)
     axes[0].set_ylabel(row.label)
 
 
-def _say_beyond(axes: Axes, values: Array) -> None:
-    """How far lines go that leave the panel, above it."""
+def _label_excess(axes: Axes, values: Array) -> None:
+    """Write above the panel how far lines go that leave it."""
     (low, high), (least, most) = axes.get_ylim(), extent([values])
     words = [f"↑ {most:.3g}"] * bool(most > high) + [f"↓ {least:.3g}"] * bool(least < low)
     axes.annotate("  ".join(words), (0.0, 1.0), (2, 1), "axes fraction", "offset points", fontsize=SMALL)
 
 
 def _draw_planes(axes: Sequence[Axes], runs: Sequence[Shown], pair: tuple[int, int]) -> dict[str, Line2D]:
+    """Draw the plane of two joints for each run."""
     entries: dict[str, Line2D] = {}
     for panel, one in zip(axes, runs, strict=True):
         lines = draw_path(panel, one, pair)
@@ -150,13 +154,14 @@ def _draw_planes(axes: Sequence[Axes], runs: Sequence[Shown], pair: tuple[int, i
 
 
 def _plane_height(runs: Sequence[Shown], pair: tuple[int, int], width: float) -> float:
+    """Return the height of the planes [in]."""
     limits, equal = plane_limits(runs, pair)
     wide = width / len(runs) - 0.3
     return float(np.clip(wide * (aspect(limits) if equal else 1.0), *_PLANE))
 
 
 def _label(grid: Sequence[Sequence[Axes]], runs: Sequence[Shown], over_times: int, room: float) -> None:
-    """Names above the columns, with ``room`` [in], numbers at the left and where they change, the time below."""
+    """Label the columns above, with ``room`` [in], numbers at the left and where they change, the time below."""
     for one, panel in zip(runs, grid[0], strict=True):
         panel.set_title(plain(one.name, room), color=one.colour)
     for r, axes in enumerate(grid):

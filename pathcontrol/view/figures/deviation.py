@@ -1,4 +1,4 @@
-"""Figures of how near the tool came to its drawing. Millimetres and micrometres, where a person reads."""
+"""The figure of the deviation of the tool from its drawing, in millimetres and micrometres."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from pathcontrol.robot.model import RobotModel
 from pathcontrol.view.figures.limits import extent, from_zero, over_time
 from pathcontrol.view.figures.lines import curve, drawable, series
 from pathcontrol.view.figures.shown import Runs, Shown, shown
-from pathcontrol.view.figures.style import GREY, INK, PEAK_LOOK, SMALL, dressed, style
-from pathcontrol.view.figures.tool import coloured_way, distance_unit
+from pathcontrol.view.figures.style import GREY, INK, PEAK_LOOK, SMALL, apply_style, style
+from pathcontrol.view.figures.tool import distance_unit, draw_coloured_line
 from pathcontrol.view.figures.toolpath import outline, plan_figure
 from pathcontrol.view.figures.words import legend
 
@@ -27,7 +27,7 @@ from pathcontrol.view.figures.words import legend
 def deviation_figure(
     run: Runs, robot: RobotModel | None = None, task: ToolpathTask | None = None, rollout: int = 0
 ) -> Figure:
-    """The tool's way over the drawing, seen on the workpiece, coloured by its distance from it; and that over time.
+    """Draw the tool's path over the drawing, coloured by its distance from it, and that distance over time.
 
     Only cuts count: between them the tool has no drawing to keep to. Several runs have a colour each instead.
 
@@ -49,19 +49,20 @@ def deviation_figure(
         plan.autoscale_view()
         distances = []
         for one in runs:
-            way, distance, cutting = _measured(one, robot)
+            way, distance, cutting = _measure(one, robot)
             way = 1e3 * way[:, [i, j]]
             if len(runs) == 1:
-                coloured_way(figure, plan, way, distance, cutting)
+                draw_coloured_line(figure, plan, way, distance, cutting)
             else:
                 curve(plan, *np.where(cutting[:, None], way, np.nan).T, linewidth=0.8, **one.look)
             distances.append(np.where(cutting, distance, np.nan))
-        _over_time(dressed(below), runs, distances)
+        _over_time(apply_style(below), runs, distances)
         legend(figure, {one.label: Line2D([], [], **one.look) for one in runs if one.name})
     return figure
 
 
 def _toolpath(runs: Sequence[Shown]) -> ToolpathTask:
+    """Return the toolpath that all runs follow."""
     for one in runs:
         if not isinstance(one.task, ToolpathTask):
             name = f" {one.name!r}" if one.name else ""
@@ -70,8 +71,8 @@ def _toolpath(runs: Sequence[Shown]) -> ToolpathTask:
     return runs[0].task
 
 
-def _measured(one: Shown, robot: RobotModel | None) -> tuple[Array, Array, Array]:
-    """The tool's way (k, 3) in the workpiece's frame, its distance from the drawing (k,) [m], and whether it cuts."""
+def _measure(one: Shown, robot: RobotModel | None) -> tuple[Array, Array, Array]:
+    """Return the tool's path (k, 3) in the workpiece's frame, its distance (k,) [m], and whether it cuts."""
     task, robot = one.task, one.run.robot if robot is None else robot
     expect("robot", robot, RobotModel)
     assert isinstance(task, ToolpathTask)
@@ -82,6 +83,7 @@ def _measured(one: Shown, robot: RobotModel | None) -> tuple[Array, Array, Array
 
 
 def _over_time(axes: Axes, runs: Sequence[Shown], distances: Sequence[Array]) -> None:
+    """Draw the distance over time."""
     factor, unit = distance_unit(np.concatenate(distances))
     values = [factor * distance for distance in distances]
     for one, v in zip(runs, values, strict=True):

@@ -1,4 +1,4 @@
-"""The error norms of runs over time: those of single runs, and the bands in which those of many rollouts lie."""
+"""The figures of error norms over time: lines of single runs, and bands of many rollouts."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.figures.inset import later, magnified
+from pathcontrol.view.figures.inset import add_inset, later
 from pathcontrol.view.figures.limits import extent, from_zero, over_time
-from pathcontrol.view.figures.lines import columns_kept, series
+from pathcontrol.view.figures.lines import select_by_column, series
 from pathcontrol.view.figures.shown import Runs, Shown, readable, shown
-from pathcontrol.view.figures.style import COLUMN, INK, PEAK_LOOK, SMALL, dressed, new_figure, style
+from pathcontrol.view.figures.style import COLUMN, INK, PEAK_LOOK, SMALL, apply_style, new_figure, style
 from pathcontrol.view.figures.words import legend
 
 _MOST_PEAKS = 3
@@ -24,7 +24,7 @@ _BANDS = ((0.0, 1.0, 0.15), (0.05, 0.95, 0.3))  # from quantile to quantile, and
 
 
 def error_figure(run: Runs, rollout: int = 0) -> Figure:
-    """‖e_p‖ [deg] and ‖e_v‖ [deg/s] over time, as in the paper's figures 8 and 10, with the steady-state peaks.
+    """Draw ‖e_p‖ [deg] and ‖e_v‖ [deg/s] over time, as in the paper's figures 8 and 10, with their late peaks.
 
     The inset magnifies the second half, of which the peaks are.
 
@@ -39,7 +39,7 @@ def error_figure(run: Runs, rollout: int = 0) -> Figure:
 
 
 def error_bands_figure(run: Runs) -> Figure:
-    """Where ‖e_p‖ [deg] and ‖e_v‖ [deg/s] of many rollouts lie over time.
+    """Draw the bands in which ‖e_p‖ [deg] and ‖e_v‖ [deg/s] of many rollouts lie over time.
 
     The median, the band from the 5th to the 95th percentile, and that from the least to the largest, at each moment.
     Rollouts whose error is no number are left out there.
@@ -58,26 +58,26 @@ def error_bands_figure(run: Runs) -> Figure:
 
 
 def draw_norm(axes: Axes, one: Shown, name: str) -> Array:
-    """‖e_p‖ or ‖e_v‖ of the first rollout; the values drawn (1, k)."""
+    """Draw ‖e_p‖ or ‖e_v‖ of the first rollout; return the values drawn (1, k)."""
     values, _ = norms(one, name)
     _draw_line(axes, one, values)
     return values[:1]
 
 
 def norms(one: Shown, name: str) -> tuple[Array, str]:
-    """Norm of a vector over the joints (rollout, time), in the unit a person reads, and that unit."""
+    """Return the norm of a vector over the joints (rollout, time), in the unit a person reads, and that unit."""
     vectors, unit = readable(one.run, name)
     return np.linalg.norm(vectors, axis=-1), unit
 
 
 def norm_label(name: str, unit: str) -> str:
-    """‖e_p‖ with its unit."""
+    """Return the label ‖e_p‖ with its unit."""
     letter, index = name.split("_")
     return rf"$\|\mathbf{{{letter}}}_{index}\|$ [{unit}]"
 
 
 def quantiles(values: Array, levels: Sequence[float]) -> list[Array]:
-    """Quantiles over the rollouts of (rollout, time), each (time,), of what is a number; NaN where nothing is."""
+    """Return quantiles over the rollouts of (rollout, time), each (time,), of finite values; NaN without any."""
     ranked = np.sort(values, axis=0)  # NaN come last
     last = (~np.isnan(values)).sum(0) - 1
     found = []
@@ -92,13 +92,13 @@ _Draw = Callable[[Axes, Shown, Array], None]
 
 
 def _norms_figure(runs: Sequence[Shown], draw: _Draw, more: Mapping[str, Artist]) -> Figure:
-    """Both norms, one panel over the other."""
+    """Draw both norms, one panel over the other."""
     several = len(runs) > 1 or bool(more)
     with style():
         figure = new_figure(COLUMN, 4.3 if several else 4.1)
         panels = figure.subplots(2, 1, sharex=True)
         for axes, name in zip(panels, ("e_p", "e_v"), strict=True):
-            _draw_norms(dressed(axes), runs, name, draw)
+            _draw_norms(apply_style(axes), runs, name, draw)
         panels[-1].set_xlabel("time [s]")
         over_time(panels[-1], [one.run.time for one in runs])
         figure.align_ylabels()
@@ -108,7 +108,7 @@ def _norms_figure(runs: Sequence[Shown], draw: _Draw, more: Mapping[str, Artist]
 
 
 def _draw_norms(axes: Axes, runs: Sequence[Shown], name: str, draw: _Draw) -> None:
-    """One norm over all the time, and magnified in an inset over the second half, with its peaks there."""
+    """Draw one norm over the whole time, and an inset of the second half, with its peaks there."""
     found = [norms(one, name) for one in runs]
     values, times, unit = [v for v, _ in found], [one.run.time for one in runs], found[0][1]
 
@@ -120,12 +120,12 @@ def _draw_norms(axes: Axes, runs: Sequence[Shown], name: str, draw: _Draw) -> No
     axes.set_ylabel(norm_label(name, unit))
     from_zero(axes, values)
     peaks = [extent([v[:, later(time)]])[1] for time, v in zip(times, values, strict=True)]
-    inset = magnified(axes, times, values, draw_all)
-    _say_peaks(axes if inset is None else inset, runs, peaks, unit, "second-half peak" if inset is None else "peak")
+    inset = add_inset(axes, times, values, draw_all)
+    _label_peaks(axes if inset is None else inset, runs, peaks, unit, "second-half peak" if inset is None else "peak")
 
 
-def _say_peaks(axes: Axes, runs: Sequence[Shown], peaks: Sequence[float], unit: str, word: str) -> None:
-    """A dashed line at each peak of the second half; its number above the panel."""
+def _label_peaks(axes: Axes, runs: Sequence[Shown], peaks: Sequence[float], unit: str, word: str) -> None:
+    """Draw a dashed line at each peak of the second half, with its number above the panel."""
     colours = [INK] if len(runs) == 1 else [one.colour for one in runs]
     lines = [
         axes.axhline(peak, color=colour, **PEAK_LOOK) for peak, colour in zip(peaks, colours, strict=True) if peak > 0
@@ -148,13 +148,15 @@ def _say_peaks(axes: Axes, runs: Sequence[Shown], peaks: Sequence[float], unit: 
 
 
 def _draw_line(axes: Axes, one: Shown, values: Array) -> None:
+    """Draw the norm of a single run."""
     series(axes, one.run.time, values[0], **one.look)
 
 
 def _draw_bands(axes: Axes, one: Shown, values: Array) -> None:
+    """Draw the bands of many rollouts."""
     time, levels = one.run.time, [level for low, high, _ in _BANDS for level in (low, high)]
     *edges, median = quantiles(values, [*levels, 0.5])
     for (_, _, alpha), low, high in zip(_BANDS, edges[::2], edges[1::2], strict=True):
-        kept = np.union1d(columns_kept(low), columns_kept(high))
+        kept = np.union1d(select_by_column(low), select_by_column(high))
         axes.fill_between(time[kept], low[kept], high[kept], color=one.colour, alpha=alpha, linewidth=0)
     series(axes, time, median, **one.look)

@@ -1,4 +1,4 @@
-"""The second half of a run, magnified in an inset where the beginning dwarfs it."""
+"""An inset that magnifies the second half of a run where the beginning dwarfs it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from pathcontrol._arrays import Array
 from pathcontrol.view.figures.limits import extent, over_time
-from pathcontrol.view.figures.style import dressed
+from pathcontrol.view.figures.style import apply_style
 
 _UPPER, _LOWER = (0.42, 0.40, 0.58, 0.46), (0.42, 0.14, 0.58, 0.46)  # of a panel
 _THIN = 0.3  # part of the panel's height that lines fill which an inset neither hides nor is too large for
@@ -17,14 +17,14 @@ _FROM = 0.3  # part of the time from which on an inset, with its numbers, lies o
 
 
 def later(time: Array, part: float = 0.5) -> Array:
-    """Which samples are of the time after its ``part``; the second half, unless told."""
+    """Return which samples are later than the ``part`` of the time, by default the first half."""
     return time >= time[0] + part * (time[-1] - time[0])
 
 
-def magnified(
+def add_inset(
     axes: Axes, times: Sequence[Array], values: Sequence[Array], draw: Callable[[Axes], object]
 ) -> Axes | None:
-    """An inset with what ``draw`` draws, over the second half; ``None`` where it would hide a line or show no more.
+    """Add an inset of the second half, filled by ``draw``; ``None`` where it would hide a line or show no more.
 
     ``values`` (rollout, time) over ``times`` are what the panel shows; its limits have been set.
     """
@@ -35,7 +35,7 @@ def magnified(
     (least, most), moments = extent(late), max(map(len, times))
     if moments < 2 or least == most == 0 or (high > _THIN and low < 1 - _THIN):
         return None
-    inset = dressed(axes.inset_axes(_UPPER if high <= _THIN else _LOWER))
+    inset = apply_style(axes.inset_axes(_UPPER if high <= _THIN else _LOWER))
     draw(inset)
     margin = 0.15 * (most - min(least, bottom if bottom == 0 else least))
     inset.set_ylim(0 if bottom == 0 else least - margin, most + (margin or 0.15 * abs(most)))

@@ -1,4 +1,4 @@
-"""Where the panels of a figure lie: as large as the page lets them be with all their words on it."""
+"""The layout of the panels of a figure: as large as the page lets them be with all their words on it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class SettledLayout(ConstrainedLayoutEngine):
 
 @contextmanager
 def laid_out(figure: Figure, dpi: float) -> Iterator[None]:
-    """Lay a figure out once, for a picture of so many ``dpi``, and keep it so for all files that are drawn inside."""
+    """Lay a figure out once, for a picture of ``dpi``, and keep it for all files that are drawn inside."""
     engine, before = figure.get_layout_engine(), figure.dpi
     if not isinstance(engine, SettledLayout):
         yield
@@ -53,16 +53,16 @@ def laid_out(figure: Figure, dpi: float) -> Iterator[None]:
 
 
 def _has_equal_scales(figure: Figure) -> bool:
-    """Whether a panel has a shape of its own, and does not fill its place."""
+    """Return whether a panel has a fixed shape, and does not fill its place."""
     return any(axes.get_aspect() != "auto" for axes in figure.axes)
 
 
 def _places(figure: Figure) -> list[tuple[float, ...]]:
-    """Where the places of all panels are, as shares of the figure."""
+    """Return the places of all panels, as shares of the figure."""
     return [axes.get_position(original=True).bounds for axes in figure.axes]
 
 
 def _round_places(figure: Figure) -> None:
-    """The solver differs in the last bit from draw to draw, and names inside SVG files come from these numbers."""
+    """Round the places: the solver differs in the last bit, and names inside SVG files come from these numbers."""
     for axes in figure.axes:
         axes._set_position(np.round(axes.get_position(original=True).bounds, 9).tolist())  # type: ignore[attr-defined]

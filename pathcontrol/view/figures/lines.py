@@ -1,4 +1,4 @@
-"""Lines of any length, thinned to what a page can show: peaks stay, gaps stay, short runs are drawn as they are."""
+"""Lines of any length, thinned to what a page can show; peaks, gaps and short runs stay."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LARGEST = 1e100  # more than that is not drawn: squares must not overflow
 
 
 def drawable(values: Any) -> Array:
-    """``values`` with NaN, which is a gap in a line, for what no axis can hold."""
+    """Return ``values`` with NaN, which is a gap in a line, where no axis can hold them."""
     array = np.asarray(values, dtype=np.float64)
     with np.errstate(invalid="ignore"):
         return np.where(np.abs(array) <= _LARGEST, array, np.nan)
@@ -25,18 +25,18 @@ def drawable(values: Any) -> Array:
 
 def series(axes: Axes, time: Array, values: Array, **look: Any) -> Line2D:
     """Draw ``values`` (k,) over ``time`` (k,)."""
-    kept = columns_kept(values)
+    kept = select_by_column(values)
     return axes.plot(time[kept], values[kept], **_seen(values, look))[0]
 
 
 def curve(axes: Axes, x: Array, y: Array, **look: Any) -> Line2D:
     """Draw ``y`` (k,) over ``x`` (k,), a curve in a plane."""
-    kept = cells_kept(x, y)
+    kept = select_by_cell(x, y)
     return axes.plot(x[kept], y[kept], **_seen(x + y, look))[0]
 
 
-def columns_kept(values: Array) -> Array:
-    """Indices of the samples of ``values`` (k,) to draw: first, least, largest and a gap, if any, of each column."""
+def select_by_column(values: Array) -> Array:
+    """Return indices of the samples of ``values`` (k,) to draw: first, least, largest and gap of each column."""
     k = len(values)
     if k <= _SHORT:
         return np.arange(k)
@@ -50,8 +50,8 @@ def columns_kept(values: Array) -> Array:
     return np.unique(np.concatenate([starts, *(at[rows, pick] for pick in picks), [k - 1]]))
 
 
-def cells_kept(x: Array, y: Array) -> Array:
-    """Indices of the points (k,) of a curve to draw: those that enter another cell of a fine grid."""
+def select_by_cell(x: Array, y: Array) -> Array:
+    """Return indices of the points (k,) of a curve to draw: those that enter another cell of a fine grid."""
     k = len(x)
     if k <= _SHORT:
         return np.arange(k)
@@ -63,6 +63,7 @@ def cells_kept(x: Array, y: Array) -> Array:
 
 
 def _cells(values: Array) -> Array:
+    """Return the cells of values."""
     if np.isnan(values).all():
         return np.zeros(len(values), dtype=int)
     low, high = np.nanmin(values), np.nanmax(values)
@@ -71,5 +72,5 @@ def _cells(values: Array) -> Array:
 
 
 def _seen(values: Array, look: dict[str, Any]) -> dict[str, Any]:
-    """A line of one point is a dot."""
+    """Return the look of a line; a line of one point is a dot."""
     return look | ({"marker": ".", "markersize": 4} if np.count_nonzero(~np.isnan(values)) == 1 else {})

@@ -1,4 +1,4 @@
-"""The figures that a sweep is looked at first with."""
+"""The first figures of a sweep."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _COSTS = ("tau_noise", "tau_demand_ratio", "tau_demand_peak", "tau_peak")  # wha
 
 
 def overview(table: xr.Dataset, metrics: Sequence[str], first: str) -> Iterator[tuple[str, Figure]]:
-    """Figures with what they show: a metric over each parameter and over two, and what it costs in another.
+    """Yield figures with their captions: a metric over each parameter and over two, and its trade-off with another.
 
     Args:
         table: of the sweep.
@@ -28,7 +28,7 @@ def overview(table: xr.Dataset, metrics: Sequence[str], first: str) -> Iterator[
     known = [name for name in metrics if np.isfinite(readable_metric(table, name)[0]).any()]
     if not known:
         return
-    metric, varied = first if first in known else known[0], _varied(table)
+    metric, varied = first if first in known else known[0], _list_varied(table)
     called = LABELS.get(metric, metric)
     for name in varied[:_MOST]:
         yield f"{called}, over {name}", robustness_figure(table, name, metric)
@@ -42,8 +42,8 @@ def overview(table: xr.Dataset, metrics: Sequence[str], first: str) -> Iterator[
         yield f"Pareto front, with {LABELS.get(others[0], others[0])}", pareto_figure(table, metric, others[0])
 
 
-def _varied(table: xr.Dataset) -> list[str]:
-    """The parameters that are numbers and differ, of vectors their components."""
+def _list_varied(table: xr.Dataset) -> list[str]:
+    """Return the parameters that are numbers and differ, of vectors their components."""
     found = []
     for name, values in table.coords.items():
         if name == "sample" or values.dtype.kind not in "iuf":

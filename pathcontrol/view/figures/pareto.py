@@ -1,4 +1,4 @@
-"""Pareto fronts: what one metric costs in another, over all samples of a sweep or all candidates of a tuning."""
+"""Pareto fronts: the trade-off of two metrics, over all samples of a sweep or all candidates of a tuning."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from pathcontrol.view.figures.style import (
     SMALL,
     VECTORS,
     Look,
-    dressed,
+    apply_style,
     error_colours,
     new_figure,
     style,
@@ -52,7 +52,7 @@ _KEPT: Look = {"marker": "o", "linestyle": "none", "markersize": 2.2, "color": B
 
 
 class _Choice(NamedTuple):
-    """What is drawn: metrics along both axes, what is better, and limits."""
+    """The content of a figure: metrics along both axes, their directions, and limits."""
 
     x: str
     y: str
@@ -70,7 +70,7 @@ def pareto_figure(
     limits: Limits | None = None,
     labelled: int = 3,
 ) -> Figure:
-    """Two metrics of all samples and the Pareto front of these two as a staircase; degrees for radians.
+    """Draw two metrics of all samples and the Pareto front of these two as a staircase; degrees for radians.
 
     Samples beyond a limit of another metric are grey and never on the front; limits of the two themselves are lines,
     beyond which the front goes on, as that is what it costs to keep them. Of a tuning its best candidate is marked too.
@@ -99,11 +99,11 @@ def pareto_figure(
         raise InputError(f"no sample has {names[0]} and {names[1]} and keeps the limits; there is no front to be drawn")
     chosen = _best(sweep, choice.x, best) if labelled else []
     marked = sorted({*_spread([_scaled(values)[rows] for values in (right, up)], labelled), *chosen})
-    words = [f"{letter}  {_told(best, i)}" for letter, i in zip(ascii_uppercase, marked, strict=False)]
+    words = [f"{letter}  {_describe_point(best, i)}" for letter, i in zip(ascii_uppercase, marked, strict=False)]
     words = [line + ", best" * (i in chosen) for line, i in zip(words, marked, strict=False)]
     with style():
         figure = new_figure(COLUMN, 2.7 + 0.14 * len(words))
-        axes = dressed(figure.add_subplot())
+        axes = apply_style(figure.add_subplot())
         kept = within(table, others)
         set_scales(axes, right, up)
         axes.margins(0.09)  # for letters at the ends
@@ -119,6 +119,7 @@ def pareto_figure(
 
 
 def _choice(sweep: Any, x: str | None, y: str | None, goals: Mapping[str, str] | None, limits: Any) -> _Choice:
+    """Return the content of the figure."""
     if isinstance(sweep, Tuning):
         known = [*sweep.objectives, *sweep.limits]
         x = known[0] if x is None else x
@@ -130,19 +131,22 @@ def _choice(sweep: Any, x: str | None, y: str | None, goals: Mapping[str, str] |
     return _Choice(x, y, goals or {}, check_limits(limits))
 
 
-def _told(best: xr.Dataset, row: int) -> str:
+def _describe_point(best: xr.Dataset, row: int) -> str:
+    """Return the parameters of a marked point in words."""
     one = best.isel(sample=row)
     values = {str(name): v.to_numpy()[()] for name, v in one.coords.items() if name != "sample"}
     return f"{int(one['sample'])}: {readable_parameters(values)}"
 
 
 def _scaled(values: Array) -> Array:
+    """Return values scaled to their range."""
     return np.log(values) if wide(values) else values
 
 
 def _draw_points(
     figure: Figure, axes: Axes, at: tuple[Array, Array], kept: Array, colour: tuple[str, xr.Dataset] | None
 ) -> None:
+    """Draw all samples."""
     right, up = at
     many: Look = {"rasterized": len(right) > VECTORS}
     axes.plot(right[~kept], up[~kept], **_BEYOND, **many)
@@ -157,6 +161,7 @@ def _draw_points(
 
 
 def _draw_limits(axes: Axes, table: xr.Dataset, choice: _Choice) -> None:
+    """Draw the limits."""
     for name, draw in ((choice.x, axes.axvline), (choice.y, axes.axhline)):
         for end in choice.limits.get(name, ()):
             if np.isfinite(end):
@@ -164,13 +169,13 @@ def _draw_limits(axes: Axes, table: xr.Dataset, choice: _Choice) -> None:
 
 
 def _best(sweep: Any, objective: str, front: xr.Dataset) -> list[int]:
-    """The row of a front that is the best candidate of a tuning, if it is one of them."""
+    """Return the row of a front that is the best candidate of a tuning, if it is one of them."""
     best = sweep.best(objective) if isinstance(sweep, Tuning) and objective in sweep.objectives else None
     return [] if best is None else np.flatnonzero(front["sample"].to_numpy() == best.number).tolist()
 
 
 def _mark(axes: Axes, letter: str, at: tuple[float, float], choice: _Choice, fill: str) -> None:
-    """A letter beside a point of the front, on the side where no sample is."""
+    """Draw a letter beside a point of the front, on the side without samples."""
     axes.plot(*at, marker="o", markersize=4.5, markerfacecolor=fill, color=INK, zorder=3)
     sides = {"min": -5.5, "max": 5.5}
     away = (sides[choice.goals.get(choice.x, "min")], sides[choice.goals.get(choice.y, "min")])
@@ -180,7 +185,7 @@ def _mark(axes: Axes, letter: str, at: tuple[float, float], choice: _Choice, fil
 
 
 def _spread(columns: Sequence[Array], count: int) -> Sequence[int]:
-    """Rows of a front that are as far apart along it as can be, its ends among them."""
+    """Return rows of a front that are as far apart along it as possible, its ends among them."""
     if count < 1:
         return []
     points = np.stack(columns, axis=1)
@@ -192,6 +197,7 @@ def _spread(columns: Sequence[Array], count: int) -> Sequence[int]:
 
 
 def _entries(choice: _Choice, beyond: bool, plainly: bool) -> dict[str, Line2D]:
+    """Return the entries of the legend."""
     entries = {"front": Line2D([], [], marker="o", markersize=2.6, **_FRONT)}
     if plainly:
         entries["samples"] = Line2D([], [], marker="o", linestyle="none", markersize=2.6, color=BLUE)

@@ -1,4 +1,4 @@
-"""Runs in joint space: the path in a plane of two joints, and the phase plane of each joint. Degrees, for readers."""
+"""The figures of runs in joint space: the plane of two joints, and the phase plane of each joint, in degrees."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from pathcontrol.errors import InputError
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.figures.limits import aspect, equal_plane, extent, span
 from pathcontrol.view.figures.lines import curve, drawable
-from pathcontrol.view.figures.shown import Runs, Shown, of_one_arm, path_parameters, readable, readable_like, shown
-from pathcontrol.view.figures.style import COLUMN, DESIRED_LOOK, INK, PAGE, START_LOOK, dressed, new_figure, style
+from pathcontrol.view.figures.shown import Runs, Shown, check_joints, path_parameters, readable, readable_like, shown
+from pathcontrol.view.figures.style import COLUMN, DESIRED_LOOK, INK, PAGE, START_LOOK, apply_style, new_figure, style
 from pathcontrol.view.figures.words import joint_label, legend
 
 _DESIRED, _START = "desired path", "start"
@@ -25,7 +25,7 @@ _STILL = 0.01  # of the largest travel: joints that move by less do not take par
 def path_figure(
     run: Runs, task: PathTask | None = None, joints: tuple[int, int] | None = None, rollout: int = 0
 ) -> Figure:
-    """q_j over q_i [deg], as in the paper's figures 7 and 9, over the desired path.
+    """Draw q_j over q_i [deg], as in the paper's figures 7 and 9, over the desired path.
 
     Args:
         run: a run, or several of one arm by their names.
@@ -37,22 +37,22 @@ def path_figure(
         InputError: there are no such joints or there is no such rollout, or runs and task do not belong together.
     """
     runs = shown(run, task, rollout)
-    of_one_arm(runs)
-    pair = chosen_pair(runs, joints)
+    check_joints(runs)
+    pair = choose_pair(runs, joints)
     with style():
         limits, equal = plane_limits(runs, pair)
         figure = new_figure(COLUMN, 0.75 + (2.85 * aspect(limits) if equal else 2.85))
-        axes = dressed(figure.add_subplot())
+        axes = apply_style(figure.add_subplot())
         lines = [draw_path(axes, one, pair) for one in runs]
         label_plane(axes, runs, pair)
-        legend(figure, _in_order(lines))
+        legend(figure, _sort_lines(lines))
     return figure
 
 
 def phase_figure(
     run: Runs, joints: int | Sequence[int] | None = None, task: PathTask | None = None, rollout: int = 0
 ) -> Figure:
-    """q̇_j over q_j, a panel for each joint, over the path's own (q_d(s), q_d'(s)ϑ(s)) of eq. (5).
+    """Draw q̇_j over q_j, a panel for each joint, over the path's own (q_d(s), q_d'(s)ϑ(s)) of eq. (5).
 
     Degrees and degrees a second; metres and metres a second for sliding joints.
 
@@ -66,7 +66,7 @@ def phase_figure(
         InputError: there is no such joint or no such rollout, or runs and task do not belong together.
     """
     runs = shown(run, task, rollout)
-    names = of_one_arm(runs)
+    names = check_joints(runs)
     chosen = _moved(runs) if joints is None else [int(j) for j in np.atleast_1d(joints)]
     if not chosen or not set(chosen) <= set(range(len(names))):
         raise InputError(f"joints = {joints}, expected indices from 0 to {len(names) - 1}: {', '.join(names)}")
@@ -76,24 +76,24 @@ def phase_figure(
         figure = new_figure(COLUMN if columns == 1 else PAGE, 0.4 + rows * (2.5 if columns < 3 else 2.1))
         lines = []
         for place, joint in enumerate(chosen):
-            axes = dressed(figure.add_subplot(rows, columns, place + 1))
+            axes = apply_style(figure.add_subplot(rows, columns, place + 1))
             lines += [_draw_phase(axes, one, joint) for one in runs]
             unit, rate = readable(runs[0].run, "q", joint)[1], readable(runs[0].run, "qd", joint)[1]
             axes.set_xlabel(f"{joint_label(joint, names)} [{unit}]")
             axes.set_ylabel(rf"$\dot{{q}}_{{{joint + 1}}}$ [{rate}]")
-        legend(figure, _in_order(lines))
+        legend(figure, _sort_lines(lines))
     return figure
 
 
 def draw_path(axes: Axes, one: Shown, pair: tuple[int, int]) -> dict[str, Line2D]:
-    """The desired path, the one taken and its start in the plane of two joints; the lines by their labels."""
+    """Draw the desired path, the actual one and its start in the plane of two joints; return the lines by label."""
     (q,), desired = readable(one.run, "q")[0], _desired(one)
     i, j = pair
     return _draw(axes, one, q[:, i], q[:, j], None if desired is None else desired[:, [i, j]])
 
 
 def label_plane(axes: Axes, runs: Sequence[Shown], pair: tuple[int, int]) -> None:
-    """Limits, equal scales where the units are, and labels of the plane of two joints."""
+    """Set limits, labels, and equal scales where the units are equal, of the plane of two joints."""
     (x, y), equal = plane_limits(runs, pair)
     unit, names = readable(runs[0].run, "q")[1], runs[0].joints
     axes.set(xlim=x, ylim=y, aspect="equal" if equal else "auto")
@@ -104,7 +104,7 @@ def label_plane(axes: Axes, runs: Sequence[Shown], pair: tuple[int, int]) -> Non
 def plane_limits(
     runs: Sequence[Shown], pair: tuple[int, int]
 ) -> tuple[tuple[tuple[float, float], tuple[float, float]], bool]:
-    """Limits of the plane of two joints that hold all runs and their paths, and whether its scales are equal."""
+    """Return limits of the plane of two joints for all runs and paths, and whether its scales are equal."""
     points = [readable(one.run, "q")[0].reshape(-1, len(one.joints)) for one in runs]
     points += [desired for one in runs if (desired := _desired(one)) is not None]
     x, y = ([p[:, k] for p in points] for k in pair)
@@ -112,8 +112,8 @@ def plane_limits(
     return (equal_plane(x, y) if equal else (span(x), span(y))), equal
 
 
-def chosen_pair(runs: Sequence[Shown], joints: Sequence[int] | None) -> tuple[int, int]:
-    """The indices of two joints as given, or of the two that move the most, in their order."""
+def choose_pair(runs: Sequence[Shown], joints: Sequence[int] | None) -> tuple[int, int]:
+    """Return the indices of the two given joints, or of the two that move the most, in their order."""
     travel, names = _travel(runs), runs[0].joints
     if joints is not None:
         pair = tuple(joints)
@@ -127,12 +127,13 @@ def chosen_pair(runs: Sequence[Shown], joints: Sequence[int] | None) -> tuple[in
 
 
 def _moved(runs: Sequence[Shown]) -> list[int]:
+    """Return the joints that move."""
     travel = _travel(runs)
     return [j for j in range(len(travel)) if travel[j] >= _STILL * travel.max()]
 
 
 def _travel(runs: Sequence[Shown]) -> Array:
-    """How far each joint moves in any of the runs, (n,)."""
+    """Return how far each joint moves in any of the runs, (n,)."""
     ranges = []
     for one in runs:
         q = drawable(one.run.array("q")).reshape(-1, len(one.joints))
@@ -141,6 +142,7 @@ def _travel(runs: Sequence[Shown]) -> Array:
 
 
 def _draw_phase(axes: Axes, one: Shown, joint: int) -> dict[str, Line2D]:
+    """Draw the phase plane of one joint."""
     (q,), unit = readable(one.run, "q", joint)
     (qd,), rate = readable(one.run, "qd", joint)
     desired = None
@@ -155,7 +157,7 @@ def _draw_phase(axes: Axes, one: Shown, joint: int) -> dict[str, Line2D]:
 
 
 def _draw(axes: Axes, one: Shown, x: Array, y: Array, desired: Array | None) -> dict[str, Line2D]:
-    """What a plane shows of a run; the lines by their labels."""
+    """Draw a run in a plane; return the lines by their labels."""
     taken = one.label or "arm"
     lines = {taken: curve(axes, x, y, label=taken, **one.look)}
     if desired is not None:
@@ -165,14 +167,14 @@ def _draw(axes: Axes, one: Shown, x: Array, y: Array, desired: Array | None) -> 
     return lines
 
 
-def _in_order(drawn: Sequence[dict[str, Line2D]]) -> dict[str, Line2D]:
-    """The lines of all the runs by their labels: the runs, then what they have in common."""
+def _sort_lines(drawn: Sequence[dict[str, Line2D]]) -> dict[str, Line2D]:
+    """Return the lines of all runs by their labels: the runs, then what they share."""
     lines = {label: line for found in drawn for label, line in found.items()}
     return dict(sorted(lines.items(), key=lambda item: [_DESIRED, _START].count(item[0])))
 
 
 def _desired(one: Shown) -> Array | None:
-    """The path (k, n) in the unit in which the run is drawn."""
+    """Return the path (k, n) in the unit in which the run is drawn."""
     if one.task is None:
         return None
     return readable_like(one.task.q_d(path_parameters(one)), readable(one.run, "q")[1])

@@ -1,4 +1,4 @@
-"""The figures that go with any run: its path, errors, torques and speed, as files."""
+"""The figures of any run, its path, errors, torques and speed, as files."""
 
 from __future__ import annotations
 
@@ -42,6 +42,6 @@ def run_figure(
 
 
 def named(path: str | Path, name: str) -> Path:
-    """``path`` with ``-name`` at its end, before the suffix of a format."""
+    """Return ``path`` with ``-name`` at its end, before the suffix of a format."""
     stem = stem_of(path)
     return stem.with_name(f"{stem.name}-{name}{Path(path).name.removeprefix(stem.name)}")

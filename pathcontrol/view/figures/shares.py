@@ -1,4 +1,4 @@
-"""How near positions, velocities and torques came to their limits."""
+"""The figure of positions, velocities and torques as shares of their limits."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from pathcontrol.simulation.run import Run
 from pathcontrol.view.figures.limits import extent, over_time
 from pathcontrol.view.figures.lines import drawable, series
 from pathcontrol.view.figures.shown import Runs, shown
-from pathcontrol.view.figures.style import BEYOND, COLUMN, dressed, new_figure, style
+from pathcontrol.view.figures.style import BEYOND, COLUMN, apply_style, new_figure, style
 from pathcontrol.view.figures.words import legend
 
 _LOOKS: dict[str, Any] = {"position": "-", "velocity": (0, (5, 1.5)), "torque": (0, (1.5, 1))}
 
 
 def limits_figure(run: Runs, rollout: int = 0) -> Figure:
-    """The largest share [%] that any joint has of its limit of position, velocity and torque, over time.
+    """Draw the largest share [%] that any joint has of its limit of position, velocity and torque, over time.
 
     A red line stands at 100 %. Of a position it is 0 in the middle between its limits and 100 at either.
 
@@ -39,7 +39,7 @@ def limits_figure(run: Runs, rollout: int = 0) -> Figure:
         raise InputError("limits_figure: no joint of the run has a limit of position, velocity or torque")
     with style():
         figure = new_figure(COLUMN, 2.3)
-        axes, several = dressed(figure.add_subplot()), len(runs) > 1
+        axes, several = apply_style(figure.add_subplot()), len(runs) > 1
         names = {}
         for one, kind, share in drawn:
             look: dict[str, Any] = {"color": one.colour, "linestyle": _LOOKS[kind]}
@@ -54,7 +54,7 @@ def limits_figure(run: Runs, rollout: int = 0) -> Figure:
 
 
 def largest_shares(run: Run) -> dict[str, Array]:
-    """The largest share [%] over the joints of the first rollout, (time,), of each kind of limit that there is."""
+    """Return the largest share [%] over the joints of the first rollout, (time,), of each kind of limit."""
     found = {}
     for name, shares in limit_shares(run).items():
         limited = np.isfinite(shares[0]).any(0)

@@ -1,4 +1,4 @@
-"""What figures show: one run, or several by their names, each with a colour of its own."""
+"""The runs of a figure: one run, or several by their names, each with a colour of its own."""
 
 from __future__ import annotations
 
@@ -48,22 +48,22 @@ class Shown(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Its name as Matplotlib draws it letter for letter."""
+        """The name in the form that Matplotlib draws letter for letter."""
         return plain(self.name)
 
     @property
     def look(self) -> dict[str, Any]:
-        """Keyword arguments of its lines."""
+        """The keyword arguments of its lines."""
         return {"color": self.colour, "linestyle": self.dashes}
 
     @property
     def joints(self) -> list[str]:
-        """Names of the joints."""
+        """The names of the joints."""
         return self.run.joints
 
 
 def shown(run: Runs, task: PathTask | None = None, rollout: int | None = None) -> list[Shown]:
-    """The runs of a figure in their order, each with its colour; ``task`` is by default each run's own.
+    """Return the runs of a figure in their order, each with its colour; ``task`` is by default each run's own.
 
     Raises:
         InputError: there is no run, there is no such rollout, or the task is for another number of joints.
@@ -92,15 +92,15 @@ def shown(run: Runs, task: PathTask | None = None, rollout: int | None = None) -
 
 
 def _alone(run: Run, rollout: int) -> Run:
-    """A rollout until it is finished, not as it is held at the end while others go on."""
+    """Return a rollout until it finished, without the time in which it is held while others go on."""
     part = run.rollout(rollout)
     if run.rollouts == 1 or part.status[0] != "finished":
         return part
     return part.excerpt(np.arange(1), int(own_samples(part)[0]))
 
 
-def of_one_arm(runs: Sequence[Shown]) -> list[str]:
-    """The names of the joints that all the runs have.
+def check_joints(runs: Sequence[Shown]) -> list[str]:
+    """Return the names of the joints that all the runs have.
 
     Raises:
         InputError: the runs are of different joints.
@@ -113,7 +113,7 @@ def of_one_arm(runs: Sequence[Shown]) -> list[str]:
 
 
 def own_robot(run: Run) -> RobotModel | None:
-    """The robot of a run, where it knows it."""
+    """Return the robot of a run, where it knows it."""
     try:
         return run.robot
     except InputError:
@@ -121,7 +121,7 @@ def own_robot(run: Run) -> RobotModel | None:
 
 
 def path_parameters(one: Shown) -> Array:
-    """Parameters s (k,) that show the whole path, or what the run used of one that neither ends nor repeats."""
+    """Return parameters s (k,) that show the whole path, or the used part of one without end."""
     assert one.task is not None
     try:
         lower, upper = one.task.one_traverse
@@ -135,7 +135,7 @@ def path_parameters(one: Shown) -> Array:
 
 
 def readable(run: Run, name: str, joint: int | None = None) -> tuple[Array, str]:
-    """A variable (rollout, time, joint), or of one joint (rollout, time), in the unit a person reads, and the unit.
+    """Return a variable (rollout, time, joint), or of one joint (rollout, time), in a reader's unit, and the unit.
 
     Degrees for angles; sliding joints stay in metres, and so does all of an arm that has both.
     """
@@ -146,12 +146,12 @@ def readable(run: Run, name: str, joint: int | None = None) -> tuple[Array, str]
 
 
 def readable_like(values: Array, unit: str) -> Array:
-    """``values`` in SI units, in the ``unit`` that :func:`readable` gave."""
+    """Return ``values`` in SI units, in the ``unit`` that :func:`readable` gave."""
     return np.rad2deg(drawable(values)) if unit.startswith("deg") else drawable(values)
 
 
 def _unit_of_joint(run: Run, unit: str, joint: int) -> str:
-    """Which of the units of an arm with turning and sliding joints is that of one of them, where that is known."""
+    """Return the unit of one joint of an arm with turning and sliding joints, where it is known."""
     robot = own_robot(run) if " or " in unit else None
     if robot is None or robot.n != len(run.joints):
         return unit
@@ -159,6 +159,7 @@ def _unit_of_joint(run: Run, unit: str, joint: int) -> str:
 
 
 def _fitting(run: Run, task: PathTask | None) -> PathTask | None:
+    """Return the task if it fits the run."""
     task = run.task if task is None else task
     if task is not None and task.n != len(run.joints):
         raise InputError(f"the task is for {task.n} joints, the run has {len(run.joints)}")

@@ -1,4 +1,4 @@
-"""One style for all figures, and how they are written: SVG, PNG and PDF, whole or not at all."""
+"""One style for all figures, written as SVG, PNG and PDF, whole or not at all."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ _METADATA: dict[str, Any] = {"svg": {"Date": None}, "png": None, "pdf": {"Creati
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Everything drawn inside has the package's look, whatever the user's own settings of Matplotlib are."""
+    """Draw everything inside with the package's look, independent of the user's settings of Matplotlib."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
@@ -80,10 +80,10 @@ def style() -> Iterator[None]:
 
 
 class NotebookFigure(Figure):
-    """A figure that Jupyter shows as it is, without pyplot or a backend."""
+    """A figure that Jupyter shows without pyplot or a backend."""
 
     def _repr_png_(self) -> bytes:
-        """The picture, as the file of :func:`save_figure` has it but with fewer dots.
+        """Return the picture, as in the file of :func:`save_figure` but with fewer dots.
 
         A copy is drawn, since the layout of what was drawn before differs in its last digits.
         """
@@ -94,14 +94,14 @@ class NotebookFigure(Figure):
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure [in]."""
+    """Return an empty figure [in]."""
     figure = NotebookFigure(figsize=(width, height), layout=SettledLayout())
     FigureCanvasAgg(figure)  # so that words are measured once, for the layout and for PNG
     return figure
 
 
-def dressed(axes: Axes) -> Axes:
-    """``axes`` with grid and ticks in the style; said outright, as ticks are made when they are first drawn."""
+def apply_style(axes: Axes) -> Axes:
+    """Return ``axes`` with grid and ticks in the style, set here, as ticks are made when they are first drawn."""
     axes.grid(True, color="#E3E3E3", linewidth=0.6)
     axes.tick_params(labelsize=SMALL, width=0.7, length=2.5, pad=2.5)
     for axis in (axes.xaxis, axes.yaxis):
@@ -112,7 +112,7 @@ def dressed(axes: Axes) -> Axes:
 
 
 def error_colours() -> LinearSegmentedColormap:
-    """From small errors to large ones: evenly perceived, without the yellow that is lost on white."""
+    """Return a colour map for errors: evenly perceived, without the yellow that is lost on white."""
     shades = mpl.colormaps["plasma"]
     return LinearSegmentedColormap.from_list("errors", [shades(0.88 * i / 15) for i in range(16)])
 
@@ -147,6 +147,6 @@ def save_figure(figure: Figure, path: str | Path, formats: Sequence[str] = ("svg
 
 
 def stem_of(path: str | Path) -> Path:
-    """``path`` without the suffix of a format."""
+    """Return ``path`` without the suffix of a format."""
     path = Path(path)
     return path.with_suffix("") if path.suffix.lower() in _SUFFIXES else path

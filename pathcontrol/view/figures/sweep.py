@@ -1,4 +1,4 @@
-"""Sweeps: a metric over two parameters, as a basin of attraction, and how it spreads over one."""
+"""The figures of a sweep: a metric over two parameters, as a basin of attraction, and its spread over one."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from pathcontrol.view.figures.style import (
     ORANGE,
     VECTORS,
     Look,
-    dressed,
+    apply_style,
     error_colours,
     new_figure,
     style,
@@ -43,7 +43,7 @@ _BINS = 20  # of samples of a distribution, with as many samples each
 
 
 def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = "contour_error_peak") -> Figure:
-    """A metric over two parameters, a point for each sample; what diverged is crossed out. Degrees for radians.
+    """Draw a metric over two parameters, a point for each sample; diverged ones are crossed out.
 
     Samples whose metric is infinite, that never settled, are grey.
 
@@ -64,7 +64,7 @@ def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = 
     )
     with style():
         figure = new_figure(COLUMN, 2.9)
-        axes = dressed(figure.add_subplot())
+        axes = apply_style(figure.add_subplot())
         known = np.isfinite(value)
         side = min(180.0 / np.sqrt(len(value)), 12.0)  # so that the points of a square grid nearly touch, in pt
         many: Look = {"rasterized": len(value) > VECTORS}
@@ -97,7 +97,7 @@ def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = 
 
 
 def robustness_figure(sweep: SweepResult | xr.Dataset, parameter: str, metric: str = "contour_error_peak") -> Figure:
-    """How a metric spreads over a parameter: median, the middle 80 % and the worst, and the share that diverged.
+    """Draw the spread of a metric over a parameter: median, middle 80 %, worst, and the diverged share.
 
     Samples whose metric is infinite, that never settled, are counted below with those that diverged. Values of a grid
     each for themselves; samples of a distribution in bins with as many samples each, drawn at their medians. Degrees
@@ -121,14 +121,14 @@ def robustness_figure(sweep: SweepResult | xr.Dataset, parameter: str, metric: s
         below = bool((lost | unsettled).any())
         figure = new_figure(COLUMN, 3.2 if below else 2.4)
         grid = figure.add_gridspec(2 if below else 1, 1, height_ratios=[3, 1][: 2 if below else 1])
-        axes = dressed(figure.add_subplot(grid[0]))
+        axes = apply_style(figure.add_subplot(grid[0]))
         axes.fill_between(where, low, high, color=BLUE, alpha=0.25, lw=0)
         axes.plot(where, middle, color=BLUE)
         axes.plot(where, worst, color=ORANGE)
         axes.set_ylabel(label(metric, unit))
         set_scales(axes, where, value)
         if below:
-            axes = _draw_lost(dressed(figure.add_subplot(grid[1], sharex=axes)), where, lost | unsettled, bins)
+            axes = _draw_lost(apply_style(figure.add_subplot(grid[1], sharex=axes)), where, lost | unsettled, bins)
             axes.set_ylabel("diverged [%]" if not unsettled.any() else "diverged, never [%]")
         axes.set_xlabel(parameter)
         legend(figure, {"median, 10 to 90 %": Line2D([], [], color=BLUE), "worst": Line2D([], [], color=ORANGE)})
@@ -136,13 +136,14 @@ def robustness_figure(sweep: SweepResult | xr.Dataset, parameter: str, metric: s
 
 
 def _draw_lost(axes: Axes, where: Array, lost: Array, bins: list[Array]) -> Axes:
+    """Draw the share of samples that diverged."""
     axes.plot(where, [100 * lost[rows].mean() for rows in bins], color=INK)
     axes.set(ylim=(0, None))
     return axes
 
 
 def _bins(values: Array) -> list[Array]:
-    """Rows with one value each where these repeat, else as many rows in each of some bins, in order."""
+    """Return rows with one value each where these repeat, else as many rows in each of some bins, in order."""
     found = np.unique(values)
     if len(found) <= max(_BINS, len(values) // 4):
         return [np.flatnonzero(values == one) for one in found]
@@ -150,7 +151,7 @@ def _bins(values: Array) -> list[Array]:
 
 
 def _spread(values: Array) -> tuple[float, float, float, float]:
-    """10 %, median, 90 % and the largest of the values that are known."""
+    """Return 10 %, median, 90 % and the largest of the known values."""
     values = values[~np.isnan(values)]
     if not values.size:
         return (np.nan,) * 4

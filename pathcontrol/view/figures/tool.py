@@ -1,4 +1,4 @@
-"""The tool in the plane in which its path extends most. Millimetres, where a person reads."""
+"""The figure of the tool in the plane in which its path extends most, in millimetres."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from pathcontrol.view.figures.style import (
     INK,
     SMALL,
     START_LOOK,
-    dressed,
+    apply_style,
     error_colours,
     new_figure,
     style,
@@ -43,8 +43,8 @@ _MOST_PIECES = 4000
 _RAPID = (0, (4, 3))
 
 
-class Way(NamedTuple):
-    """Where a tool went and where it should have gone, in the robot's base frame [m].
+class ToolPositions(NamedTuple):
+    """The actual and the desired positions of a tool, in the robot's base frame [m].
 
     Attributes:
         taken: (k, 3).
@@ -58,7 +58,7 @@ class Way(NamedTuple):
 
     @property
     def deviation(self) -> Array:
-        """Distance of the tool from its path [m], (k,), NaN where it is not known."""
+        """The distance of the tool from its path [m], (k,), NaN where it is not known."""
         distance = np.full(len(self.taken), np.nan)
         known = ~np.isnan(self.taken).any(-1)
         lines = [Polyline(points) for points, _ in self.desired if len(points) > 1 and np.ptp(points, axis=0).max() > 0]
@@ -76,7 +76,7 @@ def tool_figure(
     errors: bool = False,
     rollout: int = 0,
 ) -> Figure:
-    """The tool's path [mm] in the robot's base frame, desired and taken, in the two axes in which it extends most.
+    """Draw the tool's path [mm] in the robot's base frame, desired and actual, in its two widest axes.
 
     Args:
         run: a run, or several by their names.
@@ -99,7 +99,7 @@ def tool_figure(
     with style():
         bar = 0.55 if errors and len(runs) == 1 else 0.0
         figure = new_figure(COLUMN, 0.75 + (2.8 - bar) * aspect(limits))
-        axes = dressed(figure.add_subplot(aspect="equal"))
+        axes = apply_style(figure.add_subplot(aspect="equal"))
         axes.set(xlim=limits[0], ylim=limits[1], xlabel=f"{_AXES[i]} [mm]", ylabel=f"{_AXES[j]} [mm]")
         entries: dict[str, Line2D] = {}
         desired: dict[str, Line2D] = {}
@@ -108,7 +108,7 @@ def tool_figure(
         for one, way in zip(runs, ways, strict=True):
             taken = 1e3 * way.taken[:, [i, j]]
             if bar and way.desired:
-                coloured_way(figure, axes, taken, way.deviation, way.cutting)
+                draw_coloured_line(figure, axes, taken, way.deviation, way.cutting)
             else:
                 curve(axes, *taken.T, **one.look)
                 entries[one.label or "tool"] = Line2D([], [], **one.look)
@@ -117,8 +117,8 @@ def tool_figure(
     return figure
 
 
-def coloured_way(figure: Figure, axes: Axes, way: Array, deviation: Array, cutting: Array) -> None:
-    """A line (k, 2) coloured by a distance [m], (k,), with its scale; grey where it is not ``cutting`` (k,).
+def draw_coloured_line(figure: Figure, axes: Axes, way: Array, deviation: Array, cutting: Array) -> None:
+    """Draw a line (k, 2) coloured by a distance [m], (k,), with its scale; grey where not ``cutting`` (k,).
 
     Each of the pieces that a long line is drawn in has the colour of the largest distance on it.
     """
@@ -141,45 +141,48 @@ def coloured_way(figure: Figure, axes: Axes, way: Array, deviation: Array, cutti
 
 
 def distance_unit(distance: Array) -> tuple[float, str]:
-    """A factor for distances [m] and the unit it gives: micrometres below a millimetre."""
+    """Return a factor for distances [m] and the unit it gives: micrometres below a millimetre."""
     return (1e6, "µm") if extent([distance])[1] < 1e-3 else (1e3, "mm")
 
 
 def wide_axes(points: Sequence[Array]) -> tuple[int, int]:
-    """Indices of the two axes in which points (k, 3) extend most, in their order."""
+    """Return the indices of the two axes in which points (k, 3) extend most, in their order."""
     sizes = [high - low for low, high in (extent([p[:, k] for p in points]) for k in range(3))]
     i, j = sorted(np.argsort(-np.array(sizes), kind="stable")[:2])
     return int(i), int(j)
 
 
-def _way(one: Shown, robot: RobotModel | None, tool: str | None) -> Way:
+def _way(one: Shown, robot: RobotModel | None, tool: str | None) -> ToolPositions:
+    """Return the positions of the tool of a run."""
     robot = one.run.robot if robot is None else robot
     expect("robot", robot, RobotModel)
     robot, frame = with_tool(robot, one.task, tool)
     q = drawable(one.run.array("q")[0])
     some = slice(None, None, -(-len(q) // _MOST_POSES))
-    return Way(_positions(robot, q[some], frame), _cutting(one)[some], _desired(one, robot, frame))
+    return ToolPositions(_positions(robot, q[some], frame), _cutting(one)[some], _desired(one, robot, frame))
 
 
 def _positions(robot: RobotModel, q: Array, frame: str) -> Array:
-    """Where a frame is (k, 3) at q (k, n); NaN where q is no number."""
+    """Return the positions of a frame (k, 3) at q (k, n); NaN where q is not finite."""
     x, known = np.full((len(q), 3), np.nan), ~np.isnan(q).any(-1)
     x[known] = robot.frame_pose(q[known], frame)[:, :3, 3]
     return x
 
 
 def _cutting(one: Shown) -> Array:
-    """Whether the arm follows no rapid, (time,)."""
+    """Return where the arm follows no rapid, (time,)."""
     if "path_index" not in one.run or not isinstance(one.task, PathSequence):
         return np.ones(len(one.run.time), dtype=bool)
     return ~np.array(_rapids(one.task))[one.run.array("path_index")]
 
 
 def _rapids(task: PathSequence) -> list[bool]:
+    """Return which paths of a task are rapids."""
     return [contour.rapid for contour in task.contours] if isinstance(task, ToolpathTask) else [False] * len(task)
 
 
 def _desired(one: Shown, robot: RobotModel, frame: str) -> list[tuple[Array, bool]]:
+    """Return the desired paths of the tool, and whether each is a rapid."""
     if one.task is None:
         return []
     s = path_parameters(one)
@@ -190,7 +193,8 @@ def _desired(one: Shown, robot: RobotModel, frame: str) -> list[tuple[Array, boo
     return [(x[a : b + 1], rapid) for a, b, rapid in zip(bounds[:-1], bounds[1:], _rapids(one.task), strict=True)]
 
 
-def _draw_desired(axes: Axes, way: Way, i: int, j: int) -> dict[str, Line2D]:
+def _draw_desired(axes: Axes, way: ToolPositions, i: int, j: int) -> dict[str, Line2D]:
+    """Draw the desired path."""
     lines = {}
     for points, rapid in way.desired:
         thin = {"linewidth": 0.7, "linestyle": _RAPID} if rapid else {}

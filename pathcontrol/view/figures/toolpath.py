@@ -1,4 +1,4 @@
-"""Figures of tool paths: what a file contains, and how near to it the tool came. Millimetres, where a person reads."""
+"""The figures of toolpaths: the content of a file, and the plan for others, in millimetres."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathcontrol._expect import expect
 from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.toolpaths.smoothing.corners import corners
-from pathcontrol.view.figures.style import BLUE, GREY, ORANGE, dressed, new_figure, style
+from pathcontrol.view.figures.style import BLUE, GREY, ORANGE, apply_style, new_figure, style
 from pathcontrol.view.figures.words import legend
 
 _CURVE_SAMPLES = 64
@@ -21,7 +21,7 @@ _AXES = "xyz"
 
 
 def toolpath_figure(toolpath: Toolpath) -> Figure:
-    """The contours in order, seen against the axis along which they extend least: cuts, rapids, starts and corners."""
+    """Draw the contours in order, along the axis in which they extend least: cuts, rapids, starts, corners."""
     expect("toolpath", toolpath, Toolpath)
     with style():
         figure, (axes,), (i, j) = plan_figure(toolpath)
@@ -38,26 +38,26 @@ def toolpath_figure(toolpath: Toolpath) -> Figure:
 
 
 def plan_figure(toolpath: Toolpath, extra: float = 0.0) -> tuple[Figure, list[Axes], tuple[int, int]]:
-    """An empty plan of a toolpath in millimetres, with axes ``extra`` inches high below it, and which axes it shows."""
+    """Return an empty plan of a toolpath [mm], with axes ``extra`` inches high below it, and the axes it shows."""
     lower, upper = toolpath.bounds
     i, j = plane_axes(upper - lower)
     width, height = np.maximum((upper - lower)[[i, j]], 1e-9)
     tall = float(np.clip(4.6 * height / width, 1.2, 7.0))
     figure = new_figure(5.2, 0.7 + tall + extra)
     parts = figure.add_gridspec(2 if extra else 1, 1, height_ratios=[tall, extra] if extra else None)
-    plan = dressed(figure.add_subplot(parts[0], aspect="equal"))
+    plan = apply_style(figure.add_subplot(parts[0], aspect="equal"))
     plan.set(xlabel=f"{_AXES[i]} [mm]", ylabel=f"{_AXES[j]} [mm]")
     return figure, [plan, *([figure.add_subplot(parts[1])] if extra else [])], (i, j)
 
 
 def plane_axes(extent: Array) -> tuple[int, int]:
-    """Indices of the two axes in which something extends most, in their order."""
+    """Return the indices of the two axes of the largest extent, in their order."""
     i, j = sorted(np.argsort(-np.asarray(extent), kind="stable")[:2])
     return int(i), int(j)
 
 
 def outline(contour: Contour) -> Array:
-    """Points of a contour [m], (k, 3), near enough for a picture."""
+    """Return points of a contour [m], (k, 3), near enough for a picture."""
     parts = []
     for segment in contour.segments:
         u = np.linspace(0.0, 1.0, _CURVE_SAMPLES + 1)
@@ -67,6 +67,7 @@ def outline(contour: Contour) -> Array:
 
 
 def _draw(axes: Axes, contour: Contour, i: int, j: int) -> None:
+    """Draw a contour."""
     x, y = 1e3 * outline(contour)[:, [i, j]].T
     if contour.rapid:
         axes.plot(x, y, color=GREY, linewidth=0.7, linestyle=(0, (4, 3)), label="rapid")
@@ -75,7 +76,7 @@ def _draw(axes: Axes, contour: Contour, i: int, j: int) -> None:
 
 
 def _number(axes: Axes, toolpath: Toolpath, i: int, j: int) -> None:
-    """Where each cut starts, numbered in the order of cutting; cuts that start at the same place share a label."""
+    """Number the start of each cut in the order of cutting; cuts that start at the same place share a label."""
     starts = 1e3 * np.array([contour.start for contour in toolpath.cuts])[:, [i, j]]
     if len(starts):
         axes.plot(*starts.T, "o", color=BLUE, markersize=3.5, label="start of a cut")

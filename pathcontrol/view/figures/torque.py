@@ -1,4 +1,4 @@
-"""Torques beside their limits."""
+"""The figure of torques beside their limits."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from pathcontrol._arrays import Array, joint_array
 from pathcontrol.analysis.torque_limits import torque_limits as clamped_limits
 from pathcontrol.view.figures.limits import extent, over_time, span
 from pathcontrol.view.figures.lines import drawable, series
-from pathcontrol.view.figures.shown import Runs, Shown, of_one_arm, own_robot, readable, shown
-from pathcontrol.view.figures.style import COLUMN, LIMIT_LOOK, PAGE, SMALL, dressed, new_figure, style
+from pathcontrol.view.figures.shown import Runs, Shown, check_joints, own_robot, readable, shown
+from pathcontrol.view.figures.style import COLUMN, LIMIT_LOOK, PAGE, SMALL, apply_style, new_figure, style
 from pathcontrol.view.figures.words import joint_label, legend
 
 _BEYOND = "#ECECEC"  # what lies beyond a limit
@@ -23,7 +23,7 @@ _TALL_COLUMN = 3  # panels
 
 
 def torque_figure(run: Runs, limits: ArrayLike | None = None, rollout: int = 0) -> Figure:
-    """Applied torques [N m] over time, one panel for each joint, beside their limits, with the share that was used.
+    """Draw applied torques [N m] over time, one panel for each joint, with their limits and the used share.
 
     Sliding joints have forces [N]. The limits are always inside the panel, so that the margin is seen.
 
@@ -36,7 +36,7 @@ def torque_figure(run: Runs, limits: ArrayLike | None = None, rollout: int = 0) 
         InputError: there is no such rollout, or the limits are not one for each joint.
     """
     runs = shown(run, rollout=rollout)
-    names = of_one_arm(runs)
+    names = check_joints(runs)
     largest_torques = torque_limits(runs[0], limits)
     columns = 1 if len(names) <= _TALL_COLUMN else 2
     rows = -(-len(names) // columns)
@@ -44,7 +44,7 @@ def torque_figure(run: Runs, limits: ArrayLike | None = None, rollout: int = 0) 
         figure = new_figure(COLUMN if columns == 1 else PAGE, 0.6 + 1.35 * rows)
         for k in range(len(names)):
             # down the columns, so that neighbours on the page are neighbours on the arm
-            axes = dressed(figure.add_subplot(rows, columns, 1 + columns * (k % rows) + k // rows))
+            axes = apply_style(figure.add_subplot(rows, columns, 1 + columns * (k % rows) + k // rows))
             _draw_joint(axes, runs, k, float(largest_torques[k]))
             last = k % rows == rows - 1 or k == len(names) - 1
             axes.set_xlabel("time [s]" if last else "")
@@ -57,7 +57,7 @@ def torque_figure(run: Runs, limits: ArrayLike | None = None, rollout: int = 0) 
 
 
 def torque_limits(one: Shown, limits: ArrayLike | None = None) -> Array:
-    """Largest torques (n,): given, clamped to, or of the run's own robot; infinite where none is known."""
+    """Return the largest torques (n,): given, set by the loop, or the robot's own; infinite where unknown."""
     if limits is None:
         return clamped_limits(one.run, own_robot(one.run))
     given = np.abs(joint_array("limits", limits, len(one.joints), tuple(one.joints)))
@@ -65,11 +65,12 @@ def torque_limits(one: Shown, limits: ArrayLike | None = None) -> Array:
 
 
 def torque_share(one: Shown, limits: Array) -> Array:
-    """The largest over the joints of |τ_j| over its limit [%], (time,), of the first rollout."""
+    """Return the largest over the joints of |τ_j| over its limit [%], (time,), of the first rollout."""
     return 100.0 * (np.abs(drawable(one.run.array("tau")[0])) / limits).max(-1)
 
 
 def _draw_joint(axes: Axes, runs: Sequence[Shown], k: int, limit: float) -> None:
+    """Draw the torque of one joint."""
     found = [readable(one.run, "tau", k) for one in runs]
     values, unit = [v[0] for v, _ in found], found[0][1]
     for one, v in zip(runs, values, strict=True):
@@ -86,7 +87,7 @@ def _draw_joint(axes: Axes, runs: Sequence[Shown], k: int, limit: float) -> None
 
 
 def _draw_limits(axes: Axes, limit: float) -> None:
-    """A line at each limit, and grey beyond it."""
+    """Draw a line at each limit, and grey beyond it."""
     low, high = axes.get_ylim()
     for sign, end in ((1.0, high), (-1.0, low)):
         axes.axhline(sign * limit, **LIMIT_LOOK)

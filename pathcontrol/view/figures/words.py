@@ -1,4 +1,4 @@
-"""Words in figures: names are drawn letter for letter, and fit the room there is."""
+"""Texts in figures: names are drawn letter for letter, and fit into the available room."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ _ENTRY = 0.5  # in, of a legend's handle and the gaps around it
 
 
 def plain(text: str, room: float = 2.0) -> str:
-    """``text`` as Matplotlib draws it letter for letter, cut in the middle where it is longer than ``room`` [in]."""
-    return _fitting(_visible(text), room).replace("$", r"\$")
+    """Return ``text`` as Matplotlib draws it letter for letter, cut in the middle if longer than ``room`` [in]."""
+    return _fit(_replace_invisible(text), room).replace("$", r"\$")
 
 
 def joint_label(index: int, names: Sequence[str], symbol: str = "q") -> str:
-    """The symbol of a joint, from 1, and its name where that says more."""
+    """Return the symbol of a joint, counted from 1, and its name where it adds something."""
     letter = rf"${symbol}_{{{index + 1}}}$"
     return letter if len(names) <= 2 else f"{letter} ({plain(names[index], 1.3)})"
 
 
 def legend(figure: Figure, entries: Mapping[str, Any]) -> None:
-    """A legend above everything, of handles by their labels (as :func:`plain` gives them), in as many rows as needed.
+    """Draw a legend above everything, of handles by their labels (from :func:`plain`), in as many rows as needed.
 
     Matplotlib leaves out labels that begin with an underscore, so the words are put in afterwards.
     """
@@ -49,19 +49,20 @@ def legend(figure: Figure, entries: Mapping[str, Any]) -> None:
 
 
 def _columns(widths: Sequence[float], room: float) -> int:
-    """The most columns, filled one after the other, that fit."""
+    """Return the most columns, filled one after the other, that fit."""
     for columns in range(len(widths), 1, -1):
         if sum(float(np.max(column)) for column in np.array_split(widths, columns)) <= room:
             return columns
     return 1
 
 
-def _visible(text: str) -> str:
-    """Line breaks, control characters and halves of characters as spaces."""
+def _replace_invisible(text: str) -> str:
+    """Return a text with spaces for line breaks, control characters and halves of characters."""
     return "".join(letter if letter.isprintable() else " " for letter in str(text))
 
 
-def _fitting(text: str, room: float) -> str:
+def _fit(text: str, room: float) -> str:
+    """Return a text cut to fit the room."""
     text = text if len(text) <= 400 else f"{text[:200]}{text[-200:]}"
     kept = len(text)
     while kept > 2 and _width(shown := _cut(text, kept)) > room:
@@ -70,16 +71,18 @@ def _fitting(text: str, room: float) -> str:
 
 
 def _cut(text: str, kept: int) -> str:
+    """Return a text cut in the middle."""
     head = -(-kept // 2)
     return text if kept >= len(text) else f"{text[:head]}…{text[len(text) - (kept - head) :]}"
 
 
 def _label_width(label: str) -> float:
+    """Return the width of a label."""
     letters = label.replace(r"\$", "")
     return _width(label, mathematics=True) if "$" in letters else _width(label.replace(r"\$", "$"))
 
 
 def _width(text: str, mathematics: bool = False) -> float:
-    """Width [in] of a text."""
+    """Return the width [in] of a text."""
     width, _, _ = text_to_path.get_text_width_height_descent(text, FontProperties(size=_SIZE), mathematics)
     return float(width) / _POINTS

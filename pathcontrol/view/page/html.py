@@ -1,4 +1,4 @@
-"""One HTML file with everything in it: Meshcat's viewer, the film, the charts, and nothing to fetch."""
+"""The HTML file of a film: Meshcat's viewer, the film and the charts, with nothing to fetch."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ STYLES = ("vendor/uPlot.min.css", "css/page.css", "css/player.css", "css/charts.
 
 
 class Section(NamedTuple):
-    """What a page says below its player.
+    """A section of a page below its player.
 
     Attributes:
         title: heading; any text, it is never markup.
@@ -60,7 +60,7 @@ class Section(NamedTuple):
 
 
 def page(film: Film, title: Sequence[str], sections: Sequence[Section] = ()) -> str:
-    """The page that plays a film.
+    """Return the page that plays a film.
 
     It works from ``file://`` in any browser with WebGL, and its content security policy allows no connection and no
     script but its own.
@@ -84,42 +84,44 @@ def page(film: Film, title: Sequence[str], sections: Sequence[Section] = ()) -> 
 
 
 def own_text(name: str) -> str:
-    """The text of a file of the page, by its place beside this module."""
+    """Return the text of a file of the page, by its place beside this module."""
     return resources.files("pathcontrol.view.page").joinpath(*name.split("/")).read_text("utf-8")
 
 
 @cache
 def _template() -> jinja2.Template:
+    """Return the template of the page."""
     return jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(own_text("template.html"))
 
 
 @cache
 def _player() -> str:
-    """The charts' library with its licence, and our own parts, which share one scope and leave no trace outside it."""
+    """Return the charts' library with its licence, and our own scripts, which share one scope."""
     own = "\n".join(own_text(f"js/{name}") for name in PARTS)
     licence = f"/*! uPlot: {own_text('vendor/LICENSE')}*/"
-    return _embedded(f'{licence}\n"use strict";\n(() => {{\n{own_text("vendor/uPlot.iife.min.js")}\n{own}\n}})();\n')
+    return _embed(f'{licence}\n"use strict";\n(() => {{\n{own_text("vendor/uPlot.iife.min.js")}\n{own}\n}})();\n')
 
 
 @cache
 def _viewer() -> tuple[str, str]:
-    """Meshcat's viewer, zipped and in base64 as it is four times as long, and the digest that lets it run."""
+    """Return Meshcat's viewer, zipped and in base64, a quarter of its size, and the digest that permits it."""
     script = resources.files("meshcat").joinpath("viewer", "dist", "main.min.js").read_text("utf-8")
     zipped = gzip.compress(script.encode(), compresslevel=6, mtime=0)
     return base64.b64encode(zipped).decode(), _digest(script)
 
 
-def _embedded(script: str) -> str:
-    """A script as it may stand between tags: what would end it can only be inside a string."""
+def _embed(script: str) -> str:
+    """Return a script that may stand between tags; a closing tag can only be inside a string and is escaped."""
     return re.sub(r"<(?=/script|!--)", r"\\x3c", script, flags=re.IGNORECASE)
 
 
 def _digest(script: str) -> str:
+    """Return the digest of a script."""
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 
 def _policy(digests: Sequence[str]) -> str:
-    """A content security policy: these scripts and no others, and nothing from the network."""
+    """Return a content security policy: these scripts and no others, and nothing from the network."""
     allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
     return (
         f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:; "

@@ -1,1 +1,1 @@
-"""One page about one run or several: animation, figures, numbers, settings, and how to make it again."""
+"""The report: one page about one run or several, with animation, figures, numbers, settings, and reproduction."""

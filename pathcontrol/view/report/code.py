@@ -1,4 +1,4 @@
-"""Calls and values as Python writes them."""
+"""Calls and values as Python code."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NOT_IMPORTED = ("__main__", "pathcontrol_file_")  # modules that a script canno
 
 
 class Name(str):
-    """What stands in a script as it is: the name of a variable, or a call."""
+    """An expression that stands in a script as it is: the name of a variable, or a call."""
 
 
 def call(function: str, positional: Sequence[str], named: Mapping[str, Any]) -> str:
@@ -28,14 +28,14 @@ def call(function: str, positional: Sequence[str], named: Mapping[str, Any]) -> 
 
 
 def _literal(value: Any) -> str:
-    """A value as Python writes it, texts between double quotes."""
+    """Return a value as Python code, texts between double quotes."""
     if isinstance(value, Name):
         return value
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
 
 
 def class_code(kind: Kind, name: Any, described: Collection[str]) -> tuple[str, str] | None:
-    """Return what a class of a ``kind`` is called in a script, and the line that imports it, empty for the library's.
+    """Return the name of a class of a ``kind`` in a script, and its import line, empty for the library's.
 
     ``None`` where nobody knows: a class of the user that is not in a module that can be imported, one without
     parameters that would say what it is, or one with some that are not ``described``.

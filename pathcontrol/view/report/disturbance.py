@@ -1,4 +1,4 @@
-"""The disturbance of a run as Python that makes it again from its description."""
+"""The Python code of a run's disturbance, from its description."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ _DEEPEST = 20  # sums in one another
 
 
 class Code(NamedTuple):
-    """An expression, and the lines that import what it needs."""
+    """An expression, and the import lines that it needs."""
 
     text: str
     imports: tuple[str, ...] = ()
 
 
 def disturbance_code(described: Any, run: Run, depth: int = 0) -> Code | None:
-    """Return the expression for a disturbance or a sum of them; ``None`` for one that a record does not know whole.
+    """Return the code of a disturbance or a sum; ``None`` if its description is not complete.
 
     Sums are put into brackets as they were made, since floating-point numbers do not add up in any order.
 
@@ -44,7 +44,7 @@ def disturbance_code(described: Any, run: Run, depth: int = 0) -> Code | None:
 
 
 def _term(kind: Any, described: Mapping[str, Any], run: Run) -> Code | None:
-    """One disturbance, whose arguments have the axes that they should have."""
+    """Return the code of one disturbance, whose arguments have the right axes."""
     found = class_code(DISTURBANCES, kind, described)
     if found is None:
         return None
@@ -56,20 +56,20 @@ def _term(kind: Any, described: Mapping[str, Any], run: Run) -> Code | None:
 
 
 def _is_argument(parameter: Parameter, value: Any, run: Run) -> bool:
-    """Whether a value has the axes that a parameter says, or any where it does not say."""
+    """Return whether a value has the axes that a parameter states, or any where it states none."""
     if parameter.form is None:
         return str not in parameter.types or isinstance(value, str)
     return _fits(value, _AXES[parameter.form], run.rollouts)
 
 
 def _arm(name: Any, run: Run) -> str | None:
-    """The arm whose kinematics a force has, by its name."""
+    """Return the arm whose kinematics a force has, by its name."""
     known = {run.model.name: "saved.model", run.robot.name: "saved.robot"}
     return known.get(name) if isinstance(name, str) else None
 
 
 def _fits(value: Any, axes: int, rollouts: int) -> bool:
-    """Whether a value has so many axes, or one more for the rollouts."""
+    """Return whether a value has the number of axes, or one more for the rollouts."""
     if not isinstance(value, list):
         return axes == 0 and isinstance(value, int | float)
     if axes == 0 or (value and isinstance(value[0], list)):
@@ -78,5 +78,5 @@ def _fits(value: Any, axes: int, rollouts: int) -> bool:
 
 
 def _axes(value: Any) -> int:
-    """How many lists stand in one another, by the first of each."""
+    """Return the depth of nested lists, by the first of each."""
     return 1 + _axes(value[0]) if isinstance(value, list) and value else int(isinstance(value, list))

@@ -1,4 +1,4 @@
-"""Files that a page carries inside itself, behind links."""
+"""Files inside a page, behind links."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class Download(NamedTuple):
 
 
 def json_file(name: str, value: Any) -> Download:
-    """A file with a value as JSON."""
+    """Return a file with a value as JSON."""
     return text_file(name, json.dumps(plain(value), indent=2, ensure_ascii=False) + "\n", "application/json")
 
 
 def plain(value: Any) -> Any:
-    """``value`` as JSON can hold it: what is not finite is null."""
+    """Return ``value`` for JSON; numbers that are not finite are null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -42,14 +42,14 @@ def plain(value: Any) -> Any:
 
 
 def text_file(name: str, text: str, kind: str = "text/plain") -> Download:
-    """A file with a text."""
+    """Return a file with a text."""
     # half a character becomes \\ud800, as JSON writes it
     encoded = base64.b64encode(text.encode(errors="backslashreplace")).decode()
     return Download(file_name(name), f"data:{kind};charset=utf-8;base64,{encoded}")
 
 
 def signals_file(name: str, run: Run) -> Download:
-    """A table of the first rollout, one row a sample, at most 501 of them evenly spaced; SI units, in its header."""
+    """Return a table of the first rollout, at most 501 evenly spaced rows; SI units, named in its header."""
     kept = np.unique(np.linspace(0, len(run.time) - 1, min(len(run.time), _MOST_ROWS)).round().astype(int))
     columns = {"time [s]": run.time[kept]}
     for signal in (name for name in _SIGNALS if name in run.data):
@@ -64,6 +64,6 @@ def signals_file(name: str, run: Run) -> Download:
 
 
 def file_name(name: str) -> str:
-    """``name`` without what file systems do not take."""
+    """Return ``name`` without characters that file systems refuse."""
     found = re.sub(r"[^\w.+-]+", "_", name).strip("._")
     return found[: _LONGEST // 2] + found[-_LONGEST // 2 :] if len(found) > _LONGEST else found or "file"

@@ -20,7 +20,7 @@ _WIDE = 5.0  # inches, from which a figure has a row of its own
 
 
 class Picture(NamedTuple):
-    """A figure: the address of its image, its width [px], whether it is a wide one, and what it shows."""
+    """A figure: the address of its image, its width [px], whether it is a wide one, and its caption."""
 
     href: str
     width: int
@@ -29,7 +29,7 @@ class Picture(NamedTuple):
 
 
 def pictures(runs: Mapping[str, Run]) -> list[Picture]:
-    """The figures of the runs; SVG in images, so that no name in them can be markup of the page.
+    """Return the figures of the runs; SVG in images, so that no name in them can be markup of the page.
 
     Runs of the same joints share figures, others have figures of their own.
     """
@@ -42,7 +42,7 @@ def pictures(runs: Mapping[str, Run]) -> list[Picture]:
 
 
 def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
-    """Figures of runs of the same joints, with what they show."""
+    """Yield figures of runs of the same joints, with their captions."""
     from pathcontrol.view.figures.comparison import comparison_figure
     from pathcontrol.view.figures.deviation import deviation_figure
     from pathcontrol.view.figures.errors import error_bands_figure, error_figure
@@ -79,14 +79,15 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
 
 
 def picture(figure: Figure, caption: str) -> Picture:
-    """A figure as SVG, or as PNG where the SVG would be too large to be sent around."""
-    width, drawn = figure.get_figwidth(), _drawn(figure, "svg")
+    """Return a figure as SVG, or as PNG where the SVG would be too large."""
+    width, drawn = figure.get_figwidth(), _draw(figure, "svg")
     kind = "svg+xml" if len(drawn) <= _LARGEST else "png"
-    text = base64.b64encode(drawn if kind == "svg+xml" else _drawn(figure, "png")).decode()
+    text = base64.b64encode(drawn if kind == "svg+xml" else _draw(figure, "png")).decode()
     return Picture(f"data:image/{kind};base64,{text}", round(_PIXELS * width), width > _WIDE, caption)
 
 
-def _drawn(figure: Figure, kind: str) -> bytes:
+def _draw(figure: Figure, kind: str) -> bytes:
+    """Return the file of a figure."""
     from pathcontrol.view.figures.style import style
 
     drawn = io.BytesIO()

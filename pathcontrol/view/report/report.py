@@ -1,4 +1,4 @@
-"""One page about one run or several, to keep, to print and to send."""
+"""The function :func:`report`: one page about one run or several, to keep, to print and to send."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def report(
     from pathcontrol.view.page.html import page
     from pathcontrol.view.report.sections import sections
 
-    named, out = _named(runs), check_suffix(out, "a report as a page", ".html", ".htm")
+    named, out = _name_runs(runs), check_suffix(out, "a report as a page", ".html", ".htm")
     animation = record(runs, layout=layout)
     # the sections have tables of their own
     film = dataclasses.replace(animation.film, header=animation.film.header | {"tables": []})
@@ -59,7 +59,8 @@ def report(
     return out
 
 
-def _named(runs: Any) -> dict[str, Run]:
+def _name_runs(runs: Any) -> dict[str, Run]:
+    """Return the runs by name."""
     if isinstance(runs, Run):
         return {"run": runs}
     if not isinstance(runs, Mapping) or not runs or not all(isinstance(run, Run) for run in runs.values()):
@@ -69,6 +70,6 @@ def _named(runs: Any) -> dict[str, Run]:
 
 
 def _call(runs: Mapping[str, Run], out: Path) -> str:
-    """How the page was made from Python."""
+    """Return the Python call that made the page."""
     names = "run" if list(runs) == ["run"] else "{" + ", ".join(f"{name!r}: …" for name in runs) + "}"
     return f"pathcontrol.report({names}, {out.name!r})"

@@ -1,4 +1,4 @@
-"""How to make a run again: the experiment file it came from, or else Python that does the same."""
+"""The reproduction of a run: the experiment file it came from, or else Python that does the same."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NOT_ARGUMENTS = ("controller", "robot", "task")
 
 
 class Recipe(NamedTuple):
-    """How to make one run again.
+    """The recipe that makes one run again.
 
     Attributes:
         name: the run.
@@ -36,7 +36,7 @@ class Recipe(NamedTuple):
 
 
 def recipe(name: str, run: Run) -> Recipe:
-    """How to make the run called ``name`` again."""
+    """Return the recipe of the run called ``name``."""
     experiment = run.config.get("experiment")
     if isinstance(experiment, str):
         return Recipe(name, "experiment", experiment, text_file(f"{file_name(name)}.toml", experiment))
@@ -45,21 +45,21 @@ def recipe(name: str, run: Run) -> Recipe:
 
 
 def versions(configs: Sequence[Mapping[str, Any]]) -> list[Setting]:
-    """The versions of the packages that each run was made with."""
+    """Return the versions of the packages that each run was made with."""
     said = [table(config, "versions") for config in configs]
     names = dict.fromkeys(name for one in said for name in one)
     return [Setting(str(name), tuple(str(one.get(name, "–")) for one in said)) for name in names]
 
 
 def script(name: str, run: Run) -> str:
-    """Python that simulates a run again from its file, with the law, gains, loop and disturbance of its configuration.
+    """Return Python that simulates a run again from its file, with the settings of its configuration.
 
     Empty where the configuration is not one that :func:`simulate` or :func:`simulate_sequence` has written.
     """
     loop, several = table(run.config, "loop"), laws(run.config)
     sequence = isinstance(run.config.get("duration"), list)
     law = class_code(LAWS, several[0].get("controller"), several[0])
-    if run.task is None or law is None or not _known(several, loop) or not _ended(run.config, sequence):
+    if run.task is None or law is None or not _is_known(several, loop) or not _has_end(run.config, sequence):
         return ""
     outside = disturbance_code(run.config["disturbance"], run) if "disturbance" in run.config else None
     if (outside is None and "disturbance" in run.config) or table(run.config, "plant").get("arms", 1) != 1:
@@ -78,13 +78,14 @@ def script(name: str, run: Run) -> str:
         f"loop = {closed}",
         'q, qd = saved.array("q")[:, 0], saved.array("qd")[:, 0]',
         *([] if outside is None else [f"disturbance = {outside.text}"]),
-        *(_of_sequence if sequence else _of_one)(law[0], several[0], run.config, more),
+        *(_script_of_sequence if sequence else _script_of_one)(law[0], several[0], run.config, more),
     ]
     text = "\n".join(lines) + "\n"
     return f"from math import inf\n\n{text}" if re.search(r"\binf\b", text) else text
 
 
-def _of_one(name: str, law: Mapping[str, Any], config: Mapping[str, Any], more: Mapping[str, Any]) -> list[str]:
+def _script_of_one(name: str, law: Mapping[str, Any], config: Mapping[str, Any], more: Mapping[str, Any]) -> list[str]:
+    """Return the lines for a run along one path."""
     made = call(name, ["saved.model", "saved.task"], _without(law, _NOT_ARGUMENTS))
     settings = {key: config[key] for key in ("duration", "laps", "until")} | {**more, "loop": Name("loop")}
     if config.get("first_rollout"):
@@ -92,7 +93,10 @@ def _of_one(name: str, law: Mapping[str, Any], config: Mapping[str, Any], more: 
     return [f"law = {made}", f"run = {call('pc.simulate', ['law', 'q', 'qd'], settings)}"]
 
 
-def _of_sequence(name: str, law: Mapping[str, Any], config: Mapping[str, Any], more: Mapping[str, Any]) -> list[str]:
+def _script_of_sequence(
+    name: str, law: Mapping[str, Any], config: Mapping[str, Any], more: Mapping[str, Any]
+) -> list[str]:
+    """Return the lines for a run along a sequence of paths."""
     made = call(name, ["saved.model", "path"], _without(law, _NOT_ARGUMENTS))
     times = config["duration"]
     duration = times[0] if all(each == times[0] for each in times) else times
@@ -107,16 +111,16 @@ def _of_sequence(name: str, law: Mapping[str, Any], config: Mapping[str, Any], m
     return [f"laws = [{made} for path in saved.task]", f"run = {run}"]
 
 
-def _known(several: Sequence[Mapping[str, Any]], loop: Mapping[str, Any]) -> bool:
-    """Whether the laws are one with the same gains, and the loop is one of this package."""
+def _is_known(several: Sequence[Mapping[str, Any]], loop: Mapping[str, Any]) -> bool:
+    """Return whether the laws are one with the same gains, and the loop is one of this package."""
     first = several[0]
-    alike = all(_without(law, ["robot", "task"]) == _without(first, ["robot", "task"]) for law in several)
+    look_alike = all(_without(law, ["robot", "task"]) == _without(first, ["robot", "task"]) for law in several)
     noise = loop.get("noise", {})
     if not isinstance(noise, Mapping):
         return False
     names = [*first, *loop, *noise]  # of arguments: from a file, and soon in a script
     return (
-        alike
+        look_alike
         and all(is_whole(_without(law, ["robot", "task"])) for law in several)
         and is_whole(loop)
         and loop.get("loop") in list(_LOOPS)
@@ -124,8 +128,8 @@ def _known(several: Sequence[Mapping[str, Any]], loop: Mapping[str, Any]) -> boo
     )
 
 
-def _ended(config: Mapping[str, Any], sequence: bool) -> bool:
-    """Whether the configuration says when a simulation ends, of one path or of a sequence of them."""
+def _has_end(config: Mapping[str, Any], sequence: bool) -> bool:
+    """Return whether the configuration has the end of the simulation, of one path or of a sequence of them."""
     law, times = table(config, "controller"), config.get("duration")
     if sequence:  # one path of it, taken out, has no configuration of its own
         return "sequence" in law and bool(times) and "laps" in config
@@ -133,4 +137,5 @@ def _ended(config: Mapping[str, Any], sequence: bool) -> bool:
 
 
 def _without(entries: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+    """Return entries without some keys."""
     return {key: value for key, value in entries.items() if key not in keys}

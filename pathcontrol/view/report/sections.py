@@ -1,4 +1,4 @@
-"""The sections of a report, made of templates in which every name is text and never markup."""
+"""The sections of a report, from templates in which every name is text and never markup."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ from pathcontrol.view.report.downloads import Download, json_file, signals_file
 from pathcontrol.view.report.pictures import pictures
 from pathcontrol.view.report.reproduction import recipe, versions
 from pathcontrol.view.report.settings import settings
-from pathcontrol.view.report.summary import facts, measured, rows
-from pathcontrol.view.report.sweep import told_of
+from pathcontrol.view.report.summary import facts, measure, rows
+from pathcontrol.view.report.sweep import sweep_content
 
 
 def sections(runs: Mapping[str, Run], made_by: str, sweep: SweepResult | None = None) -> list[Section]:
-    """What stands below the animation: summary, figures, configuration, and how to make it again.
+    """Return the sections below the animation: summary, figures, configuration, and reproduction.
 
     Args:
         runs: the runs by their names.
         made_by: the call or the command that makes this page.
         sweep: what the runs are histories of, if they are.
     """
-    numbers = {name: measured(run) for name, run in runs.items()}
+    numbers = {name: measure(run) for name, run in runs.items()}
     configs = [run.config for run in runs.values()]
     configuration = configs[0] if len(runs) == 1 else {name: run.config for name, run in runs.items()}
     return [
-        *([] if sweep is None else [_section("Sweep", **told_of(sweep))]),
+        *([] if sweep is None else [_section("Sweep", **sweep_content(sweep))]),
         _section(
             "Summary",
             runs=runs,
@@ -64,13 +64,14 @@ def sections(runs: Mapping[str, Run], made_by: str, sweep: SweepResult | None = 
 
 
 def _section(title: str, **content: Any) -> Section:
+    """Return a section from its template."""
     template = templates().get_template(f"{title.lower().replace(' ', '_')}.html")
     return Section(title, Markup(template.render(content)))
 
 
 @cache
 def templates() -> jinja2.Environment:
-    """Where the templates of reports are, in which every name is text and never markup."""
+    """Return the templates of reports, in which every name is text and never markup."""
     found = jinja2.Environment(
         loader=jinja2.PackageLoader("pathcontrol.view.report"),
         autoescape=True,
@@ -83,18 +84,21 @@ def templates() -> jinja2.Environment:
 
 
 def _symbols(text: str) -> Markup:
-    """``text`` with the letters after underscores as indices, as in e_p."""
+    """Return ``text`` with the letters after underscores as indices, as in e_p."""
     return Markup(re.sub(r"_(\w)", r"<sub>\1</sub>", str(escape(text))))
 
 
 def _metrics_file(numbers: Mapping[str, Mapping[str, Any]]) -> Download:
+    """Return the file of metrics."""
     units = {key: UNITS[key] for values in numbers.values() for key in values}
     return json_file("metrics.json", {"metrics": numbers, "units": units})
 
 
 def _signals(runs: Mapping[str, Run]) -> list[Download]:
+    """Return the files of signals."""
     return [signals_file(f"{name}-signals.csv" if len(runs) > 1 else "signals.csv", run) for name, run in runs.items()]
 
 
 def _json(value: Any) -> str:
+    """Return a value as JSON."""
     return json.dumps(value, indent=2, ensure_ascii=False)

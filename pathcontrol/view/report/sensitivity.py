@@ -19,7 +19,7 @@ Table = Sequence[Sequence[str]]
 
 
 def sensitivity_page(figure: Figure, sentences: Sequence[str], spread: Table, effects: Table) -> str:
-    """The page of a figure, what it says in sentences, and two tables, heads first."""
+    """Return the page of a figure, its sentences, and two tables, heads first."""
     template: jinja2.Template = templates().get_template("sensitivity.html")
     return template.render(
         styles=Markup(own_text("css/page.css")),

@@ -1,4 +1,4 @@
-"""The configuration of runs as a table a person can read, what differs between them marked."""
+"""The configuration of runs as a table for a reader, with differences marked."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Setting(NamedTuple):
 
     @property
     def differs(self) -> bool:
-        """Whether the runs do not all have the same."""
+        """True if the runs do not all have the same."""
         return len(set(self.values)) > 1
 
 
@@ -30,19 +30,20 @@ class Group(NamedTuple):
 
 
 def settings(configs: Sequence[Mapping[str, Any]]) -> list[Group]:
-    """The settings of all runs by what they are about: controller, path, plant, loop and the rest."""
-    said = [dict(_said(config)) for config in configs]
+    """Return the settings of all runs by subject: controller, path, plant, loop and the rest."""
+    said = [dict(_list_settings(config)) for config in configs]
     titles = dict.fromkeys(title for one in said for title, _ in one)
-    return [Group(title, tuple(_of(title, said))) for title in titles]
+    return [Group(title, tuple(_select_settings(title, said))) for title in titles]
 
 
-def _of(title: str, said: Sequence[Mapping[tuple[str, str], str]]) -> Iterator[Setting]:
+def _select_settings(title: str, said: Sequence[Mapping[tuple[str, str], str]]) -> Iterator[Setting]:
+    """Yield the settings of one subject."""
     for key in dict.fromkeys(key for one in said for key in one if key[0] == title):
         yield Setting(key[1], tuple(one.get(key, _ABSENT) for one in said))
 
 
-def _said(config: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str], str]]:
-    """((group, name), text) of each setting."""
+def _list_settings(config: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str], str]]:
+    """Yield ((group, name), text) of each setting."""
     for name, value in config.items():
         if name in _ELSEWHERE:
             continue
@@ -52,39 +53,41 @@ def _said(config: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str], str]]:
         laws = value["sequence"] if _are_tables(value.get("sequence")) else [value]
         paths = [law["task"] for law in laws if isinstance(law.get("task"), Mapping)]
         left = [{key: item for key, item in law.items() if key != "task" or not paths} for law in laws]
-        own = _together(left) if value not in laws else _flat(left[0])
+        own = _summarize_tables(left) if value not in laws else _flatten(left[0])
         yield from (((name, key), said) for key, said in own)
-        yield from ((("path", key), said) for key, said in (_flat(paths[0]) if len(paths) == 1 else _together(paths)))
+        yield from (
+            (("path", key), said) for key, said in (_flatten(paths[0]) if len(paths) == 1 else _summarize_tables(paths))
+        )
 
 
-def _flat(value: Any, name: str = "") -> Iterator[tuple[str, str]]:
-    """(name, text) of what is in a value, names of nested values joined."""
+def _flatten(value: Any, name: str = "") -> Iterator[tuple[str, str]]:
+    """Yield (name, text) of the parts of a value, with names of nested values joined."""
     if isinstance(value, Mapping):
         for key, item in value.items():
-            yield from _flat(item, _joined(name, key))
+            yield from _flatten(item, _join_names(name, key))
     elif _are_tables(value):
-        yield from _listed(value, name)
+        yield from _list_tables(value, name)
     else:
         yield name, text(value)
 
 
-def _listed(items: Sequence[Mapping[str, Any]], name: str) -> Iterator[tuple[str, str]]:
-    """A list of tables: by their names where these differ, as the terms of friction, else what all of them say."""
+def _list_tables(items: Sequence[Mapping[str, Any]], name: str) -> Iterator[tuple[str, str]]:
+    """Yield a list of tables, by their names where these differ, as the terms of friction, else in summary."""
     names = [str(next(iter(item.values()), "")) for item in items]
     if len(set(names)) == len(items) <= _MOST_VALUES:
         for own, item in zip(names, items, strict=True):
-            yield from _flat(dict(list(item.items())[1:]), _joined(name, own))
+            yield from _flatten(dict(list(item.items())[1:]), _join_names(name, own))
     else:
-        yield from _together(items, name)
+        yield from _summarize_tables(items, name)
 
 
-def _together(items: Sequence[Mapping[str, Any]], name: str = "") -> Iterator[tuple[str, str]]:
-    """How many tables there are, and what they say: once where they agree, else the first few and how many differ."""
+def _summarize_tables(items: Sequence[Mapping[str, Any]], name: str = "") -> Iterator[tuple[str, str]]:
+    """Yield the number of tables, and their entries: once where they agree, else the first few and the count."""
     if items:
-        yield _joined(name, "number"), str(len(items))
+        yield _join_names(name, "number"), str(len(items))
     said: dict[str, dict[str, None]] = {}
     for item in items:
-        for key, value in _flat(item, name):
+        for key, value in _flatten(item, name):
             said.setdefault(key, {})[value] = None
     for key, values in said.items():
         some = " | ".join(list(values)[:_MOST_KINDS])
@@ -92,15 +95,17 @@ def _together(items: Sequence[Mapping[str, Any]], name: str = "") -> Iterator[tu
 
 
 def _are_tables(value: Any) -> bool:
+    """Return whether a value is a list of tables."""
     return isinstance(value, list) and bool(value) and all(isinstance(item, Mapping) for item in value)
 
 
-def _joined(name: str, key: Any) -> str:
+def _join_names(name: str, key: Any) -> str:
+    """Return the name of a nested value."""
     return f"{name} · {key}" if name else str(key)
 
 
 def text(value: Any) -> str:
-    """A value in a few words."""
+    """Return a value in a few words."""
     match value:
         case None:
             return _ABSENT

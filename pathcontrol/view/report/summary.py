@@ -1,4 +1,4 @@
-"""What came of each run, in words and in numbers, side by side. Degrees and millimetres, where a person reads."""
+"""The summary of runs in words and in numbers, side by side, in degrees and millimetres."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _NEEDED = {"q", "qd", "s", "sdot", "e_p", "e_v", "tau_demand"}
 
 
 class Cell(NamedTuple):
-    """What a table says of one run, whether it is the best of its row, and whether it is beyond a limit."""
+    """An entry of a table for one run, whether it is the best of its row, and whether it is beyond a limit."""
 
     text: str
     best: bool = False
@@ -61,8 +61,8 @@ class Row(NamedTuple):
     cells: tuple[Cell, ...]
 
 
-def measured(run: Run) -> dict[str, list[float]]:
-    """The metrics of a run by name, in SI units, each with one entry for each rollout."""
+def measure(run: Run) -> dict[str, list[float]]:
+    """Return the metrics of a run by name, in SI units, each with one entry for each rollout."""
     task = run.task
     if task is None or not set(run.data.data_vars) >= _NEEDED:
         return _without_path(run)
@@ -70,7 +70,7 @@ def measured(run: Run) -> dict[str, list[float]]:
 
 
 def _without_path(run: Run) -> dict[str, list[float]]:
-    """What can be said of a run that does not know its path, or has not recorded everything."""
+    """Return the metrics of a run that does not know its path, or has not recorded everything."""
     own, late = samples_of(run, "all"), samples_of(run)
     errors = [name for name in ("e_p", "e_v") if name in run.data]
     kinds: dict[str, Callable[[Array], Any]] = {"peak": np.max, "rms": lambda v: np.sqrt(np.mean(v**2))}
@@ -82,7 +82,7 @@ def _without_path(run: Run) -> dict[str, list[float]]:
 
 
 def facts(runs: Mapping[str, Run]) -> list[Row]:
-    """What each run is, in words."""
+    """Return the facts about each run, in words."""
     said: dict[str, Callable[[Run], str]] = {
         "robot": lambda run: run.robot.name,
         "controller": lambda run: str(_law(run).get("controller", "not known")),
@@ -94,6 +94,7 @@ def facts(runs: Mapping[str, Run]) -> list[Row]:
 
 
 def _path(run: Run) -> str:
+    """Return the path in words."""
     task = run.task
     if isinstance(task, ToolpathTask):
         return f"{Path(task.drawing.source).name}, {counted(len(task), 'path')}"
@@ -108,11 +109,12 @@ def _path(run: Run) -> str:
 
 
 def _law(run: Run) -> Mapping[str, Any]:
-    """What the configuration, which may be anyone's, says of the law."""
+    """Return the section of the law in the configuration, which may be malformed."""
     return table(run.config, "controller")
 
 
 def _outcome(run: Run) -> str:
+    """Return the outcome in words."""
     finished = run.status == "finished"
     diverged = run.status == "diverged"
     if run.rollouts > 1:
@@ -127,7 +129,7 @@ def _outcome(run: Run) -> str:
 
 
 def rows(runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]]]) -> list[Row]:
-    """A row for each metric that one of the runs has, the best of each marked where there are several.
+    """Return a row for each metric that one of the runs has, with the best of each marked where there are several.
 
     What is 0 but for rounding is shown as 0; where that would be the best, none is marked.
     """
@@ -136,11 +138,12 @@ def rows(runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]
 
 
 def _units(key: str, runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]]]) -> Iterable[str]:
-    """The units in which runs have a metric, one unless angles of some are compared with lengths of others."""
+    """Return the units in which runs have a metric: several if angles are compared with lengths."""
     return dict.fromkeys(unit_of(key, run) for name, run in runs.items() if key in numbers[name])
 
 
 def _row(key: str, unit: str, runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]]]) -> Row:
+    """Return the row of a metric."""
     given = {n: np.asarray(numbers[n][key]) for n, r in runs.items() if key in numbers[n] and unit_of(key, r) == unit}
     values = {name: without_rounding(value) for name, value in given.items()}
     rounded = {name for name in given if given[name].any() and not values[name].any()}
@@ -154,24 +157,25 @@ def _row(key: str, unit: str, runs: Mapping[str, Run], numbers: Mapping[str, Map
 
 
 def _arrived(numbers: Mapping[str, list[float]]) -> bool:
-    """Whether all rollouts of a run came as far as they were to: one that stands still has the smallest errors."""
+    """Return whether all rollouts of a run got there: one that stands still has the smallest errors."""
     return bool(got_there(np.array(numbers.get("progress", [np.nan]))).all())
 
 
 def _text(values: Array, endless: str) -> str:
-    """One number, or of many rollouts the median, the least and the largest."""
+    """Return one number, or for many rollouts the median, the least and the largest."""
     one = [_number(float(v), endless) for v in (np.median(values), values.min(), values.max())]
     return one[0] if len(values) == 1 else f"{one[0]} ({one[1]} … {one[2]})"
 
 
 def _number(value: float, endless: str) -> str:
+    """Return a number as a text."""
     if value == 0:
         return "0"
     return f"{value:#.4g}".rstrip(".") if math.isfinite(value) else endless
 
 
 def _best(badness: Callable[[float], float] | None, values: Mapping[str, float], texts: Mapping[str, str]) -> set[str]:
-    """The runs with the best value, those that read the same among them; none if all do."""
+    """Return the runs with the best value, those with the same text among them; none if all have it."""
     finite = {name: value for name, value in values.items() if math.isfinite(value)}
     if badness is None or not finite or len(set(texts.values())) < 2:
         return set()

@@ -1,4 +1,4 @@
-"""The numbers and figures of a sweep, as its report has them."""
+"""The numbers and figures of a sweep for its report."""
 
 from __future__ import annotations
 
@@ -17,18 +17,19 @@ from pathcontrol.view.report.summary import Cell, Row
 _NOT_METRICS = ("finish_time", "diverged_time")
 
 
-def told_of(sweep: SweepResult) -> dict[str, Any]:
-    """What the section of a sweep is made of: a sentence, a row for each metric, and figures."""
+def sweep_content(sweep: SweepResult) -> dict[str, Any]:
+    """Return the content of the section of a sweep: a sentence, a row for each metric, and figures."""
     table = sweep.table()
     names = [str(name) for name, v in table.data_vars.items() if v.dtype.kind == "f" and name not in _NOT_METRICS]
     return {
-        "said": _said(sweep, table),
+        "said": _describe_sweep(sweep, table),
         "rows": [row for name in names if (row := _row(table, name)) is not None],
         "pictures": [picture(figure, caption) for caption, figure in overview(table, names, sweep.kept_by)],
     }
 
 
-def _said(sweep: SweepResult, table: xr.Dataset) -> str:
+def _describe_sweep(sweep: SweepResult, table: xr.Dataset) -> str:
+    """Return the sentence about a sweep."""
     statuses = table["status"].to_numpy().tolist()
     counts = ", ".join(f"{statuses.count(status)} {status}" for status in sorted(set(statuses)))
     finished = (
@@ -38,7 +39,7 @@ def _said(sweep: SweepResult, table: xr.Dataset) -> str:
 
 
 def _row(table: xr.Dataset, name: str) -> Row | None:
-    """A metric over all samples, of which it has one at least."""
+    """Return the row of a metric with at least one value over all samples."""
     values, unit = readable_metric(table, name)
     if np.isnan(values).all():
         return None

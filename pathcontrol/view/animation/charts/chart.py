@@ -1,4 +1,4 @@
-"""Charts over time: their lines in few enough points for a screen, peaks and all."""
+"""Charts over time, whose lines are thinned to the points that a screen shows, peaks included."""
 
 from __future__ import annotations
 
@@ -37,25 +37,25 @@ class Curve:
     shade: int = 0
 
     def repeats(self, other: Curve) -> bool:
-        """Whether it is a reference or a limit that another one shows already."""
+        """Return whether it is a reference or a limit that another one shows already."""
         same = self.role == other.role != "value"
         return same and np.array_equal(self.times, other.times) and np.array_equal(self.values, other.values)
 
     def at(self, times: Array) -> Array:
-        """Values at other times (m,), linear between its own; NaN before the first and after the last."""
+        """Return values at other times (m,), linear between its own; NaN before the first and after the last."""
         return np.interp(times, self.times, self.values, left=np.nan, right=np.nan)
 
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Lines of one quantity over time."""
+    """The lines of one quantity over time."""
 
     title: str
     unit: str
     curves: Sequence[Curve]
 
     def header(self, film: Film) -> dict[str, Any]:
-        """The chart as the header of a film has it: all lines at the same times."""
+        """Return the chart for the header of a film: all lines at the same times."""
         bins = max(MOST_POINTS // (_EACH_BIN * len(self.curves)), 1)
         times = np.unique(np.concatenate([curve.times[extremes(curve.values, bins)] for curve in self.curves]))
         lines = [
@@ -72,7 +72,7 @@ class Chart:
 
 
 def extremes(values: Array, bins: int) -> Indices:
-    """Samples that show a line (k,) as all of them would, increasing: the least and the greatest of each bin.
+    """Return increasing indices of the least and the greatest sample in each bin, which draw like the whole line (k,).
 
     Of bins with gaps also the first sample of a gap. The first and the last sample stay; if there are no
     more than two samples in a bin, all do.

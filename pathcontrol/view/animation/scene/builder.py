@@ -1,4 +1,4 @@
-"""What is put into a film's scene: arms, lines and markers, each with how it moves."""
+"""The builder of a film's scene: arms, lines and markers, each with its motion."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.view.animation.payload import Film
-from pathcontrol.view.animation.rollout import Take
+from pathcontrol.view.animation.rollout import Recording
 from pathcontrol.view.animation.scene.desired_path import Line
 from pathcontrol.view.animation.scene.ground import ground_grid
 from pathcontrol.view.animation.scene.meshcat_commands import Scene, absolute, path
 from pathcontrol.view.animation.scene.palette import DESIRED, GRID, RAPID
 from pathcontrol.view.animation.scene.trace import Trace
 from pathcontrol.view.animation.scene.tracks import Track
-from pathcontrol.view.animation.scene.tube import SIDES, dashes, joined, simplified, tube
+from pathcontrol.view.animation.scene.tube import SIDES, dashes, join_meshes, simplify, tube
 from pathcontrol.view.bodies.shapes import Color, Mesh, Sphere
 
 GHOST = 0.35  # opacity of an arm that stands in another
@@ -27,7 +27,7 @@ _MOST_DASHES = 10_000
 
 
 class Stage:
-    """A scene, and what moves and grows in it.
+    """A scene with the parts that move and grow in it.
 
     Attributes:
         film: keeps the numbers.
@@ -42,27 +42,27 @@ class Stage:
         self.on_top: list[str] = []
         self.tubes: list[dict[str, Any]] = []
 
-    def add_arm(self, index: int, take: Take, shift: Array, *, ghost: bool = False) -> None:
-        """Put the links of an arm on stage, moved by ``shift`` [m], (3,), or its ghost in the colour of its run."""
+    def add_arm(self, index: int, recording: Recording, shift: Array, *, ghost: bool = False) -> None:
+        """Add the links of an arm, moved by ``shift`` [m], (3,), or its ghost in the colour of its run."""
         group = f"arms/{index}"
-        self.scene.place(group, _moved(shift))
-        links = list(dict.fromkeys(visual.link for visual in take.visuals))
+        self.scene.place(group, _translation(shift))
+        links = list(dict.fromkeys(visual.link for visual in recording.visuals))
         names = {link: path(group, i, link) for i, link in enumerate(links)}
-        for i, visual in enumerate(take.visuals):
-            color = (*take.color[:3], GHOST) if ghost else visual.color
+        for i, visual in enumerate(recording.visuals):
+            color = (*recording.color[:3], GHOST) if ghost else visual.color
             self.scene.add(path(names[visual.link], i, visual.name), visual.shape, color, visual.origin)
         for link in links:
-            self._move(names[link], Track.from_poses(take.time, take.poses[link]))
+            self._move(names[link], Track.from_poses(recording.time, recording.poses[link]))
 
     def add_desired(self, index: int, lines: Sequence[Line], radius: float, shift: Array) -> None:
-        """Draw what is asked for: cuts as tubes of a ``radius`` [m], rapids as thin dashes."""
+        """Draw the desired path: cuts as tubes of a ``radius`` [m], rapids as thin dashes."""
         cuts = [line.points + shift for line in lines if not line.rapid]
         if len(cuts) > _MOST_TUBES:
             segments = np.concatenate([np.stack([points[:-1], points[1:]], axis=1) for points in cuts])
             self.scene.add_segments(path("lines", index, "desired path"), segments, DESIRED)
         elif cuts:
-            tubes = [tube(simplified(points, radius / 24, _MOST_RINGS // len(cuts)), radius) for points in cuts]
-            self._add_tube(path("lines", index, "desired path"), joined(tubes))
+            tubes = [tube(simplify(points, radius / 24, _MOST_RINGS // len(cuts)), radius) for points in cuts]
+            self._add_tube(path("lines", index, "desired path"), join_meshes(tubes))
         rapids = [line.points + shift for line in lines if line.rapid]
         if rapids:
             whole = sum(float(np.linalg.norm(np.diff(points, axis=0), axis=-1).sum()) for points in rapids)
@@ -71,11 +71,12 @@ class Stage:
             self.scene.add_segments(path("lines", index, "rapids"), pieces, RAPID)
 
     def _add_tube(self, name: str, mesh: Mesh) -> None:
+        """Add a tube."""
         self.scene.add_line(name, mesh, DESIRED, lining=True)
         self.tubes.append({"path": absolute(name), "sides": SIDES})
 
     def add_trace(self, index: int, line: Trace, times: Array, colors: Array) -> None:
-        """Draw what the tool draws by and by, at ``times`` (k,) [s] in ``colors`` (k, 3) of all samples."""
+        """Draw the line of the tool as it grows, at ``times`` (k,) [s] in ``colors`` (k, 3) of all samples."""
         name = path("lines", index, "path taken")
         self.scene.add_colored_line(name, line.mesh, line.on_vertices(colors))
         rings = self.film.block(times[line.rings])
@@ -83,7 +84,7 @@ class Stage:
         self.growing.append({"path": absolute(name), "times": rings, "indices": line.indices})
 
     def add_marker(self, name: str, times: Array, positions: Array, color: Color, radius: float) -> None:
-        """A dot that goes through positions (k, 3) and that nothing hides."""
+        """Add a dot that moves through positions (k, 3) and that nothing hides."""
         self.scene.add(f"{name}/ball", Sphere(radius), color)
         self._move(name, Track.from_positions(times, positions))
         self.on_top.append(absolute(name))
@@ -93,7 +94,7 @@ class Stage:
         self.scene.add_segments("ground", ground_grid(points), GRID)
 
     def header(self) -> dict[str, Any]:
-        """The scene and what moves in it, as the header of a film has them."""
+        """Return the scene and its motion for the header of a film."""
         scene = [self.film.block(c, "u1") if isinstance(c, bytes) else c for c in self.scene.commands]
         lines = {"growing": self.growing, "tubes": self.tubes}
         return {"scene": scene, "tracks": self.tracks, "on_top": self.on_top, **lines}
@@ -110,19 +111,20 @@ class Stage:
         self.tracks.append({"path": absolute(name), **columns})
 
 
-def swept(take: Take) -> Array:
-    """Where the outermost points of an arm's links get to [m], (k, 3)."""
-    some = slice(None, None, -(-len(take.time) // _FRAMED_POSES))
-    outlines = [_posed(take.poses[visual.link][some], visual.outline) for visual in take.visuals]
-    return np.concatenate([take.tool_positions[:1], *outlines])
+def swept(recording: Recording) -> Array:
+    """Return the positions of the outermost points of an arm's links [m], (k, 3)."""
+    some = slice(None, None, -(-len(recording.time) // _FRAMED_POSES))
+    outlines = [_transform(recording.poses[visual.link][some], visual.outline) for visual in recording.visuals]
+    return np.concatenate([recording.tool_positions[:1], *outlines])
 
 
-def _moved(shift: Array) -> Array:
+def _translation(shift: Array) -> Array:
+    """Return the pose of a shift."""
     pose = np.eye(4)
     pose[:3, 3] = shift
     return pose
 
 
-def _posed(poses: Array, points: Array) -> Array:
-    """Points (k, 3) at poses (m, 4, 4): (m k, 3)."""
+def _transform(poses: Array, points: Array) -> Array:
+    """Return points (k, 3) at poses (m, 4, 4): (m k, 3)."""
     return (points @ poses[:, :3, :3].swapaxes(-1, -2) + poses[:, None, :3, 3]).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""From where to look: at the plane in which the tool moves, from its free side, a little from above."""
+"""The camera: it looks at the plane in which the tool moves, from its free side, a little from above."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A view that shows a scene whole, at whatever shape the window has.
+    """A view that shows the whole scene, in a window of any shape.
 
     Attributes:
         target: middle of the picture in the base frame [m], (3,).
@@ -34,7 +34,7 @@ class Camera:
 
     @classmethod
     def framing(cls, points: Array, direction: Array) -> Camera:
-        """The view from ``direction`` that shows all points [m], (k, 3), above the legend."""
+        """Return the view from ``direction`` that shows all points [m], (k, 3), above the legend."""
         axes = picture_axes(direction)
         seen = points @ axes.T
         lower, upper = seen.min(axis=0), seen.max(axis=0)
@@ -46,29 +46,29 @@ class Camera:
 
     @property
     def size(self) -> float:
-        """The larger of width and height of what is seen [m]."""
+        """The larger of width and height of the visible region [m]."""
         return float(np.ptp(self.outline[:, :2], axis=0).max())
 
     def header(self) -> dict[str, Any]:
-        """The view as the header of a film has it."""
+        """Return the view for the header of a film."""
         return {name: getattr(self, name).tolist() for name in ("target", "direction", "outline")}
 
     def seen_from_near(self, near: Camera, width: float) -> dict[str, Any]:
-        """The view and one from near, if that shows what is small here, with lines of a ``width`` [m] made as thin."""
+        """Return the view and a near one, if that shows small details, with lines of a ``width`` [m] made as thin."""
         if not SMALLEST < near.size / self.size < SMALL:
             return self.header()
         return self.header() | {"near": near.header() | {"thickness": min(LINE_WIDTH * near.size / width, 1.0)}}
 
 
 def picture_axes(direction: Array) -> Array:
-    """Rows: right, up and towards the eye, unit vectors in the base frame, (3, 3); z is up in the picture."""
+    """Return rows right, up and towards the eye, unit vectors in the base frame, (3, 3); z is up in the picture."""
     right = np.cross(_UP, direction)
     right /= np.linalg.norm(right)
     return np.array([right, np.cross(direction, right), direction])
 
 
 def view_direction(path: Array, scene: Array) -> Array:
-    """Unit vector towards an eye that sees the tool's path well, (3,).
+    """Return the unit vector towards an eye that sees the tool's path well, (3,).
 
     It is normal to the plane that fits the path best (the least principal axis), on the side of the path that
     the arm is not, then raised to an elevation from 22° to 42° and turned aside by 20°, which shows depth.
@@ -90,7 +90,7 @@ def view_direction(path: Array, scene: Array) -> Array:
 
 
 def _normal(centred: Array) -> Array:
-    """The least principal axis of a cloud; for a straight line the horizontal direction across it."""
+    """Return the least principal axis of a cloud; for a straight line the horizontal direction across it."""
     _, spread, axes = np.linalg.svd(centred, full_matrices=False) if len(centred) >= 3 else (0, np.zeros(3), np.eye(3))
     if spread[1] > 1e-3 * spread[0]:
         return axes[2]

@@ -1,4 +1,4 @@
-"""The path that is asked for, as lines in the base frame: cuts, and rapids between them."""
+"""The desired path as lines in the base frame: cuts, and rapids between them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
-from pathcontrol.view.animation.rollout import Take
+from pathcontrol.view.animation.rollout import Recording
 from pathcontrol.view.animation.scene.tube import distinct
 
 if TYPE_CHECKING:
@@ -32,8 +32,8 @@ class Line:
     rapid: bool = False
 
 
-def alike(lines: Sequence[Line], others: Sequence[Line]) -> bool:
-    """Whether lines are the same to the eye, whatever objects they come from."""
+def look_alike(lines: Sequence[Line], others: Sequence[Line]) -> bool:
+    """Return whether lines look the same, regardless of their objects."""
     return len(lines) == len(others) and all(
         one.rapid == other.rapid
         and one.points.shape == other.points.shape
@@ -42,25 +42,25 @@ def alike(lines: Sequence[Line], others: Sequence[Line]) -> bool:
     )
 
 
-def desired_lines(take: Take) -> list[Line]:
-    """Where the tool should go, once along the path: the drawing itself for a toolpath."""
-    if take.task is None:
+def desired_lines(recording: Recording) -> list[Line]:
+    """Return the desired path of the tool, once along it: the drawing itself for a toolpath."""
+    if recording.task is None:
         return []
-    if take.toolpath is not None:
-        lines = _drawing(take.toolpath)
+    if recording.toolpath is not None:
+        lines = _drawing(recording.toolpath)
     else:
-        lines = [Line(take.tool_at(line.points)) for line in desired_joints(take)]
+        lines = [Line(recording.tool_at(line.points)) for line in desired_joints(recording)]
     lines = [Line(distinct(line.points), line.rapid) for line in lines]
     return [line for line in lines if len(line.points) > 1]
 
 
-def desired_joints(take: Take) -> list[Line]:
-    """Joint positions once along the path; along an endless one over the s of the run."""
-    return [] if take.task is None else [Line(take.task.q_d(_parameters(take.task, take.s)))]
+def desired_joints(recording: Recording) -> list[Line]:
+    """Return joint positions once along the path; along an endless one over the s of the run."""
+    return [] if recording.task is None else [Line(recording.task.q_d(_parameters(recording.task, recording.s)))]
 
 
 def _parameters(task: PathTask, s: Array) -> Array:
-    """Parameters close together, and all at which pieces of the path meet."""
+    """Return closely spaced parameters, and all at which pieces of the path meet."""
     if isinstance(task, PathSequence):
         spans = zip(task.starts[:-1], task.starts[1:], strict=True)
         return np.unique(np.concatenate([np.linspace(begin, end, _SAMPLES_EACH) for begin, end in spans]))
@@ -74,12 +74,13 @@ def _parameters(task: PathTask, s: Array) -> Array:
 
 
 def _drawing(task: ToolpathTask) -> list[Line]:
+    """Return the contours of a toolpath as lines."""
     pose = task.workpiece
     return [Line(_outline(c) @ pose[:3, :3].T + pose[:3, 3], c.rapid) for c in task.drawing]
 
 
 def _outline(contour: Contour) -> Array:
-    """Points of a contour [m], (k, 3), near enough for a picture."""
+    """Return points of a contour [m], (k, 3), near enough for a picture."""
     from pathcontrol.toolpaths.segments.base import Polyline
 
     u = np.linspace(0.0, 1.0, _CURVE_SAMPLES + 1)

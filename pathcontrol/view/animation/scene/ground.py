@@ -11,7 +11,7 @@ _STEPS = np.array([1.0, 0.5, 0.2, 0.1])
 
 
 def ground_grid(points: Array) -> Array:
-    """Grid lines [m], (k, 2, 3), one segment for each side of a cell, under and around points (m, 3)."""
+    """Return grid lines [m], (k, 2, 3), one segment for each side of a cell, under and around points (m, 3)."""
     lower, upper = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     radius = max(0.8 * float(np.linalg.norm(upper - lower)), 1e-3)
     pitch = _pitch(radius)
@@ -27,6 +27,6 @@ def ground_grid(points: Array) -> Array:
 
 
 def _pitch(radius: float) -> float:
-    """The coarsest of …, 0.1, 0.2, 0.5, 1, 2, … m that gives cells enough."""
+    """Return the coarsest of …, 0.1, 0.2, 0.5, 1, 2, … m that gives enough cells."""
     power = 10.0 ** np.ceil(np.log10(radius / CELLS))
     return float(power * _STEPS[power * _STEPS <= radius / CELLS * (1 + 1e-9)][0])

@@ -1,4 +1,4 @@
-"""Which samples to keep so that straight lines between them stay near all the others."""
+"""The choice of key frames, so that straight lines between them stay near all other samples."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Test: TypeAlias = Callable[[Indices, int], NDArray[np.bool_]]
 
 
 def key_samples(samples: int, holds: Test) -> Indices:
-    """Indices of the samples that stay, the first and the last among them.
+    """Return indices of the samples to keep, the first and the last among them.
 
     Neighbouring spans of 1, 2, 4, … samples are joined while the joint span holds, from multiples of their length
     on: every span is tested in the company of all others of its length, so that this takes milliseconds for 10⁴
@@ -27,32 +27,32 @@ def key_samples(samples: int, holds: Test) -> Indices:
     while len(held) > 1:
         pairs = held[0:-1:2] & held[1::2]
         length *= 2
-        joined: Indices = np.flatnonzero(pairs)
-        if len(joined):
-            joined = joined[holds(joined * length, length)]
-        kept[joined * length + length // 2] = False
+        merged: Indices = np.flatnonzero(pairs)
+        if len(merged):
+            merged = merged[holds(merged * length, length)]
+        kept[merged * length + length // 2] = False
         held = np.zeros(len(pairs), dtype=bool)
-        held[joined] = True
+        held[merged] = True
     return np.flatnonzero(kept)
 
 
 def line_keys(time: Array, values: Array, tolerance: float) -> Indices:
-    """Samples of values (k, d) between which linear interpolation in time is off by ``tolerance`` at most, (keys,)."""
+    """Return samples of values (k, d) that interpolate the others in time within ``tolerance``, (keys,)."""
 
     def holds(first: Indices, length: int) -> NDArray[np.bool_]:
-        off = values[inside(first, length)] - interpolated(time, values, first, length)
+        off = values[inside(first, length)] - interpolate(time, values, first, length)
         return (off**2).sum(-1).max(-1) <= tolerance**2
 
     return key_samples(len(time), holds)
 
 
 def inside(first: Indices, length: int) -> Indices:
-    """Indices of the samples inside each span, (m, length − 1)."""
+    """Return indices of the samples inside each span, (m, length − 1)."""
     return first[:, None] + np.arange(1, length)
 
 
-def interpolated(time: Array, values: Array, first: Indices, length: int) -> Array:
-    """Values (k, d) between both ends of each span, at the times of the samples inside, (m, length − 1, d)."""
+def interpolate(time: Array, values: Array, first: Indices, length: int) -> Array:
+    """Return values (k, d) between both ends of each span, at the times of its samples, (m, length − 1, d)."""
     begin, end = time[first, None], time[first + length, None]
     lasting = np.maximum(end - begin, np.finfo(np.float64).tiny)  # late in a film samples may share a moment
     share = ((time[inside(first, length)] - begin) / lasting)[..., None]

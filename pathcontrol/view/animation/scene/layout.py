@@ -1,4 +1,4 @@
-"""Where arms that are filmed together stand: side by side, or in one another."""
+"""The layout of arms that are animated together: side by side, or in one another."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _GAP = 0.12  # between arms, of the width of the widest
 
 
 def shifts(extents: Sequence[Array], direction: Array, layout: Layout) -> Array:
-    """By how much each arm is moved [m], (arms, 3): the first is not.
+    """Return the shift of each arm [m], (arms, 3); the first does not move.
 
     Arms side by side are moved along the picture's horizontal, in their order and all to the same scale, so far that
     what one sweeps and draws is apart from the next.

@@ -1,4 +1,4 @@
-"""A Meshcat scene without a server: the commands are kept, to be played back by a page."""
+"""A Meshcat scene without a server: the commands are kept and played back by a page."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ class Scene:
             self._root[furniture].set_property("visible", False)
 
     def send(self, command: Any) -> None:
-        """Take a command of Meshcat's in place of its window; WebGL draws in single precision anyway."""
+        """Keep a command of Meshcat, in place of its window; WebGL draws in single precision anyway."""
         self.commands.append(umsgpack.packb(command.lower(), force_float_precision="single"))
 
     def add(self, name: str, shape: Shape, color: Color, pose: Array | None = None) -> None:
         """Put a lit shape at a pose in the frame of what is above it, (4, 4)."""
-        if not (isinstance(shape, Mesh) and self._copied(name, shape, color)):
+        if not (isinstance(shape, Mesh) and self._copy_if_known(name, shape, color)):
             material = meshes.MeshPhongMaterial(color=_rgb(color), opacity=color[3], side=_BOTH)
             self._put(name, meshes.Mesh(_geometry(shape), material))
         place = np.eye(4) if pose is None else pose
@@ -82,8 +82,8 @@ class Scene:
             part.uuid = str(self._elements)
         self._root[name].set_object(thing)
 
-    def _copied(self, name: str, mesh: Mesh, color: Color) -> bool:
-        """Whether the mesh has been sent before and is copied now."""
+    def _copy_if_known(self, name: str, mesh: Mesh, color: Color) -> bool:
+        """Return whether the mesh was sent before, in which case it is copied."""
         digest = hashlib.sha256(mesh.vertices.tobytes() + mesh.faces.tobytes()).digest()
         if digest not in self._sent:
             self._sent[digest] = (name, color)
@@ -95,16 +95,17 @@ class Scene:
 
 
 def absolute(name: str) -> str:
-    """The path of a name of the scene, as the page knows it."""
+    """Return the path of a name of the scene, as the page knows it."""
     return f"/meshcat/{name}"
 
 
 def path(group: str, index: int, name: str) -> str:
-    """A path for any name: the number keeps it unique and unlike JavaScript's own, and slashes would nest."""
+    """Return a unique path for any name; its number keeps it unlike JavaScript's own, and slashes would nest."""
     return f"{group}/{index} {name.replace('/', '|')}"
 
 
 def _geometry(shape: Shape) -> meshes.Geometry:
+    """Return a shape as geometry of Meshcat."""
     if isinstance(shape, Box):
         return meshes.Box(shape.size.tolist())
     if isinstance(shape, Cylinder):
@@ -115,5 +116,6 @@ def _geometry(shape: Shape) -> meshes.Geometry:
 
 
 def _rgb(color: Color) -> int:
+    """Return a colour as one number."""
     red, green, blue = (round(255 * channel) for channel in color[:3])
     return red << 16 | green << 8 | blue

@@ -1,4 +1,4 @@
-"""Colours of a film: seen on a light and on a dark ground, and told apart with any colour vision."""
+"""The colours of a film: visible on a light and on a dark ground, and distinct with any colour vision."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ANCHORS = np.array([[0.4, 0.273, 0.968], [0.7, 0.336, 0.604], [1.0, 0.206, 0.14
 
 
 def scale_colors(share: Array) -> Array:
-    """Red, green and blue, (*batch, 3), for shares (*batch,) of the scale from 0 to 1; grey where they are NaN."""
+    """Return red, green and blue, (*batch, 3), for shares (*batch,) of the scale from 0 to 1; grey where NaN."""
     known = np.clip(np.nan_to_num(share), 0.0, 1.0)
     steps = np.linspace(0.0, 1.0, len(_ANCHORS))
     colors = np.stack([np.interp(known, steps, channel) for channel in _ANCHORS.T], axis=-1)
@@ -39,5 +39,5 @@ def scale_colors(share: Array) -> Array:
 
 
 def run_color(index: int) -> Color:
-    """The colour of a run, counted from 0."""
+    """Return the colour of a run, counted from 0."""
     return RUNS[index % len(RUNS)]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.animation.scene.keyframes import Indices, inside, interpolated, key_samples
+from pathcontrol.view.animation.scene.keyframes import Indices, inside, interpolate, key_samples
 from pathcontrol.view.animation.scene.tube import SIDES, distinct_rows, tube
 from pathcontrol.view.bodies.shapes import Mesh
 
@@ -20,7 +20,7 @@ _SHADE = 1 / 32  # of the scale: how far the colour may be from that of the erro
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """A tube by and by.
+    """A tube that grows with time.
 
     Attributes:
         mesh: the whole tube, ring after ring.
@@ -34,12 +34,12 @@ class Trace:
     indices = 6 * SIDES
 
     def on_vertices(self, values: Array) -> Array:
-        """Values at the samples (k, …) for each vertex of the tube."""
+        """Return values at the samples (k, …) for each vertex of the tube."""
         return np.repeat(values[self.rings], SIDES, axis=0)
 
 
 def trace(time: Array, points: Array, share: Array, radius: float) -> Trace | None:
-    """The tube of ``radius`` [m] through points (k, 3) [m], or None if they are all in one place.
+    """Return the tube of ``radius`` [m] through points (k, 3) [m], or None if they are all in one place.
 
     Rings are where the line or the colour, a ``share`` of its scale (k,), bend, and at least every :data:`FRAME` of the
     ``time`` (k,) [s] while the tool moves; where it stands there are few. If they are more than
@@ -53,14 +53,14 @@ def trace(time: Array, points: Array, share: Array, radius: float) -> Trace | No
 
 
 def _rings(time: Array, points: Array, share: Array, radius: float, looseness: float) -> Indices:
-    """Samples from which the others follow by linear interpolation."""
+    """Return the samples from which the others follow by linear interpolation."""
     known = np.nan_to_num(np.clip(share, 0.0, 1.0), nan=-1.0)
     values = np.column_stack([points / (_BEND * radius), known / _SHADE]) / looseness
 
     def holds(first: Indices, length: int) -> NDArray[np.bool_]:
         short = time[first + length] - time[first] <= looseness * FRAME
         still = np.linalg.norm(points[first + length] - points[first], axis=-1) <= looseness * _BEND * radius
-        off = values[inside(first, length)] - interpolated(time, values, first, length)
+        off = values[inside(first, length)] - interpolate(time, values, first, length)
         return (short | still) & ((off**2).sum(-1).max(-1) <= 1.0)
 
     return key_samples(len(time), holds)

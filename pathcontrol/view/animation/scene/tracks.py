@@ -1,4 +1,4 @@
-"""Poses over time: key frames of what moves, taken from the samples of a run."""
+"""Poses over time: key frames of moving parts, from the samples of a run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.animation.scene.keyframes import Indices, inside, interpolated, key_samples
+from pathcontrol.view.animation.scene.keyframes import Indices, inside, interpolate, key_samples
 
 STILL = 1e-9  # m, and the same of the quaternion: what does not move by more is at rest
 ERROR = 4.9e-5  # m, and the same of the entries of a rotation: single precision stays within 5e-5, too
@@ -17,7 +17,7 @@ ERROR = 4.9e-5  # m, and the same of the entries of a rotation: single precision
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Where something is over time, relative to what is above it.
+    """The poses of a part over time, relative to its parent.
 
     Attributes:
         times: increasing, from the start of the film [s], (keys,).
@@ -31,17 +31,17 @@ class Track:
 
     @classmethod
     def from_poses(cls, times: Array, poses: Array) -> Track:
-        """A track from homogeneous poses, (keys, 4, 4)."""
+        """Return a track from homogeneous poses, (keys, 4, 4)."""
         return cls(times, poses[:, :3, 3], continuous_quaternions(poses[:, :3, :3]))
 
     @classmethod
     def from_positions(cls, times: Array, positions: Array) -> Track:
-        """A track of what does not turn, through positions (keys, 3)."""
+        """Return a track of a part that does not turn, through positions (keys, 3)."""
         return cls(times, positions, np.tile([0.0, 0.0, 0.0, 1.0], (len(times), 1)))
 
     @property
     def moves(self) -> bool:
-        """Whether it is anywhere else than where it starts."""
+        """True if it leaves its first pose."""
         return bool(
             np.abs(self.positions - self.positions[0]).max() > STILL
             or np.abs(self.quaternions - self.quaternions[0]).max() > STILL
@@ -49,11 +49,11 @@ class Track:
 
     @property
     def first_rotation(self) -> Array:
-        """How it is turned at first, (3, 3)."""
+        """The first rotation, (3, 3)."""
         return Rotation.from_quat(self.quaternions[0]).as_matrix()
 
     def thinned(self, error: float = ERROR) -> Track:
-        """The track with as few of its keys as give every other within ``error`` [m; entries of the rotation].
+        """Return the track with the fewest keys that give every other within ``error`` [m; entries of the rotation].
 
         Between keys the position is linear in time and the quaternion too, normalised. The entries of a rotation
         change by no more than 2‖Δ‖ for a change Δ of its unit quaternion: that is what is measured.
@@ -61,9 +61,9 @@ class Track:
 
         def holds(first: Indices, length: int) -> NDArray[np.bool_]:
             rows = inside(first, length)
-            near = interpolated(self.times, self.positions, first, length)
+            near = interpolate(self.times, self.positions, first, length)
             off = np.linalg.norm(self.positions[rows] - near, axis=-1).max(-1)
-            turned = interpolated(self.times, self.quaternions, first, length)
+            turned = interpolate(self.times, self.quaternions, first, length)
             turned /= np.linalg.norm(turned, axis=-1, keepdims=True)
             return (off <= error) & (2 * np.linalg.norm(self.quaternions[rows] - turned, axis=-1).max(-1) <= error)
 
@@ -72,7 +72,7 @@ class Track:
 
 
 def continuous_quaternions(rotations: Array) -> Array:
-    """Unit quaternions (x, y, z, w) of rotations (k, 3, 3), without changes of sign on the way."""
+    """Return unit quaternions (x, y, z, w) of rotations (k, 3, 3), without changes of sign on the way."""
     quaternions = Rotation.from_matrix(rotations).as_quat()
     turned = (quaternions[1:] * quaternions[:-1]).sum(-1) < 0
     signs = np.cumprod(np.where(turned, -1.0, 1.0))

@@ -1,4 +1,4 @@
-"""Lines thick enough to see: WebGL draws lines one pixel wide, so a path is drawn as a tube."""
+"""Tubes for lines: WebGL draws lines one pixel wide, so that a visible path is drawn as a tube."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from pathcontrol.view.bodies.shapes import Mesh
 SIDES = 6
 
 
-def simplified(points: Array, tolerance: float, most: int = 400) -> Array:
-    """A polyline through fewer of the points [m], (k, 3), at most ``most`` segments.
+def simplify(points: Array, tolerance: float, most: int = 400) -> Array:
+    """Return a polyline through fewer of the points [m], (k, 3), at most ``most`` segments.
 
     Ramer, Douglas and Peucker's algorithm, the farthest point first: no point is farther than ``tolerance`` [m]
     from the result, if that is within ``most``.
@@ -33,8 +33,8 @@ def simplified(points: Array, tolerance: float, most: int = 400) -> Array:
 
 
 def tube(points: Array, radius: float, sides: int = SIDES) -> Mesh:
-    """An open tube of ``radius`` [m] around a polyline of two or more distinct points [m], (k, 3)."""
-    normals = _transported(_tangents(points))
+    """Return an open tube of ``radius`` [m] around a polyline of two or more distinct points [m], (k, 3)."""
+    normals = _transport_normals(_tangents(points))
     angles = 2 * np.pi * np.arange(sides) / sides
     rings = np.cos(angles)[:, None] * normals[:, 0, None] + np.sin(angles)[:, None] * normals[:, 1, None]
     vertices = points[:, None] + radius * rings
@@ -42,24 +42,24 @@ def tube(points: Array, radius: float, sides: int = SIDES) -> Mesh:
 
 
 def distinct(points: Array) -> Array:
-    """The points without those that repeat their predecessor."""
+    """Return the points without those that repeat their predecessor."""
     return points[distinct_rows(points)]
 
 
 def distinct_rows(points: Array) -> NDArray[np.bool_]:
-    """Which of the points are not where their predecessor is, (k,)."""
+    """Return which of the points differ from their predecessor, (k,)."""
     return np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=-1) > 1e-9])
 
 
-def joined(parts: Sequence[Mesh]) -> Mesh:
-    """Several meshes as one."""
+def join_meshes(parts: Sequence[Mesh]) -> Mesh:
+    """Return several meshes as one."""
     offsets = np.cumsum([0, *(len(part.vertices) for part in parts)])
     faces = [part.faces + offset for part, offset in zip(parts, offsets[:-1], strict=True)]
     return Mesh(np.concatenate([part.vertices for part in parts]), np.concatenate(faces))
 
 
 def dashes(points: Array, length: float) -> Array:
-    """Every other piece of ``length`` [m] of a polyline, (k, 2, 3), from its first point on."""
+    """Return every other piece of ``length`` [m] of a polyline, (k, 2, 3), from its first point on."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=-1))])
     count = max(int(np.round((along[-1] / length - 1) / 2)), 0)
     ends = along[-1] / (2 * count + 1) * np.arange(2 * count + 2)  # that begin and end with a dash
@@ -68,7 +68,7 @@ def dashes(points: Array, length: float) -> Array:
 
 
 def _farthest(points: Array, first: int, last: int) -> tuple[float, int, int, int]:
-    """The point of a span that is farthest from its chord: its distance, negative, and (first, farthest, last)."""
+    """Return the point of a span farthest from its chord: its distance, negative, and (first, farthest, last)."""
     if last - first < 2:
         return 0.0, first, first, last
     away = _distance(points[first + 1 : last], points[first], points[last])
@@ -77,14 +77,14 @@ def _farthest(points: Array, first: int, last: int) -> tuple[float, int, int, in
 
 
 def _distance(points: Array, start: Array, end: Array) -> Array:
-    """Distance of points from the segment between start and end [m], (k,)."""
+    """Return the distance of points from the segment between start and end [m], (k,)."""
     along = end - start
     share = np.clip((points - start) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
     return np.linalg.norm(points - start - share[:, None] * along, axis=-1)
 
 
 def _tangents(points: Array) -> Array:
-    """Unit tangent at each point, (k, 3): the mean of both segments, the later if they are opposite."""
+    """Return the unit tangent at each point, (k, 3): the mean of both segments, the later if they are opposite."""
     segments = np.diff(points, axis=0)
     segments /= np.linalg.norm(segments, axis=-1, keepdims=True)
     before, after = np.vstack([segments[:1], segments]), np.vstack([segments, segments[-1:]])
@@ -93,8 +93,8 @@ def _tangents(points: Array) -> Array:
     return np.where(length > 1e-6, mean / np.maximum(length, 1e-6), after)
 
 
-def _transported(tangents: Array) -> Array:
-    """Two normals at each point, (k, 2, 3), that turn as little as they can along the line."""
+def _transport_normals(tangents: Array) -> Array:
+    """Return two normals at each point, (k, 2, 3), that turn as little as they can along the line."""
     normals, (x, y, z) = [], np.eye(3)[np.abs(tangents[0]).argmin()].tolist()
     for a, b, c in tangents.tolist():  # numbers one by one: each depends on the one before, and arrays are slow at that
         along = x * a + y * b + z * c
@@ -109,7 +109,7 @@ def _transported(tangents: Array) -> Array:
 
 
 def _tube_faces(rings: int, sides: int) -> np.ndarray:
-    """Triangles from ring to ring, those of the first two rings first, so that a tube can be drawn by and by."""
+    """Return triangles from ring to ring, in order, so that a tube can be drawn as it grows."""
     ring, side = np.meshgrid(np.arange(rings - 1), np.arange(sides), indexing="ij")
     here, beside = ring * sides + side, ring * sides + (side + 1) % sides
     pairs = [[here, beside, beside + sides], [here, beside + sides, here + sides]]
