@@ -102,7 +102,7 @@ class ContourPaths:
         limit = MotionLimit(
             ToolMotion(self.robot, self.frame), speed, tangential=self.acceleration, normal=self.acceleration
         )
-        # at once as fast as friction lets go of: a plan that waits for the arm would wait for ever at a creep
+        # fast enough at once to overcome friction: a plan that waits for the arm would wait for ever at a slow start
         begin = min(speed, _START_TIME * self.acceleration)
         return path.with_profile(limited(path, limit, start_rate=begin)), path.posture
 

@@ -17,8 +17,8 @@ from pathcontrol.arguments import Direction, Form, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.curve import ToolCurve
 
-_PARALLEL = 1e-6  # sine of an angle that counts as none
-_NO_SINE = 1e-12  # what is left of the sine of no turn, or of half a turn, by rounding
+_PARALLEL = 1e-6  # sine of an angle that counts as zero
+_NO_SINE = 1e-12  # rounding error of the sine of no turn, or of half a turn
 _WIDE = -0.9  # cosine of angles whose axis is better known from the symmetric part of the matrix
 
 

@@ -38,7 +38,7 @@ class Tool:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_offset", readonly(_transform(self.offset)))
-        self.robot.frame_pose(np.zeros(self.robot.n), self.frame)  # an unknown frame is told here
+        self.robot.frame_pose(np.zeros(self.robot.n), self.frame)  # raises for an unknown frame
 
     @property
     def pose(self) -> Array | None:

@@ -13,7 +13,7 @@ from pathcontrol._arrays import Array, as_array, physical, quantity, scalar
 from pathcontrol.errors import InputError
 from pathcontrol.robot.lump import rod
 
-_SPREAD = 1e12  # between what joints feel of the bodies of one arm
+_SPREAD = 1e12  # largest ratio of the inertias of the bodies of one arm
 _ROUNDING = 1e-12  # of the largest moment, how far below zero a principal moment may be
 
 

@@ -22,7 +22,7 @@ from pathcontrol.robot.urdf.model_values import moving_bodies, read_arm
 from pathcontrol.robot.urdf.numbers import read_numbers
 from pathcontrol.robot.urdf.xml.parse import parse_urdf
 
-#: [kg/m³] of what a link's shape encloses, castings, motors and air: the median of ten arms of example-robot-data,
+#: [kg/m³], mean density of links, castings, motors and air: the median of ten arms of example-robot-data,
 #: which are between 375 (TIAGo) and 1890 (Z1)
 DENSITY = 1300.0
 
@@ -39,7 +39,7 @@ def with_estimated_inertia(urdf: UrdfSource, density: float = DENSITY) -> UrdfSo
     """
     root = parse_urdf(urdf.text)
     if any(finding.level == "error" for finding in check_form(root)):
-        return urdf  # which the checks refuse
+        return urdf  # refused by the checks
     arm, links = read_arm(root), {link.get("name", ""): link for link in root.iterfind("link")}
     empty = {name for name in links if not has_mass(arm.links[name].inertial)}
     unread: dict[str, str] = {}

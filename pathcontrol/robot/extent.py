@@ -14,7 +14,7 @@ from pathcontrol.robot.model import RobotModel
 
 _POSTURES = 32
 _USUAL = 4 * np.pi  # rad/s, or m/s of sliding joints, where the robot states no limit of velocity
-_MARGIN = 1.5  # times what the postures tried can do
+_MARGIN = 1.5  # times the speed found in the postures
 _FAR = 3.0  # times the reach
 
 

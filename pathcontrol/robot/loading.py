@@ -22,7 +22,7 @@ from pathcontrol.robot.urdf.checks.extension import extension_values
 from pathcontrol.robot.urdf.locking import locked_angles, locked_beyond_limits
 from pathcontrol.robot.urdf.xml.parse import Parsed, parse_and_mend
 
-TOLD = ("inertia-negative",)  # warnings of the check that are worth hearing of each time, beside those of its XML
+TOLD = ("inertia-negative",)  # codes of the findings that become warnings, beside those of the XML
 _UNLIMITED = LARGEST  # some URDFs write 1.8e308 for "no limit"
 
 

@@ -19,7 +19,7 @@ MAX_BYTES = 128 << 20
 #: most triangles of a mesh, counted as often as they are placed
 MAX_TRIANGLES = 5_000_000
 
-_BESIDE = (".mtl", ".bin")  # what else is read of a mesh: materials and buffers, but no pictures
+_BESIDE = (".mtl", ".bin")  # other files of a mesh that are read: materials and buffers, but no pictures
 
 
 class Part(NamedTuple):

@@ -15,7 +15,7 @@ from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.geometry.differentiation import Differentiator, find_width
 from pathcontrol.tasks.profile import plain_attributes
 
-_MOST_SHOWN = 16  # values of an array in a repr
+_MOST_SHOWN = 16  # most values of an array that a repr shows
 
 
 class PathPoint(NamedTuple):

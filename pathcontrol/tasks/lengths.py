@@ -38,7 +38,7 @@ def arc_length(task: Task, s0: ArrayLike | None = None, s_end: ArrayLike | None 
     lower, upper = (
         (task.s0, last_parameter(task)) if task.closed else (both.min(initial=np.inf), both.max(initial=-np.inf))
     )
-    if not lower < upper:  # nothing is asked for
+    if not lower < upper:  # no length to measure
         return np.zeros(both.shape[1:])
     length = length_along(task, float(lower), float(upper))(both)
     return length[1] - length[0]

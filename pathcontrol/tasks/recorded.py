@@ -19,9 +19,9 @@ from pathcontrol.tasks.task import PathTask
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-_CELLS = 256  # of a path that is all of one piece, at first
-_CONSTANT = 1e-13  # by how much what is called constant may vary
-_MARGIN = 0.1  # of the part that was used of an endless path
+_CELLS = 256  # first cells of a path of one piece
+_CONSTANT = 1e-13  # relative variation of a profile that counts as constant
+_MARGIN = 0.1  # recorded beyond the used part of an endless path, as a share of it
 
 
 class RecordedProfile(VelocityProfile):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from pathcontrol.errors import InputError, ToolpathError
 
-#: what may be done with what a reader does not understand and what cannot move the tool
+#: the choices for words that a reader does not understand and that cannot move the tool
 UNKNOWN = ("refuse", "warn")
 _MOST_KINDS, _MOST_PLACES = 50, 8
 

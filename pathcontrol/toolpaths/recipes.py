@@ -17,7 +17,7 @@ from pathcontrol.toolpaths.segments.bezier import Bezier
 _NEAR = 1e-7  # m, from segments of any other kind to the polylines that are kept of them
 _FINEST = 1 << 20
 
-Put = Callable[[Array], dict[str, Any]]  # puts an array away and returns what is written in its place
+Put = Callable[[Array], dict[str, Any]]  # stores an array and returns its reference in the recipe
 Get = Callable[[Mapping[str, Any]], Array]
 
 

@@ -11,7 +11,7 @@ from pathcontrol.errors import InputError, ToolpathError
 #: most segments, moves or points that a file may hold
 MAX_SEGMENTS = 2_000_000
 MAX_CONTOURS = 100_000
-#: largest coordinate, radius or length [m]: what lies further is a mistake in the unit, or an attack
+#: largest coordinate, radius or length [m]: a larger one is a mistake in the unit, or an attack
 MAX_COORDINATE = 1e4
 
 #: beginnings of other files that end like toolpaths, and what to do about them

@@ -11,8 +11,8 @@ from pathcontrol.cartesian.ik.correction import correct
 from pathcontrol.cartesian.ik.redundancy import PostureCost
 
 _SAME = 1e-6  # rad, between the first and the last posture of a lap
-_LEFT = 3.0  # rad, what may be taken back; half a turn and more would change the number of turns
-_PACE = 0.1  # rad, taken back at a time
+_LEFT = 3.0  # rad, largest gap that is closed; half a turn and more would change the number of turns
+_PACE = 0.1  # rad, closed in one step
 
 
 def close_lap(constraint: ToolConstraint, s: Array, q: Array) -> Array | None:

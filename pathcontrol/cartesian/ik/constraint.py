@@ -14,7 +14,7 @@ from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.curve import ToolCurve
 
 _SAMPLES = 64
-_NO_RANK = 1e-6  # singular values below this share of the largest are none
+_NO_RANK = 1e-6  # singular values below this share of the largest count as zero
 
 
 @dataclass(frozen=True, eq=False)

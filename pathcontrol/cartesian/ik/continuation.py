@@ -17,10 +17,12 @@ from pathcontrol.cartesian.ik.redundancy import PostureCost
 _PIECES = 8  # a step is at most this part of the curve, …
 _REACH = 0.1  # … and this part of the lever arm long
 _SMALLEST = 1e-7  # part of the curve; smaller steps are not tried
-_TRIES = 20_000  # steps in all, so that nothing goes on for ever
+_TRIES = 20_000  # steps in all, so that the walk ends
 _DRIFT = 0.1  # rad, largest correction of a predicted posture; more may be another branch
 _LEAP = 0.4  # rad, largest motion of a joint in a step
-SINGULAR = 1e-3  # singular values below this are none: the joints move 1000 times as much as the tool over its lever
+SINGULAR = (
+    1e-3  # singular values below this count as zero: the joints move 1000 times as much as the tool over its lever
+)
 _TIGHT = 0.2  # share of the way to a joint limit from which on a posture counts as less comfortable
 
 

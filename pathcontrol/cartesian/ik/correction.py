@@ -15,7 +15,7 @@ KEPT = 0.5  # of the tolerance, by which the tool may be off at the postures the
 _STEPS = 12
 _ARRIVED = 1e-9  # rad; the next step would be its square
 _LONGEST = 0.3  # rad, longest step of a joint
-_DAMPING = 1e-5  # singular values below this are taken for none
+_DAMPING = 1e-5  # singular values below this count as zero
 _PROBE = 1e-6  # rad, step of the difference quotient for second derivatives
 _FLAT = 1e-3  # curvatures of H below this do not make a step longer
 

@@ -19,9 +19,9 @@ from pathcontrol.robot.model import RobotModel
 
 _SEEDS = 64
 _AHEAD = np.array([1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0])  # parts of the curve
-_REGULAR = 0.02  # singular values above this are none that stops an arm
-_NOTHING = 1e-3  # share of a displacement that is not worth saying
-_NEXT = 4  # of those ahead; out of reach in one of them is why the arm does not go on
+_REGULAR = 0.02  # singular values above this do not stop an arm
+_NOTHING = 1e-3  # share of a displacement that is negligible
+_NEXT = 4  # points ahead; if one of them is out of reach, that is the reason
 
 
 def trail_error(constraint: ToolConstraint, trail: Trail, tries: int = 1) -> TaskError:

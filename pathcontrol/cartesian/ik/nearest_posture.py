@@ -10,7 +10,7 @@ from pathcontrol.cartesian.ik.constraint import ToolConstraint
 _STEPS = 60
 _LEAST_DAMPING, _FIRST_DAMPING, _LARGEST_DAMPING = 1e-10, 1e-2, 1e6
 _ARRIVED = 1e-24  # of ‖f‖²
-_STUCK = 1e-6  # share of ‖f‖² by which a step that is worth going on has to lower it
+_STUCK = 1e-6  # least relative decrease of ‖f‖² for the iteration to continue
 
 
 def reach(constraint: ToolConstraint, q: Array, s: Array) -> Array:

@@ -14,7 +14,7 @@ from pathcontrol.cartesian.ik.preference import PLANE, find_lowest
 from pathcontrol.cartesian.ik.refinement import Refined
 from pathcontrol.cartesian.ik.spline_deviation import deviations
 
-_VALLEYS = 8  # of a function along the path, looked at more closely
+_VALLEYS = 8  # minima of a function along the path that are refined
 _HEIGHTS = 256  # postures at which heights are measured
 _FINE, _ZOOMS = 33, 3  # points in each, and how often
 

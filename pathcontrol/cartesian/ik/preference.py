@@ -12,7 +12,7 @@ from pathcontrol.cartesian.ik.continuation import Trail
 
 PLANE = 1e-3  # m below the base plane that is still on it
 _AS_COMFORTABLE = 0.5  # share of the best comfort from which on the higher elbow counts more
-_SAMPLES = 32  # postures of a trail that are looked at
+_SAMPLES = 32  # postures of a trail that are compared
 
 
 def heights(constraint: ToolConstraint, q: Array) -> Array:

@@ -17,13 +17,15 @@ from pathcontrol.errors import TaskError
 
 _DEGREE = 5
 _PIECES = 8  # intervals to begin with, at least
-_PROBES = np.array([0.2, 0.5, 0.8])  # of an interval: where the deviation is looked at
+_PROBES = np.array([0.2, 0.5, 0.8])  # places of the probes, as shares of an interval
 #: of an interval: where it is verified, at its ends, where derivatives are most off, and between, at none of the probes
 _CHECKS = np.concatenate([[0.0], (np.arange(16) + 0.5 * (5**0.5 - 1)) / 16, [1.0]])
-_VERIFIED = 0.7  # of what is allowed, at most, there; between places so near to each other it is not much worse
-_SHARE = 0.5  # of what is allowed, used up at the probes; the rest is for what lies between them
-_QUARTER = 50.0  # an interval so many times too far off is cut in four, for the error falls with a power of its length
-_SMALLEST = 1e-8  # part of the curve: an interval so short does not help by being cut
+_VERIFIED = 0.7  # largest share of the tolerance there; between points so close it is not much larger
+_SHARE = 0.5  # share of the tolerance allowed at the probes; the rest is kept for the points between them
+_QUARTER = (
+    50.0  # an interval with so many times the allowed error is cut in four: the error falls with a power of its length
+)
+_SMALLEST = 1e-8  # part of the curve: cutting a shorter interval does not help
 _MOST_KNOTS = 300_000
 
 

@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 
 VELOCITY = 1e-3  # share of p' by which the tool's velocity may be off, in size and direction
-_CHUNK = 1 << 14  # postures looked at together
+_CHUNK = 1 << 14  # postures evaluated together
 
 
 class Deviations(NamedTuple):

@@ -23,7 +23,7 @@ class Ramp(NamedTuple):
     def speed(self, distance: Array) -> tuple[Array, Array]:
         """Return v and dv/dd at a ``distance`` d (*batch,) from the end of the path; ``inf`` and 0 beyond ``until``."""
         over = distance >= self.until
-        if over.all():  # so it is nearly all along a path
+        if over.all():  # true nearly all along a path
             return np.full_like(distance, np.inf), np.zeros_like(distance)
         v, slope = self.curve.speed(distance)
         return np.where(over, np.inf, v), np.where(over, 0.0, slope)

@@ -15,7 +15,10 @@ from pathcontrol.profiles.limited.tangential import Tangential
 from pathcontrol.profiles.motion import growth
 from pathcontrol.tasks.profile import Path
 
-_START, _END = 2.5e-3, 2.5e-4  # s, how long the acceleration that an open path begins and ends with has been at work
+_START, _END = (
+    2.5e-3,
+    2.5e-4,
+)  # s, of acceleration from rest before the start, and of deceleration after the end, of an open path
 _MAX_EXCESS = 1.05  # of a chord over a ceiling that it resolves
 
 

@@ -13,8 +13,8 @@ from pathcontrol.profiles.topp.fastest_pair import fastest_pair
 from pathcontrol.profiles.topp.joint_limits import JointLimits
 from pathcontrol.profiles.topp.passes import Allowed
 
-_ACCEPTED = 1 + 7e-4  # at the samples, a little less than is promised between them
-_KEPT = 0.1  # of what rest leaves of a limit
+_ACCEPTED = 1 + 7e-4  # largest share at the samples, a little below what is promised between them
+_KEPT = 0.1  # share kept of the margin that standstill leaves
 
 
 class Excess(NamedTuple):

@@ -14,9 +14,9 @@ from pathcontrol.robot.urdf.mesh_names import MeshName, expand_home, is_in_packa
 FORMATS = (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf")
 
 _POINTER = b"version https://git-lfs"
-_MOST_ENTRIES = 1000  # of a folder that are looked at
+_MOST_ENTRIES = 1000  # entries of a folder that are searched
 _OPTIONS = "package_dirs in Python, --package-dir on the command line"
-#: what names the folders of packages to ROS and Gazebo: those that hold packages, and those with packages in share/
+#: variables of ROS and Gazebo: with folders that hold packages, and with prefixes that have packages in share/
 _ENVIRONMENT = ("ROS_PACKAGE_PATH", "GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH")
 _PREFIXES = ("AMENT_PREFIX_PATH", "COLCON_PREFIX_PATH")
 

@@ -9,7 +9,9 @@ from typing import NamedTuple
 from urllib.parse import unquote
 
 _PACKAGE, _FILE = ("package", "model"), "file"
-_FIND = re.compile(r"\$\(find(?:-pkg-share)?\s+([^)\s]+)\s*\)/*")  # what xacro or roslaunch would have replaced
+_FIND = re.compile(
+    r"\$\(find(?:-pkg-share)?\s+([^)\s]+)\s*\)/*"
+)  # left by xacro or roslaunch, which should have replaced it
 _DEEPEST = 8  # folders of a path that are kept in its ends
 _DRIVE = re.compile(r"[A-Za-z]:/+")
 

@@ -78,7 +78,7 @@ def summarize(every: Sequence[dict[str, Any]]) -> dict[str, Any]:
         elif all(isinstance(value, dict) for value in values):
             told[name] = summarize(values)
         else:
-            with suppress(ValueError):  # other things than numbers, or numbers of several shapes
+            with suppress(ValueError):  # values that are no numbers, or have several shapes
                 array = np.array(values)
                 if array.dtype.kind in "iuf":
                     told[name] = {"shape": list(array.shape), "min": array.min().item(), "max": array.max().item()}

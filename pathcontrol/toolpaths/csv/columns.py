@@ -14,7 +14,7 @@ from pathcontrol.toolpaths.csv.names import AXIS, KNOWN, POINT, QUATERNION, Name
 from pathcontrol.toolpaths.csv.rows import Rows
 from pathcontrol.toolpaths.passed import Passed
 
-#: what a caller may say of columns
+#: the ways to name columns
 Chosen = Sequence[str] | Mapping[str, int | str]
 _MOST_TOLD = 8
 _ANGLES = ({"roll", "pitch", "yaw"}, {"rx", "ry", "rz"}, {"a", "b", "c"}, {"w", "p", "r"})

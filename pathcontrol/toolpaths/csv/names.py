@@ -24,7 +24,7 @@ _LONG = re.compile(
 )
 #: x_pos, X Position, x coordinate
 _POINT_FIRST = re.compile(r"(?P<letter>[xyz])[._/-]?(?:pos(?:ition)?|coord(?:inate)?)")
-_LONGEST = 100  # characters of a name that is looked at closer
+_LONGEST = 100  # longest name that is parsed
 _PREFIX = {"point": "", "quaternion": "q", "axis": "n"}
 _NORMAL = {"nx": "i", "ny": "j", "nz": "k"}
 #: x_mm, x/mm, x-mm, x in mm, xmm, x [mm] and x (mm), without their blanks

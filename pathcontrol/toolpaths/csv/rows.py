@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from pathcontrol.errors import ToolpathError
 
-#: what stands between values, as messages call it; None is blanks
+#: names of the separators in messages; None stands for blanks
 SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", None: "blanks"}
 _UNIT_OF_LINES = re.compile(r"[Ss][Ee][Pp]=([;,\t])")
 _MOST_COMMENTS, _LONGEST_COMMENT = 100, 500

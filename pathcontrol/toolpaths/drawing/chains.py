@@ -21,7 +21,7 @@ from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
 
 _NEAR, _NEAR_SHARE = 1e-6, 1e-4  # m and of the drawing's diagonal, how near ends that belong together lie
-_WIDEST_TOLD = 5e-5  # m, gaps up to this are told if they stay open
+_WIDEST_TOLD = 5e-5  # m, larger gaps are not noted
 
 
 class Strand(NamedTuple):
@@ -229,7 +229,7 @@ def _shift(segment: Segment, start: Array, end: Array) -> Segment:
         points[0] += start
         points[-1] += end
         points = drop_repeated(points)
-        return Polyline(points) if len(points) > 1 else segment  # whose gap the contour then refuses by name
+        return Polyline(points) if len(points) > 1 else segment  # the contour refuses a gap there
     if isinstance(segment, Arc):
         return replace(segment, center=segment.center + start, rise=segment.rise + end - start)
     assert isinstance(segment, Bezier)

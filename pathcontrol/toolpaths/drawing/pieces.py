@@ -18,7 +18,7 @@ from pathcontrol.toolpaths.segments.bezier import Bezier
 from pathcontrol.toolpaths.segments.cusps import is_plain, straight_turns, without_cusps
 from pathcontrol.toolpaths.text import MAX_COORDINATE, MAX_SEGMENTS
 
-NOTHING = 1e-9  # m, what is shorter than this has no length
+NOTHING = 1e-9  # m, a shorter piece has no length
 _CURVE = 10  # lines
 _LARGEST_RADIUS = 100 * MAX_COORDINATE  # m; the ends of an arc of a larger one would not be known to 1 nm
 
@@ -102,7 +102,7 @@ class EllipticArc:
     sweep: float
 
     def mapped(self, matrix: Array) -> EllipticArc:
-        with np.errstate(over="ignore", invalid="ignore"):  # segments() refuses what is not finite
+        with np.errstate(over="ignore", invalid="ignore"):  # segments() refuses values that are not finite
             x, y = matrix[:3, :3] @ self.x, matrix[:3, :3] @ self.y
         return replace(self, center=_map(self.center, matrix), x=x, y=y)
 
@@ -192,7 +192,7 @@ def _merge(segments: Sequence[Segment]) -> list[Segment]:
 
 
 def _map(points: Array, matrix: Array) -> Array:
-    with np.errstate(over="ignore", invalid="ignore"):  # segments() refuses what is not finite
+    with np.errstate(over="ignore", invalid="ignore"):  # segments() refuses values that are not finite
         return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 

@@ -13,7 +13,7 @@ from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.dxf.values import common, layer_of, number, object_axes, vector
 from pathcontrol.toolpaths.passed import Passed
 
-_MOST_INSERTS = 64  # inside each other
+_MOST_INSERTS = 64  # depth of nesting
 _MOST_ENTITIES = 200_000
 _EXTERNAL = 4  # a block that stands for another file
 

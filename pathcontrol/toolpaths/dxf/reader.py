@@ -112,7 +112,7 @@ def _load(source: str, text: str) -> Any:
     from ezdxf.filemanagement import read
 
     lines = text.split("\n")
-    entities = sum(line.strip() == "0" for line in lines[::2])  # of pairs of lines, the first says what the second is
+    entities = sum(line.strip() == "0" for line in lines[::2])  # the first line of a pair is the code of the second
     if len(lines) > _MOST_LINES or entities > _MOST_ENTITIES:
         raise ToolpathError(
             f"{source} has {len(lines)} lines and {entities} entities, expected at most {_MOST_LINES} and "
@@ -127,7 +127,7 @@ def _load(source: str, text: str) -> Any:
 def _readable(source: str) -> Iterator[None]:
     """Name the file in whatever ezdxf raises on a malformed one, also later, while entities are read."""
     try:
-        with np.errstate(all="ignore"):  # what is not finite is refused where it is drawn
+        with np.errstate(all="ignore"):  # a value that is not finite is refused when it is drawn
             yield
     except PathControlError:
         raise

@@ -47,7 +47,7 @@ def sweep_between(start: float, end: float) -> float:
     Ends that are the same but for rounding are a whole turn apart: 0 and 6.2831855, 270° and 270°, 90° and 450.0001°.
     """
     sweep = (end - start) % (2 * np.pi)
-    beyond = _NO_ARC if 0 <= end - start < np.pi else _WHOLE  # an arc may be short, but not one of several turns
+    beyond = _NO_ARC if 0 <= end - start < np.pi else _WHOLE  # a short arc is allowed, one of several turns is not
     return 2 * np.pi if sweep <= beyond or 2 * np.pi - sweep <= _WHOLE else sweep
 
 

@@ -41,7 +41,7 @@ def arcs(
     first, last = (start[a], start[b]), (end[a], end[b])
     by_radius = "R" in words
     center = (_by_radius if by_radius else _by_offsets)(first, last, words, modes, clockwise)
-    if not all(abs(coordinate) <= MAX_COORDINATE for coordinate in center):  # nor is a NaN
+    if not all(abs(coordinate) <= MAX_COORDINATE for coordinate in center):  # false for NaN too
         raise ToolpathError(f"the arc's centre is further than {MAX_COORDINATE:g} m from the origin; write a line, G1")
     if not by_radius:
         _check_normal(start[normal], end[normal], words, modes)

@@ -13,7 +13,7 @@ from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.base import Polyline, Segment
 
-_NOTHING = 1e-9  # m, moves shorter than this are none
+_NOTHING = 1e-9  # m, shorter moves are ignored
 
 
 class ContourBuilder:

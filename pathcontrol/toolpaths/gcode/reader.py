@@ -110,7 +110,7 @@ def _run(program: Program, texts: Sequence[str], passed: Passed) -> None:
                 began = True
                 if not program.carry_out(parse(text), number):
                     return
-                if PLAIN.fullmatch(text):  # what follows other lines is rarely plain, and looking for it takes time
+                if PLAIN.fullmatch(text):  # lines after other lines are rarely plain, and the test takes time
                     number += program.follow(texts, number)
         except ToolpathError as error:
             raise ToolpathError(f"line {number}: {error}", **error.details_with(line=number)) from None

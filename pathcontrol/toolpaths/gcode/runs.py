@@ -16,7 +16,7 @@ from pathcontrol.toolpaths.gcode.words import PLAIN
 from pathcontrol.toolpaths.text import MAX_COORDINATE
 
 _DIGITS = {0: "0", 10: "1"}
-_NONE = "nan"  # the text of a word that is not there
+_NONE = "nan"  # the text of a missing word
 
 
 def read_run(texts: Sequence[str], first: int, most: int, position: Sequence[float], modes: Modes) -> tuple[int, Array]:
@@ -59,7 +59,7 @@ def _plain_rows(texts: Sequence[str], first: int, most: int, modes: Modes) -> li
 def _places(lengths: Array, position: Sequence[float], *, absolute: bool) -> Array:
     """Return the points (k, 3) that words (k, 3) [m] lead to from a position [m]; NaN stands for no word."""
     if not absolute:
-        with np.errstate(invalid="ignore"):  # the first place that is too far ends the run
+        with np.errstate(invalid="ignore"):  # the first point out of bounds ends the run
             return np.cumsum([position, *np.where(np.isnan(lengths), 0.0, lengths)], axis=0)[1:]
     known = np.concatenate([[position], lengths + 0.0])
     rows = np.where(np.isnan(known), 0, np.arange(len(known))[:, None])

@@ -25,14 +25,14 @@ def _optional(letters: str, value: str) -> str:
     return rf"(?:[{letters}][ \t]*({value})[ \t]*)?"
 
 
-#: a line that says no more than where a straight move leads, if anything: the digit of G0 or G1, then X, Y, Z and F
+#: a line with at most the end of a straight move: the digit of G0 or G1, then X, Y, Z and F
 PLAIN = re.compile(
     r"[ \t]*(?:[Nn][ \t]*[0-9]+[ \t]*)?(?:[Gg]0*([01])(?![0-9.])[ \t]*)?"
     + "".join(_optional(axis + axis.lower(), _NUMBER) for axis in "XYZ")
     + _optional("Ff", _NUMBER)
 )
 
-#: what the first character that fits into no word stands for
+#: the meaning of the first character that fits into no word
 _REASONS = {
     "#": "parameters are not supported: write the numbers",
     "=": "parameters are not supported: write the numbers",

@@ -10,8 +10,8 @@ from scipy.special import comb
 
 from pathcontrol._arrays import Array
 
-_STILL = 1e-8  # of the largest coefficient, what counts as zero
-_NEARLY_STILL, _TINY = 1e-4, 1e-300  # of the largest step, below which a closer look is taken
+_STILL = 1e-8  # share of the largest coefficient that counts as zero
+_NEARLY_STILL, _TINY = 1e-4, 1e-300  # share of the largest step below which the derivative is examined closely
 _INSIDE = 1e-6  # how far from 0 and 1 a parameter lies inside
 
 
@@ -74,12 +74,12 @@ def without_cusps(points: Array, weights: Array | None) -> list[tuple[Array, Arr
     legs = points[1:] - points[:-1]
     sizes = np.sqrt((legs * legs).sum(-1))
     ahead = legs @ (legs / np.maximum(sizes, 1e-300)[:, None]).sum(0)
-    if (ahead >= 0).all() and ahead.any():  # in this direction it goes on and on
+    if (ahead >= 0).all() and ahead.any():  # the curve is monotonic in this direction
         return [(points, weights)]
     parts, rest, begin = [], _homogeneous(points, weights), 0.0
     for u in _standstills(points, weights):
         first, rest = _split(rest, (u - begin) / (1 - begin))
-        first[-2, :3], rest[1, :3] = first[-1, :3], rest[0, :3]  # exactly where they are but for rounding
+        first[-2, :3], rest[1, :3] = first[-1, :3], rest[0, :3]  # exact up to rounding
         parts.append(first)
         begin = u
     return [(part[:, :3], None if weights is None else part[:, 3]) for part in [*parts, rest]]

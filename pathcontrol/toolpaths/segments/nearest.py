@@ -12,7 +12,7 @@ from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.toolpaths.segments.base import Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
 
-_DEGREE = 3  # what lower ones are raised to
+_DEGREE = 3  # the degree that lower ones are raised to
 
 
 def is_cubic(segment: Segment) -> bool:

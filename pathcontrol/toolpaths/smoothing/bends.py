@@ -10,7 +10,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.smoothing.corners import angles, end_tangent, start_tangent
 
-_BETWEEN = 64  # places of each piece, at which a polyline is compared with what it stands for
+_BETWEEN = 64  # points of each piece at which a polyline is compared with the segment it replaces
 _FIRST_PIECES = 32
 _TURN = 0.2  # rad over a piece
 _NARROWEST = 2.0**-40
@@ -57,7 +57,7 @@ class _Pieces(NamedTuple):
         size = np.linalg.norm(middle - p[:-1], axis=-1) + np.linalg.norm(p[1:] - middle, axis=-1)
         turn = angles(t[:-1], t[1:])
         sagitta = np.linalg.norm(middle - 0.5 * (p[:-1] + p[1:]), axis=-1)
-        # what is too narrow to be halved has no size
+        # a piece too narrow to be halved has no size
         return cls(u, np.where(np.diff(u) > _NARROWEST, size, 0.0), turn, np.maximum(sagitta, size * turn / 8))
 
     def halved(self, segment: Segment, chosen: Array) -> _Pieces:

@@ -20,11 +20,11 @@ from pathcontrol.toolpaths.smoothing.corners import angles
 #: position, tangent and curvature vector at arc lengths (*batch,) [m] away from a junction
 Arm = Callable[[Array], CurvePoint]
 
-_SMOOTH = 1e-9  # rad; turns below it are none
+_SMOOTH = 1e-9  # rad; smaller turns are ignored
 _MOST_TURN = np.radians(160.0)  # rad, from one end of a blend to the other
 _SLOWEST, _FASTEST = 0.5, 2.0  # ‖p'‖ of a blend
 _SAMPLES = 65
-_MARGIN = 0.99  # of the tolerance, for what is between samples
+_MARGIN = 0.99  # share of the tolerance, kept for deviations between samples
 _TANGENT = 92.0  # where only the curvature jumps a blend deviates by 1/93 of d² times the jump
 
 

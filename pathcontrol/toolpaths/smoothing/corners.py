@@ -13,7 +13,7 @@ from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier_columns import end_tangents, measure_lengths
 
 TURN_BACK = np.radians(150.0)  # rad; sharper than this nothing can be blended without nearly standing still
-SHARP = np.radians(5.0)  # rad, what is counted, shown and stopped at as a corner
+SHARP = np.radians(5.0)  # rad, turns above this are corners: counted, shown and stopped at
 
 
 class Corner(NamedTuple):

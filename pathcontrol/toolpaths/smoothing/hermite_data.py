@@ -14,9 +14,9 @@ from pathcontrol.geometry.quintic import CurvePoint, quintic_spline
 from pathcontrol.toolpaths.segments.base import Segment
 from pathcontrol.toolpaths.smoothing.corners import end_tangent, start_tangent
 
-_ACCURACY = 1e-9  # m, between a segment and the quintics that stand for it
+_ACCURACY = 1e-9  # m, between a segment and the quintics in its place
 _MOST_PIECES = 1 << 16
-_STILL = 1e-6  # of the mean speed, what counts as standing still
+_STILL = 1e-6  # share of the mean speed that counts as standstill
 _SHORTEST = 1e-12  # m
 
 

@@ -17,7 +17,7 @@ _GENTLE = np.radians(30.0)  # rad; turns below this may be samples of a smooth c
 _UNEQUAL = 3.0  # how much farther a blend of such a turn may reach on one side than on the other
 _TINY = 1e-12  # m
 _SAMPLES = 33
-_BLOCK = 1 << 13  # blends looked at at once
+_BLOCK = 1 << 13  # blends evaluated together
 
 
 def round_polyline(polyline: Polyline, before: float, after: float, tolerance: float) -> Stretch:

@@ -132,7 +132,7 @@ def transform(text: str) -> Array:
         if len(values) not in _TAKES.get(name, ()):
             known = "matrix(6 numbers), translate(1 or 2), scale(1 or 2), rotate(1 or 3), skewX(1), skewY(1)"
             raise ToolpathError(f"transform has {match[0].strip()[:59] + ')'!r}, expected {known}")
-        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused where it is drawn
+        with np.errstate(over="ignore", invalid="ignore"):  # an overflow is refused when it is drawn
             total = total @ _plane(*_matrix(name, values))
     if text[end:].strip():
         raise ToolpathError(f"transform has {text[end:][:30]!r}, expected name(numbers)")

@@ -13,7 +13,7 @@ from pathcontrol.toolpaths.svg.shapes import Attributes
 from pathcontrol.toolpaths.svg.style import StyleSheet
 from pathcontrol.toolpaths.text import read_text
 
-_LONGEST = 300  # characters of what the parser says
+_LONGEST = 300  # characters of a message of the parser that are shown
 _NAMESPACES = ("", "http://www.w3.org/2000/svg")
 _MOST_ELEMENTS = 1_000_000
 _SERVER = re.compile(

@@ -29,7 +29,7 @@ class Pen:
 
     def __init__(self) -> None:
         self.at = self._start = 0j
-        self._handle = ("", 0j)  # the last control point, and of which kind of curve
+        self._handle = ("", 0j)  # the last control point, and the kind of its curve
         self._line: list[complex] = [0j]
         self._curves: list[Array] = []
         self._pieces: list[Piece] = []

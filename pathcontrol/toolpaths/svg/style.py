@@ -17,7 +17,7 @@ from cssselect2 import ElementWrapper, Matcher, SelectorError, compile_selector_
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.svg.paint import PAINT, is_valid
 
-#: properties that have a say in the geometry
+#: properties that affect the geometry
 KNOWN = frozenset({"display", "visibility", "transform", "x", "y", "width", "height", "cx", "cy", "r", "rx", "ry"})
 _CLIPS = frozenset({"clip-path", "mask"})
 _REFUSED_ATTRIBUTES = frozenset({"transform-origin", "transform-box"})
@@ -37,7 +37,7 @@ _SCREEN = re.compile("(?:only )?(?:all|screen)?")
 
 #: importance, specificity and order, which decide between declarations of one property
 Rank = tuple[bool, tuple[int, ...], int]
-#: by property its rank and value
+#: rank and value by property
 Declarations = dict[str, tuple[Rank, str]]
 _ATTRIBUTE, _INLINE = (-1,), (9,)  # below and above the specificity of all selectors
 

@@ -27,7 +27,7 @@ _DEFINITIONS = frozenset({"defs", "symbol", "clipPath", "mask", "marker", "patte
     *("radialGradient", "filter", "style", "script", "title", "desc", "metadata", "view", "animate", "set"),
     *("animateTransform", "animateMotion", "font", "font-face", "cursor", "color-profile"),
 }
-_MOST_USES = 64  # inside each other
+_MOST_USES = 64  # depth of nesting
 _MOST_ELEMENTS = 200_000
 
 

@@ -56,7 +56,7 @@ def check_inertias(arm: Arm) -> Iterator[Finding]:
 def check_inertials(arm: Arm) -> Iterator[Finding]:
     """Check that every moving body has an inertial, and so has every moving link with a shape."""
     if is_massless(arm):
-        return  # which is told once
+        return  # reported once
     for body in moving_bodies(arm):
         bare = [name for name in body.poses if arm.links[name].inertial is None]
         if len(bare) < len(body.poses):

@@ -19,7 +19,7 @@ _ROOT = re.compile(r"<[A-Za-z_][^\s/>]*")
 _PREFIX = re.compile(r"Namespace prefix (\S+) (?:for \S+ )?on \S+ is not defined")
 _MOST_PREFIXES = 50
 
-_UNDECLARED = "undeclared:"  # the namespace that a prefix without one is put into
+_UNDECLARED = "undeclared:"  # the namespace of a prefix that is not declared
 
 
 def mend(text: str) -> tuple[str, list[Finding]]:

@@ -14,7 +14,7 @@ from pathcontrol.robot.urdf.xml.mending import mend, parser
 from pathcontrol.robot.urdf.xml.prolog import COMMENT, INSTRUCTION, end_of_prolog
 
 MAX_BYTES = 64 * 2**20
-_LONGEST = 200  # characters of what the parser says
+_LONGEST = 200  # characters of a message of the parser that are shown
 
 _NO_DOCTYPE = "a DOCTYPE may define entities and is refused; expected none, remove it"
 _RUN_XACRO = "run xacro first and load what it prints"
@@ -100,7 +100,7 @@ def _without_stray_xacro(root: etree._Element) -> list[Finding]:
         return []
     stray = [child for child in root.iterchildren(etree.Element) if _is_definition(child)]
     for element in stray:
-        root.remove(element)  # what is between it and the next one goes too, which is blank
+        root.remove(element)  # removes the blank text behind it as well
     if not stray:
         return []
     lines = f"line {stray[0].sourceline}" + (f" and {len(stray) - 1} more" if len(stray) > 1 else "")
