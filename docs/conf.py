@@ -68,12 +68,26 @@ def _colon_in_property(app, what, name, obj, options, lines):
 
 
 def _signature(app, what, name, obj, options, signature, return_annotation):
-    """Names of type aliases, as they are written in the code."""
+    """Names of type aliases, as they are written in the code, and types without what else is annotated."""
 
     def plain(text):
-        return text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text)
+        return text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", _without_annotations(text))
 
     return plain(signature), plain(return_annotation)
+
+
+def _without_annotations(text):
+    """Replace each ``Annotated[X, …]`` by X; the union that an evaluated ArrayLike is gets its name again."""
+    while match := re.search(r"~?[\w.]*\bAnnotated\[", text):
+        depth, commas, end = 1, [], match.end()
+        while depth:
+            depth += {"[": 1, "(": 1, "]": -1, ")": -1}.get(text[end], 0)
+            commas += [end] * (depth == 1 and text[end] == ",")
+            end += 1
+        kind = text[match.end() : commas[0]]
+        plain = "ArrayLike" + kind.rpartition("]")[2] if "_SupportsArray" in kind else kind
+        text = text[: match.start()] + plain + text[end:]
+    return text
 
 
 def _skip_fields(app, what, name, obj, skip, options):

@@ -200,7 +200,11 @@ def test_a_report_shows_the_file_that_names_them(own, tmp_path, monkeypatch):
         ("py:Bump", "py:Rough", "disturbance.type: 'Rough' in my_classes.py is not a subclass of pathcontrol.Disturb"),
         ("my_classes.py:Rough", "none.py:Rough", "plant.friction.type: there is no Python file"),
         ("my_classes.py:Rough", "no_module:Rough", "plant.friction.type: the module 'no_module' cannot be imported"),
-        ("K = ", "k = ", "controller.parameters: missing a required argument: 'K'; it is Stiff(robot, task, K"),
+        (
+            "K = ",
+            "k = ",
+            "controller.parameters: missing a required argument: 'K'; it is Stiff(robot, task, K, D=100.0, **options)",
+        ),
         ("2000 N m/rad", "2000 N m s", "controller.parameters.K = '2000 N m s', expected a finite quantity in N m/rad"),
         (
             "depth = 0.3",

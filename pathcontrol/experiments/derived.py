@@ -73,8 +73,10 @@ def chooser(
     def find(name: str) -> type[Section] | None:
         if own is not None and (".py" in name or ":" in name):
             return own
+        if name in more:
+            return more[name]
         target = kind.find(name)
-        return more.get(name) if target is None else section_of(target, base, kind.given)
+        return None if target is None else section_of(target, base, kind.given)
 
     choices, also = [*kind.members, *more], "" if own is None else " or 'FILE.py:ClassName'"
     return partial(choose, key=key, find=find, choices=choices, default=default, also=also)

@@ -60,9 +60,15 @@ def make(
     try:
         inspect.signature(target).bind(**needed)
     except TypeError as error:
-        raise ExperimentError(f"{where}: {error}; it is {target.__name__}{inspect.signature(target)}") from error
+        raise ExperimentError(f"{where}: {error}; it is {target.__name__}{_plain_signature(target)}") from error
     with users_code(where, target.__name__, arguments):
         return target(**needed)
+
+
+def _plain_signature(target: Callable[..., Any]) -> inspect.Signature:
+    """Return the names and defaults of parameters, without annotations."""
+    parameters = inspect.signature(target).parameters.values()
+    return inspect.Signature([parameter.replace(annotation=parameter.empty) for parameter in parameters])
 
 
 def target_of(key: str, section: Any, kind: Kind | None, place: Place) -> Callable[..., Any]:
