@@ -135,6 +135,7 @@ def kind_of(base: Any) -> Kind | None:
 
 
 def _last(place: str) -> str:
+    """Return the name at the end of a place."""
     return re.split(r"[.:]", place)[-1]
 
 

@@ -176,10 +176,12 @@ def _interpolate(normals: Array, at: Array | None) -> Callable[[Array], Array]:
 
 
 def _constant(direction: Array, s: Array) -> Array:
+    """Return the same direction at all s, (*batch, 3)."""
     return np.broadcast_to(direction, (*np.shape(s), 3))
 
 
 def _direction(name: str, value: ArrayLike) -> Array:
+    """Check that a direction is a vector (3,) with a length; return it with unit length."""
     vector = finite(name, as_array(name, value))
     if vector.shape != (3,) or not np.linalg.norm(vector) > 0:
         raise InputError(f"{name} = {np.asarray(value).tolist()}, expected a direction (3,) with a length")
@@ -187,6 +189,7 @@ def _direction(name: str, value: ArrayLike) -> Array:
 
 
 def _unit(vectors: Array, s: Array) -> Array:
+    """Scale vectors to unit length; a zero vector is an error that names its s."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     if not (length > _PARALLEL).all():
         where = float(np.asarray(s)[int(np.argmin(length > _PARALLEL))])

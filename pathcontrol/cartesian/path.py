@@ -90,7 +90,7 @@ class CartesianPath(SplinePath):
         self.curve = curve if isinstance(curve, ToolCurve) else ToolCurve.spline(as_array("curve", curve))
         self.tolerance = scalar("tolerance", tolerance, least=_FINEST)
         self.angle_tolerance = scalar("angle_tolerance", angle_tolerance, least=_FINEST)
-        speed, closed = scalar("speed", speed, positive=True), _closed(self.curve, closed)
+        speed, closed = scalar("speed", speed, positive=True), _is_closed(self.curve, closed)
         carried, first = Tool(robot, frame, tool), None if start is None else check_posture(robot, start)
         self._question(speed, carried)
         self.orientation = _orientation(orientation, carried, first)
@@ -132,7 +132,7 @@ class CartesianPath(SplinePath):
         return self.speed / length, -self.speed * (dp * ddp).sum(-1) / length**3
 
 
-def _closed(curve: ToolCurve, closed: bool | None) -> bool:
+def _is_closed(curve: ToolCurve, closed: bool | None) -> bool:
     if closed and not curve.closed:
         raise InputError("closed = True, but the curve is open; close the curve, or leave closed out")
     return curve.closed if closed is None else closed

@@ -56,6 +56,7 @@ class Tool:
 
 
 def _transform(offset: ArrayLike | None) -> Array:
+    """Return the transform of an offset, a position or a pose."""
     transform = np.eye(4)
     if offset is None:
         return transform

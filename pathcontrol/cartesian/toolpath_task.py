@@ -124,6 +124,7 @@ def _tour(toolpath: Toolpath, pose: Array) -> ToolCurve:
 
 
 def _check_feeds(toolpath: Toolpath, feed: float | None) -> None:
+    """Check that every contour has a feed."""
     if feed is not None:
         scalar("feed", feed, positive=True)
         return

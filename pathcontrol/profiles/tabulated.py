@@ -30,9 +30,9 @@ class TabulatedProfile(VelocityProfile):
     """
 
     def __init__(self, s: ArrayLike, squared: ArrayLike, period: float | None = None) -> None:
-        self.s = _checked_knots(s)
-        self.squared = _checked_squares(self.s, finite("squared", as_array("squared", squared)))
-        self.period = None if period is None else _checked_period(self.s, self.squared, period)
+        self.s = _check_knots(s)
+        self.squared = _check_squares(self.s, finite("squared", as_array("squared", squared)))
+        self.period = None if period is None else _check_period(self.s, self.squared, period)
         self._acceleration = 0.5 * np.diff(self.squared) / np.diff(self.s)
 
     def theta(self, path: Path, s: Array) -> Array:
@@ -71,7 +71,7 @@ class TabulatedProfile(VelocityProfile):
         return s - self.period * np.floor((s - self.s[0]) / self.period)
 
 
-def _checked_knots(s: ArrayLike) -> Array:
+def _check_knots(s: ArrayLike) -> Array:
     knots = finite("s", as_array("s", s))
     if knots.ndim != 1 or len(knots) < 2:
         raise InputError(f"s has shape {knots.shape}, expected at least two knots, (m,)")
@@ -81,7 +81,7 @@ def _checked_knots(s: ArrayLike) -> Array:
     return readonly(knots)
 
 
-def _checked_squares(s: Array, squared: Array) -> Array:
+def _check_squares(s: Array, squared: Array) -> Array:
     if squared.shape != s.shape:
         raise InputError(f"squared has shape {squared.shape} and s {s.shape}, expected one ϑ² for each knot")
     if not (squared > 0).all():
@@ -93,7 +93,7 @@ def _checked_squares(s: Array, squared: Array) -> Array:
     return readonly(squared)
 
 
-def _checked_period(s: Array, squared: Array, period: float) -> float:
+def _check_period(s: Array, squared: Array, period: float) -> float:
     period = scalar("period", period, positive=True)
     if not np.isclose(s[-1] - s[0], period, rtol=1e-9, atol=0):
         raise InputError(f"period = {period:g}, but the knots span {s[-1] - s[0]:g}; give knots from s0 to s0 + period")

@@ -117,6 +117,7 @@ def _own_name(text: str) -> str:
 
 
 def _example_robots() -> dict[str, Any]:
+    """Return the loaders of example-robot-data."""
     try:
         from example_robot_data.robots_loader import ROBOTS
     except ImportError as error:
@@ -131,4 +132,5 @@ def _bundled_dir() -> Path:
 
 
 def _names() -> str:
+    """Enumerate the names of known robots."""
     return ", ".join(known_robots())

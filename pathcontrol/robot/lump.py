@@ -49,4 +49,5 @@ def rod(mass: float, end: Array) -> Lump:
 
 
 def _steiner(mass: float, arm: Array) -> Array:
+    """Return the term m (aᵀa I − a aᵀ) of the parallel axis theorem for an offset a."""
     return mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))

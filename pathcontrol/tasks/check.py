@@ -53,6 +53,7 @@ def check_task(task: PathTask, n: int) -> None:
 
 
 def _check_each(batch: TaskBatch, n: int) -> None:
+    """Check each different task of a batch."""
     for task, rows in batch.groups():
         try:
             check_task(task, n)
@@ -61,6 +62,7 @@ def _check_each(batch: TaskBatch, n: int) -> None:
 
 
 def _check_domain(task: PathTask, name: str) -> None:
+    """Check the domain of a task."""
     if not np.isfinite(task.s0) or not task.s_end > task.s0:
         raise TaskError(f"{name} has s0 = {task.s0} and s_end = {task.s_end}, expected a finite s0 < s_end")
     if task.period is not None and not (0 < task.period < np.inf and task.s_end == np.inf):

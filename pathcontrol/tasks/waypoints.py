@@ -43,7 +43,7 @@ class WaypointPath(SplinePath):
         tolerance: Annotated[float, Form.NOT_NEGATIVE, Unit("rad")] = 0.0,
         parametrisation: Parametrisation | Annotated[ArrayLike, Form.NUMBERS] = "centripetal",
     ) -> None:
-        self.points = readonly(_checked_points(points, closed))
+        self.points = readonly(_check_points(points, closed))
         self.tolerance = scalar("tolerance", tolerance, least=0.0)
         ring = np.concatenate([self.points, self.points[:1]]) if closed else self.points
         self.parameters = readonly(_parameters(ring, parametrisation))
@@ -62,7 +62,8 @@ class WaypointPath(SplinePath):
             )
 
 
-def _checked_points(points: ArrayLike, closed: bool) -> Array:
+def _check_points(points: ArrayLike, closed: bool) -> Array:
+    """Check the waypoints."""
     array = finite("points", as_array("points", points))
     least = 3 if closed else 2
     if array.ndim != 2 or len(array) < least:
@@ -77,6 +78,7 @@ def _checked_points(points: ArrayLike, closed: bool) -> Array:
 
 
 def _parameters(ring: Array, parametrisation: Parametrisation | ArrayLike) -> Array:
+    """Return the parameters of the points."""
     if isinstance(parametrisation, str):
         if parametrisation not in _POWER:
             choices = ", ".join(map(repr, get_args(Parametrisation)))

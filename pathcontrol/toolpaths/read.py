@@ -51,6 +51,7 @@ def read_toolpath(path: str | Path, **options: Any) -> Toolpath:
 
 
 def _reader(path: Path) -> Callable[..., Toolpath]:
+    """Return the reader of a file, by its suffix."""
     for suffixes, (module, name) in READERS.items():
         if path.suffix.lower() in suffixes:
             return getattr(import_module(f"pathcontrol.toolpaths.{module}"), name)

@@ -36,6 +36,7 @@ def contour_of(recipe: dict[str, Any], get: Get) -> Contour:
 
 
 def _segment_recipe(segment: Segment, put: Put) -> dict[str, Any]:
+    """Return the recipe of a segment."""
     if type(segment) is Arc:
         vectors = [segment.center, segment.x, segment.y, segment.rise]
         return {"arc": put(np.concatenate([*vectors, [segment.start, segment.sweep]]))}
@@ -46,6 +47,7 @@ def _segment_recipe(segment: Segment, put: Put) -> dict[str, Any]:
 
 
 def _segment_of(recipe: dict[str, Any], get: Get) -> Segment:
+    """Rebuild the segment of a recipe."""
     if "line" in recipe:
         return Polyline(get(recipe["line"]))
     if "arc" in recipe:

@@ -27,6 +27,7 @@ def summary(toolpath: Toolpath) -> dict[str, Any]:
 
 
 def _contour(contour: Contour) -> dict[str, Any]:
+    """Return the summary of a contour."""
     found = corners(contour)
     return {
         "name": contour.name,
@@ -42,5 +43,6 @@ def _contour(contour: Contour) -> dict[str, Any]:
 
 
 def _bounds(thing: Contour | Toolpath) -> list[list[float]]:
+    """Return the corners of a bounding box as lists."""
     lower, upper = thing.bounds
     return [lower.tolist(), upper.tolist()]

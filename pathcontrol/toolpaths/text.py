@@ -76,6 +76,7 @@ def read_lines(path: str | os.PathLike[str], what: str = "a toolpath") -> list[s
 
 
 def _read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
+    """Read the bytes of a regular file of bounded size."""
     try:
         file = Path(path)
     except TypeError as error:

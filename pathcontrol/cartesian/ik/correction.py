@@ -74,6 +74,7 @@ def correct(constraint: ToolConstraint, cost: PostureCost, q: Array, s: Array) -
 
 
 def _linearise(constraint: ToolConstraint, q: Array, s: Array) -> _Linear:
+    """Return the linearisation of the constraint at postures."""
     f, slope = constraint.at(q, s)
     u, values, v = np.linalg.svd(slope)
     rank = constraint.rank

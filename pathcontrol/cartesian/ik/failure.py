@@ -70,11 +70,13 @@ def place(constraint: ToolConstraint, s: float) -> str:
 
 
 def _tool(constraint: ToolConstraint) -> str:
+    """Name the tool for a message."""
     tool = constraint.tool
     return f"{'the tool in ' if tool.offset is not None else ''}{tool.frame} of {tool.robot.name}"
 
 
 def _reason(constraint: ToolConstraint, trail: Trail) -> str:
+    """Return the reason why a trail stops, with advice."""
     if trail.stop is Stop.LIMIT:
         return _limit(constraint, trail.beyond)
     return _out_of_reach(constraint, trail) or _stuck(constraint, trail)
@@ -97,6 +99,7 @@ def _limit_details(constraint: ToolConstraint, trail: Trail) -> dict[str, Any]:
 
 
 def _limit(constraint: ToolConstraint, beyond: Array) -> str:
+    """Write which joint is at which limit, with advice."""
     robot = constraint.tool.robot
     i, side, value = _passed_limit(robot, beyond)
     return (
@@ -106,6 +109,7 @@ def _limit(constraint: ToolConstraint, beyond: Array) -> str:
 
 
 def _stuck(constraint: ToolConstraint, trail: Trail) -> str:
+    """Write why no posture continues a trail: a jump, or a singularity, with advice."""
     robot, rank = constraint.tool.robot, constraint.rank
     _, slope = constraint.at(trail.q[-1][None], np.array([trail.s[-1]]))
     _, values, motions = np.linalg.svd(slope[0])

@@ -67,11 +67,12 @@ def refine(kinematics: InverseKinematics, known: Samples, closed: bool) -> Refin
             worst = worst / _VERIFIED
             if (worst <= 1).all():
                 return Refined(spline, mesh, rounds, checks, found)
-        _refuse_endless(constraint, mesh, worst)
+        _check_progress(constraint, mesh, worst)
         mesh, rounds = grade(subdivide(mesh, np.select([worst > _QUARTER, worst > 1], [4, 2], 1))), rounds + 1
 
 
 def _interpolant(known: Samples, closed: bool) -> BSpline:
+    """Return the spline through postures, periodic for a closed curve."""
     if not closed:
         return make_interp_spline(known.s, known.q, k=_DEGREE)
     ring = np.concatenate([known.q[:-1], known.q[:1]])
@@ -89,7 +90,8 @@ def _worst(
     return excess.reshape(s.shape).max(-1), s.ravel(), found
 
 
-def _refuse_endless(constraint: ToolConstraint, mesh: Array, worst: Array) -> None:
+def _check_progress(constraint: ToolConstraint, mesh: Array, worst: Array) -> None:
+    """Check that another round of refinement can help."""
     i = int(np.argmax(worst))
     if len(mesh) > _MOST_KNOTS or mesh[i + 1] - mesh[i] < _SMALLEST * constraint.curve.length:
         raise TaskError(

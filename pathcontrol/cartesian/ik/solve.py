@@ -90,11 +90,12 @@ def _choose_trail(constraint: ToolConstraint, trails: list[Trail], closed: bool)
 def _check_between(constraint: ToolConstraint, refined: Refined, report: CartesianReport) -> None:
     """Check limits and singularities between the knots, where Newton's method has not been."""
     if is_outside(constraint.tool.robot, refined.spline(report.limit_at)):
-        raise _refused_at(constraint, refined, report.limit_at, Stop.LIMIT)
+        raise _stop_error(constraint, refined, report.limit_at, Stop.LIMIT)
     if report.smallest_singular_value < SINGULAR:
-        raise _refused_at(constraint, refined, report.singular_at, Stop.SINGULAR)
+        raise _stop_error(constraint, refined, report.singular_at, Stop.SINGULAR)
 
 
-def _refused_at(constraint: ToolConstraint, refined: Refined, s: float, stop: Stop) -> Exception:
+def _stop_error(constraint: ToolConstraint, refined: Refined, s: float, stop: Stop) -> Exception:
+    """Return the error for a spline that fails at s between its knots."""
     q = refined.spline(s)
     return trail_error(constraint, Trail([s], [q], stop=stop, beyond=q))

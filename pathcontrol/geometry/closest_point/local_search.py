@@ -109,4 +109,5 @@ def _first_root(curve: Curve, x: Array, s: Array, rising: Array) -> Array:
 
 
 def _dot(a: Array, b: Array) -> Array:
+    """Return the inner products of rows."""
     return np.vecdot(a, b)

@@ -67,6 +67,7 @@ class Course(NamedTuple):
 
 
 def _ramp(curve: Callable[[Any], Curve], speed: float, highest: float) -> Ramp:
+    """Return the ramp to a speed, or to the highest that is reached."""
     met = curve(np.asarray(min(speed, highest)))
     return Ramp(met, float(met.length) if speed <= highest else np.inf)
 

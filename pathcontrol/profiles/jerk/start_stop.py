@@ -109,6 +109,7 @@ class SmoothStartStop(VelocityProfile):
 
 
 def _check_open(path: Path) -> None:
+    """Check that a path has two ends."""
     if path.period is not None or not np.isfinite(path.s_end):
         raise TaskError(
             f"{type(path).__name__} has period = {path.period} and s_end = {path.s_end}: only an open path with a "

@@ -72,6 +72,7 @@ def bounds(cells: Cells, x_next: Array) -> tuple[Bound, Bound]:
 
 
 def _active(row: Array, *values: Array) -> Bound:
+    """Return the bound of the chosen row of each cell, with its slope."""
     x, y, rise, A, B = (array[np.arange(len(row)), row] for array in values)
     bounding = np.isfinite(x) & (y > 0)
     return Bound(x, np.where(bounding, rise / (A + 0.5 * B / np.where(bounding, y, 1.0)), 0.0))

@@ -76,4 +76,5 @@ def _inside(limits: JointLimits, samples: Samples, torques: Torques, x: Array) -
 
 
 def _shares(samples: Samples) -> Array:
+    """Return the places of the samples within a cell, as shares of its width."""
     return np.arange(1, samples.k)[:, None] / samples.k

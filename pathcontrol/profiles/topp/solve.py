@@ -69,6 +69,7 @@ def fastest(demand: Demand) -> tuple[Array, Binding]:
 
 
 def _traversal(demand: Demand, allowed: Allowed) -> Array:
+    """Return ṡ² at the knots of the fastest traversal of the cells."""
     limits, samples, _, closed, start_rate, end_rate, end_time = demand
     if closed:
         return traverse_closed(allowed)

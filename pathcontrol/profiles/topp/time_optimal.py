@@ -116,6 +116,7 @@ def time_optimal(
 
 
 def _knots(path: Path, points: int) -> Array:
+    """Return the knots of the grid; the path must end or close."""
     end = path.s_end if path.period is None else path.s0 + path.period
     if not np.isfinite(end):
         raise TaskError(f"{type(path).__name__} neither ends nor closes, so ϑ cannot be tabulated; give it an s_end")
@@ -123,6 +124,7 @@ def _knots(path: Path, points: int) -> Array:
 
 
 def _ends(path: Path, **ends: float | None) -> list[float | None]:
+    """Check the rates and the time asked for at the ends of a path."""
     given = {name: scalar(name, value, positive=True) for name, value in ends.items() if value is not None}
     if given and path.period is not None:
         raise InputError(f"{' and '.join(given)} for a closed path, which begins as fast as it ends; leave them out")

@@ -148,6 +148,7 @@ def _match_any_case(folder: Path, relative: PurePosixPath) -> list[Path]:
 
 
 def _entries(folder: Path) -> list[Path]:
+    """Return the entries of a folder, at most so many."""
     try:
         return sorted(islice(folder.iterdir(), _MOST_ENTRIES))
     except OSError:

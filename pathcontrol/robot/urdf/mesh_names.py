@@ -63,6 +63,7 @@ def expand_home(name: str) -> Path:
 
 
 def _scheme(name: str) -> str:
+    """Return the scheme of a mesh name, empty for a path."""
     scheme, colon, rest = name.partition(":")
     scheme = scheme.lower()
     if not colon or len(scheme) == 1 or not scheme.isalpha():  # C:\arm.stl is a path

@@ -142,4 +142,5 @@ def _sort_outwards(joints: Sequence[Joint]) -> tuple[Joint, ...]:
 
 
 def _pose(element: Joint | Inertial) -> np.ndarray:
+    """Return the pose of an element in its parent, (4, 4)."""
     return np.eye(4) if element.origin is None else element.origin

@@ -64,6 +64,7 @@ def check_numbers(root: etree._Element) -> Iterator[Finding]:
 
 
 def _check_number(where: str, what: str, text: str, length: int) -> Iterator[Finding]:
+    """Check the numbers of one attribute."""
     values = read_numbers(text, length)
     if values is None:
         expected = "a finite number" if length == 1 else f"{length} finite numbers with spaces between"
@@ -75,4 +76,5 @@ def _check_number(where: str, what: str, text: str, length: int) -> Iterator[Fin
 
 
 def _is_number(word: str) -> bool:
+    """Return whether a word is a number as urdfdom reads it, of bounded length."""
     return len(word) <= MAX_DIGITS and _NUMBER.fullmatch(word) is not None

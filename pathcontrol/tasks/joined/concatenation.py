@@ -183,6 +183,7 @@ def _rescale(point: PathPoint, rate: float) -> PathPoint:
 
 
 def _check_paths(paths: Sequence[PathTask]) -> list[PathTask]:
+    """Check that there are two or more open paths for the same joints."""
     checked = list(paths)
     if len(checked) < 2:
         raise InputError(f"{len(checked)} paths are given, expected two or more")

@@ -80,6 +80,7 @@ def _tree(text: str) -> ast.expr:
 
 
 def _expression(node: ast.expr, names: Mapping[str, Any], depth: int) -> Any:
+    """Convert a node of the syntax tree to a sympy expression."""
     if depth == 0:
         raise _FormulaError(f"it is nested deeper than {_DEEPEST} levels")
     match node:
@@ -161,6 +162,7 @@ def _refuse_high(exponent: Any) -> None:
 
 
 def _call(name: str, arguments: list[Any]) -> Any:
+    """Apply a function to its arguments."""
     import sympy
 
     needed = 2 if name == "atan2" else 1

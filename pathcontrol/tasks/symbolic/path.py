@@ -64,7 +64,7 @@ class SymbolicPath(PathTask):
         self.speed = None if speed is None else scalar("speed", speed, positive=True)
         self.parameters = {str(key): scalar(f"parameters[{str(key)!r}]", v) for key, v in (parameters or {}).items()}
         self._s = _symbol(s, self.parameters)
-        given = {f"q_d[{i}]": formula for i, formula in enumerate(_listed(q_d))}
+        given = {f"q_d[{i}]": formula for i, formula in enumerate(_check_formulas(q_d))}
         if theta is not None:
             given["theta"] = theta
         self.formulas = {label: self._read(label, formula, values=False) for label, formula in given.items()}
@@ -175,7 +175,8 @@ def _symbol(s: Any, parameters: Mapping[str, float]) -> sympy.Symbol:
     return sympy.Symbol(str(s), real=True)
 
 
-def _listed(q_d: Iterable[Formula]) -> list[Formula]:
+def _check_formulas(q_d: Iterable[Formula]) -> list[Formula]:
+    """Check that there is a list of formulas, one for each joint."""
     if isinstance(q_d, str) or not isinstance(q_d, Iterable):
         raise InputError(f"q_d = {q_d!r}, expected a list with one expression for each joint")
     formulas = list(q_d)

@@ -143,6 +143,7 @@ def _is_short(strands: Sequence[Strand], end: int, other: int, apart: float) -> 
 
 
 def _chains(strands: Sequence[Strand], tolerance: float) -> list[Strand]:
+    """Chain the strands whose ends are within a tolerance."""
     meets = _meets(np.array([end for strand in strands for end in strand.ends]), tolerance)
     taken, chains = np.zeros(len(strands), dtype=bool), []
     for first in range(len(strands)):
@@ -216,6 +217,7 @@ def _size(strands: Sequence[Strand]) -> float:
 
 
 def _frame(segment: Segment) -> Array:
+    """Return points whose bounding box holds the segment."""
     if isinstance(segment, Arc):
         return np.stack(segment.bounds)
     assert isinstance(segment, Polyline | Bezier)

@@ -192,11 +192,13 @@ def _merge(segments: Sequence[Segment]) -> list[Segment]:
 
 
 def _map(points: Array, matrix: Array) -> Array:
+    """Apply an affine map to points."""
     with np.errstate(over="ignore", invalid="ignore"):  # segments() refuses values that are not finite
         return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _near(values: Array, most: float = MAX_COORDINATE, what: str = "a coordinate of") -> Array:
+    """Check that values are finite and bounded."""
     largest = np.abs(values).max()
     if not largest <= most:
         raise ToolpathError(

@@ -118,6 +118,7 @@ def _places(insert: Any, base: Array) -> Iterator[Array]:
 
 
 def _affine(linear: Array, shift: Array) -> Array:
+    """Return the affine map with a linear part and a shift, (4, 4)."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = linear, shift
     return matrix

@@ -28,15 +28,18 @@ def pieces(entity: Any) -> list[Piece] | None:
 
 
 def _line(entity: Any) -> list[Piece]:
+    """Return the pieces of a LINE."""
     check_given(entity, "start", "end")
     return [Lines(np.stack([vector(entity, "start"), vector(entity, "end")]))]
 
 
 def _circle(entity: Any) -> list[Piece]:
+    """Return the pieces of a CIRCLE."""
     return [_arc_between(entity, 0.0, 360.0)]
 
 
 def _arc(entity: Any) -> list[Piece]:
+    """Return the pieces of an ARC."""
     check_given(entity, "start_angle", "end_angle")
     return [_arc_between(entity, number(entity, "start_angle"), number(entity, "end_angle"))]
 
@@ -54,6 +57,7 @@ def _arc_between(entity: Any, start: float, end: float) -> EllipticArc:
 
 
 def _ellipse(entity: Any) -> list[Piece]:
+    """Return the pieces of an ELLIPSE."""
     check_given(entity, "center", "major_axis", "ratio")
     major, ratio = vector(entity, "major_axis"), number(entity, "ratio")
     minor = ratio * np.cross(object_axes(entity)[:, 2], major)
@@ -62,6 +66,7 @@ def _ellipse(entity: Any) -> list[Piece]:
 
 
 def _spline(entity: Any) -> list[Piece]:
+    """Return the pieces of a SPLINE."""
     closed = bool(entity.dxf.get("flags", 0) & _CLOSED)
     control, fit = (_points(v) for v in (entity.control_points, entity.fit_points))
     if len(control):

@@ -55,6 +55,7 @@ def _convert(entity: Any, points: Array, elevation: float, bulges: Array, closed
 
 
 def _bulge(start: complex, end: complex, bulge: float) -> Piece:
+    """Return the arc between two vertices with a bulge."""
     middle, half = (start + end) / 2, (end - start) / 2
     if abs(bulge) < _SHALLOW:  # a rational parabola between the ends and where their tangents meet
         pole = middle - 2j * half * bulge / (1 - bulge**2)

@@ -73,6 +73,7 @@ def _bernstein(powers: Array) -> Array:
 
 
 def _check(degree: int, knots: Array, points: Array, weights: Array | None) -> None:
+    """Check the data of a B-spline."""
     if not 1 <= degree <= _HIGHEST_DEGREE:
         raise ToolpathError(f"it has degree {degree}, expected 1 to {_HIGHEST_DEGREE}")
     if len(points) <= degree or len(knots) != len(points) + degree + 1:

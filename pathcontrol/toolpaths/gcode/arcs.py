@@ -93,6 +93,7 @@ def _sweep(first: Sequence[float], last: Sequence[float], center: Sequence[float
 def _by_offsets(
     first: Sequence[float], last: Sequence[float], words: Mapping[str, float], modes: Modes, clockwise: bool
 ) -> tuple[float, float]:
+    """Return the centre of an arc given by I J K."""
     letters = ["IJK"[axis] for axis in PLANES[modes.plane][:2]]
     given = [letter for letter in letters if letter in words]
     if not given or (modes.absolute_centers and len(given) < 2):
@@ -156,6 +157,7 @@ def _rounded_up(length: float) -> str:
 def _by_radius(
     first: Sequence[float], last: Sequence[float], words: Mapping[str, float], modes: Modes, clockwise: bool
 ) -> tuple[float, float]:
+    """Return the centre of an arc given by R."""
     if not words.keys().isdisjoint("IJK"):
         raise ToolpathError("an arc with R and with I, J or K, expected one of the two")
     unit = modes.known_unit("the arc")

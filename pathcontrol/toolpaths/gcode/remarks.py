@@ -36,6 +36,7 @@ def without_remarks(text: str, line: int, passed: Passed) -> str:
 
 
 def _without_brackets(text: str, line: int, passed: Passed) -> str:
+    """Return the line without a text in brackets."""
     if not text.endswith("]"):
         return text
     passed.unless_refused("a text in [ ]", line, f"{text[:40]!r} is no comment: {_COMMENT}")
@@ -43,6 +44,7 @@ def _without_brackets(text: str, line: int, passed: Passed) -> str:
 
 
 def _without_slashes(text: str, line: int, passed: Passed) -> str:
+    """Return the line without a remark after //."""
     before, _, after = text.partition("//")
     if after.strip() and are_words(after):
         raise ToolpathError(
@@ -54,6 +56,7 @@ def _without_slashes(text: str, line: int, passed: Passed) -> str:
 
 
 def _without_checksum(text: str, line: int, passed: Passed) -> str:
+    """Return the line without its checksum."""
     found = _CHECKSUM.search(text)
     if found is None:
         return text

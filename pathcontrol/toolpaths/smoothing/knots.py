@@ -60,6 +60,7 @@ def _stretch(segment: Segment, before: float, after: float, tolerance: float) ->
 
 
 def _junction(before: Segment, after: Segment, tolerance: float) -> Junction:
+    """Return the blend between two segments."""
     longest = min(_room(before, -1), _room(after, 0))
     return Junction.of(_arm(before, -1), _arm(after, 1), longest, tolerance)
 

@@ -163,4 +163,5 @@ def _cos_sin(degrees: float) -> tuple[float, float]:
 
 
 def _plane(a: float, b: float, c: float, d: float, e: float, f: float) -> Array:
+    """Return the affine map (4, 4) of matrix(a, b, c, d, e, f)."""
     return np.array([[a, c, 0, e], [b, d, 0, f], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=np.float64)

@@ -161,6 +161,7 @@ def _convex(pieces: Sequence[Piece], matrix: Array) -> Iterator[Array]:
 
 
 def _outline(piece: Piece) -> Array:
+    """Return points on a piece."""
     u = np.linspace(0.0, 1.0, _SAMPLES)
     if isinstance(piece, Lines):
         return piece.points
@@ -192,4 +193,5 @@ def _reach(segment: Segment, outward: Array, most: Array) -> Array:
 
 
 def _cross(a: Array, b: Array) -> Array:
+    """Return the cross product of vectors in the plane."""
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

@@ -61,6 +61,7 @@ class _Lengths:
 
 
 def _poly(values: list[float], closed: bool) -> list[Subpath]:
+    """Return the subpath of a polyline or polygon."""
     if len(values) % 2:
         raise ToolpathError(f"points has {len(values)} numbers, expected x and y of each point")
     pen = Pen()
@@ -72,6 +73,7 @@ def _poly(values: list[float], closed: bool) -> list[Subpath]:
 
 
 def _line(length: _Lengths) -> list[Subpath]:
+    """Return the subpath of a line."""
     pen = Pen()
     pen.move(complex(length("x1"), length("y1")))
     pen.line(complex(length("x2"), length("y2")))
@@ -79,6 +81,7 @@ def _line(length: _Lengths) -> list[Subpath]:
 
 
 def _rect(length: _Lengths) -> list[Subpath]:
+    """Return the subpath of a rectangle."""
     width, height = length.size("width") or 0.0, length.size("height") or 0.0
     if width == 0 or height == 0:
         return []
@@ -102,6 +105,7 @@ def _rect(length: _Lengths) -> list[Subpath]:
 
 
 def _round(tag: str, length: _Lengths) -> list[Subpath]:
+    """Return the subpath of a circle or ellipse."""
     names = ("r", "r") if tag == "circle" else ("rx", "ry")
     first, second = (length.size(name) for name in names)
     rx, ry = (second if first is None else first) or 0.0, (first if second is None else second) or 0.0

@@ -90,7 +90,7 @@ class StyleSheet:
     def _add(self, rules: list[Any], media: str, depth: int) -> None:
         query = media.removeprefix("@media").strip().lower()
         if depth > 4 or not _SCREEN.fullmatch(query):
-            _refuse_if_deciding(_text(rules), media)
+            _refuse_condition(_text(rules), media)
             return
         for rule in rules:
             if rule.type == "qualified-rule":
@@ -106,7 +106,7 @@ class StyleSheet:
             inside = tinycss2.parse_rule_list(rule.content, skip_comments=True, skip_whitespace=True)
             self._add(inside, head, depth + 1)
         elif rule.content is not None:
-            _refuse_if_deciding(_text(rule.content), head)
+            _refuse_condition(_text(rule.content), head)
 
     def _add_rule(self, rule: Any) -> None:
         given = _parse_rule(rule.content)
@@ -170,11 +170,13 @@ class _Element(ElementWrapper):
 
 
 def _check_steps(steps: int) -> None:
+    """Check that matching of selectors has not taken too many steps."""
     if steps > _MOST_STEPS:
         raise ToolpathError("the style sheet takes too long to match its selectors; write styles as attributes")
 
 
-def _refuse_if_deciding(text: str, head: str) -> None:
+def _refuse_condition(text: str, head: str) -> None:
+    """Refuse a conditional rule that affects the geometry."""
     if _DECIDES.search(text):
         raise ToolpathError(f"the style sheet decides with {head[:60]!r} what is drawn: write it as attributes")
 
@@ -190,6 +192,7 @@ def _text(nodes: Any) -> str:
 
 
 def _overlay(found: Declarations, more: Declarations) -> None:
+    """Add declarations to those found; of equal names the higher rank wins."""
     for name, declaration in more.items():
         if name not in found or declaration[0] >= found[name][0]:
             found[name] = declaration
@@ -216,11 +219,12 @@ def _parse_rule(content: Any) -> Declarations:
             value = _text([token for token in node.value if token.type != "comment"])
             _overlay(found, _keep(node.lower_name, value.strip(), node.important))
         elif node.type in ("qualified-rule", "at-rule") and node.content is not None:
-            _refuse_if_deciding(_text(node.content), _text(node.prelude).strip())
+            _refuse_condition(_text(node.content), _text(node.prelude).strip())
     return found
 
 
 def _keep(name: str, value: str, important: bool) -> Declarations:
+    """Return a valid inline declaration of a relevant property, else nothing."""
     if name not in _PROPERTIES or not is_valid(name, value):
         return {}
     return {name: ((important, _INLINE, 0), value)}

@@ -38,7 +38,7 @@ def nested_view(get: Attributes, outer: Viewport, size: Attributes) -> View:
     """Return the view of an inner svg or symbol element; ``size`` gives width and height, by default 100 %."""
     place = np.eye(4)
     place[:2, 3] = [outer.length(get(name) or "0", name) for name in ("x", "y")]
-    width, height = (outer.length(_size_view(size, name) or "100%", name) for name in ("width", "height"))
+    width, height = (outer.length(_explicit_size(size, name) or "100%", name) for name in ("width", "height"))
     if width < 0 or height < 0:
         raise ToolpathError(f"width = {width:g}, height = {height:g}, expected lengths not below 0")
     inner = _fit(_view_box(get), Viewport(width, height, outer.ppi), get)
@@ -48,7 +48,7 @@ def nested_view(get: Attributes, outer: Viewport, size: Attributes) -> View:
 def page_unit(get: Attributes) -> str:
     """Return the unit that the size of the page is given in."""
     for name in ("width", "height"):
-        unit = (_size_view(get, name) or "").strip().lstrip("+-.0123456789eE").strip()
+        unit = (_explicit_size(get, name) or "").strip().lstrip("+-.0123456789eE").strip()
         if unit and unit != "%":
             return unit
     return "px"
@@ -56,7 +56,7 @@ def page_unit(get: Attributes) -> str:
 
 def _page_size(get: Attributes, box: list[float] | None, ppi: float) -> tuple[float, float]:
     """Return width and height in px; missing ones follow from the viewBox, as in browsers."""
-    sizes = [_size_view(get, name) for name in ("width", "height")]
+    sizes = [_explicit_size(get, name) for name in ("width", "height")]
     sizes = [None if size is None or size.strip().endswith("%") else size for size in sizes]
     unknown = Viewport(0.0, 0.0, ppi)
     width, height = (
@@ -80,12 +80,14 @@ def _page_size(get: Attributes, box: list[float] | None, ppi: float) -> tuple[fl
     return width, height
 
 
-def _size_view(get: Attributes, name: str) -> str | None:
+def _explicit_size(get: Attributes, name: str) -> str | None:
+    """Return the text of a size, None for ``auto`` or none."""
     text = get(name)
     return None if text is None or text.strip() == "auto" else text
 
 
 def _view_box(get: Attributes) -> list[float] | None:
+    """Return the viewBox, None where there is none."""
     text = get("viewBox")
     if text is None:
         return None

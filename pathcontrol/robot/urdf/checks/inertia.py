@@ -99,6 +99,7 @@ def is_massless(arm: Arm) -> bool:
 
 
 def _is_positive_definite(arm: Arm) -> bool:
+    """Return whether the mass matrix is positive definite in all sampled postures."""
     M, _ = dynamics(arm, postures(arm))
     return bool(np.linalg.eigvalsh(M).min() > NO_INERTIA)
 

@@ -61,5 +61,6 @@ def check_repeated(root: etree._Element) -> Iterator[Finding]:
 
 
 def _missing(element: etree._Element, what: str) -> Finding:
+    """Return the finding about a missing part."""
     message = f"{what} is missing; expected it there, add it"
     return Finding("error", "part-missing", place_of(element), message)

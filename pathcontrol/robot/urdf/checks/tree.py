@@ -32,11 +32,11 @@ def check_tree(root: etree._Element) -> Iterator[Finding]:
     links = dict.fromkeys(link.get("name", "") for link in root.findall("link"))
     roots = [name for name in links if name not in parents]
     if len(roots) > 1:
-        message = f"{len(roots)} root links ({_listed(roots)}); expected one, join the others to it"
+        message = f"{len(roots)} root links ({_enumerate(roots)}); expected one, join the others to it"
         yield Finding("error", "several-roots", "robot", message)
     for name, joints in holders.items():
         if len(joints) > 1:
-            message = f"it is the child of the joints {_listed(joints)}; expected one, remove the others"
+            message = f"it is the child of the joints {_enumerate(joints)}; expected one, remove the others"
             yield Finding("error", "two-parents", place("link", name), message)
     if loop := _loop(parents):
         chain = " -> ".join(map(quote, loop))
@@ -45,6 +45,7 @@ def check_tree(root: etree._Element) -> Iterator[Finding]:
 
 
 def _end(joint: etree._Element, end: str) -> str | None:
+    """Return the name of the link at an end of a joint."""
     element = joint.find(end)
     return None if element is None else element.get("link")
 
@@ -65,6 +66,7 @@ def _loop(parents: dict[str, str]) -> list[str]:
     return []
 
 
-def _listed(names: Sequence[str], most: int = 5) -> str:
+def _enumerate(names: Sequence[str], most: int = 5) -> str:
+    """Write names, separated by commas, at most so many of them."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(map(quote, names[:most])) + more

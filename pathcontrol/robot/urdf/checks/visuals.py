@@ -79,6 +79,7 @@ def _shape_problems(holder: etree._Element) -> Iterator[str]:
 
 
 def _bad_numbers(element: etree._Element, lengths: dict[str, int]) -> Iterator[str]:
+    """Yield the attributes of an element that are not the numbers expected."""
     for name, length in lengths.items():
         text = element.get(name)
         if text and read_numbers(text, length) is None:

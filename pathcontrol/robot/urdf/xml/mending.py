@@ -130,6 +130,7 @@ def _blank(text: str) -> str:
 
 
 def _line(text: str, position: int) -> int:
+    """Return the number of the line that holds a position."""
     return text.count("\n", 0, position) + 1
 
 

@@ -89,6 +89,7 @@ def _parse(text: str, data: bytes) -> tuple[etree._Element, list[Finding]]:
 
 
 def _not_xml(error: etree.XMLSyntaxError) -> UrdfError:
+    """Return the error about malformed XML."""
     reason = str(error.msg).splitlines()[0][:_LONGEST]  # it repeats names and values of the file
     advice = _RUN_XACRO if "xacro" in reason else "correct that line"
     return UrdfError(f"line {error.lineno}: not XML: {reason}; {advice}")
@@ -109,11 +110,13 @@ def _without_stray_xacro(root: etree._Element) -> list[Finding]:
 
 
 def _is_definition(element: etree._Element) -> bool:
+    """Return whether an element defines a property or an argument of xacro."""
     name = etree.QName(element)
     return "xacro" in (name.namespace or "") and name.localname in ("property", "arg")
 
 
 def _uses_xacro(element: etree._Element) -> bool:
+    """Return whether an element has a substitution of xacro."""
     return any("${" in value for value in element.attrib.values())
 
 
