@@ -32,7 +32,7 @@ from pathcontrol.experiments.sweep_runner import run_sweep
 from pathcontrol.experiments.swept import SweptExperiment
 from pathcontrol.sweeps.chunk import Job
 from pathcontrol.sweeps.cluster import connection as cluster_module
-from pathcontrol.sweeps.cluster import dispatch as desk
+from pathcontrol.sweeps.cluster import dispatch
 
 dask = pytest.importorskip("workers").dask
 distributed = pytest.importorskip("distributed")
@@ -178,7 +178,7 @@ def test_killed_workers_lose_nothing(victims, workers, here, tmp_path):
 
 def test_a_chunk_that_kills_its_worker_is_told_and_what_is_there_stays(tmp_path, monkeypatch):
     """There is one worker more than the chunk kills, so that nobody waits for one to be started again."""
-    monkeypatch.setattr(desk, "_KILLS", 2)
+    monkeypatch.setattr(dispatch, "_KILLS", 2)
 
     def deadly(p, samples):
         if samples[0] == 6:
@@ -186,7 +186,7 @@ def test_a_chunk_that_kills_its_worker_is_told_and_what_is_there_stays(tmp_path,
             os.kill(os.getpid(), signal.SIGKILL)
         return circle(p, samples)
 
-    with distributed.LocalCluster(**QUIET, n_workers=desk._KILLS + 1, threads_per_worker=1) as many:
+    with distributed.LocalCluster(**QUIET, n_workers=dispatch._KILLS + 1, threads_per_worker=1) as many:
         many.scheduler.allowed_failures = 0  # else Dask itself would have four of them die each time
         with pytest.raises(ClusterError, match=r"samples \d+ to \d+: every worker .* died, .*; finished"):
             swept(tmp_path, build=deadly, cluster=many.scheduler_address)
@@ -248,7 +248,7 @@ def test_large_arrays_do_not_go_through_the_scheduler(address, tmp_path, monkeyp
     passed = {}
     for direct in (True, False):
         if not direct:  # as on a machine that cannot reach the workers
-            monkeypatch.setattr(desk, "_can_reach_workers", lambda client: False)
+            monkeypatch.setattr(dispatch, "_can_reach_workers", lambda client: False)
         counting = Counting(address)
         swept(tmp_path / str(direct), build=with_it, keep=pc.Keep(random=5), cluster=counting.address)
         passed[direct] = counting.bytes
@@ -259,7 +259,7 @@ def test_large_arrays_do_not_go_through_the_scheduler(address, tmp_path, monkeyp
 
 
 def test_workers_out_of_reach_are_told(address, tmp_path, here, monkeypatch):
-    monkeypatch.setattr(desk, "_PATIENCE", 0.0)
+    monkeypatch.setattr(dispatch, "_PATIENCE", 0.0)
     with pytest.warns(UserWarning, match="cannot reach all workers .* all results go through the scheduler"):
         swept(tmp_path, cluster=address)
     assert content(tmp_path) == here
@@ -507,7 +507,7 @@ def test_other_versions_are_refused_before_work_begins(address, tmp_path, monkey
 
 
 def test_a_worker_that_joins_later_with_other_versions_is_refused(address, tmp_path, monkeypatch):
-    monkeypatch.setattr(desk, "expected_versions", lambda: cluster_module.expected_versions() | {"scipy": "0.3"})
+    monkeypatch.setattr(dispatch, "expected_versions", lambda: cluster_module.expected_versions() | {"scipy": "0.3"})
     with pytest.raises(ClusterError, match=r"tcp://.* has joined with other versions: scipy .* \(here 0.3\); finished"):
         swept(tmp_path / "out", cluster=address)
 

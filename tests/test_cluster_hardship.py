@@ -22,7 +22,7 @@ from scipy import stats
 import pathcontrol as pc
 from pathcontrol.cli import main
 from pathcontrol.errors import InputError
-from pathcontrol.sweeps.cluster import dispatch as desk
+from pathcontrol.sweeps.cluster import dispatch
 
 distributed = pytest.importorskip("workers").distributed
 pytest.importorskip("pyarrow")
@@ -63,9 +63,9 @@ def when_chunks_are_there(folder, count, action):
 
 
 def test_others_take_over_from_a_frozen_worker(here, tmp_path, monkeypatch):
-    monkeypatch.setattr(desk, "_SILENCE", 3.0)
-    monkeypatch.setattr(desk, "_LOOK", 0.5)
-    monkeypatch.setattr(desk, "_RESTART", 15.0)  # what computes chunks may go to the frozen one
+    monkeypatch.setattr(dispatch, "_SILENCE", 3.0)
+    monkeypatch.setattr(dispatch, "_LOOK", 0.5)
+    monkeypatch.setattr(dispatch, "_RESTART", 15.0)  # what computes chunks may go to the frozen one
     with distributed.LocalCluster(**QUIET) as cluster:
         frozen = pids(cluster)[0]
         when_chunks_are_there(tmp_path / "out", 2, lambda: os.kill(frozen, signal.SIGSTOP))

@@ -143,7 +143,7 @@ def toolpath_metrics(
     }
     values = {f"{name}_peak": counted.reduce(_largest, v * cutting) for name, v in signals.items()}
     values |= {f"{name}_rms": counted.reduce(_rms, v * cutting) for name, v in signals.items()}
-    if "path_finish_time" in run:  # not of a part of a run
+    if "path_finish_time" in run:  # a part of a run has none
         values |= _measure_drawing(run, task, arm, tolerance)
     values |= _measure_tool(run, task, arm, counted, cutting)
     values["smoothing_deviation"] = np.full(run.rollouts, task.deviation)

@@ -65,7 +65,7 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     e_p, e_v = run.array("e_p"), run.array("e_v")
     if isinstance(controller, ExtendedMotionPlan):
         s, K_p, K_v = run.array("s").T, _add_time_axis(controller.K_p), _add_time_axis(controller.K_v)
-        # where a rollout has diverged its errors are NaN, whatever the path does; laws want the rollouts last in s
+        # the errors of a diverged rollout are NaN, so that any s will do there; laws take the rollouts last in s
         tangent = controller.point(np.where(np.isfinite(s), s, controller.task.s0)).dq_d.swapaxes(0, 1)
         k = np.broadcast_to(controller.plan_gain(s), s.shape).T
         return _extended(K_p, K_v, k, e_p, e_v, tangent)

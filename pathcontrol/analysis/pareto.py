@@ -50,7 +50,7 @@ def _filter_blocks(points: Array) -> NDArray[np.bool_]:
         within = np.all(block[:, None] >= block, axis=-1)
         np.fill_diagonal(within, False)
         best = ~np.any(within, axis=1)
-        found[left[:_BLOCK][best]] = True  # what could dominate one of them comes before it
+        found[left[:_BLOCK][best]] = True  # a point that dominates another comes before it
         left = left[_BLOCK:]
         left = left[~_find_dominated(points[left], block[best])]
     return found

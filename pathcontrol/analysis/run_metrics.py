@@ -190,7 +190,7 @@ def metrics(
     values: dict[str, Array] = {}
     for part, own, rows in split_by_task(run, resolve_task(run, task)):
         counted = samples_of(part, window, fraction)
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers from a file, which may be huge
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # numbers from a file may be huge
             found = _metrics(part, own, counted, band, only)
         for name, value in found.items():
             values.setdefault(name, np.full(run.rollouts, np.nan))[rows] = value

@@ -57,5 +57,5 @@ def _select_locked(text: str, lock: tuple[str, ...], keep: tuple[str, ...], tip:
     try:
         root = parse_urdf(text)
     except UrdfError:
-        return ()  # which the report says
+        return ()  # the report says why
     return tuple(locked_angles(root, dict.fromkeys(lock, 0.0), keep, tip))

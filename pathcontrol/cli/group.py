@@ -79,7 +79,7 @@ def _split_items(value: str) -> list[str]:
     """Return the words of a value written as in Python, without the quotes around a single text."""
     try:
         literal = ast.literal_eval(value) if value[:1] in ("(", "[") else value
-    except (ValueError, SyntaxError):  # as it is: (x, y, z)
+    except (ValueError, SyntaxError):  # not Python: (x, y, z)
         return [word.strip() for word in value.strip("()[]").split(",")]
     return [shlex.quote(str(item)) for item in literal] if isinstance(literal, list | tuple) else [value]
 
@@ -96,7 +96,7 @@ def warnings_in_one_line(command: Callable[[], click.Command | None] = lambda: N
 
     def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
         if issubclass(category, PathControlWarning) and str(message) in told:
-            return  # from another place
+            return  # of another origin
         if issubclass(category, PathControlWarning):
             told.add(str(message))
             click.echo(f"warning: {printable(in_options(str(message), command()))}", err=True)

@@ -38,7 +38,7 @@ def command(
 
     out = Path("results") / file.stem if out is None else out
     done = run_experiment(file, out, engine=engine)
-    if opened and "html" not in done.written:  # not asked for by the file, but now
+    if opened and "html" not in done.written:  # requested by the option, not by the file
         done.written["html"] = _animation(done, out)
     _tell(done, as_json)
     if opened:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathcontrol.simulation.run import Run
     from pathcontrol.sweeps.result import SweepResult
 
-_DEFAULT = "run.nc"  # as experiments call it unless told
+_DEFAULT = "run.nc"  # the default name of experiments
 
 runs_argument = click.argument(
     "runs", nargs=-1, required=True, type=click.Path(exists=False, path_type=Path), metavar="RUN..."

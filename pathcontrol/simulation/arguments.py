@@ -190,7 +190,7 @@ def check_law(controller: Controller, q: Array, qd: Array, z: Array) -> None:
                 f"{shape}; gains that differ between rollouts need one row for each, and as many initial states or one"
             )
         sound = np.isfinite(np.reshape(value, (len(q), -1))).all(-1)
-        if not sound.any():  # where some are no numbers, those rollouts diverge
+        if not sound.any():  # if only some are not finite, those rollouts diverge
             raise InputError(f"{name}.law gives {field} = {np.asarray(value).tolist()} at the start, expected numbers")
 
 

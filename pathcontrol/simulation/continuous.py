@@ -145,7 +145,7 @@ class _Solution:
 
     def at(self, time: Array, update: Callable[[float], None]) -> Iterator[Array]:
         """Yield states (N, 2n + m) at each of ``time``; integrate no further than they are requested."""
-        from scipy.integrate import LSODA  # which sampled loops do without
+        from scipy.integrate import LSODA  # sampled loops do not need it
 
         t, y, given = 0.0, self._start, 1
         yield self._start

@@ -20,7 +20,7 @@ from pathcontrol.simulation.loops import SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
 from pathcontrol.sweeps.histories import Keep
-from pathcontrol.sweeps.too_fast import too_fast
+from pathcontrol.sweeps.step_warnings import find_step_warnings
 
 Arguments = Mapping[str, Any]
 Parts = Sequence[tuple[NDArray[np.intp], Arguments]]
@@ -111,7 +111,7 @@ def _compute(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int6
         parts = [(np.arange(len(samples)), built)] if isinstance(built, Mapping) else built
         for rows, arguments in parts:
             run = _simulate(job.engine, samples[rows], arguments)
-            told += too_fast(arguments, samples[rows])
+            told += find_step_warnings(arguments, samples[rows])
             values = _measure(run, job.measure)
             _put(measured, values, rows, len(samples))
             for row in _candidates(values, samples[rows], job.keep, job.at_random):

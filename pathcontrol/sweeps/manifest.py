@@ -204,7 +204,7 @@ def _read_log(path: Path) -> tuple[list[dict[str, str | None]], str]:
     for number, line in enumerate(text.split(b"\n")[:-1], 1):
         try:
             content = json.loads(line)
-            if wrong := next(_wrong_line(content), None):
+            if wrong := next(_find_line_faults(content), None):
                 raise ValueError(wrong)
             noted.append(content["files"])
         except (ValueError, RecursionError) as error:
@@ -213,8 +213,8 @@ def _read_log(path: Path) -> tuple[list[dict[str, str | None]], str]:
     return noted, "; ".join(broken[:_TOLD]) + more
 
 
-def _wrong_line(content: Any) -> Iterator[str]:
-    """What a line of the log says that none would."""
+def _find_line_faults(content: Any) -> Iterator[str]:
+    """Yield what is wrong with a line of the log."""
     if not isinstance(content, dict) or content.keys() != {"files", "sha256"}:
         yield "expected files and their checksum"
         return

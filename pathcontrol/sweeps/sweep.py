@@ -25,8 +25,8 @@ from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.manifest import MANIFEST
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.sweeps.space import Space, check_seed, digest
+from pathcontrol.sweeps.step_warnings import WarningFilter
 from pathcontrol.sweeps.store import Store, load_parquet
-from pathcontrol.sweeps.too_fast import Teller
 
 if TYPE_CHECKING:
     from distributed import Client, Security
@@ -98,7 +98,7 @@ def sweep(
         definition |= {"engine": engine}
         with open_store(Path(out), space.samples, definition, resume) as store:
             store.tidy(keep, job.at_random)
-            missing, done, tell = store.missing(chunk), 0, Teller()
+            missing, done, tell = store.missing(chunk), 0, WarningFilter()
             pieces = (({name: values[samples] for name, values in design.items()}, samples) for samples in missing)
             with closing(computed(pieces)) as chunks, progress_bar("sweep", sum(map(len, missing)), progress) as update:
                 for finished in chunks:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pathcontrol.tasks.task import PathTask
 
 _MOVES = 1e-9  # m or rad of a frame or a joint; less is rounding
-_SAMPLES = 64  # of the path
+_SAMPLES = 64  # samples of the path
 
 
 def default_tool(robot: RobotModel, task: PathTask | None = None) -> str:

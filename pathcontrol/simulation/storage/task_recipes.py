@@ -29,7 +29,7 @@ from pathcontrol.tasks.task import PathSection, PathTask, Reprofiled
 if TYPE_CHECKING:
     from pathcontrol.cartesian.toolpath_task import ToolpathTask
 
-#: where the classes are that no experiment file names, but that are made again from their arguments too
+#: modules of classes that no experiment file names, but that saved runs make again from their arguments
 _PLACES = {
     "TabulatedProfile": "profiles.tabulated:TabulatedProfile",
     "Reprofiled": "tasks.task:Reprofiled",

@@ -106,7 +106,7 @@ def _open_client(address: Any, security: Security | None) -> Client:
         if isinstance(address, str):  # a client that cannot connect takes long, or waits forever for what says nothing
             _check_scheduler(address, security)
         return Client(address, timeout=_PATIENCE, set_as_default=False, security=security)
-    except Exception as error:  # what answers may be anything
+    except Exception as error:  # any kind of process may answer
         raise ClusterError(
             f"cluster = {address!r}: no Dask scheduler answers ({str(error) or 'it says nothing'}); start one with "
             "`dask scheduler`, and give its address, as tcp://host:8786, or its scheduler file"
@@ -130,7 +130,7 @@ def _check_scheduler(address: str, security: Security | None) -> None:
             return (await asyncio.wait_for(there.identity(), _PATIENCE))["type"]
 
     socket.create_connection(parse_host_port(parse_address(address)[1]), timeout=_PATIENCE).close()  # refused at once
-    with ThreadPoolExecutor(1) as thread:  # as this one may be in a loop of its own, such as that of a notebook
+    with ThreadPoolExecutor(1) as thread:  # the present thread may have a loop, as in a notebook
         kind = thread.submit(lambda: asyncio.run(ask_kind())).result()
     if kind != "Scheduler":
         raise OSError(f"it is a {kind}")
@@ -200,7 +200,7 @@ def within(seconds: float, ask: Callable[[], Any], there: Callable[[], bool] = l
         try:
             answer.set_result(ask())
         except BaseException as error:
-            own = error.__traceback__  # of this frame, which would keep the answer, and what is asked, alive
+            own = error.__traceback__  # this frame's, which would keep the answer alive
             answer.set_exception(error.with_traceback(None if own is None else own.tb_next))
 
     threading.Thread(target=work, daemon=True).start()

@@ -175,7 +175,7 @@ class Dispatcher:
         scheduler: Any = self._client.scheduler
         try:
             within(_PATIENCE, lambda: self._client.sync(scheduler.identity))
-        except Exception as error:  # of any kind, as the connection is closed
+        except Exception as error:  # the error may be of any kind, since the connection is closed
             raise ClusterError(f"the cluster is lost: {error}; {_KEPT}") from error
 
     def _collect(self, future: Future | None) -> Chunk | None:

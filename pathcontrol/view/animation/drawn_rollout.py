@@ -16,7 +16,7 @@ from pathcontrol.view.animation.scene.desired_path import Line, desired_lines
 
 LINE_WIDTH = 0.002  # radius of the line the tool has drawn, of the diagonal of what is seen of its arm …
 FINE_LINE_WIDTH = 0.012  # … or of that of the line, if that is less: a small drawing stays legible
-THINNEST = 0.0003  # of the diagonal of what is seen
+THINNEST = 0.0003  # share of the diagonal of the visible region
 _SAMPLES = 5000
 
 

@@ -23,7 +23,7 @@ from pathcontrol.view.tool import with_tool
 if TYPE_CHECKING:
     from pathcontrol.robot.arm_dynamics import UrdfSource
 
-FINENESS = 1.5e-4  # of the arm's reach: where a picture shows it whole, a small part of a pixel
+FINENESS = 1.5e-4  # share of the arm's reach, a small part of a pixel where the picture shows all of it
 
 
 def make_recordings(
@@ -55,7 +55,7 @@ def make_recordings(
         path = part.task if task is None else select_rows(task, np.array([rollout]))
         if arm.source not in looks:
             looks[arm.source] = link_visuals(arm.source, FINENESS) or stick_figure(arm.source)
-        path = path if "s" in one else None  # where on it the arm should be is not known
+        path = path if "s" in one else None  # the desired position on it is unknown
         arm, frame = with_tool(arm, path, tool)
         part, visuals = _cut_at_divergence(part), looks[arm.source]
         recordings.append(Recording(str(name), part, arm, path, frame, visuals, run_color(i), one.rollouts))

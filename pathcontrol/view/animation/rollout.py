@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pathcontrol.tasks.task import PathTask
 
 _ABSURD = 1e6  # rad, or m: beyond any arm
-_PROBES = 1001  # of a path
+_PROBES = 1001  # samples of a path
 _AT_ONCE = 20_000  # samples, so that memory for long runs is not needed twice
 
 

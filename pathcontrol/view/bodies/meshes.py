@@ -14,7 +14,7 @@ from pathcontrol.robot.meshes import Part, load_parts
 from pathcontrol.view.bodies.shapes import Color, Mesh
 from pathcontrol.view.bodies.thinning import clustered, rounded, thinned
 
-MOST_TRIANGLES = 100_000  # of one colour: a picture shows no more
+MOST_TRIANGLES = 100_000  # limit for one colour: a picture shows no more
 _FARTHEST = 1e6  # m
 SHARP = np.deg2rad(40.0)  # faces that meet at more than this show an edge
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from pathcontrol.view.bodies.shapes import Mesh
 
-_ROUNDING = 1 / 16  # of the detail: far below a pixel, and numbers with fewer digits are packed into less room
+_ROUNDING = 1 / 16  # share of the detail, far below a pixel; numbers with fewer digits compress better
 
 
 def clustered(mesh: Mesh, most: int) -> Mesh:

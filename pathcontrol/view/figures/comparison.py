@@ -28,7 +28,7 @@ from pathcontrol.view.figures.words import legend, plain
 _COLUMN = 1.75  # in, of a run where there are many
 _HEIGHT = 1.1  # in, of a row over time
 _PLANE = (1.0, 3.0)  # in, least and largest height of the row with the paths
-_BEGINNING, _DWARFED = 0.1, 0.5  # of the time, and of the range
+_BEGINNING, _DWARFED = 0.1, 0.5  # shares of the time, and of the range
 
 
 class _Row(NamedTuple):

@@ -20,7 +20,7 @@ from pathcontrol.view.figures.style import COLUMN, INK, PEAK_LOOK, SMALL, apply_
 from pathcontrol.view.figures.words import legend
 
 _MOST_PEAKS = 3
-_BANDS = ((0.0, 1.0, 0.15), (0.05, 0.95, 0.3))  # from quantile to quantile, and how opaque
+_BANDS = ((0.0, 1.0, 0.15), (0.05, 0.95, 0.3))  # lower and upper quantile, and opacity
 
 
 def error_figure(run: Runs, rollout: int = 0) -> Figure:

@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.view.figures.limits import extent, over_time
 from pathcontrol.view.figures.style import apply_style
 
-_UPPER, _LOWER = (0.42, 0.40, 0.58, 0.46), (0.42, 0.14, 0.58, 0.46)  # of a panel
+_UPPER, _LOWER = (0.42, 0.40, 0.58, 0.46), (0.42, 0.14, 0.58, 0.46)  # places, as shares of a panel
 _THIN = 0.3  # part of the panel's height that lines fill which an inset neither hides nor is too large for
 _FROM = 0.3  # part of the time from which on an inset, with its numbers, lies over the panel
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from pathcontrol._arrays import Array
 
 _MARGIN = 0.05
-_STILL = 1e-4  # of a value: motion that is not looked at
+_STILL = 1e-4  # share of a value; smaller motion is not shown
 _FLATTEST = 0.45  # height of an equal plane over its width, and the other way round
 
 

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
 
-_COLUMNS = 3000  # of a page, more than 300 dpi on both of its columns
+_COLUMNS = 3000  # columns across a page: more than 300 dpi over both text columns
 _CELLS = 4000  # along a side of a plane
 _SHORT = 4 * _COLUMNS
 _LARGEST = 1e100  # more than that is not drawn: squares must not overflow

@@ -14,7 +14,7 @@ from pathcontrol.view.figures.pareto import pareto_figure
 from pathcontrol.view.figures.sweep import basin_figure, robustness_figure
 
 _MOST = 6  # parameters with a figure each
-_COSTS = ("tau_noise", "tau_demand_ratio", "tau_demand_peak", "tau_peak")  # what small errors are paid with
+_COSTS = ("tau_noise", "tau_demand_ratio", "tau_demand_peak", "tau_peak")  # the price of small errors
 
 
 def overview(table: xr.Dataset, metrics: Sequence[str], first: str) -> Iterator[tuple[str, Figure]]:

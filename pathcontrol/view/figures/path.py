@@ -19,7 +19,7 @@ from pathcontrol.view.figures.style import COLUMN, DESIRED_LOOK, INK, PAGE, STAR
 from pathcontrol.view.figures.words import joint_label, legend
 
 _DESIRED, _START = "desired path", "start"
-_STILL = 0.01  # of the largest travel: joints that move by less do not take part
+_STILL = 0.01  # share of the largest travel below which a joint is left out
 
 
 def path_figure(

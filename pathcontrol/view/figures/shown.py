@@ -25,7 +25,7 @@ from pathcontrol.view.figures.words import plain
 Runs = Run | Mapping[str, Run]
 
 _DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (5, 1, 1.5, 1)))
-_SAMPLES = 2881  # of a path, at least
+_SAMPLES = 2881  # samples of a path, at least
 _MOST_KNOTS = 100_000
 
 

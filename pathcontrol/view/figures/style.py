@@ -26,12 +26,12 @@ from pathcontrol.view.figures.ticks import SpacedLocator, label_plainly
 BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 #: of the first run, the second, …
 RUN_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY)
-#: what is desired, and what else a run is held against: limits, peaks, ϑ
+#: the look of references of a run: the desired path, limits, peaks, ϑ
 GREY, INK = "#9A9A9A", "#2B2B2B"
 VECTORS = 5000  # points from which they are an image inside an SVG
 DASHED = (0, (4, 2))
 
-#: how what is not a run looks
+#: the look of everything that is not a run
 Look = dict[str, Any]
 DESIRED_LOOK: Look = {"color": GREY, "linewidth": 2.4, "zorder": 1.9}
 START_LOOK: Look = {"marker": "o", "markerfacecolor": "white", "markersize": 4.5, "zorder": 3}

@@ -39,7 +39,7 @@ from pathcontrol.view.figures.words import legend
 _LOST: Look = {"marker": "x", "color": INK, "linestyle": "none", "markersize": 3.5}
 _NEVER: Look = {"marker": "s", "color": GREY, "linestyle": "none", "mew": 0}
 _DIVERGED = "diverged"
-_BINS = 20  # of samples of a distribution, with as many samples each
+_BINS = 20  # bins of a distribution, with equally many samples
 
 
 def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = "contour_error_peak") -> Figure:

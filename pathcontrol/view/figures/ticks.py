@@ -11,8 +11,8 @@ from matplotlib.ticker import AutoLocator, LogFormatterSciNotation, ScalarFormat
 
 _DIGIT = 0.64  # width of a digit in the default font, of its size
 _GAP = 1.2  # digits between numbers
-_MATHEMATICS = (r"$\mathdefault{", "}$")  # what Matplotlib puts around numbers
-_PLAIN = (1e-3, 1e4)  # from and to which numbers along a logarithmic axis are not powers of ten
+_MATHEMATICS = (r"$\mathdefault{", "}$")  # the marks that Matplotlib puts around numbers
+_PLAIN = (1e-3, 1e4)  # range in which numbers along a logarithmic axis are written out
 
 
 class SpacedLocator(AutoLocator):
@@ -72,7 +72,7 @@ def label_plainly(axis: Axis) -> None:
 
 
 def _figures(ticks: np.ndarray, step: float) -> int:
-    """Characters of the longest of the numbers; those far from one share a power of ten."""
+    """Return the length of the longest number; those far from one share a power of ten."""
     largest = float(np.abs(ticks).max())
     if not 1e-4 <= largest < 1e5:
         ticks, step = ticks / largest, step / largest

@@ -18,7 +18,7 @@ from pathcontrol.view.figures.shown import Runs, Shown, check_joints, own_robot,
 from pathcontrol.view.figures.style import COLUMN, LIMIT_LOOK, PAGE, SMALL, apply_style, new_figure, style
 from pathcontrol.view.figures.words import joint_label, legend
 
-_BEYOND = "#ECECEC"  # what lies beyond a limit
+_BEYOND = "#ECECEC"  # the region beyond a limit
 _TALL_COLUMN = 3  # panels
 
 

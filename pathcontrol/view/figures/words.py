@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import text_to_path
 
-_POINTS = 72.0  # in an inch
+_POINTS = 72.0  # points in an inch
 _SIZE = 8.0  # pt
 _ENTRY = 0.5  # in, of a legend's handle and the gaps around it
 

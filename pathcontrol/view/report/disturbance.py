@@ -11,7 +11,7 @@ from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.summaries import is_whole
 from pathcontrol.view.report.code import call, class_code
 
-_AXES = {Form.NUMBERS: 1, Form.NUMBER: 0, Form.POSITIVE: 0}  # that a value has for a single rollout
+_AXES = {Form.NUMBERS: 1, Form.NUMBER: 0, Form.POSITIVE: 0}  # axes of a value for a single rollout
 _DEEPEST = 20  # sums in one another
 
 

@@ -38,7 +38,7 @@ def pictures(runs: Mapping[str, Run]) -> list[Picture]:
         return [picture(figure, caption) for caption, figure in _figures(runs)]
     own = {name: _figures({name: run}) for name, run in runs.items()}
     found = [picture(figure, f"{name}: {caption}") for name, figures in own.items() for caption, figure in figures]
-    return sorted(found, key=lambda one: one.wide)  # which end a row of those beside one another
+    return sorted(found, key=lambda one: one.wide)  # wide ones would end a row of narrow ones
 
 
 def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:

@@ -23,7 +23,7 @@ from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.joined.sequence import PathSequence
 
-#: how far from good a value is, where that is not the value itself; None where none is better than another
+#: distance of a value from a good one, if not the value itself; None if no value is better than another
 _BADNESS: dict[str, Callable[[float], float] | None] = {
     "speed_ratio": lambda value: abs(value - 1),
     "progress": lambda value: -value,

@@ -12,7 +12,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.view.animation.payload import Film
 from pathcontrol.view.animation.scene.keyframes import Indices
 
-MOST_POINTS = 4000  # of a chart
+MOST_POINTS = 4000  # limit of points in a chart
 _EACH_BIN = 3  # points of a bin: the least, the greatest, and one where there is none
 
 

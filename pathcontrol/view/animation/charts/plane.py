@@ -20,7 +20,7 @@ from pathcontrol.view.animation.scene.tube import simplify
 if TYPE_CHECKING:
     from pathcontrol.cartesian.toolpath_task import ToolpathTask
 
-_FINE = 1 / 2000  # of the extent: less than a pixel
+_FINE = 1 / 2000  # share of the extent, less than a pixel
 _MOST_POINTS = 4000
 _AXES = "xyz"
 

@@ -21,7 +21,7 @@ from pathcontrol.view.bodies.shapes import Color, Mesh, Sphere
 
 GHOST = 0.35  # opacity of an arm that stands in another
 _FRAMED_POSES = 50
-_MOST_RINGS = 20_000  # of all cuts of a drawing
+_MOST_RINGS = 20_000  # limit of rings for all cuts of a drawing
 _MOST_TUBES = 2000  # more cuts are drawn as lines of a pixel
 _MOST_DASHES = 10_000
 

@@ -12,8 +12,8 @@ from pathcontrol.view.bodies.shapes import directions
 
 LOWEST, HIGHEST = np.deg2rad([22.0, 42.0])
 ASIDE = np.deg2rad(20.0)
-LEGEND = 0.1  # of the height of what is seen: room below it
-SMALLEST, SMALL = 1e-4, 0.4  # of the size of the picture: a point, and what deserves a view from near
+LEGEND = 0.1  # room below, as a share of the visible height
+SMALLEST, SMALL = 1e-4, 0.4  # shares of the picture: size of a point, and size below which there is a near view
 LINE_WIDTH = 0.003  # radius of lines in the view from near, of the size of its picture
 _UP = np.array([0.0, 0.0, 1.0])
 

@@ -12,7 +12,7 @@ from pathcontrol._arrays import Array
 
 Indices: TypeAlias = NDArray[np.int64]
 
-#: which of some spans hold, (m,) bool, from the first samples of them (m,) and their length in samples
+#: returns which spans hold, (m,) bool, from their first samples (m,) and their length in samples
 Test: TypeAlias = Callable[[Indices, int], NDArray[np.bool_]]
 
 

@@ -14,7 +14,7 @@ from pathcontrol.view.animation.scene.palette import DESIRED, DESIRED_POINT, PLA
 from pathcontrol.view.bodies.shapes import Color
 
 _STEPS = 9  # colours of a scale, between which the page blends
-_ABOVE, _APART = 0.06, 0.05  # of the height of what is seen: labels over the arm, and over one another
+_ABOVE, _APART = 0.06, 0.05  # shares of the visible height: labels above the arm, and above one another
 
 
 def legend(drawn_rollouts: Sequence[DrawnRollout], ghosted: bool) -> list[dict[str, Any]]:

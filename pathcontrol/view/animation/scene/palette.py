@@ -20,7 +20,7 @@ RUNS: tuple[Color, ...] = (
 DESIRED: Color = (0.53, 0.56, 0.6, 1.0)
 RAPID: Color = (0.6, 0.63, 0.67, 0.6)
 DESIRED_POINT: Color = (0.45, 0.48, 0.53, 0.6)
-#: where there is no error to be coloured by
+#: the colour without a known error
 PLAIN: Color = (0.6, 0.63, 0.67, 1.0)
 GRID: Color = (0.76, 0.79, 0.82, 1.0)
 

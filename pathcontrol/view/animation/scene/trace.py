@@ -14,8 +14,8 @@ from pathcontrol.view.bodies.shapes import Mesh
 
 MOST_RINGS = 2500
 FRAME = 1 / 60  # s between rings while the tool moves, so that the line grows in steps too small to see
-_BEND = 0.25  # of the radius: how far the tool may have been from the middle of the tube
-_SHADE = 1 / 32  # of the scale: how far the colour may be from that of the error
+_BEND = 0.25  # allowed distance of the tool from the middle of the tube, as a share of the radius
+_SHADE = 1 / 32  # allowed error of the colour, as a share of the scale
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,7 +62,7 @@ def dashes(points: Array, length: float) -> Array:
     """Return every other piece of ``length`` [m] of a polyline, (k, 2, 3), from its first point on."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=-1))])
     count = max(int(np.round((along[-1] / length - 1) / 2)), 0)
-    ends = along[-1] / (2 * count + 1) * np.arange(2 * count + 2)  # that begin and end with a dash
+    ends = along[-1] / (2 * count + 1) * np.arange(2 * count + 2)  # begins and ends with a dash
     at = np.stack([np.interp(ends, along, axis) for axis in points.T], axis=-1)
     return at.reshape(-1, 2, 3)
 

@@ -1,4 +1,4 @@
-"""What is too fast for the period or the steps is looked for in every chunk of a sweep, and told once of each kind."""
+"""Warnings of steps that are too long, found in every chunk of a sweep and given once of each kind."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _ROLLOUT = re.compile(r" \(rollout (\d+)\)")
 _NUMBER = re.compile(r"[0-9][0-9.e+-]*")
 
 
-def too_fast(arguments: Mapping[str, Any], samples: NDArray[Any]) -> Iterator[str]:
-    """Say what a simulation of ``samples`` (k,) would warn of, with the number of a sample and not of a rollout."""
+def find_step_warnings(arguments: Mapping[str, Any], samples: NDArray[Any]) -> Iterator[str]:
+    """Yield the warnings of steps for a simulation of ``samples`` (k,), with sample numbers in place of rollouts."""
     controller, disturbance = arguments["controller"], arguments.get("disturbance")
     robot, loop = make_plant(arguments.get("plant"), controller), check_loop(arguments.get("loop"))
     states = broadcast_states(arguments["q"], arguments.get("qd"), robot, controller.task)
@@ -28,14 +28,14 @@ def too_fast(arguments: Mapping[str, Any], samples: NDArray[Any]) -> Iterator[st
         yield f"sample {number}: {_ROLLOUT.sub('', sentence)}"
 
 
-class Teller:
-    """Warns of each kind of sentence once: of those that differ in their numbers alone, of the first."""
+class WarningFilter:
+    """A filter that warns of each kind of sentence once; sentences of a kind differ in their numbers alone."""
 
     def __init__(self) -> None:
         self._kinds: set[str] = set()
 
     def __call__(self, sentences: Sequence[str]) -> None:
-        """Warn of those whose kind is new."""
+        """Warn of sentences of a new kind."""
         for sentence in sentences:
             if (kind := _NUMBER.sub("#", sentence)) not in self._kinds:
                 self._kinds.add(kind)
