@@ -58,12 +58,12 @@ class Reel:
 
     def attribute(self, path: str, name: str = "position") -> np.ndarray:
         """An attribute of the vertices of an object, (k, 3)."""
-        packed = self.objects()[path]["geometries"][0]["data"]["attributes"][name]["array"]
-        return np.frombuffer(packed.data, dtype=np.float32).reshape(-1, 3).astype(float)
+        pack = self.objects()[path]["geometries"][0]["data"]["attributes"][name]["array"]
+        return np.frombuffer(pack.data, dtype=np.float32).reshape(-1, 3).astype(float)
 
     def faces(self, path: str) -> np.ndarray:
-        packed = self.objects()[path]["geometries"][0]["data"]["index"]["array"]
-        return np.frombuffer(packed.data, dtype=np.uint32).reshape(-1, 3)
+        pack = self.objects()[path]["geometries"][0]["data"]["index"]["array"]
+        return np.frombuffer(pack.data, dtype=np.uint32).reshape(-1, 3)
 
     def center_line(self, path: str) -> np.ndarray:
         """Where the middle of a tube runs, (k, 3)."""
@@ -150,4 +150,4 @@ def test_the_text_is_the_same_for_the_same_film_and_holds_no_markup() -> None:
 
 def test_a_header_with_numbers_that_json_has_not_is_refused() -> None:
     with pytest.raises(ValueError, match="JSON"):
-        Film({"duration": float("nan")}).packed()
+        Film({"duration": float("nan")}).pack()

@@ -83,14 +83,14 @@ def test_the_plan_comes_to_rest_at_the_end(path, share, u):
     assert ending.braking == pytest.approx(T * rate.theta(path, path.s_end))
     assert ending.begin <= path.s_end - ending.braking
     s, h = path.s_end - u * ending.braking * 0.99 - 1e-6, 1e-7
-    low, here, high = (ending.braked(task.at(np.array(x)), np.array(x)) for x in (s - h, s, s + h))
+    low, here, high = (ending.brake(task.at(np.array(x)), np.array(x)) for x in (s - h, s, s + h))
     left = path.s_end - s
     assert here.theta == pytest.approx(rate.theta(path, s) * left / ending.braking)
     assert (high.theta - low.theta) / (2 * h) == pytest.approx(here.dtheta, rel=1e-5, abs=1e-6)
     assert 0 < here.theta <= rate.theta(path, s)
     before, at_end = (np.array(x) for x in (path.s_end - ending.braking * 1.01, path.s_end))
-    assert ending.braked(task.at(before), before).theta == rate.theta(path, before)
-    assert ending.braked(task.at(at_end), at_end).theta == 0
+    assert ending.brake(task.at(before), before).theta == rate.theta(path, before)
+    assert ending.brake(task.at(at_end), at_end).theta == 0
 
 
 @given(floats(0.5, 3.0), floats(0.3, 2.0))

@@ -16,7 +16,7 @@ from pathcontrol.robot.catalogue import find_urdf, own_urdf
 from pathcontrol.robot.meshes import load_parts
 from pathcontrol.robot.urdf import check_urdf
 from pathcontrol.view.bodies.meshes import MOST_TRIANGLES, read_mesh
-from pathcontrol.view.bodies.thinning import clustered
+from pathcontrol.view.bodies.thinning import cluster_vertices
 from pathcontrol.view.bodies.visuals import link_visuals
 
 # --- the robot that was asked for -----------------------------------------------------------------------------
@@ -114,11 +114,11 @@ def test_triangles_without_corners_are_refused(tmp_path, name, text):
 
 def test_a_dense_mesh_keeps_its_form_with_a_bounded_number_of_triangles():
     ball = trimesh.creation.icosphere(subdivisions=7, radius=0.3)  # 327 680 triangles
-    few = clustered(ball, 20_000)
+    few = cluster_vertices(ball, 20_000)
     assert len(few.faces) <= 20_000
     assert np.abs(np.linalg.norm(few.vertices, axis=1) - 0.3).max() < 0.01
     assert trimesh.Trimesh(few.vertices, few.faces).volume == pytest.approx(4 / 3 * np.pi * 0.3**3, rel=0.03)
-    assert clustered(few, 20_000) is few
+    assert cluster_vertices(few, 20_000) is few
 
 
 def test_loose_triangles_are_bounded_too(tmp_path):

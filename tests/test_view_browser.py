@@ -73,7 +73,7 @@ def saved(html: str, folder: Path) -> Path:
 
 def numbers(film: Film, block: dict[str, Any]) -> np.ndarray:
     """The numbers of a block, as the page reads them."""
-    whole = gzip.decompress(film.packed())
+    whole = gzip.decompress(film.pack())
     first = 4 + int.from_bytes(whole[:4], "little") + block["at"]
     return np.frombuffer(whole, np.dtype(block["type"]).newbyteorder("<"), block["count"], first)
 

@@ -59,7 +59,7 @@ def motions(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
 @given(motions())
 def test_a_track_is_within_its_error_at_every_sample(motion: tuple[np.ndarray, np.ndarray]) -> None:
     time, poses = motion
-    track = Track.from_poses(time, poses).thinned()
+    track = Track.from_poses(time, poses).thin()
     single = [column.astype(np.float32).astype(float) for column in (track.times, track.positions, track.quaternions)]
     positions, rotations = played(tuple(single), time)
     assert np.linalg.norm(positions - poses[:, :3, 3], axis=-1).max() <= 5e-5
@@ -72,14 +72,14 @@ def test_a_track_is_within_its_error_at_every_sample(motion: tuple[np.ndarray, n
 def test_even_motion_takes_few_keys_however_densely_it_is_sampled(seed: int, samples: int) -> None:
     rng = np.random.default_rng(seed)
     time = np.linspace(0, 2, samples)
-    track = Track.from_positions(time, np.outer(time, rng.normal(size=3)) + rng.normal(size=3)).thinned()
+    track = Track.from_positions(time, np.outer(time, rng.normal(size=3)) + rng.normal(size=3)).thin()
     assert len(track.times) <= 2 + np.log2(samples)
 
 
 def test_keys_are_as_many_as_a_parabola_asks_for() -> None:
     """On x = t²/2 a chord of length h is off by h²/8."""
     time = np.linspace(0, 10, 100_001)
-    track = Track.from_positions(time, np.outer(time**2 / 2, [1.0, 0, 0])).thinned(1e-4)
+    track = Track.from_positions(time, np.outer(time**2 / 2, [1.0, 0, 0])).thin(1e-4)
     fewest = 10 / np.sqrt(8 * 1e-4)
     assert fewest <= len(track.times) <= 2 * fewest + 18
 
@@ -94,7 +94,7 @@ def test_samples_that_are_left_out_are_near_the_lines_between_the_others(seed: i
 
 
 def test_what_stands_still_has_the_keys_of_its_ends() -> None:
-    track = Track.from_positions(np.linspace(0, 1, 1025), np.ones((1025, 3))).thinned()
+    track = Track.from_positions(np.linspace(0, 1, 1025), np.ones((1025, 3))).thin()
     np.testing.assert_array_equal(track.times, [0, 1])
     assert not track.moves
 

@@ -16,7 +16,7 @@ from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.view.bodies.links import reach
 from pathcontrol.view.bodies.shapes import Box, Cylinder, Mesh, Sphere
 from pathcontrol.view.bodies.sticks import stick_figure
-from pathcontrol.view.bodies.thinning import rounded, thinned
+from pathcontrol.view.bodies.thinning import round_vertices, thin
 from pathcontrol.view.bodies.visuals import leaf_links, link_visuals
 
 seeds = st.integers(0, 2**32 - 1)
@@ -192,7 +192,7 @@ def bumpy(seed: int) -> Mesh:
 @given(seeds, st.floats(1e-4, 2e-2))
 def test_a_thinned_surface_is_near_the_whole_one_and_the_other_way_round(seed: int, detail: float) -> None:
     whole = bumpy(seed)
-    fewer = thinned(whole, detail)
+    fewer = thin(whole, detail)
     assert len(fewer.faces) <= len(whole.faces)
     assert away(fewer.vertices[:200], whole).max() <= detail
     assert away(whole.vertices[::5], fewer).max() <= detail
@@ -203,11 +203,11 @@ def test_flat_and_fine_parts_lose_most_of_their_triangles() -> None:
     box = trimesh.creation.box()
     for _ in range(4):
         box = box.subdivide()
-    few = thinned(Mesh(box.vertices, box.faces), 1e-4)
+    few = thin(Mesh(box.vertices, box.faces), 1e-4)
     assert len(few.faces) < len(box.faces) / 10
     np.testing.assert_allclose(few.bounds, [[-0.5] * 3, [0.5] * 3], atol=1e-4)
     ball = trimesh.creation.icosphere(subdivisions=5)
-    assert len(thinned(Mesh(ball.vertices, ball.faces), 1e-2).faces) < len(ball.faces) / 2
+    assert len(thin(Mesh(ball.vertices, ball.faces), 1e-2).faces) < len(ball.faces) / 2
 
 
 def test_borders_and_what_is_small_stay() -> None:
@@ -217,18 +217,18 @@ def test_borders_and_what_is_small_stay() -> None:
     sheet = Mesh(
         np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), np.concatenate([squares[:, :3], squares[:, [0, 2, 3]]])
     )
-    fewer = thinned(sheet, 1e-2)
+    fewer = thin(sheet, 1e-2)
     assert len(fewer.faces) < len(sheet.faces)
     rim = {tuple(p) for p in sheet.vertices.round(6) if {0.0, 1.0} & set(p[:2])}
     assert rim <= {tuple(p) for p in fewer.vertices.round(6)}
     lamp = trimesh.creation.box([1e-3] * 3)
-    np.testing.assert_array_equal(thinned(Mesh(lamp.vertices, lamp.faces), 0.1).vertices, lamp.vertices)
+    np.testing.assert_array_equal(thin(Mesh(lamp.vertices, lamp.faces), 0.1).vertices, lamp.vertices)
 
 
 @given(seeds, st.floats(1e-6, 1.0))
 def test_rounding_is_far_finer_than_the_detail_and_shortens_numbers(seed: int, detail: float) -> None:
     mesh = bumpy(seed)
-    short = rounded(mesh, detail)
+    short = round_vertices(mesh, detail)
     assert np.abs(short.vertices - mesh.vertices).max() <= detail / 32
     step = 2.0 ** np.floor(np.log2(detail / 16))
     np.testing.assert_array_equal(np.mod(short.vertices, step), 0)
@@ -236,8 +236,8 @@ def test_rounding_is_far_finer_than_the_detail_and_shortens_numbers(seed: int, d
 
 def test_without_a_detail_a_mesh_is_left_alone() -> None:
     mesh = bumpy(0)
-    assert thinned(mesh, 0.0) is mesh
-    assert rounded(mesh, 0.0) is mesh
+    assert thin(mesh, 0.0) is mesh
+    assert round_vertices(mesh, 0.0) is mesh
 
 
 def test_visuals_are_thinned_by_a_share_of_the_reach(tmp_path: Path) -> None:

@@ -100,7 +100,7 @@ def _plan_task(task: PathTask, ending: Ending | None) -> Callable[[Array], PathP
     """Return the task as a function of s, with the ending of the controllers' plan where there is one."""
     if ending is None:
         return task.at
-    return lambda s: ending.braked(task.at(np.clip(s, task.s0, task.s_end)), s)
+    return lambda s: ending.brake(task.at(np.clip(s, task.s0, task.s_end)), s)
 
 
 def _kinks(task: PathTask, ending: Ending | None) -> Array | None:

@@ -28,7 +28,7 @@ def progress(run: Run, task: PathTask) -> Array:
     return np.where(run.status == "finished", 1.0, np.clip(share, 0.0, 1.0))
 
 
-def unfinished(run: Run) -> NDArray[np.bool_]:
+def is_unfinished(run: Run) -> NDArray[np.bool_]:
     """Return which rollouts were still running at the end without having got there, (rollout,); none without a task."""
     if run.task is None or "s" not in run:
         return np.zeros(run.rollouts, dtype=bool)

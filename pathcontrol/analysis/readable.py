@@ -74,7 +74,7 @@ def readable_parameters(parameters: Mapping[str, Any], digits: int = 4) -> str:
     )
 
 
-def counted(number: int, word: str) -> str:
+def count_words(number: int, word: str) -> str:
     """Return a number of things in words: ``"1 path"``, ``"2 paths"``."""
     return f"{number} {word}{'' if number == 1 else 's'}"
 

@@ -123,7 +123,7 @@ class Controller(ABC):
     # --- for laws -------------------------------------------------------------------------------------------
 
     def point(self, s: Array) -> PathPoint:
-        """Return the task at s; on an open path with ϑ and ϑ' of the plan that comes to rest, :meth:`Ending.braked`.
+        """Return the task at s; on an open path with ϑ and ϑ' of the plan that comes to rest, :meth:`Ending.brake`.
 
         Outside [s0, s_end] the point is the end that was passed.
         """
@@ -131,7 +131,7 @@ class Controller(ABC):
             return PathPoint(*(value[0] for value in self.point(s[None])))
         if self.ending is None:
             return self.task.at(s if self.task.closed else np.maximum(s, self.task.s0))
-        return self.ending.braked(self.task.at(np.minimum(np.maximum(s, self.task.s0), self.task.s_end)), s)
+        return self.ending.brake(self.task.at(np.minimum(np.maximum(s, self.task.s0), self.task.s_end)), s)
 
     def timed(self, s: Array) -> NDArray[np.bool_]:
         """Return where the plan follows σ̇ = ϑ(σ) without feedback, at the end of an open path, (*batch,)."""

@@ -51,7 +51,7 @@ class Ending(NamedTuple):
         braking = max(END_TIME * float(theta[-1]), _SHORTEST)
         return cls(task.s_end, braking, task.s_end - max(braking, END_TIME * float(speed / length[-1])))
 
-    def braked(self, point: PathPoint, s: Array) -> PathPoint:
+    def brake(self, point: PathPoint, s: Array) -> PathPoint:
         """Return ``point``, the task at s, with ϑ and ϑ' of the plan that comes to rest."""
         left = (self.s_end - s) / self.braking
         share, slope = np.minimum(np.maximum(left, 0.0), 1.0), np.where(left < 1.0, -1.0 / self.braking, 0.0)

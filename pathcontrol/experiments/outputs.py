@@ -70,7 +70,7 @@ def _write_summary(numbers: dict[str, Any], path: Path) -> Path:
 
 
 def _write_figures(run: Run, setup: Setup, path: Path) -> dict[str, Path]:
-    from pathcontrol.view.figures.run import named, run_figure
+    from pathcontrol.view.figures.run import add_name, run_figure
 
     pair = setup.output.figure_joints
     joints = None if pair is None else (pair[0], pair[1])
@@ -79,7 +79,7 @@ def _write_figures(run: Run, setup: Setup, path: Path) -> dict[str, Path]:
         from pathcontrol.view.figures.deviation import deviation_figure
         from pathcontrol.view.figures.style import save_figure
 
-        figures += save_figure(deviation_figure(run, setup.plant, setup.task), named(path, "deviation"))
+        figures += save_figure(deviation_figure(run, setup.plant, setup.task), add_name(path, "deviation"))
     stem = path.with_suffix("").name
     return {f"figure{figure.name.removeprefix(stem)}": figure for figure in figures}
 

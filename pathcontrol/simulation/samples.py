@@ -64,7 +64,7 @@ class Samples(NamedTuple):
         units = [unit if kind == "rad" else unit.replace("rad", "m").replace("N m", "N") for kind in kinds]
         return " or ".join(dict.fromkeys(units))
 
-    def labelled(self) -> tuple[dict[str, Labelled], dict[str, Labelled]]:
+    def label_all(self) -> tuple[dict[str, Labelled], dict[str, Labelled]]:
         """Return variables and coordinates by their names, with their dimensions and attributes."""
         variables = {}
         for name, array in self.arrays.items():
@@ -81,7 +81,7 @@ class Samples(NamedTuple):
         """Return all arrays with names and units, as the ``data`` of a run."""
         import xarray as xr  # it takes a third of a second to load
 
-        return xr.Dataset(*self.labelled())
+        return xr.Dataset(*self.label_all())
 
 
 class _Cut(Mapping[str, Array]):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array
-from pathcontrol.analysis.progress import unfinished
+from pathcontrol.analysis.progress import is_unfinished
 from pathcontrol.analysis.run_metrics import UNITS, metrics
 from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError, SimulationError, UnknownNameError
@@ -153,7 +153,7 @@ def _simulate(engine: Engine, samples: NDArray[np.int64], arguments: Arguments) 
 def _measure(run: Run, measure: Measure) -> dict[str, Array]:
     """Return the outcome and the metrics of each rollout, as if it had been alone, (k,) each."""
     values: dict[str, Array] = {name: np.array(run.array(name)) for name in OUTCOME}
-    values["status"] = np.where(unfinished(run), "unfinished", values["status"])
+    values["status"] = np.where(is_unfinished(run), "unfinished", values["status"])
     sound = values["status"] != "diverged"
     some = np.flatnonzero(sound) if sound.any() else np.array([0])  # one at least, for the names
     for rows, part in _blocks(run, some):

@@ -89,13 +89,13 @@ def within(table: xr.Dataset, limits: Limits | None) -> NDArray[np.bool_]:
     """
     kept = np.ones(table.sizes["sample"], dtype=bool)
     if "status" in table:
-        kept &= ~failed(table)
+        kept &= ~has_failed(table)
     for name, ends in check_limits(limits).items():
         kept &= excess(metric(table, name), ends) <= 0
     return kept
 
 
-def failed(table: xr.Dataset) -> NDArray[np.bool_]:
+def has_failed(table: xr.Dataset) -> NDArray[np.bool_]:
     """Return which samples diverged or did not finish, (sample,): an arm that stands still has the smallest errors."""
     return np.isin(table["status"].to_numpy().astype(str), FAILED)
 

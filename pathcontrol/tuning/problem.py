@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pathcontrol._arrays import Array
-from pathcontrol.sweeps.objectives import costs, excess, failed, metric
+from pathcontrol.sweeps.objectives import costs, excess, has_failed, metric
 from pathcontrol.tuning.optimizer import Evaluation
 
 #: the reduction of a metric over the scenarios to one number
@@ -56,7 +56,7 @@ class Terms(NamedTuple):
     def evaluate(self, table: xr.Dataset) -> Evaluation:
         """Return costs and violations of candidates for the search, all finite."""
         cost = costs(table, self.goals)
-        lost = ~np.isfinite(cost).all(1) | failed(table)
+        lost = ~np.isfinite(cost).all(1) | has_failed(table)
         beyond = [excess(metric(table, name), ends) for name, ends in self.bounds.items()]
         violations = np.stack([np.where(lost, _FARTHEST, -1.0), *(np.minimum(one, _FAR) for one in beyond)], axis=1)
         return Evaluation(np.where(lost[:, None], 0.0, cost), violations)

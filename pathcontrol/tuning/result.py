@@ -12,7 +12,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.analysis.readable import readable_number, readable_parameters
 from pathcontrol.analysis.run_metrics import LABELS, UNITS
 from pathcontrol.errors import UnknownNameError
-from pathcontrol.sweeps.objectives import costs, excess, failed, front, metric, within
+from pathcontrol.sweeps.objectives import costs, excess, front, has_failed, metric, within
 from pathcontrol.tuning.problem import Terms
 
 
@@ -112,7 +112,7 @@ class Tuning:
         beyond = np.zeros(self._table.sizes["sample"])
         for name in self.limits:
             beyond += np.maximum(self.beyond(name), 0.0)
-        beyond = np.where(np.isfinite(self._cost(None)) & ~failed(self._table), beyond, np.inf)
+        beyond = np.where(np.isfinite(self._cost(None)) & ~has_failed(self._table), beyond, np.inf)
         return self.candidate(int(np.argmin(beyond))) if np.isfinite(beyond).any() else None
 
     def knee(self) -> Candidate | None:

@@ -141,7 +141,7 @@ def _digest_of_origin(stored: StoredContext) -> str:
 def _put(file: h5netcdf.File, data: xr.Dataset | Samples) -> None:
     """Write the data of a run."""
     if isinstance(data, Samples):
-        put_labelled(file, *data.labelled(), _LEVEL)
+        put_labelled(file, *data.label_all(), _LEVEL)
         return
     from xarray.backends import H5NetCDFStore  # loaded already, and it handles any other content of the data
 

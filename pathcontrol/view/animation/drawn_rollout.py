@@ -39,15 +39,15 @@ class DrawnRollout:
     @property
     def sight(self) -> Array:
         """The points that must be seen well [m], (k, 3): the desired path, or without one the path of the tool."""
-        return np.concatenate([line.points for line in self.lines] or [self._taken])
+        return np.concatenate([line.points for line in self.lines] or [self._sample_tool])
 
     @cached_property
     def drawn(self) -> Array:
         """The points of all lines [m], (k, 3)."""
-        return np.concatenate([self._taken, *(line.points for line in self.lines)])
+        return np.concatenate([self._sample_tool, *(line.points for line in self.lines)])
 
     @property
-    def _taken(self) -> Array:
+    def _sample_tool(self) -> Array:
         """Enough samples of the tool's positions [m], (k, 3)."""
         positions = self.recording.tool_positions
         return positions[:: -(-len(positions) // _SAMPLES)]

@@ -39,7 +39,7 @@ class Film:
         self._size += len(raw)
         return reference
 
-    def packed(self) -> bytes:
+    def pack(self) -> bytes:
         """Return all of it, compressed; the same film gives the same bytes."""
         header = json.dumps(self.header, allow_nan=False).encode()
         header += b" " * (-(4 + len(header)) % _ALIGNMENT)
@@ -48,4 +48,4 @@ class Film:
 
     def text(self) -> str:
         """Return all of it in base64, which can contain no markup."""
-        return base64.b64encode(self.packed()).decode()
+        return base64.b64encode(self.pack()).decode()

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pathcontrol.errors import UrdfError
 from pathcontrol.robot.meshes import Part, load_parts
 from pathcontrol.view.bodies.shapes import Color, Mesh
-from pathcontrol.view.bodies.thinning import clustered, rounded, thinned
+from pathcontrol.view.bodies.thinning import cluster_vertices, round_vertices, thin
 
 MOST_TRIANGLES = 100_000  # limit for one colour: a picture shows no more
 _FARTHEST = 1e6  # m
@@ -54,11 +54,11 @@ def _join(parts: Sequence[Part], factor: np.ndarray) -> Mesh:
 
 def _split_sharp_edges(mesh: Mesh, detail: float) -> Mesh:
     """Return a mesh that shares vertices across smooth edges only, so that averaged normals keep sharp ones."""
-    few = clustered(mesh, MOST_TRIANGLES)
+    few = cluster_vertices(mesh, MOST_TRIANGLES)
     whole = trimesh.Trimesh(few.vertices[few.faces].reshape(-1, 3), np.arange(few.faces.size).reshape(-1, 3))
     whole.update_faces(whole.nondegenerate_faces())
-    coarse = thinned(Mesh(np.asarray(whole.vertices), np.asarray(whole.faces)), detail)
+    coarse = thin(Mesh(np.asarray(whole.vertices), np.asarray(whole.faces)), detail)
     if not len(coarse.faces):
         return coarse
     smooth = trimesh.graph.smooth_shade(trimesh.Trimesh(coarse.vertices, coarse.faces, process=False), angle=SHARP)
-    return rounded(Mesh(np.asarray(smooth.vertices), np.asarray(smooth.faces)), detail)
+    return round_vertices(Mesh(np.asarray(smooth.vertices), np.asarray(smooth.faces)), detail)

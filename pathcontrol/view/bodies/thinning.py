@@ -10,7 +10,7 @@ from pathcontrol.view.bodies.shapes import Mesh
 _ROUNDING = 1 / 16  # share of the detail, far below a pixel; numbers with fewer digits compress better
 
 
-def clustered(mesh: Mesh, most: int) -> Mesh:
+def cluster_vertices(mesh: Mesh, most: int) -> Mesh:
     """Return a mesh with at most ``most`` triangles, in time and memory proportional to the given ones.
 
     Vertices in one cell of a grid become their mean, and triangles that lose their area go (Rossignac and Borrel,
@@ -36,7 +36,7 @@ def _merge_cells(mesh: Mesh, cell: float) -> Mesh:
     return Mesh(np.stack(sums, axis=-1) / count[:, None], faces[kept])
 
 
-def thinned(mesh: Mesh, detail: float) -> Mesh:
+def thin(mesh: Mesh, detail: float) -> Mesh:
     """Return a mesh with shared vertices and fewer triangles: its surface moves by at most ``detail`` [m].
 
     Edges are collapsed while the sum of the squared distances from the planes of all triangles that a vertex
@@ -55,7 +55,7 @@ def thinned(mesh: Mesh, detail: float) -> Mesh:
     return fewer if same else mesh
 
 
-def rounded(mesh: Mesh, detail: float) -> Mesh:
+def round_vertices(mesh: Mesh, detail: float) -> Mesh:
     """Return a mesh whose coordinates are multiples of a power of two, a small part of the ``detail`` [m]."""
     if detail <= 0:
         return mesh

@@ -26,13 +26,13 @@ def drawable(values: Any) -> Array:
 def series(axes: Axes, time: Array, values: Array, **look: Any) -> Line2D:
     """Draw ``values`` (k,) over ``time`` (k,)."""
     kept = select_by_column(values)
-    return axes.plot(time[kept], values[kept], **_seen(values, look))[0]
+    return axes.plot(time[kept], values[kept], **_choose_look(values, look))[0]
 
 
 def curve(axes: Axes, x: Array, y: Array, **look: Any) -> Line2D:
     """Draw ``y`` (k,) over ``x`` (k,), a curve in a plane."""
     kept = select_by_cell(x, y)
-    return axes.plot(x[kept], y[kept], **_seen(x + y, look))[0]
+    return axes.plot(x[kept], y[kept], **_choose_look(x + y, look))[0]
 
 
 def select_by_column(values: Array) -> Array:
@@ -71,6 +71,6 @@ def _cells(values: Array) -> Array:
     return np.where(np.isnan(values), -1, np.nan_to_num(scaled)).astype(int)
 
 
-def _seen(values: Array, look: dict[str, Any]) -> dict[str, Any]:
+def _choose_look(values: Array, look: dict[str, Any]) -> dict[str, Any]:
     """Return the look of a line; a line of one point is a dot."""
     return look | ({"marker": ".", "markersize": 4} if np.count_nonzero(~np.isnan(values)) == 1 else {})

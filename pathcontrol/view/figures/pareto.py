@@ -98,7 +98,7 @@ def pareto_figure(
     if not len(rows):
         raise InputError(f"no sample has {names[0]} and {names[1]} and keeps the limits; there is no front to be drawn")
     chosen = _best(sweep, choice.x, best) if labelled else []
-    marked = sorted({*_spread([_scaled(values)[rows] for values in (right, up)], labelled), *chosen})
+    marked = sorted({*_spread([_scale(values)[rows] for values in (right, up)], labelled), *chosen})
     words = [f"{letter}  {_describe_point(best, i)}" for letter, i in zip(ascii_uppercase, marked, strict=False)]
     words = [line + ", best" * (i in chosen) for line, i in zip(words, marked, strict=False)]
     with style():
@@ -138,7 +138,7 @@ def _describe_point(best: xr.Dataset, row: int) -> str:
     return f"{int(one['sample'])}: {readable_parameters(values)}"
 
 
-def _scaled(values: Array) -> Array:
+def _scale(values: Array) -> Array:
     """Return values scaled to their range."""
     return np.log(values) if wide(values) else values
 

@@ -67,7 +67,7 @@ def phase_figure(
     """
     runs = shown(run, task, rollout)
     names = check_joints(runs)
-    chosen = _moved(runs) if joints is None else [int(j) for j in np.atleast_1d(joints)]
+    chosen = _find_moved(runs) if joints is None else [int(j) for j in np.atleast_1d(joints)]
     if not chosen or not set(chosen) <= set(range(len(names))):
         raise InputError(f"joints = {joints}, expected indices from 0 to {len(names) - 1}: {', '.join(names)}")
     columns = min(len(chosen), 2 if len(chosen) in (2, 4) else 3)
@@ -126,7 +126,7 @@ def choose_pair(runs: Sequence[Shown], joints: Sequence[int] | None) -> tuple[in
     return int(i), int(j)
 
 
-def _moved(runs: Sequence[Shown]) -> list[int]:
+def _find_moved(runs: Sequence[Shown]) -> list[int]:
     """Return the joints that move."""
     travel = _travel(runs)
     return [j for j in range(len(travel)) if travel[j] >= _STILL * travel.max()]

@@ -38,10 +38,10 @@ def run_figure(
     if len(run.joints) > 1:
         figures["path"] = path_figure(run, task, joints)
     figures |= {"torque": torque_figure(run, limits), "speed": speed_figure(run, task)}
-    return [file for name, figure in figures.items() for file in save_figure(figure, named(path, name))]
+    return [file for name, figure in figures.items() for file in save_figure(figure, add_name(path, name))]
 
 
-def named(path: str | Path, name: str) -> Path:
+def add_name(path: str | Path, name: str) -> Path:
     """Return ``path`` with ``-name`` at its end, before the suffix of a format."""
     stem = stem_of(path)
     return stem.with_name(f"{stem.name}-{name}{Path(path).name.removeprefix(stem.name)}")

@@ -13,7 +13,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.limit_shares import RATIOS, is_passed, limit_ratios
 from pathcontrol.analysis.progress import got_there
-from pathcontrol.analysis.readable import counted, reading, unit_of, without_rounding
+from pathcontrol.analysis.readable import count_words, reading, unit_of, without_rounding
 from pathcontrol.analysis.run_metrics import LABELS, metrics
 from pathcontrol.analysis.torque import torque_metrics
 from pathcontrol.analysis.window import samples_of
@@ -97,11 +97,11 @@ def _path(run: Run) -> str:
     """Return the path in words."""
     task = run.task
     if isinstance(task, ToolpathTask):
-        return f"{Path(task.drawing.source).name}, {counted(len(task), 'path')}"
+        return f"{Path(task.drawing.source).name}, {count_words(len(task), 'path')}"
     if isinstance(task, PathSequence):
-        return counted(len(task), "path")
+        return count_words(len(task), "path")
     if isinstance(task, TaskBatch):
-        return f"{counted(len(task), 'task')}, {', '.join(task.describe()['kinds'])}"
+        return f"{count_words(len(task), 'task')}, {', '.join(task.describe()['kinds'])}"
     # what was sampled for a file has its own name still in the configuration
     described = _law(run).get("task")
     name = described.get("task") if isinstance(described, Mapping) else None
@@ -125,7 +125,9 @@ def _outcome(run: Run) -> str:
         return f"diverged at {run.diverged_time[0]:.4g} s"
     if finished[0]:
         return f"finished after {run.finish_time[0]:.4g} s"
-    return counted(int(run.laps[0]), "whole lap") if "laps" in run.data.coords else "not finished when the time was up"
+    return (
+        count_words(int(run.laps[0]), "whole lap") if "laps" in run.data.coords else "not finished when the time was up"
+    )
 
 
 def rows(runs: Mapping[str, Run], numbers: Mapping[str, Mapping[str, list[float]]]) -> list[Row]:
@@ -149,14 +151,14 @@ def _row(key: str, unit: str, runs: Mapping[str, Run], numbers: Mapping[str, Map
     rounded = {name for name in given if given[name].any() and not values[name].any()}
     scale, shown = reading(unit, np.concatenate(list(values.values())))
     texts = {name: _text(scale * value, _ENDLESS.get(key, "–")) for name, value in values.items()}
-    arrived = {name: float(np.median(value)) for name, value in values.items() if _arrived(numbers[name])}
+    arrived = {name: float(np.median(value)) for name, value in values.items() if _has_arrived(numbers[name])}
     beyond = {name for name, value in values.items() if key in RATIOS and is_passed(value).any()}
     best = _best(_BADNESS.get(key, abs), arrived, texts)
     best = set() if best & rounded else best - beyond
     return Row(LABELS[key], shown, tuple(Cell(texts.get(name, "–"), name in best, name in beyond) for name in runs))
 
 
-def _arrived(numbers: Mapping[str, list[float]]) -> bool:
+def _has_arrived(numbers: Mapping[str, list[float]]) -> bool:
     """Return whether all rollouts of a run got there: one that stands still has the smallest errors."""
     return bool(got_there(np.array(numbers.get("progress", [np.nan]))).all())
 

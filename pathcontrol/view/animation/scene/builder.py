@@ -106,7 +106,7 @@ class Stage:
         self.scene.place(name, start)
         if not whole.moves:
             return
-        track = whole.thinned()
+        track = whole.thin()
         columns = {name: self.film.block(getattr(track, name)) for name in ("times", "positions", "quaternions")}
         self.tracks.append({"path": absolute(name), **columns})
 

@@ -52,7 +52,7 @@ class Track:
         """The first rotation, (3, 3)."""
         return Rotation.from_quat(self.quaternions[0]).as_matrix()
 
-    def thinned(self, error: float = ERROR) -> Track:
+    def thin(self, error: float = ERROR) -> Track:
         """Return the track with the fewest keys that give every other within ``error`` [m; entries of the rotation].
 
         Between keys the position is linear in time and the quaternion too, normalised. The entries of a rotation
