@@ -58,12 +58,12 @@ class Reel:
 
     def attribute(self, path: str, name: str = "position") -> np.ndarray:
         """An attribute of the vertices of an object, (k, 3)."""
-        pack = self.objects()[path]["geometries"][0]["data"]["attributes"][name]["array"]
-        return np.frombuffer(pack.data, dtype=np.float32).reshape(-1, 3).astype(float)
+        packed = self.objects()[path]["geometries"][0]["data"]["attributes"][name]["array"]
+        return np.frombuffer(packed.data, dtype=np.float32).reshape(-1, 3).astype(float)
 
     def faces(self, path: str) -> np.ndarray:
-        pack = self.objects()[path]["geometries"][0]["data"]["index"]["array"]
-        return np.frombuffer(pack.data, dtype=np.uint32).reshape(-1, 3)
+        packed = self.objects()[path]["geometries"][0]["data"]["index"]["array"]
+        return np.frombuffer(packed.data, dtype=np.uint32).reshape(-1, 3)
 
     def center_line(self, path: str) -> np.ndarray:
         """Where the middle of a tube runs, (k, 3)."""
