@@ -8,11 +8,11 @@ import pytest
 
 from pathcontrol import InputError, read_csv, read_dxf, read_gcode, read_svg, read_toolpath
 from pathcontrol.errors import ToolpathError
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 
 
 def test_each_kind_is_one_sentence_with_its_count_and_lines():
-    passed = Passed("warn")
+    passed = Notes("warn")
     for line in (3, 5, 5):
         passed.unless_refused("M62", line, "M62 is not understood")
     passed.over("TEXT", "layer 'NOTES'")
@@ -26,7 +26,7 @@ def test_each_kind_is_one_sentence_with_its_count_and_lines():
 
 
 def test_a_million_things_are_a_short_text():
-    passed = Passed("warn")
+    passed = Notes("warn")
     for number in range(20_000):
         passed.over(f"M{number % 2000}", number)
     assert len(passed.notes) == 51
@@ -37,7 +37,7 @@ def test_a_million_things_are_a_short_text():
 
 def test_what_is_not_understood_is_refused_by_default():
     with pytest.raises(ToolpathError, match="it is odd, or pass it over with unknown='warn'"):
-        Passed().unless_refused("it", 3, "it is odd")
+        Notes().unless_refused("it", 3, "it is odd")
 
 
 @pytest.mark.parametrize("reader", [read_csv, read_gcode, read_svg, read_dxf])

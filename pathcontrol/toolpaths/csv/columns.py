@@ -12,7 +12,7 @@ from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.csv.header import Header
 from pathcontrol.toolpaths.csv.names import AXIS, KNOWN, POINT, QUATERNION, Name
 from pathcontrol.toolpaths.csv.rows import Rows
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 
 #: the ways to name columns
 Chosen = Sequence[str] | Mapping[str, int | str]
@@ -33,7 +33,7 @@ class Columns:
     unit: str | None = None
 
     @classmethod
-    def of(cls, rows: Rows, chosen: Chosen | None, passed: Passed, *, flat: bool) -> Columns:
+    def of(cls, rows: Rows, chosen: Chosen | None, passed: Notes, *, flat: bool) -> Columns:
         """Find the columns of the rows, and take the line that names them out of the rows.
 
         Args:
@@ -154,7 +154,7 @@ def _name_columns(header: Header, chosen: Chosen | None) -> list[str]:
     return [said[k] if k < len(said) and said[k].strip("_- ") else str(k) for k in range(header.width)]
 
 
-def _note_unused(texts: Sequence[str], places: Mapping[str, int], passed: Passed) -> None:
+def _note_unused(texts: Sequence[str], places: Mapping[str, int], passed: Notes) -> None:
     """Note the columns that are passed over."""
     unread = [text for k, text in enumerate(texts) if k not in places.values()]
     if unread:

@@ -15,7 +15,7 @@ from pathcontrol.toolpaths.csv.columns import Columns, check_choice
 from pathcontrol.toolpaths.csv.names import CONTOUR, UNITS, hint_of_unit
 from pathcontrol.toolpaths.csv.rows import Rows
 from pathcontrol.toolpaths.csv.table import Table, decimal_mark
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.toolpaths.text import read_lines
 
@@ -65,7 +65,7 @@ def read_csv(
         InputError: an argument is none of these.
         ToolpathError: the file cannot be used; the message says in which line and why.
     """
-    passed, chosen = Passed(unknown), check_choice(columns)
+    passed, chosen = Notes(unknown), check_choice(columns)
     _check_choice("unit", unit, [*UNITS])
     _check_choice("decimal", decimal, [".", ","])
     feed = None if feed is None else scalar("feed", feed, positive=True)
@@ -89,7 +89,7 @@ def _check_choice(name: str, value: str | None, choices: list[str]) -> None:
         raise InputError(f"{name} = {value!r}, expected one of {', '.join(choices)}, or None")
 
 
-def _assume_metres(rows: Rows, passed: Passed) -> str:
+def _assume_metres(rows: Rows, passed: Notes) -> str:
     """Return metres, with a note if a comment hints at another unit."""
     for line, comment in rows.comments:
         if (word := hint_of_unit(comment)) is not None:
@@ -100,7 +100,7 @@ def _assume_metres(rows: Rows, passed: Passed) -> str:
     return "m"
 
 
-def _decimal(rows: Rows, columns: Columns, passed: Passed) -> str:
+def _decimal(rows: Rows, columns: Columns, passed: Notes) -> str:
     """Return the decimal mark of the numbers."""
     mark = decimal_mark(rows, columns)
     if mark == ",":

@@ -15,7 +15,7 @@ from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.drawing.pieces import NOTHING, contour_of, drop_repeated, ends_of
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 from pathcontrol.toolpaths.segments.arc import Arc
 from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
@@ -72,7 +72,7 @@ def checked_gap(gap: float | None) -> float | None:
     return gap
 
 
-def chain_strands(strands: Sequence[Strand], gap: float | None, passed: Passed) -> list[Strand]:
+def chain_strands(strands: Sequence[Strand], gap: float | None, passed: Notes) -> list[Strand]:
     """Join the strands whose ends meet, each chain in the place and direction of its first strand.
 
     Ends meet if they lie within the gap of each other and of no third one. Where they do not coincide both are moved
@@ -102,7 +102,7 @@ def chain_strands(strands: Sequence[Strand], gap: float | None, passed: Passed) 
     return sorted([*done, *chains], key=lambda strand: strand.place)
 
 
-def _note_gaps(chains: Sequence[Strand], tolerance: float, passed: Passed) -> None:
+def _note_gaps(chains: Sequence[Strand], tolerance: float, passed: Notes) -> None:
     """Note the gaps, up to 50 µm, that are left open, with the option that closes them."""
     layers: dict[str, list[Strand]] = {}
     for chain in chains:

@@ -11,7 +11,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.dxf.values import common, layer_of, number, object_axes, vector
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 
 _MOST_INSERTS = 64  # depth of nesting
 _MOST_ENTITIES = 200_000
@@ -42,7 +42,7 @@ class Entities:
         passed: takes note of entities that are marked as invisible.
     """
 
-    def __init__(self, source: str, document: Any, frozen: Callable[[str], bool], passed: Passed) -> None:
+    def __init__(self, source: str, document: Any, frozen: Callable[[str], bool], passed: Notes) -> None:
         self.source = source
         self._document, self._frozen, self._passed = document, frozen, passed
         self._count = 0

@@ -7,7 +7,7 @@ from typing import Any
 
 from pathcontrol.errors import UnknownNameError
 from pathcontrol.toolpaths.dxf.values import common, layer_of
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 
 _SHOWN = 20
 _SOLID = ("continuous", "bylayer", "byblock", "")
@@ -26,7 +26,7 @@ class Layers:
         types: of all entities.
     """
 
-    def __init__(self, document: Any, chosen: Sequence[str] | None, passed: Passed) -> None:
+    def __init__(self, document: Any, chosen: Sequence[str] | None, passed: Notes) -> None:
         self._passed = passed
         self.types: set[str] = set()
         self._table = {layer.dxf.name.lower(): layer for layer in document.layers}

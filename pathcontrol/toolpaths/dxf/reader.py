@@ -19,13 +19,13 @@ from pathcontrol._arrays import Array, scalar
 from pathcontrol.errors import PathControlError, ToolpathError, UnknownNameError
 from pathcontrol.toolpaths.contour import Toolpath
 from pathcontrol.toolpaths.drawing.chains import Strand, chain_strands, checked_gap
-from pathcontrol.toolpaths.drawing.doubled import note_doubled
+from pathcontrol.toolpaths.drawing.duplicates import note_doubled
 from pathcontrol.toolpaths.drawing.pieces import Budget
 from pathcontrol.toolpaths.drawing.skip import kinds_to_skip, names_of
 from pathcontrol.toolpaths.dxf.blocks import Entities
 from pathcontrol.toolpaths.dxf.entities import DRAWN, pieces
 from pathcontrol.toolpaths.dxf.layers import Layers
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 from pathcontrol.toolpaths.segments.base import Segment
 from pathcontrol.toolpaths.text import read_text
 
@@ -87,7 +87,7 @@ def read_dxf(
     if feed is not None:
         scalar("feed", feed, positive=True)
     gap, names = checked_gap(gap), names_of("layers", layers)
-    passed = Passed(unknown)
+    passed = Notes(unknown)
     text = read_text(path, "a DXF drawing")
     source = os.fspath(path)
     with _readable(source):
@@ -151,7 +151,7 @@ def _unit(source: str, unit: str | None, code: int) -> str:
     return _BY_CODE[code]
 
 
-def _strands(entities: Entities, layers: Layers, skip: frozenset[str], scale: Array, passed: Passed) -> list[Strand]:
+def _strands(entities: Entities, layers: Layers, skip: frozenset[str], scale: Array, passed: Notes) -> list[Strand]:
     """Return the curves of each entity that has a length [m]."""
     strands: list[Strand] = []
     refused: Counter[tuple[str, str]] = Counter()

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.gcode.codes import GROUPS
 from pathcontrol.toolpaths.gcode.words import Block
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 
 _SYSTEMS = GROUPS["coordinate system"]
 _FIRST_SYSTEM = 540
@@ -25,7 +25,7 @@ class Frame:
         passed: what is passed over is counted there.
     """
 
-    def __init__(self, passed: Passed) -> None:
+    def __init__(self, passed: Notes) -> None:
         self.used = False
         self._passed = passed
         self._system: int = _FIRST_SYSTEM

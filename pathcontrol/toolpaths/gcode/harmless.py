@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.gcode.codes import KNOWN_G, KNOWN_M, reason_to_refuse
 from pathcontrol.toolpaths.gcode.words import Block
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 
 #: G codes times ten, with the letters that belong to them: smoothing, look-ahead, exact stops, speed of the cut
 _SMOOTHING = {50: "PR", 51: "QR", 80: "P", 90: "", 620: "", 960: "D", 1030: "P", 1870: "PE"}
@@ -20,7 +20,7 @@ _PRINTERS = frozenset({17, 18, 84, 201, 202, 203, 204, 205, 350, 566, 906, 907})
 _PLACES = frozenset("XYZIJK")
 
 
-def without_codes(block: Block, turning: bool, line: int, passed: Passed) -> Block:
+def without_codes(block: Block, turning: bool, line: int, passed: Notes) -> Block:
     """Return the block without G and M codes that move nothing, and the words that belong to them.
 
     Args:
@@ -54,7 +54,7 @@ def without_codes(block: Block, turning: bool, line: int, passed: Passed) -> Blo
     )
 
 
-def without_letters(block: Block, line: int, passed: Passed) -> Block:
+def without_letters(block: Block, line: int, passed: Notes) -> Block:
     """Return the block without E, and without D and H that nothing in it uses.
 
     Raises:
@@ -75,7 +75,7 @@ def _smooths(code: int, block: Block) -> bool:
     return code not in (50, 51) or (_SMOOTHING[code][0] in block.words and _PLACES.isdisjoint(block.words))
 
 
-def _of_m(code: int, block: Block, line: int, passed: Passed) -> set[str]:
+def _of_m(code: int, block: Block, line: int, passed: Notes) -> set[str]:
     """Return the letters that belong to an M code which is passed over."""
     if code in _OUTPUTS:
         passed.over(f"M{code}", line)

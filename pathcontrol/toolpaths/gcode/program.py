@@ -15,7 +15,7 @@ from pathcontrol.toolpaths.gcode.modes import Modes
 from pathcontrol.toolpaths.gcode.runs import read_run
 from pathcontrol.toolpaths.gcode.strokes import Strokes
 from pathcontrol.toolpaths.gcode.words import Block
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 
 _RAPID, _LINE, _CLOCKWISE, _COUNTER_CLOCKWISE = 0, 10, 20, 30
 _DWELL, _MACHINE = 40, 530
@@ -31,7 +31,7 @@ class Program:
         passed: what is passed over is counted there.
     """
 
-    def __init__(self, modes: Modes, position: Sequence[float], passed: Passed) -> None:
+    def __init__(self, modes: Modes, position: Sequence[float], passed: Notes) -> None:
         self.modes = modes
         self.strokes = Strokes()
         self._position = list(position)

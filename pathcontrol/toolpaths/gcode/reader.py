@@ -17,7 +17,7 @@ from pathcontrol.toolpaths.gcode.program import Program
 from pathcontrol.toolpaths.gcode.remarks import without_remarks
 from pathcontrol.toolpaths.gcode.units import UNITS
 from pathcontrol.toolpaths.gcode.words import PERCENT, PLAIN, PROGRAM_NAME, parse, without_comments
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 from pathcontrol.toolpaths.text import MAX_COORDINATE, read_lines
 
 
@@ -67,7 +67,7 @@ def read_gcode(
         feed = scalar("feed", feed, positive=True)
     if arc_tolerance is not None:
         arc_tolerance = scalar("arc_tolerance", arc_tolerance, positive=True)
-    passed = Passed(unknown)
+    passed = Notes(unknown)
     texts = [without_comments(line).strip(" \t") for line in read_lines(path, "a G-code program")]
     modes = Modes(None if unit is None else UNITS[unit], feed=feed, arc_tolerance=arc_tolerance)
     program = Program(modes, _start(start, texts), passed)
@@ -94,7 +94,7 @@ def _start(start: ArrayLike | None, texts: list[str]) -> list[float]:
     return position.tolist()
 
 
-def _run(program: Program, texts: Sequence[str], passed: Passed) -> None:
+def _run(program: Program, texts: Sequence[str], passed: Notes) -> None:
     """Carry out the lines until the program ends; errors name the line."""
     began, number = False, 0
     while number < len(texts):

@@ -6,14 +6,14 @@ import re
 
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.gcode.words import are_words
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 
 _SIGN = re.compile(r"\A\[|//|\*|\A(?:[Nn][0-9]+[ \t]*)?[Mm]0*11[78](?![0-9.])")
 _CHECKSUM = re.compile(r"\*[ \t]*[0-9]+\Z")
 _COMMENT = "a comment of G-code stands after ; or in ( )"
 
 
-def without_remarks(text: str, line: int, passed: Passed) -> str:
+def without_remarks(text: str, line: int, passed: Notes) -> str:
     """Return the line without text in [ ], a remark after //, a message, or a checksum, which move nothing.
 
     Raises:
@@ -35,7 +35,7 @@ def without_remarks(text: str, line: int, passed: Passed) -> str:
     return ""
 
 
-def _without_brackets(text: str, line: int, passed: Passed) -> str:
+def _without_brackets(text: str, line: int, passed: Notes) -> str:
     """Return the line without a text in brackets."""
     if not text.endswith("]"):
         return text
@@ -43,7 +43,7 @@ def _without_brackets(text: str, line: int, passed: Passed) -> str:
     return ""
 
 
-def _without_slashes(text: str, line: int, passed: Passed) -> str:
+def _without_slashes(text: str, line: int, passed: Notes) -> str:
     """Return the line without a remark after //."""
     before, _, after = text.partition("//")
     if after.strip() and are_words(after):
@@ -55,7 +55,7 @@ def _without_slashes(text: str, line: int, passed: Passed) -> str:
     return before.rstrip()
 
 
-def _without_checksum(text: str, line: int, passed: Passed) -> str:
+def _without_checksum(text: str, line: int, passed: Notes) -> str:
     """Return the line without its checksum."""
     found = _CHECKSUM.search(text)
     if found is None:

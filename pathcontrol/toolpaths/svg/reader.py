@@ -16,9 +16,9 @@ from pathcontrol._arrays import scalar
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.contour import Toolpath
 from pathcontrol.toolpaths.drawing.chains import chain_strands, checked_gap
-from pathcontrol.toolpaths.drawing.doubled import note_doubled
+from pathcontrol.toolpaths.drawing.duplicates import note_doubled
 from pathcontrol.toolpaths.drawing.skip import kinds_to_skip, names_of
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 from pathcontrol.toolpaths.svg.document import Document, tag_of
 from pathcontrol.toolpaths.svg.layers import Chosen
 from pathcontrol.toolpaths.svg.shapes import SHAPES
@@ -63,7 +63,7 @@ def read_svg(
     if feed is not None:
         scalar("feed", feed, positive=True)
     gap = checked_gap(gap)
-    passed, names = Passed(unknown), names_of("layers", layers)
+    passed, names = Notes(unknown), names_of("layers", layers)
     document = Document(path)
     tags = {tag for element in document.root.iter("*") if (tag := tag_of(element))} if skip else set()
     walk = Walk(document, Chosen(document, names), kinds_to_skip(skip, tags | SHAPES), passed)

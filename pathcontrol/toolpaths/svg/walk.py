@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.drawing.chains import Strand
 from pathcontrol.toolpaths.drawing.pieces import Budget
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 from pathcontrol.toolpaths.svg.attributes import Viewport, transform
 from pathcontrol.toolpaths.svg.clip import Clips, Region
 from pathcontrol.toolpaths.svg.document import Document, label_of, tag_of
@@ -65,7 +65,7 @@ class Walk:
         passed: takes note of what is not cut.
     """
 
-    def __init__(self, document: Document, chosen: Chosen, skip: frozenset[str], passed: Passed) -> None:
+    def __init__(self, document: Document, chosen: Chosen, skip: frozenset[str], passed: Notes) -> None:
         self._document, self._chosen, self._skip, self._passed = document, chosen, skip, passed
         self._clips = Clips(document)
         self._ahead: list[tuple[Any, _Place]] = []

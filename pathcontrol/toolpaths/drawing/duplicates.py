@@ -9,7 +9,7 @@ from scipy.special import comb
 
 from pathcontrol._arrays import Array
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.passed import Passed
+from pathcontrol.toolpaths.notes import Notes
 from pathcontrol.toolpaths.segments.arc import Arc
 from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
@@ -19,7 +19,7 @@ _OFFSET = 0.3127  # of a cell, so that round coordinates lie inside cells
 _MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
 
 
-def note_doubled(contours: Sequence[Contour], passed: Passed) -> None:
+def note_doubled(contours: Sequence[Contour], passed: Notes) -> None:
     """Note the edges, arcs and curves that were drawn before, in either direction."""
     owners, marks = [], []
     for of, first, middle, last in _features(contours):

@@ -1,4 +1,4 @@
-"""Collection of what a reader of toolpaths passes over: refused, or noted once for each kind."""
+"""Notes on what a reader of toolpaths passes over: each kind is refused, or noted once."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class _Kind:
     places: list[str] = field(default_factory=list)
 
 
-class Passed:
+class Notes:
     """A collector of notes on what a reader passes over or assumes, for :attr:`Toolpath.notes`.
 
     Args:
