@@ -102,7 +102,7 @@ class ArmDynamics:
 
     @property
     def has_mass(self) -> bool:
-        """Whether the joints move any mass; an arm without mass has kinematics and no dynamics."""
+        """True if the joints move any mass; an arm without mass has kinematics and no dynamics."""
         bodies = list(self.pinocchio_model.inertias)[1:]
         return any(body.mass or body.inertia.any() for body in bodies) or bool((self.armature > 0).all())
 

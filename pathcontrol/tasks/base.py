@@ -113,7 +113,7 @@ class Task(ABC):
 
     @property
     def closed(self) -> bool:
-        """Whether the path closes on itself."""
+        """True if the path closes on itself."""
         return self.period is not None
 
     @property

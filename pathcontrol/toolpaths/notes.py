@@ -65,7 +65,7 @@ class Notes:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The notes: those that were told, then a sentence for each kind, with its count and places."""
+        """The sentences of the notes: those added as such, then one for each kind, with its count and places."""
         kinds = list(self._kinds.items())
         more = [f"{len(kinds) - _MOST_KINDS} more kinds were passed over"] if len(kinds) > _MOST_KINDS else []
         return (*self._sentences, *(_sentence(*names, kind) for names, kind in kinds[:_MOST_KINDS]), *more)

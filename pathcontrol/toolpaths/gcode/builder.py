@@ -40,7 +40,7 @@ class ContourBuilder:
 
     @property
     def empty(self) -> bool:
-        """Whether the contour has no length yet."""
+        """True if the contour has no length yet."""
         return not self._segments and len(self._corners) == 1
 
     def line_to(self, point: Sequence[float] | Array) -> None:

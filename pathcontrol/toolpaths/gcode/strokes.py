@@ -24,7 +24,7 @@ class Strokes:
 
     @property
     def begun(self) -> bool:
-        """Whether there was a move."""
+        """True once there was a move."""
         return self._moves > 0
 
     @property

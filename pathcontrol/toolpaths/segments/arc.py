@@ -61,7 +61,7 @@ class Arc(Segment):
 
     @property
     def circular(self) -> bool:
-        """Whether it is an arc of a circle, or a helix over one."""
+        """True for an arc of a circle, or a helix over one."""
         size = float(self.x @ self.x)
         return bool(abs(self.x @ self.y) <= 1e-12 * size and abs(self.y @ self.y - size) <= 1e-12 * size)
 

@@ -54,23 +54,23 @@ class Paint:
 
     @property
     def fills(self) -> bool:
-        """Whether the fill is visible."""
+        """True if the fill is visible."""
         return self.opacity > 0 and self.fill_opacity > 0 and self._is_seen(self.fill)
 
     @property
     def strokes(self) -> bool:
-        """Whether the stroke is visible."""
+        """True if the stroke is visible."""
         seen = self.stroke_opacity > 0 and self.stroke_width > 0 and self._is_seen(self.stroke)
         return self.opacity > 0 and seen
 
     @property
     def seen(self) -> bool:
-        """Whether the fill or the stroke is visible."""
+        """True if the fill or the stroke is visible."""
         return self.fills or self.strokes
 
     @property
     def dashed(self) -> bool:
-        """Whether the stroke is visible and dashed."""
+        """True if the stroke is visible and dashed."""
         lengths = [float(match[1]) for match in _AMOUNT.finditer(self.stroke_dasharray)]
         return self.strokes and any(lengths)
 

@@ -60,7 +60,7 @@ class UrdfReport:
 
     @property
     def ok(self) -> bool:
-        """Whether there is no error."""
+        """True if there is no error."""
         return not self.errors
 
     def as_dict(self) -> dict[str, Any]:
