@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+import shutil
 import webbrowser
 from pathlib import Path
 
@@ -31,13 +32,21 @@ def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pathcontrol.view.report.sections.pictures", lambda runs: [])
 
 
+@pytest.fixture(scope="module")
+def saved(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the run in two places, and once without its robot."""
+    folder = tmp_path_factory.mktemp("saved")
+    for name in ("first.nc", "results/mine/run.nc"):
+        run.save(folder / name)
+    Run(run.data, run.config).save(folder / "bare.nc")
+    return folder
+
+
 @pytest.fixture
-def folder(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder to work in, with the run in two places, and once without its robot."""
+def folder(saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder to work in, with those files."""
+    shutil.copytree(saved, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
-    run.save("first.nc")
-    run.save("results/mine/run.nc")
-    Run(run.data, run.config).save("bare.nc")
     return tmp_path
 
 
