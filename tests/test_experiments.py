@@ -533,7 +533,8 @@ KEYS = st.sampled_from(
         "task.speed task.center task.joints task.profile controller controller.type controller.K_p",
         "controller.K_v controller.k controller.start start start.q start.qd plant plant.friction loop",
         "plant.payload loop.mode loop.period loop.encoders loop.torque_limits loop.delay loop.substeps",
-        "output output.data output.figure other task.new",
+        "output output.data output.figure other task.new until disturbance disturbance.type disturbance.magnitude",
+        "loop.noise loop.noise.position loop.noise.seed task.points task.q_d task.curve task.frame plant.friction.type",
     ]
 ).flatmap(lambda line: st.sampled_from(line.split()))
 
