@@ -23,6 +23,7 @@ from pathcontrol.experiments.build import build
 from pathcontrol.experiments.schema import Experiment
 from pathcontrol.experiments.sweep_runner import run_sweep
 from pathcontrol.experiments.swept import SweptExperiment, put
+from pathcontrol.sweeps.manifest import LOG
 
 pytest.importorskip("pyarrow")
 
@@ -217,7 +218,7 @@ def test_after_ctrl_c_finished_chunks_stay(experiment, tmp_path):
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background ignore it
     )
-    wait_until(lambda: list(out.glob("chunks/0*.parquet")) or process.poll() is not None, pause=0.05)
+    wait_until(lambda: (out / LOG).exists() or process.poll() is not None, pause=0.05)  # a chunk counts once it is noted
     os.kill(process.pid, signal.SIGINT)
     assert process.wait(PATIENCE) == 130
     told = process.stderr.read()
