@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-SOURCE = Path(__file__).parents[1] / "pathcontrol" / "engine" / "src" / "api.cpp"
+SOURCE = Path(__file__).parents[2] / "pathcontrol" / "engine" / "src" / "api.cpp"
 SCRIPT = """
 import sys
 from pathlib import Path

@@ -31,7 +31,7 @@ ROBOT = pc.load_robot("cicese_2dof")
 CIRCLE = pc.Circle(1.0, 2.0)
 SPACE = pc.Space.random({"K_p": stats.loguniform(100.0, 1e4)}, 24)
 QUIET = {"dashboard_address": "127.0.0.1:0", "silence_logs": 50, "n_workers": 2, "threads_per_worker": 1}
-PAGE = Path(__file__).parents[1] / "docs" / "cluster.md"
+PAGE = Path(__file__).parents[2] / "docs" / "cluster.md"
 
 
 def slowly(p, samples):

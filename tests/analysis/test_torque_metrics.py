@@ -94,7 +94,7 @@ def test_peaks_and_their_share_of_the_limits(arm, circle):
 
 
 def test_each_rollout_has_the_limits_of_its_own_arm(arm, circle):
-    urdf = (Path(__file__).parent.parent / "urdf" / "cicese_2dof.urdf").read_text()
+    urdf = (Path(__file__).parents[2] / "urdf" / "cicese_2dof.urdf").read_text()
     weak = pc.load_robot(urdf.replace('effort="150', 'effort="75').replace('effort="15"', 'effort="7.5"'))
     law = pc.ExtendedMotionPlan(arm, circle, 800.0, [45.0, 100.0], 20.0)
     run = pc.simulate(law, START, duration=0.1, plant=[arm, weak], progress=False)

@@ -218,7 +218,9 @@ def test_after_ctrl_c_finished_chunks_stay(experiment, tmp_path):
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background ignore it
     )
-    wait_until(lambda: (out / LOG).exists() or process.poll() is not None, pause=0.05)  # a chunk counts once it is noted
+    wait_until(
+        lambda: (out / LOG).exists() or process.poll() is not None, pause=0.05
+    )  # a chunk counts once it is noted
     os.kill(process.pid, signal.SIGINT)
     assert process.wait(PATIENCE) == 130
     told = process.stderr.read()

@@ -11,7 +11,7 @@ from patience import PATIENCE
 
 import pathcontrol as pc
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 PNG = b"\x89PNG\r\n\x1a\n"
 
 

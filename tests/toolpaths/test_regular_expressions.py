@@ -14,7 +14,7 @@ from pathcontrol.robot.urdf.numbers import read_numbers
 from pathcontrol.robot.urdf.xml.parse import parse_and_mend, parse_urdf
 from pathcontrol.robot.urdf.xml.prolog import COMMENT, INSTRUCTION, end_of_prolog
 
-MODULES = sorted((Path(__file__).parent.parent / "pathcontrol").rglob("*.py"))
+MODULES = sorted((Path(__file__).parents[2] / "pathcontrol").rglob("*.py"))
 ATOMIC = re.compile(r"(?<!\\)(?:[*+?]|[0-9,]\})\+|\(\?>")
 ROBOT = '<robot name="a"><link name="base"/></robot>'
 

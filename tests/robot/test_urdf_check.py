@@ -642,7 +642,7 @@ def test_the_extension_is_checked(extension, code, value):
 
 
 def test_the_extension_of_the_bundled_arm_is_sound():
-    text = (Path(__file__).parent.parent / "urdf" / "cicese_2dof.urdf").read_text()
+    text = (Path(__file__).parents[2] / "urdf" / "cicese_2dof.urdf").read_text()
     assert check_urdf(text).ok
     one_missing = re.sub(r'<encoder counts_per_revolution="655360"/>', "", text)
     assert [f.code for f in check_urdf(one_missing).warnings] == ["extension-encoders"]
