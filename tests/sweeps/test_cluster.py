@@ -513,7 +513,7 @@ def test_a_worker_that_joins_later_with_other_versions_is_refused(address, tmp_p
 
 
 def test_a_machine_without_this_package_can_be_asked():
-    question = cloudpickle.dumps(cluster_module._asker())
+    question = cloudpickle.dumps(cluster_module._make_question())
     code = (
         "import sys, importlib.metadata as m; sys.modules['pathcontrol'] = None; true = m.version\n"
         "def version(name):\n  if name == 'pathcontrol': raise m.PackageNotFoundError(name)\n  return true(name)\n"
