@@ -117,10 +117,10 @@ def test_the_worst_of_several_scenarios_is_least_in_their_middle():
 @given(arrays(np.float64, (5, 3), elements=st.floats(-3, 3)), st.sampled_from([(None, 1.0), (0.5, None), (-1.0, 1.0)]))
 def test_the_worst_keeps_a_limit_if_and_only_if_every_scenario_does(values, ends):
     bounds = (-np.inf if ends[0] is None else ends[0], np.inf if ends[1] is None else ends[1])
-    worst = Terms({"f": "min"}, {"g": bounds}, "worst").reduced("g", values)
+    worst = Terms({"f": "min"}, {"g": bounds}, "worst").reduce_scenarios("g", values)
     np.testing.assert_array_equal(excess(worst, bounds) <= 0, (excess(values, bounds) <= 0).all(1))
-    np.testing.assert_array_equal(Terms({"f": "min"}, {}, "worst").reduced("f", values), values.max(1))
-    np.testing.assert_array_equal(Terms({"f": "max"}, {}, "worst").reduced("f", values), values.min(1))
+    np.testing.assert_array_equal(Terms({"f": "min"}, {}, "worst").reduce_scenarios("f", values), values.max(1))
+    np.testing.assert_array_equal(Terms({"f": "max"}, {}, "worst").reduce_scenarios("f", values), values.min(1))
 
 
 # --- made of simulations -----------------------------------------------------------------------------------------
