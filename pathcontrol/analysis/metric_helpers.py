@@ -93,7 +93,7 @@ def apply_where_finite(function: Callable[..., Array], *arrays: Array, shape: tu
     Numbers whose squares are not finite count as not finite.
     """
     moments = arrays[0].shape[:2]
-    known = np.all([(np.abs(a) < FARTHEST).reshape(*moments, -1).all(-1) for a in arrays], axis=0)
+    known = np.all([(np.abs(a) < FARTHEST).all(tuple(range(2, a.ndim))) for a in arrays], axis=0)
     if known.all():
         return function(*arrays)
     values = np.full(moments + shape, np.nan)

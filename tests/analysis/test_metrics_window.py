@@ -156,3 +156,13 @@ def test_noise_without_the_jumps_of_compensated_friction(arm, ideal_arm, circle)
     none = pc.ComputedTorque(ideal_arm, circle, K_p, K_v)
     without = pc.metrics(pc.simulate(none, *start, duration=6.0, progress=False))["tau_noise"][0]
     assert exact < without + 5e-3  # of jumps by 15 N m
+
+
+def test_a_window_without_any_sample_has_no_errors_to_tell(arm):
+    """A run that is kept from its last sample on, asked for a time before it."""
+    line = pc.Line([0.0, 0.0], [0.3, 0.3], 1.0)
+    run = pc.simulate(pc.ExtendedMotionPlan(arm, line, 800.0, 45.0, 20.0), [0.0, 0.0], duration=0.15, progress=False)
+    late = run.with_data(run.data.isel(time=[-1]))
+    found = pc.metrics(late, window=(0.01, 0.05))
+    for name in ("e_p_peak", "lag_error_rms", "contour_error_peak", "gamma_distance_peak"):
+        assert np.isnan(found[name]).all(), name
