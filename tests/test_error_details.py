@@ -52,7 +52,7 @@ def test_places_on_a_path_are_told(circle):
 
 
 def test_a_joint_at_its_limit_is_told():
-    """A full turn of the wrist about its own axis is more than the joint has."""
+    """A start posture may not be beyond the limits of a joint."""
     robot = pc.load_robot("panda", lock={"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0})
     q = np.clip(np.zeros(7), robot.limits.lower, robot.limits.upper)
     q[0] = robot.limits.upper[0] + 0.1
