@@ -10,7 +10,7 @@ import pytest
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
 
-NEEDED = ["distributed.worker", "distributed.nanny", "pathcontrol.sweeps.compute", "pathcontrol.analysis.metrics"]
+NEEDED = ["distributed.worker", "distributed.nanny", "pathcontrol.sweeps.chunk", "pathcontrol.analysis.run_metrics"]
 
 dask.config.set({"distributed.worker.multiprocessing-method": "forkserver"})
 distributed.utils.get_mp_context().set_forkserver_preload(NEEDED)  # after what Dask itself asks for, instead of it

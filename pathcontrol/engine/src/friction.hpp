@@ -25,7 +25,7 @@ template <class V> ALWAYS_INLINE void friction_levels(const Friction<V> &law, in
 //
 // The solution is unique. It is found by block principal pivoting on which joints stick, with single exchanges by Murty's
 // least-index rule where blocks make no progress (Júdice and Pires, Computers & Operations Research 21, 1994), as
-// simulation/dry_friction.py does. `sign` is a guess of the signs of v⁺, 0 for joints that may stick, and is changed.
+// simulation/arm/dry_friction.py does. `sign` is a guess of the signs of v⁺, 0 for joints that may stick, and is changed.
 // Lanes in which M is not positive definite end in NaN.
 template <int N, class V>
 static NOINLINE void stick_slip(int joints, V (*M)[room<N>()], const V *p, const V *low, const V *high, V *sign, V *v) {

@@ -1,4 +1,4 @@
-// One step of the simulated arm: the scheme that simulation/plant.py and simulation/damping.py explain, with their names.
+// One step of the simulated arm: the scheme that simulation/arm/plant.py and simulation/arm/damping.py explain, with their names.
 #pragma once
 #include "friction.hpp"
 
