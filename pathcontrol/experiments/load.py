@@ -12,8 +12,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.schema import Experiment
-from pathcontrol.experiments.values import shown
+from pathcontrol.experiments.schema.experiment import Experiment
+from pathcontrol.experiments.schema.validators import shown
 
 _LONGEST = 2_000_000  # bytes
 _DEEPEST = 100  # parts of a key

@@ -14,8 +14,8 @@ from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.run_metrics import UNITS, metrics
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
-from pathcontrol.experiments.build import Setup
-from pathcontrol.experiments.schema import Output
+from pathcontrol.experiments.builders.setup import Setup
+from pathcontrol.experiments.schema.experiment import Output
 from pathcontrol.simulation.run import Run
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.build import Setup, build
+from pathcontrol.experiments.builders.setup import Setup, build
 from pathcontrol.experiments.load import invalid, load_experiment, read_text
 from pathcontrol.experiments.outputs import check_folder, measured, write_outputs
 from pathcontrol.simulation.engines import Engine

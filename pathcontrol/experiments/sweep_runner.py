@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.keyed import keyed
+from pathcontrol.experiments.builders.file_errors import keyed
 from pathcontrol.experiments.load import invalid, load_experiment, read_toml
-from pathcontrol.experiments.sweep_section import SweepSection
-from pathcontrol.experiments.swept import SweptExperiment
+from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
+from pathcontrol.experiments.schema.sweep_sections import SweepSection
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.sweeps.cluster.connection import connect
 from pathcontrol.sweeps.histories import Keep

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.keyed import keyed
+from pathcontrol.experiments.builders.file_errors import keyed
 from pathcontrol.experiments.load import invalid, load_experiment, read_toml
+from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
+from pathcontrol.experiments.schema.tune_section import TuneSection
 from pathcontrol.experiments.sweep_runner import of_samples, values_of
-from pathcontrol.experiments.swept import SweptExperiment
-from pathcontrol.experiments.tune_section import TuneSection
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.sweeps.space import Space
 from pathcontrol.tuning.result import Tuning

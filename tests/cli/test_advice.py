@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import pathcontrol
 from pathcontrol.cli import main
 from pathcontrol.cli.group import in_options
-from pathcontrol.experiments.keyed import keyed
+from pathcontrol.experiments.builders.file_errors import keyed
 
 SOURCE = Path(pathcontrol.__file__).parent
 KEYWORD = re.compile(r"(?<![-\w.&?#/=$'])(?<!\w\()([a-z_]\w*)=(?![=\d])")

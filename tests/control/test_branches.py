@@ -21,7 +21,7 @@ from pathcontrol import (
     simulate,
 )
 from pathcontrol.control.branch import BranchPolicy
-from pathcontrol.experiments.derived import section_of
+from pathcontrol.experiments.schema.derived import section_of
 from pathcontrol.registry import LAWS
 
 SPACING, WIDTH, EACH = 0.002, 0.6, 40

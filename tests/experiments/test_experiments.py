@@ -33,7 +33,7 @@ from pathcontrol import (
 )
 from pathcontrol.experiments.load import load_experiment
 from pathcontrol.experiments.runner import load_setup, run_experiment
-from pathcontrol.experiments.schema import Experiment
+from pathcontrol.experiments.schema.experiment import Experiment
 from pathcontrol.experiments.template import example_text
 from pathcontrol.registry import KINDS, LOOPS
 
@@ -605,7 +605,7 @@ def test_validating_loads_nothing_heavy():
 
 
 def test_experiments_can_be_made_in_python():
-    from pathcontrol.experiments.build import build
+    from pathcontrol.experiments.builders.setup import build
 
     experiment = Experiment.model_validate(BASE)
     again = Experiment(**{name: getattr(experiment, name) for name in Experiment.model_fields})

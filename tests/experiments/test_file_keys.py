@@ -16,7 +16,7 @@ from pathcontrol import ExperimentError
 from pathcontrol._units import quantity
 from pathcontrol.arguments import Form, Unit, parameters_of
 from pathcontrol.experiments.runner import load_setup, run_experiment
-from pathcontrol.experiments.swept import SweptExperiment, put
+from pathcontrol.experiments.samples.swept_experiment import SweptExperiment, put
 from pathcontrol.experiments.template import example_text
 from pathcontrol.registry import KINDS, LOOPS, Kind
 

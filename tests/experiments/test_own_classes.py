@@ -14,8 +14,8 @@ import pathcontrol as pc
 from pathcontrol import ExperimentError, Run
 from pathcontrol.experiments.load import read_toml
 from pathcontrol.experiments.runner import load_setup, run_experiment
+from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
 from pathcontrol.experiments.sweep_runner import of_samples
-from pathcontrol.experiments.swept import SweptExperiment
 from pathcontrol.registry import Kind
 from pathcontrol.view.report.report import report
 from pathcontrol.view.report.reproduction import recipe

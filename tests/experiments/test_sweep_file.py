@@ -19,10 +19,10 @@ from patience import PATIENCE, wait_until
 import pathcontrol as pc
 from pathcontrol.cli import main
 from pathcontrol.errors import ExperimentError, InputError
-from pathcontrol.experiments.build import build
-from pathcontrol.experiments.schema import Experiment
+from pathcontrol.experiments.builders.setup import build
+from pathcontrol.experiments.samples.swept_experiment import SweptExperiment, put
+from pathcontrol.experiments.schema.experiment import Experiment
 from pathcontrol.experiments.sweep_runner import run_sweep
-from pathcontrol.experiments.swept import SweptExperiment, put
 from pathcontrol.sweeps.manifest import LOG
 
 pytest.importorskip("pyarrow")

@@ -338,7 +338,7 @@ def test_two_arms_are_one_by_its_tip():
 
 
 def test_experiment_files_say_what_is_locked_and_estimated(tmp_path):
-    from pathcontrol.experiments.build_arms import build_arms
+    from pathcontrol.experiments.builders.arms import build_arms
     from pathcontrol.experiments.load import load_experiment
 
     (tmp_path / "hand.urdf").write_text(hand())

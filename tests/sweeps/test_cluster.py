@@ -28,8 +28,8 @@ import pathcontrol as pc
 from pathcontrol.cli import main
 from pathcontrol.errors import ClusterError, InputError, MissingExtraError, PathControlError
 from pathcontrol.experiments.load import read_toml
+from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
 from pathcontrol.experiments.sweep_runner import run_sweep
-from pathcontrol.experiments.swept import SweptExperiment
 from pathcontrol.sweeps.chunk import Job
 from pathcontrol.sweeps.cluster import connection as cluster_module
 from pathcontrol.sweeps.cluster import dispatch

@@ -24,7 +24,7 @@ from pathcontrol import (
     tool_figure,
     torque_figure,
 )
-from pathcontrol.experiments.schema import Output
+from pathcontrol.experiments.schema.experiment import Output
 from pathcontrol.view.figures.errors import quantiles
 from pathcontrol.view.figures.lines import select_by_cell, select_by_column
 from pathcontrol.view.figures.run import run_figure

@@ -12,13 +12,13 @@ import numpy as np
 from pathcontrol._arrays import Array, finite, joint_array
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.build_arms import build_arms
-from pathcontrol.experiments.build_disturbance import build_disturbance
-from pathcontrol.experiments.build_duration import build_duration
-from pathcontrol.experiments.build_task import build_task
-from pathcontrol.experiments.keyed import keyed, refuse_unit, users_code
-from pathcontrol.experiments.making import Place, make
-from pathcontrol.experiments.schema import Experiment, Output
+from pathcontrol.experiments.builders.arms import build_arms
+from pathcontrol.experiments.builders.disturbances import build_disturbance
+from pathcontrol.experiments.builders.durations import build_duration
+from pathcontrol.experiments.builders.file_errors import keyed, refuse_unit, users_code
+from pathcontrol.experiments.builders.making import Place, make
+from pathcontrol.experiments.builders.tasks import build_task
+from pathcontrol.experiments.schema.experiment import Experiment, Output
 from pathcontrol.registry import LAWS
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance

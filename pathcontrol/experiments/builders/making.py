@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 from pathcontrol.arguments import parameters_of
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.derived import OwnSection
-from pathcontrol.experiments.keyed import keyed, users_code
-from pathcontrol.experiments.own_class import own_class
-from pathcontrol.experiments.section import Section, in_radians, in_si, units_of
+from pathcontrol.experiments.builders.file_errors import keyed, users_code
+from pathcontrol.experiments.builders.own_class import own_class
+from pathcontrol.experiments.schema.derived import OwnSection
+from pathcontrol.experiments.schema.section import Section, in_radians, in_si, units_of
 from pathcontrol.registry import Kind
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})

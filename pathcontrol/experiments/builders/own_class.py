@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 
 from pathcontrol.errors import InputError
-from pathcontrol.experiments.keyed import told
+from pathcontrol.experiments.builders.file_errors import told
 from pathcontrol.registry import Kind, load
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.schema import Experiment
+from pathcontrol.experiments.schema.experiment import Experiment
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 

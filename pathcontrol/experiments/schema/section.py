@@ -13,7 +13,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 from pathcontrol._units import Quantity, is_quantity, list_units, quantity
 from pathcontrol.arguments import Unit
 from pathcontrol.errors import InputError
-from pathcontrol.experiments.values import did_you_mean, expected, shown
+from pathcontrol.experiments.schema.validators import did_you_mean, expected, shown
 
 #: the SI units of each field that is a quantity, one or several
 Units = Mapping[str, tuple[str, ...]]

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import PlainValidator
 
-from pathcontrol.experiments.section import Section
-from pathcontrol.experiments.values import Text, Whole, expected
+from pathcontrol.experiments.schema.section import Section
+from pathcontrol.experiments.schema.validators import Text, Whole, expected
 
 KINDS = ("grid", "uniform", "log_uniform", "normal")
 _EXAMPLE = '"controller.k" = { uniform = [1.0, 50.0] }'

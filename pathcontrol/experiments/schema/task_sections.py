@@ -6,9 +6,9 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import PlainValidator
 
-from pathcontrol.experiments.derived import Chosen, OwnSection, chooser
-from pathcontrol.experiments.section import Section
-from pathcontrol.experiments.toolpath_section import ToolpathSection
+from pathcontrol.experiments.schema.derived import Chosen, OwnSection, chooser
+from pathcontrol.experiments.schema.section import Section
+from pathcontrol.experiments.schema.toolpath_section import ToolpathSection
 from pathcontrol.registry import PROFILES, TASKS
 
 

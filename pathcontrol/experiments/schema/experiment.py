@@ -1,4 +1,4 @@
-"""What an experiment file may say. Importing this loads nothing heavy; :mod:`.build` makes objects of it."""
+"""An experiment file as a model, whose import loads nothing heavy; :mod:`..builders` makes objects of it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, PlainValidator
 
 from pathcontrol.arguments import Unit
-from pathcontrol.experiments.arm_sections import Plant, Robot
-from pathcontrol.experiments.derived import chooser, one_or_several
-from pathcontrol.experiments.section import Section
-from pathcontrol.experiments.sweep_section import SweepSection
-from pathcontrol.experiments.task_sections import Task
-from pathcontrol.experiments.tune_section import TuneSection
-from pathcontrol.experiments.values import Numbers, Positive, Whole, expected
+from pathcontrol.experiments.schema.arm_sections import Plant, Robot
+from pathcontrol.experiments.schema.derived import chooser, one_or_several
+from pathcontrol.experiments.schema.section import Section
+from pathcontrol.experiments.schema.sweep_sections import SweepSection
+from pathcontrol.experiments.schema.task_sections import Task
+from pathcontrol.experiments.schema.tune_section import TuneSection
+from pathcontrol.experiments.schema.validators import Numbers, Positive, Whole, expected
 from pathcontrol.registry import DISTURBANCES, LAWS, LOOPS
 
 

@@ -12,8 +12,8 @@ from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
 from pydantic import Field, PlainValidator, TypeAdapter, create_model
 
 from pathcontrol.arguments import Form, Parameter, parameters_of
-from pathcontrol.experiments.section import Section, choose
-from pathcontrol.experiments.values import check, did_you_mean, expected
+from pathcontrol.experiments.schema.section import Section, choose
+from pathcontrol.experiments.schema.validators import check, did_you_mean, expected
 from pathcontrol.registry import Kind, kind_of
 
 _OWN = re.compile(r"(?P<file>.+\.py|[^\W\d]\w*(\.[^\W\d]\w*)*):(?P<name>[^\W\d]\w*)")

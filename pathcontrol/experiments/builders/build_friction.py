@@ -10,9 +10,9 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
-from pathcontrol.experiments.arm_sections import Directions, FrictionTable
-from pathcontrol.experiments.keyed import keyed
-from pathcontrol.experiments.making import Place, make
+from pathcontrol.experiments.builders.file_errors import keyed
+from pathcontrol.experiments.builders.making import Place, make
+from pathcontrol.experiments.schema.arm_sections import Directions, FrictionTable
 from pathcontrol.registry import FRICTION_LAWS
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Stribeck, Viscous
 from pathcontrol.robot.model import RobotModel

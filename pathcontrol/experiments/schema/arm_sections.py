@@ -8,9 +8,9 @@ from typing import Annotated, Any, Self
 from pydantic import PlainValidator, model_validator
 
 from pathcontrol.arguments import Unit
-from pathcontrol.experiments.derived import chooser, one_or_several, section_of
-from pathcontrol.experiments.section import Section
-from pathcontrol.experiments.values import Number, Numbers, Text, expected
+from pathcontrol.experiments.schema.derived import chooser, one_or_several, section_of
+from pathcontrol.experiments.schema.section import Section
+from pathcontrol.experiments.schema.validators import Number, Numbers, Text, expected
 from pathcontrol.registry import FRICTION_LAWS, load
 
 

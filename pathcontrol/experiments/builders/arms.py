@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.arm_sections import Payload
-from pathcontrol.experiments.build_friction import with_friction
-from pathcontrol.experiments.keyed import keyed, refuse_unit
-from pathcontrol.experiments.making import Place
-from pathcontrol.experiments.placement import pose_of
-from pathcontrol.experiments.schema import Experiment
-from pathcontrol.experiments.section import converted
+from pathcontrol.experiments.builders.build_friction import with_friction
+from pathcontrol.experiments.builders.file_errors import keyed, refuse_unit
+from pathcontrol.experiments.builders.making import Place
+from pathcontrol.experiments.builders.poses import pose_of
+from pathcontrol.experiments.schema.arm_sections import Payload
+from pathcontrol.experiments.schema.experiment import Experiment
+from pathcontrol.experiments.schema.section import converted
 from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.extent import question_offset
 from pathcontrol.robot.loading import load_robot

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Literal
 
 from pathcontrol.arguments import Unit
-from pathcontrol.experiments.section import Section
-from pathcontrol.experiments.values import Columns, NotNegative, Number, Numbers, Positive, Text
+from pathcontrol.experiments.schema.section import Section
+from pathcontrol.experiments.schema.validators import Columns, NotNegative, Number, Numbers, Positive, Text
 
 
 class Workpiece(Section):

@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import PlainValidator
 
-from pathcontrol.experiments.section import Section
-from pathcontrol.experiments.sweep_section import Varied
-from pathcontrol.experiments.values import Text, Whole, expected
+from pathcontrol.experiments.schema.section import Section
+from pathcontrol.experiments.schema.sweep_sections import Varied
+from pathcontrol.experiments.schema.validators import Text, Whole, expected
 
 
 def _objectives(value: Any) -> Any:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from pathcontrol.experiments.build_toolpath import build_toolpath
-from pathcontrol.experiments.keyed import users_code
-from pathcontrol.experiments.making import Place, make
-from pathcontrol.experiments.toolpath_section import ToolpathSection
+from pathcontrol.experiments.builders.build_toolpath import build_toolpath
+from pathcontrol.experiments.builders.file_errors import users_code
+from pathcontrol.experiments.builders.making import Place, make
+from pathcontrol.experiments.schema.toolpath_section import ToolpathSection
 from pathcontrol.registry import PROFILES, TASKS
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.check import check_task

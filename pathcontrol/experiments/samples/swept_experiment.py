@@ -22,16 +22,16 @@ from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, parameters_of
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.build import Setup, build, law_of
-from pathcontrol.experiments.build_arms import build_models, build_plant
-from pathcontrol.experiments.build_disturbance import build_disturbance, varies_together
-from pathcontrol.experiments.keyed import keyed
+from pathcontrol.experiments.builders.arms import build_models, build_plant
+from pathcontrol.experiments.builders.disturbances import build_disturbance, varies_together
+from pathcontrol.experiments.builders.file_errors import keyed
+from pathcontrol.experiments.builders.making import Place, arguments_of, target_of
+from pathcontrol.experiments.builders.setup import Setup, build, law_of
 from pathcontrol.experiments.load import finding
-from pathcontrol.experiments.making import Place, arguments_of, target_of
-from pathcontrol.experiments.named_files import named_files, relative
-from pathcontrol.experiments.schema import Experiment
-from pathcontrol.experiments.swept_tasks import SweptTask, joined, refuse_sequence, rows_together, swept_tasks
-from pathcontrol.experiments.values import shown
+from pathcontrol.experiments.samples.named_files import named_files, relative
+from pathcontrol.experiments.samples.swept_tasks import SweptTask, joined, refuse_sequence, rows_together, swept_tasks
+from pathcontrol.experiments.schema.experiment import Experiment
+from pathcontrol.experiments.schema.validators import shown
 from pathcontrol.registry import LAWS
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.sweeps.cluster.user_code import PackedBuilder

@@ -12,10 +12,10 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, parameters_of
-from pathcontrol.experiments.derived import OwnSection
-from pathcontrol.experiments.keyed import users_code
-from pathcontrol.experiments.making import Place, arguments_of, make
-from pathcontrol.experiments.schema import Experiment
+from pathcontrol.experiments.builders.file_errors import users_code
+from pathcontrol.experiments.builders.making import Place, arguments_of, make
+from pathcontrol.experiments.schema.derived import OwnSection
+from pathcontrol.experiments.schema.experiment import Experiment
 from pathcontrol.registry import DISTURBANCES
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
-from pathcontrol.experiments.keyed import keyed
-from pathcontrol.experiments.making import Place
-from pathcontrol.experiments.placement import pose_of
-from pathcontrol.experiments.toolpath_section import ToolpathSection
+from pathcontrol.experiments.builders.file_errors import keyed
+from pathcontrol.experiments.builders.making import Place
+from pathcontrol.experiments.builders.poses import pose_of
+from pathcontrol.experiments.schema.toolpath_section import ToolpathSection
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.toolpaths.read import read_toolpath
 

@@ -1,0 +1,1 @@
+"""The objects that an experiment file names, made of its validated sections."""
