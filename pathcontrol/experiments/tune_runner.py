@@ -10,7 +10,7 @@ from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.builders.file_errors import keyed
 from pathcontrol.experiments.load import invalid, load_experiment, read_toml
 from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
-from pathcontrol.experiments.schema.tune_section import TuneSection
+from pathcontrol.experiments.schema.sweep_sections import TuneSection
 from pathcontrol.experiments.sweep_runner import of_samples, values_of
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.sweeps.space import Space

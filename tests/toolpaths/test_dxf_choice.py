@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from pathcontrol.cli import main
 from pathcontrol.errors import InputError, PathControlWarning, ToolpathError, UnknownNameError
-from pathcontrol.experiments.schema.toolpath_section import ToolpathSection
+from pathcontrol.experiments.schema.task_sections import ToolpathSection
 from pathcontrol.toolpaths.dxf.reader import read_dxf
 from pathcontrol.toolpaths.read import read_toolpath
 

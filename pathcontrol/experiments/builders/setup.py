@@ -14,10 +14,9 @@ from pathcontrol.control.base import Controller
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.builders.arms import build_arms
 from pathcontrol.experiments.builders.disturbances import build_disturbance
-from pathcontrol.experiments.builders.durations import build_duration
 from pathcontrol.experiments.builders.file_errors import keyed, refuse_unit, users_code
 from pathcontrol.experiments.builders.making import Place, make
-from pathcontrol.experiments.builders.tasks import build_task
+from pathcontrol.experiments.builders.tasks import build_duration, build_task
 from pathcontrol.experiments.schema.experiment import Experiment, Output
 from pathcontrol.registry import LAWS
 from pathcontrol.robot.model import RobotModel

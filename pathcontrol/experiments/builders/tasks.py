@@ -4,14 +4,24 @@ from __future__ import annotations
 
 from typing import Any
 
-from pathcontrol.experiments.builders.build_toolpath import build_toolpath
-from pathcontrol.experiments.builders.file_errors import users_code
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.errors import ExperimentError
+from pathcontrol.experiments.builders.file_errors import keyed, users_code
 from pathcontrol.experiments.builders.making import Place, make
-from pathcontrol.experiments.schema.toolpath_section import ToolpathSection
+from pathcontrol.experiments.builders.poses import pose_of
+from pathcontrol.experiments.schema.experiment import Experiment
+from pathcontrol.experiments.schema.task_sections import ToolpathSection
 from pathcontrol.registry import PROFILES, TASKS
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.check import check_task
+from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
+from pathcontrol.toolpaths.read import read_toolpath
+
+_SAMPLES = 4001
 
 
 def build_task(section: Any, robot: RobotModel, place: Place) -> PathTask:
@@ -28,3 +38,43 @@ def build_task(section: Any, robot: RobotModel, place: Place) -> PathTask:
     with users_code("task", f"checking {type(task).__name__}"):
         check_task(task, robot.n)
     return task
+
+
+def build_toolpath(section: ToolpathSection, robot: RobotModel, place: Place) -> ToolpathTask:
+    """Read the file and follow its contours with the arm.
+
+    Raises:
+        ExperimentError: the file cannot be used, or a contour cannot be followed.
+    """
+    workpiece = pose_of("task.workpiece", section.workpiece.arguments(place.to_radians))
+    keys = {name.removeprefix("tool_"): name for name in (*section.reader_options, "feed")}
+    with keyed("task.file", keys):
+        toolpath = read_toolpath(place.folder / section.file, **section.reading)
+    arguments = section.arguments(place.to_radians)
+    with keyed("task", ToolpathSection.model_fields):
+        return ToolpathTask(robot, arguments.pop("frame"), toolpath, workpiece, **arguments)
+
+
+def build_duration(experiment: Experiment, task: PathTask) -> tuple[float | Array, int | None]:
+    """Longest simulated time [s], one for each path of a sequence, and the laps of a closed path.
+
+    Raises:
+        ExperimentError: the path has no end that a duration would follow from, or laps are asked of an open one.
+    """
+    laps = experiment.laps
+    if laps is not None and (not task.closed or laps < 1):
+        closed = "" if task.closed else f" of a closed path, but {type(task).__name__} is open; leave it out"
+        raise ExperimentError(f"laps = {laps}, expected a whole number from 1{closed}")
+    if experiment.duration is not None:
+        return float(experiment.duration), laps
+    if isinstance(task, PathSequence):
+        return np.array([_generous(path) for path in task.paths]), None
+    if laps is None and not np.isfinite(task.s_end):
+        raise ExperimentError(f"duration: missing; {type(task).__name__} does not end by itself; give it or laps")
+    return _generous(task, laps or 1), laps
+
+
+def _generous(task: PathTask, laps: int = 1) -> float:
+    """Twice the time that the path takes by ϑ, and 5 s [s]."""
+    s = np.linspace(*task.one_traverse, _SAMPLES)
+    return 2.0 * laps * float(np.trapezoid(1 / (task.theta(s) + np.zeros_like(s)), s)) + 5.0

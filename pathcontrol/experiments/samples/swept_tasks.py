@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.builders.durations import build_duration
 from pathcontrol.experiments.builders.making import Place
-from pathcontrol.experiments.builders.tasks import build_task
+from pathcontrol.experiments.builders.tasks import build_duration, build_task
 from pathcontrol.experiments.schema.experiment import Experiment
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.batch.checks import kind_of

@@ -13,9 +13,8 @@ from pathcontrol.arguments import Unit
 from pathcontrol.experiments.schema.arm_sections import Plant, Robot
 from pathcontrol.experiments.schema.derived import chooser, one_or_several
 from pathcontrol.experiments.schema.section import Section
-from pathcontrol.experiments.schema.sweep_sections import SweepSection
+from pathcontrol.experiments.schema.sweep_sections import SweepSection, TuneSection
 from pathcontrol.experiments.schema.task_sections import Task
-from pathcontrol.experiments.schema.tune_section import TuneSection
 from pathcontrol.experiments.schema.validators import Numbers, Positive, Whole, expected
 from pathcontrol.registry import DISTURBANCES, LAWS, LOOPS
 
