@@ -6,7 +6,7 @@ A file is read by them: ``speed: Annotated[float, Form.POSITIVE, Unit("m/s")]`` 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
@@ -37,6 +37,7 @@ class Form(Enum):
     LIMITS = "true, false or a list with one number above 0 for each joint"
     FORMULA = "a formula as a text, or a number"
     FORMULAS = "a list of formulas as texts, or of numbers"
+    COLUMNS = "names of columns in their order, or a table with the number or the name of each"
 
 
 @dataclass(frozen=True)
@@ -62,10 +63,13 @@ class Unit:
 Rate = Annotated[float, Form.POSITIVE, Unit("1/s")]
 Speed = Annotated[float, Form.POSITIVE, Unit("rad/s")]
 Length = Annotated[float, Form.POSITIVE, Unit("m")]
+Distance = Annotated[float, Form.NOT_NEGATIVE, Unit("m")]
+Feed = Annotated[float, Form.POSITIVE, Unit("m/s")]
 Point = Annotated[ArrayLike, Form.NUMBERS, Unit("m")]
 Points = Annotated[ArrayLike, Form.POINTS, Unit("m")]
 Direction = Annotated[ArrayLike, Form.NUMBERS]
 Posture = Annotated[ArrayLike, Form.NUMBERS, Unit("rad")]
+Names = Annotated[str | Sequence[str], Form.TEXTS]
 Torques = Annotated[ArrayLike, Form.NUMBERS, Unit("N m")]
 
 

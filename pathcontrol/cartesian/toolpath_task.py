@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, rigid, scalar
 from pathcontrol._expect import expect
+from pathcontrol.arguments import Distance, Feed, Form, Length, Unit
 from pathcontrol.cartesian.contour_paths import ContourPaths, Held, rotations_of
 from pathcontrol.cartesian.links import link_contours
 from pathcontrol.cartesian.orientation import Orientation
@@ -71,13 +72,13 @@ class ToolpathTask(PathSequence):
         workpiece: ArrayLike | None = None,
         *,
         orientation: Held | Orientation = "free",
-        feed: float | None = None,
-        rapid_speed: float = 0.1,
-        acceleration: float = 0.5,
-        tolerance: float = 1e-4,
+        feed: Feed | None = None,
+        rapid_speed: Feed = 0.1,
+        acceleration: Annotated[float, Form.POSITIVE, Unit("m/s^2")] = 0.5,
+        tolerance: Length = 1e-4,
         corner: Corners = "blend",
-        clearance: float = 0.01,
-        start: ArrayLike | None = None,
+        clearance: Distance = 0.01,
+        start: Annotated[ArrayLike, Form.NUMBERS, Unit("rad", "m")] | None = None,
     ) -> None:
         expect("robot", robot, RobotModel)
         expect("toolpath", toolpath, Toolpath)

@@ -8,13 +8,14 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import as_array, physical, quantity, rigid, scalar
+from pathcontrol.arguments import Form, Point, Unit
 from pathcontrol.errors import InputError, PathControlWarning
 from pathcontrol.robot.actuation import Actuation
 from pathcontrol.robot.arm_dynamics import ArmDynamics
@@ -62,7 +63,11 @@ class RobotModel(ArmDynamics):
         return replace(self, actuation=actuation)
 
     def with_payload(
-        self, mass: float, frame: str, com: ArrayLike = (0.0, 0.0, 0.0), inertia: ArrayLike | None = None
+        self,
+        mass: Annotated[float, Unit("kg")],
+        frame: str,
+        com: Point = (0.0, 0.0, 0.0),
+        inertia: Annotated[ArrayLike, Form.POINTS, Unit("kg m^2")] | None = None,
     ) -> RobotModel:
         """Return the same arm carrying a rigid body.
 

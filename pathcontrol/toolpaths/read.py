@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -50,10 +50,21 @@ def read_toolpath(path: str | Path, **options: Any) -> Toolpath:
     return toolpath
 
 
+def readers() -> Iterator[Callable[..., Toolpath]]:
+    """Yield the readers of all formats."""
+    yield from (_load(*place) for place in READERS.values())
+
+
+def _load(module: str, name: str) -> Callable[..., Toolpath]:
+    """Return a reader, whose module is loaded now."""
+    reader: Callable[..., Toolpath] = getattr(import_module(f"pathcontrol.toolpaths.{module}"), name)
+    return reader
+
+
 def _reader(path: Path) -> Callable[..., Toolpath]:
     """Return the reader of a file, by its suffix."""
-    for suffixes, (module, name) in READERS.items():
+    for suffixes, place in READERS.items():
         if path.suffix.lower() in suffixes:
-            return getattr(import_module(f"pathcontrol.toolpaths.{module}"), name)
+            return _load(*place)
     known = ", ".join(suffix for suffixes in READERS for suffix in suffixes)
     raise ToolpathError(f"{str(path)!r} ends in {path.suffix or 'nothing'!r}, expected one of {known}")

@@ -268,6 +268,17 @@ def test_payloads(write, arm):
     np.testing.assert_array_equal(apart.plant.gravity(q), expected)
 
 
+def test_a_payload_may_have_an_inertia(write, arm):
+    tensor = np.diag([0.1, 0.2, 0.25])
+    body = {"mass": 2.0, "frame": "tool", "inertia": tensor.tolist()}
+    setup = load_setup(write({"plant.payload": body}))
+    q = np.array([0.3, 0.4])
+    expected = arm.with_payload(2.0, "tool", inertia=tensor).mass_matrix(q)
+    np.testing.assert_array_equal(setup.plant.mass_matrix(q), expected)
+    with pytest.raises(ExperimentError, match=r"plant\.payload\.com has shape \(3,\) and inertia \(2, 2\)"):
+        load_setup(write({"plant.payload": body | {"inertia": [[0.1, 0.0], [0.0, 0.1]]}}))
+
+
 def test_profiles(write):
     rate = load_setup(write({"task.profile": {"type": "constant_rate", "rate": 3.0}})).controller.task
     assert rate.theta(np.array(0.2)) == 3.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 
@@ -9,10 +10,14 @@ import click
 import pytest
 from test_toolpath_cli import EXPERIMENT, called
 
+import pathcontrol as pc
 from pathcontrol import ExperimentError, InputError, read_toolpath
 from pathcontrol.cli import main
 from pathcontrol.cli.group import in_options
+from pathcontrol.experiments.builders import tasks
 from pathcontrol.experiments.runner import load_setup
+from pathcontrol.experiments.schema.task_sections import toolpath_section
+from pathcontrol.toolpaths.read import readers
 
 TOOLPATH = main.commands["toolpath"]
 
@@ -38,6 +43,12 @@ TOOLPATH = main.commands["toolpath"]
 def test_options_are_spelled_as_the_commands_own(message, spelled):
     assert in_options(message, TOOLPATH) == spelled
     assert in_options(message, None) == message
+
+
+def test_a_file_takes_all_options_of_readers_and_all_arguments_of_the_task():
+    options = {name for reader in readers() for name in inspect.signature(reader).parameters} - {"path", "start"}
+    arguments = {*inspect.signature(pc.ToolpathTask).parameters} - {"robot", "toolpath"}
+    assert {*toolpath_section().model_fields} == options | arguments | {"type", "file", "tool_start"}
 
 
 def test_every_option_of_a_reader_is_an_option_of_the_command():
@@ -115,3 +126,15 @@ def test_columns_in_an_experiment_file(tmp_path, columns):
     text = EXPERIMENT.replace("part.ngc", "part.csv").replace("clearance = 0.0", f"feed = 0.02\ncolumns = {columns}")
     (tmp_path / "part.toml").write_text(text.replace("feed =", 'decimal = ","\nfeed ='))
     assert len(load_setup(tmp_path / "part.toml").task) == 1
+
+
+def test_a_toolpath_of_a_file_may_have_an_orientation_as_a_table(tmp_path, monkeypatch):
+    (tmp_path / "part.ngc").write_text("G21 G90\nG0 X0 Y0 Z0\nG1 X5 F60")
+    file, up = tmp_path / "e.toml", [0.0, 0.6, -0.8]
+    file.write_text(EXPERIMENT.replace("clearance = 0.0", f'orientation = {{ type = "tangent", up = {up} }}'))
+    made = []
+    monkeypatch.setattr(tasks, "ToolpathTask", lambda *_, orientation, **__: made.append(orientation))
+    with pytest.raises(ExperimentError, match="task = None"):
+        load_setup(file)
+    assert isinstance(made[0], pc.TangentOrientation)
+    assert made[0].describe() == pc.TangentOrientation(up).describe()

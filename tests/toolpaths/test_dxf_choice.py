@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from pathcontrol.cli import main
 from pathcontrol.errors import InputError, PathControlWarning, ToolpathError, UnknownNameError
-from pathcontrol.experiments.schema.task_sections import ToolpathSection
+from pathcontrol.experiments.schema.task_sections import toolpath_section
 from pathcontrol.toolpaths.dxf.reader import read_dxf
 from pathcontrol.toolpaths.read import read_toolpath
 
@@ -214,6 +214,6 @@ def test_the_options_on_the_command_line_and_in_experiment_files(tmp_path):
         assert "--gap 1.1e-05" in shown.output
     joined = CliRunner().invoke(main, ["toolpath", file, "--json", "--lenient", "--gap", "0.011 mm"])
     assert len(json.loads(joined.stdout)["contours"]) == 1
-    section = ToolpathSection(file=file, frame="tip", skip=["point", "text"], gap=1.1e-5)
+    section = toolpath_section()(file=file, frame="tip", skip=["point", "text"], gap=1.1e-5)
     assert section.reading == {"skip": ["point", "text"], "gap": 1.1e-5}
     assert len(read_toolpath(file, **section.reading)) == 1

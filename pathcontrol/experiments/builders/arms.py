@@ -14,9 +14,9 @@ from pathcontrol.errors import ExperimentError, InputError
 from pathcontrol.experiments.builders.file_errors import keyed, refuse_unit
 from pathcontrol.experiments.builders.making import Place, make
 from pathcontrol.experiments.builders.poses import pose_of
-from pathcontrol.experiments.schema.arm_sections import Directions, FrictionTable, Payload
+from pathcontrol.experiments.schema.arm_sections import Directions, FrictionTable
 from pathcontrol.experiments.schema.experiment import Experiment
-from pathcontrol.experiments.schema.section import converted
+from pathcontrol.experiments.schema.section import Section, converted
 from pathcontrol.registry import FRICTION_LAWS
 from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.extent import question_offset
@@ -118,12 +118,13 @@ def _refuse_degrees(robot: RobotModel, sliding: set[str]) -> None:
         )
 
 
-def _carrying(key: str, robot: RobotModel, payload: Payload | None) -> RobotModel:
+def _carrying(key: str, robot: RobotModel, payload: Section | None) -> RobotModel:
     if payload is None:
         return robot
-    question_offset(f"{key}.com", payload.com or (0.0,), robot)
-    with keyed(key, ("mass", "com")):
-        return robot.with_payload(**payload.arguments(float))
+    given = payload.arguments(float)
+    question_offset(f"{key}.com", given.get("com", (0.0,)), robot)
+    with keyed(key, ("mass", "com", "inertia")):
+        return robot.with_payload(**given)
 
 
 def with_friction(robot: RobotModel, section: Any, place: Place) -> RobotModel:

@@ -10,7 +10,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.builders.file_errors import keyed, users_code
-from pathcontrol.experiments.builders.making import Place, make
+from pathcontrol.experiments.builders.making import Place, arguments_of, make
 from pathcontrol.experiments.builders.poses import pose_of
 from pathcontrol.experiments.schema.experiment import Experiment
 from pathcontrol.experiments.schema.task_sections import ToolpathSection
@@ -50,8 +50,8 @@ def build_toolpath(section: ToolpathSection, robot: RobotModel, place: Place) ->
     keys = {name.removeprefix("tool_"): name for name in (*section.reader_options, "feed")}
     with keyed("task.file", keys):
         toolpath = read_toolpath(place.folder / section.file, **section.reading)
-    arguments = section.arguments(place.to_radians)
-    with keyed("task", ToolpathSection.model_fields):
+    arguments = arguments_of("task", section, None, place)
+    with keyed("task", type(section).model_fields):
         return ToolpathTask(robot, arguments.pop("frame"), toolpath, workpiece, **arguments)
 
 

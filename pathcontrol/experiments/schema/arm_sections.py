@@ -8,18 +8,13 @@ from typing import Annotated, Any, Self
 from pydantic import PlainValidator, model_validator
 
 from pathcontrol.arguments import Unit
-from pathcontrol.experiments.schema.derived import chooser, one_or_several, section_of
+from pathcontrol.experiments.schema.derived import chooser, one_or_several, table_for
 from pathcontrol.experiments.schema.section import Section
 from pathcontrol.experiments.schema.validators import Number, Numbers, Text, expected
-from pathcontrol.registry import FRICTION_LAWS, load
+from pathcontrol.registry import FRICTION_LAWS
 
-
-class Payload(Section):
-    """A point mass [kg] carried by ``frame``, at ``com`` [m] in it."""
-
-    mass: Annotated[Number, Unit("kg")]
-    frame: Text
-    com: Annotated[Numbers | None, Unit("m")] = None
+#: the arguments of :meth:`pathcontrol.RobotModel.with_payload`
+Payload = Annotated[Any, table_for("robot.model:RobotModel.with_payload")]
 
 
 class ToolFrame(Section):
@@ -46,7 +41,7 @@ class Robot(Section):
     tip: Text | None = None
     estimated_inertia: Annotated[bool | float, PlainValidator(_density)] = False
     package_dirs: list[Text] | None = None
-    payload: Payload | None = None
+    payload: Payload = None
     tool: ToolFrame | None = None
 
 
@@ -65,16 +60,12 @@ def _levels(value: Any) -> Any:
     return value
 
 
-def _stribeck(value: Any) -> Any:
-    return None if value is None else section_of(load(FRICTION_LAWS.members["stribeck"])).model_validate(value)
-
-
 class FrictionTable(Section):
     """The sum of the friction laws given."""
 
     viscous: Annotated[Numbers | None, Unit("N m s/rad")] = None
     coulomb: Annotated[list[float] | Directions | None, PlainValidator(_levels), Unit("N m")] = None
-    stribeck: Annotated[Any, PlainValidator(_stribeck)] = None
+    stribeck: Annotated[Any, table_for(FRICTION_LAWS.members["stribeck"])] = None
 
     @model_validator(mode="after")
     def _one_dry_law(self) -> Self:
@@ -105,4 +96,4 @@ class Plant(Section):
     """The arm that is simulated: the controller's model, but for what is said here."""
 
     friction: Annotated[Any, PlainValidator(_friction)] = "urdf"
-    payload: Payload | None = None
+    payload: Payload = None

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import is_dataclass
 from functools import lru_cache, partial
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
 
 from pydantic import Field, PlainValidator, TypeAdapter, create_model
+from pydantic_core import PydanticCustomError
 
 from pathcontrol.arguments import Form, Parameter, parameters_of
 from pathcontrol.experiments.schema.section import Section, choose
-from pathcontrol.experiments.schema.validators import check, did_you_mean, expected
-from pathcontrol.registry import Kind, kind_of
+from pathcontrol.experiments.schema.validators import Text, check, did_you_mean, expected
+from pathcontrol.registry import Kind, kind_of, load
 
 _OWN = re.compile(r"(?P<file>.+\.py|[^\W\d]\w*(\.[^\W\d]\w*)*):(?P<name>[^\W\d]\w*)")
 _FORMS = {float: Form.NUMBER, int: Form.WHOLE, bool: Form.FLAG, str: Form.TEXT}
@@ -55,7 +57,7 @@ def chooser(
     kind: Kind,
     base: type[Section] = Chosen,
     own: type[Section] | None = OwnSection,
-    more: Mapping[str, type[Section]] = MappingProxyType({}),
+    more: Mapping[str, Callable[[], type[Section]]] = MappingProxyType({}),
     key: str = "type",
     default: str | None = None,
 ) -> Callable[[Any], Any]:
@@ -65,7 +67,7 @@ def chooser(
         kind: the classes, of which the user's own are found too.
         base: what the sections derive from.
         own: the section for a class that is named with its file.
-        more: sections that are derived from no class, by the name of each.
+        more: sections beside those of the classes, by the name of each; one is made on first use.
         key: the key whose value names the class.
         default: the name where the file gives none.
     """
@@ -74,7 +76,7 @@ def chooser(
         if own is not None and (".py" in name or ":" in name):
             return own
         if name in more:
-            return more[name]
+            return more[name]()
         target = kind.find(name)
         return None if target is None else section_of(target, base, kind.given)
 
@@ -91,14 +93,23 @@ def one_or_several(validate: Callable[[Any], Any]) -> Callable[[Any], Any]:
 @lru_cache(maxsize=256)
 def section_of(target: Callable[..., Any], base: type[Section] = Section, given: tuple[str, ...] = ()) -> type[Section]:
     """Return the section whose keys are the parameters of a class or function, but for those that are ``given``."""
-    fields: dict[str, Any] = {
+    made = create_model(getattr(target, "__name__", "section"), __base__=base, **fields_of(target, given))
+    made.target = target  # type: ignore[attr-defined]
+    return made
+
+
+def fields_of(target: Callable[..., Any], given: Container[str] = ()) -> dict[str, Any]:
+    """Return the annotation and the default of a field for each parameter of a class or function, but the ``given``."""
+    return {
         name: (_annotation(parameter), ... if parameter.required else None)
         for name, parameter in parameters_of(target).items()
         if name not in given
     }
-    made = create_model(getattr(target, "__name__", "section"), __base__=base, **fields)
-    made.target = target  # type: ignore[attr-defined]
-    return made
+
+
+def table_for(place: str, given: tuple[str, ...] = ()) -> PlainValidator:
+    """Return the validator of a table for the class or function at a ``place``, which is loaded on first use."""
+    return PlainValidator(lambda value: section_of(load(place), given=given).model_validate(value))
 
 
 def _annotation(parameter: Parameter) -> Any:
@@ -106,6 +117,8 @@ def _annotation(parameter: Parameter) -> Any:
     literals = [value for kind in parameter.types if get_origin(kind) is Literal for value in get_args(kind)]
     form = parameter.form or next((_FORMS[kind] for kind in parameter.types if kind in _FORMS), None)
     table = next(filter(None, map(_table_of, parameter.types)), None)
+    if form is Form.TEXTS:
+        return list[Text]  # its errors name the entry
     if literals and form is None and table is None:
         return Literal[tuple(literals)]
     validate = partial(check, form) if form else _anything
@@ -136,6 +149,9 @@ def _anything(value: Any) -> Any:
 
 def _one_or(literals: Iterable[str], words: str, validate: Callable[[Any], Any], value: Any) -> Any:
     """Return one of some texts, or what ``validate`` makes of any other value."""
-    if not isinstance(value, str) or value in literals:
-        return value if isinstance(value, str) else validate(value)
+    if isinstance(value, str) and value in literals:
+        return value
+    if not isinstance(value, str):
+        with suppress(PydanticCustomError):
+            return validate(value)
     raise expected(f"one of {', '.join(map(repr, literals))}, or {words}{did_you_mean(value, literals)}")

@@ -7,20 +7,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import PlainValidator
 
+from pathcontrol.experiments.schema.derived import table_for
 from pathcontrol.experiments.schema.section import Section
 from pathcontrol.experiments.schema.validators import Text, Whole, expected
 
 KINDS = ("grid", "uniform", "log_uniform", "normal")
 _EXAMPLE = '"controller.k" = { uniform = [1.0, 50.0] }'
-
-
-class KeepSection(Section):
-    """The rollouts whose history is kept: see :class:`pathcontrol.Keep`."""
-
-    worst: Whole | None = None
-    by: Text | None = None
-    random: Whole | None = None
-    diverged: Whole | None = None
 
 
 def _parameters(value: Any) -> dict[str, dict[str, list[Any]]]:
@@ -77,7 +69,7 @@ class SweepSection(Section):
     samples: Whole | None = None
     seed: Whole = 0
     metrics: list[Text] | None = None
-    keep: KeepSection | None = None
+    keep: Annotated[Any, table_for("sweeps.histories:Keep")] = None
 
 
 def _objectives(value: Any) -> Any:

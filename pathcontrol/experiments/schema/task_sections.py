@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import PlainValidator
+from pydantic import PlainValidator, create_model
 
 from pathcontrol.arguments import Unit
-from pathcontrol.experiments.schema.derived import Chosen, OwnSection, chooser
+from pathcontrol.experiments.schema.derived import Chosen, OwnSection, chooser, fields_of
 from pathcontrol.experiments.schema.section import Section
-from pathcontrol.experiments.schema.validators import Columns, NotNegative, Number, Numbers, Positive, Text
-from pathcontrol.registry import PROFILES, TASKS
+from pathcontrol.experiments.schema.validators import Numbers, Text
+from pathcontrol.registry import PROFILES, TASKS, load
 
 
 class TaskSection(Section):
@@ -43,44 +44,37 @@ class Workpiece(Section):
 class ToolpathSection(Section):
     """``toolpath``: see :func:`pathcontrol.read_toolpath` and :class:`pathcontrol.ToolpathTask`.
 
-    ``file`` is relative to the experiment file; the options of its reader are keys of the same name, but for its
+    ``file`` is relative to the experiment file; the options of all readers are keys of the same name, but for their
     ``start``, which is ``tool_start``. Lengths are in metres and metres per second, ``start`` is in ``angle_unit``.
     """
 
-    reader_options: ClassVar[tuple[str, ...]] = (
-        *("unit", "layers", "skip", "gap", "ppi", "tool_start", "arc_tolerance", "columns", "decimal", "z", "unknown"),
-    )
-    not_arguments: ClassVar[tuple[str, ...]] = ("type", "file", "workpiece", *reader_options)
+    reader_options: ClassVar[tuple[str, ...]] = ()
+    not_arguments: ClassVar[tuple[str, ...]] = ("type", "file", "workpiece")
     type: Literal["toolpath"] = "toolpath"
     file: Text
-    frame: Text
     workpiece: Workpiece = Workpiece()
-    unit: Text | None = None
-    layers: list[Text] | None = None
-    skip: list[Text] | None = None
-    gap: Annotated[NotNegative | None, Unit("m")] = None
-    ppi: Positive | None = None
-    tool_start: Annotated[Numbers | None, Unit("m")] = None
-    arc_tolerance: Annotated[Positive | None, Unit("m")] = None
-    columns: Columns | None = None
-    decimal: Literal[".", ","] | None = None
-    z: Annotated[Number | None, Unit("m")] = None
-    unknown: Literal["refuse", "warn"] | None = None
-    orientation: Literal["free", "down", "normals", "tangent"] | None = None
-    feed: Annotated[Positive | None, Unit("m/s")] = None
-    rapid_speed: Annotated[Positive | None, Unit("m/s")] = None
-    acceleration: Annotated[Positive | None, Unit("m/s^2")] = None
-    tolerance: Annotated[Positive | None, Unit("m")] = None
-    corner: Literal["blend", "stop"] | None = None
-    clearance: Annotated[NotNegative | None, Unit("m")] = None
-    start: Annotated[Numbers | None, Unit("rad", "m")] = None
 
     @property
     def reading(self) -> dict[str, Any]:
         """What the reader of the file is told."""
-        given = {name: getattr(self, name) for name in (*self.reader_options, "feed")}
-        given["start"] = given.pop("tool_start")
+        given = {name.removeprefix("tool_"): getattr(self, name) for name in (*self.reader_options, "feed")}
         return {name: value for name, value in given.items() if value is not None}
 
 
-Task = Annotated[Any, PlainValidator(chooser(TASKS, PathSection, OwnTask, {"toolpath": ToolpathSection}))]
+@cache
+def toolpath_section() -> type[ToolpathSection]:
+    """Return the section with the options of all readers and the arguments of :class:`ToolpathTask`."""
+    options = {
+        name: field
+        for reader in load("toolpaths.read:readers")()
+        for name, field in fields_of(reader, ("path", "feed")).items()
+    }
+    options["tool_start"] = options.pop("start")
+    own = fields_of(load("cartesian.toolpath_task:ToolpathTask"), ("robot", "toolpath", "workpiece"))
+    made = create_model("toolpath", __base__=ToolpathSection, **options, **own)
+    made.reader_options = tuple(options)
+    made.not_arguments = (*ToolpathSection.not_arguments, *options)
+    return made
+
+
+Task = Annotated[Any, PlainValidator(chooser(TASKS, PathSection, OwnTask, {"toolpath": toolpath_section}))]

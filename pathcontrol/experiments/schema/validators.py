@@ -92,7 +92,6 @@ def _is_columns(value: Any) -> bool:
 
 _TESTS: dict[Form, Callable[[Any], bool]] = {
     Form.TEXT: _is_text,
-    Form.TEXTS: _list_of(_is_text),
     Form.FLAG: _is_flag,
     Form.WHOLE: _is_whole,
     Form.WHOLES: _list_of(_is_whole),
@@ -109,18 +108,14 @@ _TESTS: dict[Form, Callable[[Any], bool]] = {
     Form.LIMITS: _either(_is_flag, _list_of(_is_limit)),
     Form.FORMULA: _is_formula,
     Form.FORMULAS: _list_of(_is_formula),
+    Form.COLUMNS: _is_columns,
 }
 
 
 def check(form: Form, value: Any) -> Any:
     """Return a value that has the ``form``, integers as they are; others are told what was expected."""
-    return checked(_TESTS[form], form.value, value)
-
-
-def checked(test: Callable[[Any], bool], what: str, value: Any) -> Any:
-    """Return a value that passes ``test``; others are told that ``what`` was expected."""
-    if not test(value):
-        raise expected(what)
+    if not _TESTS[form](value):
+        raise expected(form.value)
     return list(value) if isinstance(value, tuple) else value
 
 
@@ -129,15 +124,7 @@ def _of(form: Form) -> PlainValidator:
 
 
 Text = Annotated[str, _of(Form.TEXT)]
-Flag = Annotated[bool, _of(Form.FLAG)]
 Whole = Annotated[int, _of(Form.WHOLE)]
-Columns = Annotated[
-    str | list[str] | dict[str, int | str],
-    PlainValidator(
-        partial(checked, _is_columns, "names of columns in their order, or a table with the number or the name of each")
-    ),
-]
 Number = Annotated[float, _of(Form.NUMBER)]
 Positive = Annotated[float, _of(Form.POSITIVE)]
-NotNegative = Annotated[float, _of(Form.NOT_NEGATIVE)]
 Numbers = Annotated[list[float], _of(Form.NUMBERS)]

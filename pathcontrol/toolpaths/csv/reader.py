@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
+from typing import Annotated, Literal
 
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
+from pathcontrol.arguments import Feed, Form, Unit
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.csv.columns import Columns, check_choice
@@ -25,11 +27,11 @@ _NOTHING = 1e-9  # m, points nearer than this are the same, as are tool axes
 def read_csv(
     path: str | os.PathLike[str],
     unit: str | None = None,
-    feed: float | None = None,
-    columns: str | Sequence[str] | Mapping[str, int | str] | None = None,
-    decimal: str | None = None,
-    z: float | None = None,
-    unknown: str = "refuse",
+    feed: Feed | None = None,
+    columns: Annotated[str | Sequence[str] | Mapping[str, int | str], Form.COLUMNS] | None = None,
+    decimal: Literal[".", ","] | None = None,
+    z: Annotated[float, Unit("m")] | None = None,
+    unknown: Literal["refuse", "warn"] = "refuse",
 ) -> Toolpath:
     """Read contours from a table of points, a point a line: ``x y z``, with axis or orientation of the tool if any.
 

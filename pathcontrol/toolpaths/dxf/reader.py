@@ -9,13 +9,14 @@ from __future__ import annotations
 import io
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
+from pathcontrol.arguments import Distance, Feed, Names
 from pathcontrol.errors import PathControlError, ToolpathError, UnknownNameError
 from pathcontrol.toolpaths.contour import Toolpath
 from pathcontrol.toolpaths.drawing.chains import Strand, chain_strands, checked_gap
@@ -52,11 +53,11 @@ _MOST_LINES, _LONGEST_LINE, _MOST_ENTITIES = 5_000_000, 100_000, 500_000
 def read_dxf(
     path: str | os.PathLike[str],
     unit: str | None = None,
-    layers: str | Sequence[str] | None = None,
-    feed: float | None = None,
-    unknown: str = "refuse",
-    skip: str | Sequence[str] = (),
-    gap: float | None = None,
+    layers: Names | None = None,
+    feed: Feed | None = None,
+    unknown: Literal["refuse", "warn"] = "refuse",
+    skip: Names = (),
+    gap: Distance | None = None,
 ) -> Toolpath:
     """Read the contours of a DXF drawing's modelspace, in its order.
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import as_array, finite, scalar
+from pathcontrol.arguments import Feed, Length, Point
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Toolpath
 from pathcontrol.toolpaths.gcode.modes import Modes
@@ -24,10 +26,10 @@ from pathcontrol.toolpaths.text import MAX_COORDINATE, read_lines
 def read_gcode(
     path: str | os.PathLike[str],
     unit: str | None = None,
-    start: ArrayLike | None = None,
-    feed: float | None = None,
-    arc_tolerance: float | None = None,
-    unknown: str = "refuse",
+    start: Point | None = None,
+    feed: Feed | None = None,
+    arc_tolerance: Length | None = None,
+    unknown: Literal["refuse", "warn"] = "refuse",
 ) -> Toolpath:
     """Read contours from a G-code program, RS274/NGC as LinuxCNC and most CAM programs write it.
 

@@ -10,9 +10,10 @@ or lose part of what they read. A contour that is silently another one is a scra
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from typing import Annotated, Literal
 
 from pathcontrol._arrays import scalar
+from pathcontrol.arguments import Distance, Feed, Form, Names
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.contour import Toolpath
 from pathcontrol.toolpaths.drawing.chains import chain_strands, checked_gap
@@ -28,12 +29,12 @@ from pathcontrol.toolpaths.svg.walk import Walk
 
 def read_svg(
     path: str | os.PathLike[str],
-    ppi: float = 96.0,
-    feed: float | None = None,
-    unknown: str = "refuse",
-    layers: str | Sequence[str] | None = None,
-    skip: str | Sequence[str] = (),
-    gap: float | None = None,
+    ppi: Annotated[float, Form.POSITIVE] = 96.0,
+    feed: Feed | None = None,
+    unknown: Literal["refuse", "warn"] = "refuse",
+    layers: Names | None = None,
+    skip: Names = (),
+    gap: Distance | None = None,
 ) -> Toolpath:
     """Read the outlines that an SVG file draws, in its order: a contour for each subpath, named after the id.
 
