@@ -4,8 +4,9 @@ Each cell is looked at once more inside, at an irregular place, and is cut there
 the way from end to end. A curve that says where its pieces meet begins with these pieces, each of which is simple. Any
 other begins with 512 equal cells, and the neighbours of a cell that turns too much are cut too, since a detail that
 repeats may hide from one cell but not from several. What is smaller than a cell and does not show in its tangents
-there is not resolved, nor is what asks for more than 2^19 cells. Where the curve says that its tangent may jump, a cell
-of next to no length lies across the jump, so that no other cell has to be cut for it.
+there is not resolved, nor is what asks for more than 2^19 cells; a curve that turns so much over a quarter of its
+parameter is refused. Where the curve says that its tangent may jump, a cell of next to no length lies across the jump,
+so that no other cell has to be cut for it.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ _FIRST_CELLS, _MAX_CELLS = 512, 1 << 19
 _NEIGHBOURS = 4  # cut with a cell on either side
 _NARROWEST = 1e-10  # of the whole curve
 _KINK = 1e-12  # of the whole curve, on either side of a jump of the tangent
+_LOST = 2.0  # rad over a cell that tell nothing of the way in between
+_ROUNDING = 1e-13  # of the largest coordinate
 _GOLDEN = (5**0.5 - 1) / 2  # spreads the places inside the cells irregularly, so that no period of the curve meets them
 _BLOCK = 1 << 15  # parameters evaluated at once
 
@@ -54,7 +57,8 @@ class Cells(NamedTuple):
         """Cut ``curve`` into cells; its pieces meet at ``knots`` and its tangent jumps at ``kinks``, if it has any.
 
         Raises:
-            TaskError: the curve is not finite somewhere, or too far away for its square to be.
+            TaskError: the curve is not finite somewhere, or too far away for its square to be, or it turns so much that
+                the largest number of cells does not follow it.
         """
         ends = _first_ends(interval, knots)
         if kinks is not None:
@@ -65,7 +69,26 @@ class Cells(NamedTuple):
         stretch = 1 / np.cos(np.minimum(turn, 2.0) / 2)
         before, after = (np.linalg.norm(middle - end, axis=-1) * stretch for end in (p[:-1], p[1:]))
         sag = 0.5 * (before + after) * np.sin(np.minimum(turn, np.pi / 2))
-        return cls(s, p, middle, np.maximum(before, after), sag, turn)
+        cells = cls(s, p, middle, np.maximum(before, after), sag, turn)
+        if knots is None and len(turn) >= _MAX_CELLS:
+            cells._check_resolved()
+        return cells
+
+    @property
+    def rounding(self) -> float:
+        """The distance below which points of the curve are the same but for rounding."""
+        return _ROUNDING * float(np.abs(self.p).max())
+
+    def _check_resolved(self) -> None:
+        """Check that the cells follow the tangent over three quarters of the parameter at least."""
+        lost = np.flatnonzero((self.turn > _LOST) & (self.radius > self.rounding))
+        if (self.s[lost + 1] - self.s[lost]).sum() > 0.25 * (self.s[-1] - self.s[0]):
+            first, last = self.s[lost[0]], self.s[lost[-1] + 1]
+            raise TaskError(
+                f"the path turns by more than {self.turn.sum():.3g} rad on the way from s = {first:g} to {last:g}, "
+                f"and {_MAX_CELLS} cells do not follow it, expected a tangent that goes on from cell to cell; "
+                "look for noise in the path or its derivatives, for other units, and for a frequency that is too high"
+            )
 
     def place(self, s: Array, interval: Interval) -> Array:
         """Return the position of ``s`` (*batch,) counted in cells, laps included: i + u at the share u of cell i."""
@@ -143,10 +166,11 @@ def _evaluate_points(curve: Curve, s: Array) -> Array:
 def _unit_tangents(curve: Curve, s: Array) -> Array:
     """Return the unit tangents."""
     dp = _evaluate_by_blocks(curve.dp, s)
-    huge = ~(np.abs(dp) < FARTHEST).all(-1)
-    if huge.any():  # their squares are not finite
+    largest = np.abs(dp).max(-1)
+    extreme = ~(largest < FARTHEST) | ((largest > 0) & (largest < 1 / FARTHEST))
+    if extreme.any():  # their squares are not finite, or zero
         dp = np.nan_to_num(dp)
-        dp[huge] /= np.maximum(np.abs(dp[huge]).max(-1, keepdims=True), 1.0)
+        dp[extreme] /= np.maximum(np.abs(dp[extreme]).max(-1, keepdims=True), np.finfo(float).tiny)
     return dp / np.maximum(np.linalg.norm(dp, axis=-1, keepdims=True), np.finfo(float).tiny)
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _TURN = 1 / 8  # rad over a piece of a cell, which is taken to hold one minimum at most
 _SIZES, _RATIO = 6, 4.0  # how many groups of cells by size, and their sizes
 _BLOCK = 1 << 18  # pairs of a point and a cell held at once
+_PIECES = 1 << 20  # pieces of cells searched at once
 _TIE = 1e-12  # by how much a sample must be nearer than a root: not by rounding alone
 
 
@@ -31,8 +32,9 @@ class GlobalSearch:
     def __init__(self, curve: Curve, cells: Cells) -> None:
         self._curve, self._cells = curve, cells
         self._groups = list(_group_by_size(cells))
-        self._pieces = np.maximum(np.ceil(cells.turn / _TURN), 1).astype(int)
-        self._rounding = 1e-13 * float(np.abs(cells.p).max())
+        self._rounding = cells.rounding
+        turn = np.where(cells.radius > self._rounding, cells.turn, 0.0)  # the turns of a point are rounding errors
+        self._pieces = np.maximum(np.ceil(turn / _TURN), 1).astype(int)
 
     def __call__(self, x: Array) -> Array:
         """Return the parameter (N,) of the point nearest to each row of x (N, m); NaN where ‖x‖² overflows."""
@@ -54,7 +56,29 @@ class GlobalSearch:
 
     def _search(self, x: Array, bound: Array) -> Array:
         """Return the parameter (N,) of the nearest point among the candidate cells of each row."""
-        row, lower, upper = self._divide(*self._narrow_candidates(x, *self._candidates(x, bound)))
+        row, cell, least = self._narrow_candidates(x, *self._candidates(x, bound))
+        nearest, distance = np.empty(len(x)), np.full(len(x), np.inf)
+        for pairs in self._split_pairs(cell, least):
+            pairs = pairs[least[pairs] <= distance[row[pairs]]]
+            if pairs.size:
+                rows, closest, s = self._search_cells(x, row[pairs], cell[pairs])
+                closer = closest < distance[rows]
+                nearest[rows[closer]], distance[rows[closer]] = s[closer], closest[closer]
+        return nearest
+
+    def _split_pairs(self, cell: Array, least: Array) -> Iterator[Array]:
+        """Yield the indices of pairs whose pieces fit into memory together, those first that may be nearest."""
+        count = self._pieces[cell]
+        if count.sum() <= _PIECES:
+            yield np.arange(len(cell))
+            return
+        order = np.argsort(least, kind="stable")
+        edges = np.flatnonzero(np.diff(np.cumsum(count[order]) // _PIECES, prepend=-1, append=-1))
+        yield from np.split(order, edges[1:-1])
+
+    def _search_cells(self, x: Array, row: Array, cell: Array) -> tuple[Array, Array, Array]:
+        """Return the rows that occur in the pairs, with the distance to and the parameter of their nearest point."""
+        row, lower, upper = self._divide(row, cell)
         s = np.stack([lower, upper])
         difference = self._curve.p(s) - x[row]
         slope, distance = np.vecdot(difference, self._curve.dp(s)), np.linalg.norm(difference, axis=-1)
@@ -84,8 +108,11 @@ class GlobalSearch:
         order = np.argsort(row, kind="stable")
         return row[order], cell[order]
 
-    def _narrow_candidates(self, x: Array, row: Array, cell: Array) -> tuple[Array, Array]:
-        """Return the pairs whose chord, less the sag, is no farther than any other chord plus its sag."""
+    def _narrow_candidates(self, x: Array, row: Array, cell: Array) -> tuple[Array, Array, Array]:
+        """Return the pairs whose chord, less the sag, is no farther than any other chord plus its sag, and the former.
+
+        Chord less sag is a lower bound (M,) on the distance of each pair (row, cell).
+        """
         cells = self._cells
         start, chord = cells.p[cell] - x[row], cells.p[cell + 1] - cells.p[cell]
         square = np.maximum((chord * chord).sum(-1), np.finfo(float).tiny)
@@ -93,8 +120,9 @@ class GlobalSearch:
         distance = np.linalg.norm(start + share[:, None] * chord, axis=-1)
         sag = cells.sag[cell] + _TIE * distance + self._rounding
         bound = np.minimum.reduceat(distance + sag, np.searchsorted(row, np.arange(len(x))))
-        near = distance - sag <= bound[row]
-        return row[near], cell[near]
+        least = distance - sag
+        near = least <= bound[row]
+        return row[near], cell[near], least[near]
 
 
 class _Group(NamedTuple):
@@ -124,8 +152,9 @@ def _group_by_size(cells: Cells) -> Iterator[_Group]:
         yield _Group(cell, float(cells.radius[cell].max()), cKDTree(cells.middle[cell], balanced_tree=False))
 
 
-def _select_nearest(row: Array, distance: Array, s: Array, roots: int) -> Array:
-    """Return the ``s`` of least distance for each row; a sample beats a root only by more than rounding."""
+def _select_nearest(row: Array, distance: Array, s: Array, roots: int) -> tuple[Array, Array, Array]:
+    """Return each row, its least ``distance`` and the ``s`` of it; a sample beats a root by more than rounding only."""
     distance[roots:] *= 1 + _TIE
     order = np.lexsort((distance, row))
-    return s[order[np.unique(row[order], return_index=True)[1]]]
+    rows, first = np.unique(row[order], return_index=True)
+    return rows, distance[order[first]], s[order[first]]
