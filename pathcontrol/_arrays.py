@@ -91,6 +91,19 @@ def scalar(name: str, value: Any, *, positive: bool = False, least: float | None
     return number
 
 
+def whole(name: str, value: Any, least: int, most: int) -> int:
+    """Convert ``value`` to a whole number from ``least`` to ``most``, such as one that sets how much is allocated."""
+    array = as_array(name, value)
+    if array.ndim != 0 or not least <= array <= most or array != np.floor(array):
+        raise InputError(
+            f"{name} = {value!r:.80}, expected a whole number from {least} to {most}",
+            argument=name,
+            value=value,
+            limit=(least, most),
+        )
+    return int(array)
+
+
 def quantity(name: str, value: Any) -> float:
     """Convert ``value`` to a float from 1e-12 to 1e30, such as a mass, so that dynamics can compute with it."""
     number = scalar(name, value, positive=True)

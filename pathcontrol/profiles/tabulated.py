@@ -11,6 +11,8 @@ from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.profile import Path, VelocityProfile
 
+MOST_POINTS = 1_000_000  # of a table that is computed
+
 
 class TabulatedProfile(VelocityProfile):
     """A velocity profile with ϑ² linear in s between knots, so that s̈ = ½ dϑ²/ds is constant there.

@@ -18,6 +18,8 @@ from pathcontrol.tasks.lengths import arc_length, curvature, last_parameter, len
 from pathcontrol.tasks.profile import VelocityProfile
 from pathcontrol.tasks.regularity import check_moves
 
+_MOST_PIECES = 10_000_000  # of a stretch of several laps
+
 
 class PathTask(Task):
     """A robotic task: *where* (a path q_d(s)) and *how fast along it* (a velocity profile ϑ(s)), never *when*.
@@ -291,10 +293,20 @@ class PathSection(_SameParameter):
         """Return the knots of the path within the stretch, of a closed one those of each lap, and the ends."""
         if self.path.period is not None:
             first, last_one = np.floor((np.array([self.s0, self.s_end]) - self.path.s0) / self.path.period)
+            self._check_count((last_one + 1 - first) * len(knots))
             # a lap ends with the first knot of the next
             knots = (np.arange(first, last_one + 1)[:, None] * self.path.period + knots[:-1]).ravel()
         within = knots[(knots > self.s0) & (knots < self.s_end)]
         return np.unique(np.concatenate([[self.s0], within, [self.s_end]]))
+
+    def _check_count(self, pieces: float) -> None:
+        """Check that the pieces of all laps can be listed."""
+        if pieces > _MOST_PIECES:
+            raise InputError(
+                f"the stretch from s0 = {self.s0:g} to s_end = {self.s_end:g} of a path with the period "
+                f"{self.path.period:g} has {pieces:.3g} pieces, expected at most {_MOST_PIECES}; take fewer laps, or "
+                "simulate the closed path itself"
+            )
 
 
 class ArcLengthPath(DerivedPath):

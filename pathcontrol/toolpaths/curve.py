@@ -41,7 +41,13 @@ class ToolCurve:
     def __init__(self, s: ArrayLike, p: ArrayLike, dp: ArrayLike, ddp: ArrayLike, closed: bool = False) -> None:
         self.knots = readonly(finite("s", as_array("s", s)))
         values = np.stack([finite(name, as_array(name, v)) for name, v in (("p", p), ("dp", dp), ("ddp", ddp))], axis=1)
-        if values.shape != (len(self.knots), 3, 3) or len(self.knots) < 2 or not (np.diff(self.knots) > 0).all():
+        if self.knots.ndim == 1 and (np.diff(self.knots) <= 0).any():
+            i = int(np.argmax(np.diff(self.knots) <= 0))
+            raise InputError(
+                f"s[{i + 1}] = {self.knots[i + 1]:.17g} m after s[{i}] = {self.knots[i]:.17g} m, expected increasing "
+                "knots; a curve much longer than its knots are far apart cannot tell them apart"
+            )
+        if values.shape != (len(self.knots), 3, 3) or len(self.knots) < 2:
             raise InputError(f"s has shape {self.knots.shape}, expected increasing knots and p, dp, ddp of (k + 1, 3)")
         if closed and not np.allclose(values[0], values[-1], rtol=1e-6, atol=1e-9):
             raise InputError("the curve is said to be closed, but its last knot is not its first one again")

@@ -42,6 +42,8 @@ _PICTURE = {"format": "png", "optimizeForSpeed": True}
 _INPUT = ("-y", "-v", "error", "-f", "image2pipe", "-c:v", "png")
 _CODEC = ("-an", "-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart")
 _COLOURS = ("-vf", "scale=out_range=tv:out_color_matrix=bt709", "-colorspace", "bt709")
+_MOST_FRAMES = 1_000_000
+_LARGEST = 16_384  # px, of a picture of a browser and of H.264
 _PATIENCE = 60_000  # ms, for the page to be drawn once
 
 
@@ -128,9 +130,17 @@ class _NoBrowserError(MissingExtraError):
 
 def _clip(duration: float, size: tuple[int, int], fps: float, speed: float) -> _Clip:
     """Return the frames of the video."""
-    if len(size) != 2 or any(not isinstance(n, int) or n < 2 or n % 2 for n in size):
-        raise InputError(f"size = {size!r}, expected width and height in pixels, two even numbers such as (1280, 720)")
+    if len(size) != 2 or any(not isinstance(n, int) or not 2 <= n <= _LARGEST or n % 2 for n in size):
+        raise InputError(
+            f"size = {size!r:.80}, expected width and height in pixels, two even numbers up to {_LARGEST} "
+            "such as (1280, 720)"
+        )
     step = scalar("speed", speed, positive=True) / fps
+    if not step * _MOST_FRAMES >= duration:
+        raise InputError(
+            f"fps = {fps:g} and speed = {speed:g} make more than {_MOST_FRAMES} frames of a film of {duration:g} s; "
+            "lower fps, or raise speed"
+        )
     frames = max(1, math.ceil(duration / step - 1e-9))
     return _Clip(size, fps, tuple(k * step for k in range(frames)))
 

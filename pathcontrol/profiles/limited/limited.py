@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import scalar
+from pathcontrol._arrays import whole
 from pathcontrol._expect import expect
 from pathcontrol.arguments import Form, Rate, Unit
 from pathcontrol.errors import InputError
@@ -17,7 +17,7 @@ from pathcontrol.profiles.limited.motion_limit import MotionLimit
 from pathcontrol.profiles.limited.tangential import all_steps
 from pathcontrol.profiles.limited.two_pass import largest_sequence
 from pathcontrol.profiles.motion import JointMotion, ToolMotion
-from pathcontrol.profiles.tabulated import TabulatedProfile
+from pathcontrol.profiles.tabulated import MOST_POINTS, TabulatedProfile
 from pathcontrol.profiles.topp.joint_limits import VelocityLimit, joint_values
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.profile import Path
@@ -57,7 +57,7 @@ def limited(
     expect("path", path, PathTask)
     for i, limit in enumerate(limits):
         expect(f"limits[{i}]", limit, MotionLimit)
-    cells = edges(path, int(scalar("points", points, least=1)))
+    cells = edges(path, whole("points", points, 1, MOST_POINTS))
     demands = Demands(path, limits, velocity, start_rate)
     s = refine(demands.resolved, cells)
     ceiling, tangential = demands.at(quarters(s))

@@ -6,11 +6,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array, readonly, scalar
+from pathcontrol._arrays import Array, readonly, scalar, whole
 from pathcontrol._expect import expect
 from pathcontrol.arguments import Form, Rate, Unit
 from pathcontrol.errors import InputError, TaskError
-from pathcontrol.profiles.tabulated import TabulatedProfile
+from pathcontrol.profiles.tabulated import MOST_POINTS, TabulatedProfile
 from pathcontrol.profiles.topp.dynamics import sample, torques
 from pathcontrol.profiles.topp.joint_limits import LimitChoice, VelocityLimit, joint_limits
 from pathcontrol.profiles.topp.solve import Demand, fastest
@@ -120,7 +120,7 @@ def _knots(path: Path, points: int) -> Array:
     end = path.s_end if path.period is None else path.s0 + path.period
     if not np.isfinite(end):
         raise TaskError(f"{type(path).__name__} neither ends nor closes, so ϑ cannot be tabulated; give it an s_end")
-    return np.linspace(path.s0, end, int(scalar("points", points, least=10)))
+    return np.linspace(path.s0, end, whole("points", points, 10, MOST_POINTS))
 
 
 def _ends(path: Path, **ends: float | None) -> list[float | None]:
