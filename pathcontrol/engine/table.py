@@ -17,6 +17,7 @@ from pathcontrol.engine.structs import Memory, Path
 from pathcontrol.errors import EngineError
 from pathcontrol.geometry import hermite
 from pathcontrol.geometry.hermite import horner
+from pathcontrol.geometry.periodic import wrap
 from pathcontrol.tasks.profile import ConstantRate
 from pathcontrol.tasks.recorded import RecordedPath
 from pathcontrol.tasks.task import PathTask
@@ -166,7 +167,7 @@ def _add_corners(task: PathTask, knots: Array) -> Array:
     lower, upper = knots[0], knots[-1]
     corners = np.asarray(task.profile_knots, dtype=np.float64)
     if task.period is not None:
-        corners = lower + np.mod(corners - lower, task.period)
+        corners = wrap(corners, lower, task.period)
     every = np.union1d(knots, corners[(corners > lower) & (corners < upper)])
     apart = np.diff(every) > 1e-12 * (upper - lower)
     return np.append(every[:-1][apart], upper)

@@ -8,7 +8,7 @@ functions to O(h⁴) or O(h⁶).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,14 @@ _ALLOWED = {2: (1e-9, 1e-6), 3: (1e-11, 1e-9)}
 _ROUNDING = 32 * np.finfo(float).eps
 _HALVINGS = 40
 _MOST_CELLS = 1 << 12  # more than there were at first
+
+
+class CurvePoint(NamedTuple):
+    """A curve at s: position [m] and its first two derivatives with respect to s, each (*batch, 3)."""
+
+    p: Array
+    dp: Array
+    ddp: Array
 
 
 def hermite_polynomials(s: Array, jets: Array) -> PPoly:
@@ -50,6 +58,16 @@ def coefficients(s: Array, jets: Array) -> Array:
     fourth = -15 * r / h**4 + 7 * v / h**3 - a / h**2
     third = 10 * r / h**3 - 4 * v / h**2 + a / (2 * h)
     return np.stack([fifth, fourth, third, ddy / 2, dy, y])
+
+
+def bezier_points(length: Array, start: Array, end: Array) -> Array:
+    """Return the Bézier points (*batch, 6, 3) of the quintics of a ``length`` (*batch,) from jets (*batch, 3, 3)."""
+    h = length[..., None]
+    (p0, v0, a0), (p1, v1, a1) = (np.moveaxis(jet, -2, 0) for jet in (start, end))
+    # a Bézier curve's end derivatives in terms of its control points, solved for them
+    first = [p0, p0 + h * v0 / 5, p0 + 2 * h * v0 / 5 + h**2 * a0 / 20]
+    last = [p1 - 2 * h * v1 / 5 + h**2 * a1 / 20, p1 - h * v1 / 5, p1]
+    return np.stack(first + last, axis=-2)
 
 
 def horner(coefficients: Array, x: Array) -> tuple[Array, Array]:

@@ -12,6 +12,7 @@ from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.geometry.hermite import hermite_polynomials, sample_adaptively
+from pathcontrol.geometry.periodic import wrap
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.profile import ConstantRate, ConstantSpeed, Path, VelocityProfile
 from pathcontrol.tasks.task import PathTask
@@ -225,7 +226,7 @@ def _wrap(s: Array, knots: Array, period: float | None) -> Array:
     """Move ``s`` into the first lap of a closed path, or between the ends of an open one."""
     if period is None:
         return np.clip(s, knots[0], knots[-1])
-    return knots[0] + np.mod(s - knots[0], period)
+    return wrap(s, knots[0], period)
 
 
 def _check_period(s: Array, period: float | None) -> float | None:

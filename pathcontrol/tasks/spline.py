@@ -10,6 +10,7 @@ from scipy.interpolate import BSpline, PPoly
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
+from pathcontrol.geometry.periodic import wrap
 from pathcontrol.tasks.curves import JointCurve
 
 
@@ -86,7 +87,7 @@ class SplinePath(JointCurve):
     def _within(self, s: Array) -> Array:
         if self.period is None:
             return np.asarray(s)
-        return self.s0 + np.mod(np.asarray(s) - self.s0, self.period)
+        return wrap(np.asarray(s), self.s0, self.period)
 
 
 def _polynomials(spline: BSpline) -> PPoly:

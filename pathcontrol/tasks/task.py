@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.geometry.arc_length import curvature_vector, drop_coincident
+from pathcontrol.geometry.periodic import wrap
 from pathcontrol.tasks.base import PathPoint, Task, refuse_batch
 from pathcontrol.tasks.lengths import arc_length, curvature, last_parameter, length_along
 from pathcontrol.tasks.profile import VelocityProfile
@@ -198,7 +199,7 @@ class ReversedPath(DerivedPath):
         if near is not None:
             return self._mirror - self.path.sigma_bar(q, self._mirror - as_array("near", near))
         s = self._mirror - self.path.sigma_bar(q)
-        return s if self.period is None else self.s0 + np.mod(s - self.s0, self.period)
+        return s if self.period is None else wrap(s, self.s0, self.period)
 
     def _map_knots(self, knots: Array) -> Array:
         return self._mirror - knots[::-1] + (self.period or 0.0)

@@ -12,7 +12,8 @@ from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.arguments import Direction, Length, Point, Points
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
-from pathcontrol.geometry.quintic import CurvePoint, quintic_spline
+from pathcontrol.geometry.hermite import CurvePoint, hermite_polynomials
+from pathcontrol.geometry.periodic import wrap
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.toolpaths.smoothing.corners import TURN_BACK, corners
@@ -40,19 +41,19 @@ class ToolCurve:
 
     def __init__(self, s: ArrayLike, p: ArrayLike, dp: ArrayLike, ddp: ArrayLike, closed: bool = False) -> None:
         self.knots = readonly(finite("s", as_array("s", s)))
-        values = np.stack([finite(name, as_array(name, v)) for name, v in (("p", p), ("dp", dp), ("ddp", ddp))], axis=1)
+        values = np.stack([finite(name, as_array(name, v)) for name, v in (("p", p), ("dp", dp), ("ddp", ddp))])
         if self.knots.ndim == 1 and (np.diff(self.knots) <= 0).any():
             i = int(np.argmax(np.diff(self.knots) <= 0))
             raise InputError(
                 f"s[{i + 1}] = {self.knots[i + 1]:.17g} m after s[{i}] = {self.knots[i]:.17g} m, expected increasing "
                 "knots; a curve much longer than its knots are far apart cannot tell them apart"
             )
-        if values.shape != (len(self.knots), 3, 3) or len(self.knots) < 2:
+        if values.shape != (3, len(self.knots), 3) or len(self.knots) < 2:
             raise InputError(f"s has shape {self.knots.shape}, expected increasing knots and p, dp, ddp of (k + 1, 3)")
-        if closed and not np.allclose(values[0], values[-1], rtol=1e-6, atol=1e-9):
+        if closed and not np.allclose(values[:, 0], values[:, -1], rtol=1e-6, atol=1e-9):
             raise InputError("the curve is said to be closed, but its last knot is not its first one again")
         self.s0, self.s_end, self.closed = float(self.knots[0]), float(self.knots[-1]), bool(closed)
-        curve = quintic_spline(self.knots, values)
+        curve = hermite_polynomials(self.knots, values)
         self._curves = [curve, curve.derivative(1), curve.derivative(2)]
 
     @property
@@ -92,7 +93,7 @@ class ToolCurve:
         return ClosestPoint(Curve(*functions), self.s0, self.s_end, self.closed, self.knots)
 
     def _within(self, s: Array) -> Array:
-        return self.s0 + np.mod(s - self.s0, self.length) if self.closed else np.clip(s, self.s0, self.s_end)
+        return wrap(s, self.s0, self.length) if self.closed else np.clip(s, self.s0, self.s_end)
 
     # --- curves given in closed form --------------------------------------------------------------------------
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import BPoly
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
+from pathcontrol.geometry.hermite import hermite_polynomials
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.task import PathTask
 
@@ -27,9 +27,11 @@ class Blend(PathTask):
 
     def __init__(self, before: PathPoint, after: PathPoint, s_end: float) -> None:
         self.s_end = float(s_end)
-        ends = [0.0, self.s_end]
-        path = BPoly.from_derivatives(ends, [[p.q_d, p.dq_d, p.ddq_d] for p in (before, after)])
-        rate = BPoly.from_derivatives(ends, [[np.log(p.theta), p.dtheta / p.theta] for p in (before, after)])
+        ends, both = np.array([0.0, self.s_end]), (before, after)
+        path = hermite_polynomials(ends, np.stack([[p.q_d, p.dq_d, p.ddq_d] for p in both], axis=1))
+        rate = hermite_polynomials(
+            ends, np.stack([[np.log(p.theta), p.dtheta / p.theta] for p in both], axis=1)[..., None]
+        )
         self._path, self._rate = [path, path.derivative(1), path.derivative(2)], [rate, rate.derivative(1)]
         speed = np.linalg.norm(self.dq_d(np.linspace(0.0, self.s_end, 65)), axis=-1)
         if speed.min() < _SLOWEST * speed[0]:
@@ -48,7 +50,7 @@ class Blend(PathTask):
         return self._path[2](s)
 
     def theta(self, s: Array) -> Array:
-        return np.exp(self._rate[0](s))
+        return np.exp(self._rate[0](s)[..., 0])
 
     def dtheta(self, s: Array) -> Array:
-        return self.theta(s) * self._rate[1](s)
+        return self.theta(s) * self._rate[1](s)[..., 0]

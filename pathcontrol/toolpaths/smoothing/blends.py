@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import comb
 
 from pathcontrol._arrays import Array
-from pathcontrol.geometry.quintic import CurvePoint, quintic_points
+from pathcontrol.geometry.hermite import CurvePoint, bezier_points
 from pathcontrol.toolpaths.smoothing.corners import angles
 
 #: position, tangent and curvature vector at arc lengths (*batch,) [m] away from a junction
@@ -80,7 +80,7 @@ class Blends(NamedTuple):
     @classmethod
     def between(cls, start: CurvePoint, end: CurvePoint, length: Array, samples: int) -> Blends:
         """Return the blends from ``start`` to ``end`` (*batch, 3) over the parameter ``length`` (*batch,) [m]."""
-        control = quintic_points(length, np.stack(start, axis=-2), np.stack(end, axis=-2))
+        control = bezier_points(length, np.stack(start, axis=-2), np.stack(end, axis=-2))
         slopes = 5 * np.diff(control, axis=-2) / length[..., None, None]
         return cls(_bernstein(5, samples) @ control, np.linalg.norm(_bernstein(4, samples) @ slopes, axis=-1))
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
-from pathcontrol.geometry.quintic import CurvePoint, quintic_spline
+from pathcontrol.geometry.hermite import CurvePoint, hermite_polynomials
 from pathcontrol.toolpaths.segments.base import Segment
 from pathcontrol.toolpaths.smoothing.corners import end_tangent, start_tangent
 
@@ -80,11 +80,12 @@ def curved_stretch(segment: Segment, start: float, end: float) -> Stretch:
         between = s[:-1] + 0.4 * np.diff(s)  # beside the middle, where an odd error would not show
         if not between.size:
             break
-        error = np.linalg.norm(quintic_spline(s, np.stack(data, axis=1))(between) - curve.at(between).p, axis=-1)
-        coarse = error > 0.6 * _ACCURACY  # elsewhere in a piece it may be 1.6 times as large
-        if not coarse.any():
+        error = np.linalg.norm(hermite_polynomials(s, np.stack(data))(between) - curve.at(between).p, axis=-1)
+        allowed = 0.6 * _ACCURACY  # elsewhere in a piece it may be 1.6 times as large
+        coarse, resolved = error > allowed, np.spacing(np.abs(data.p).max()) <= allowed
+        if resolved and not coarse.any():
             break
-        if len(s) > _MOST_PIECES:
+        if not resolved or len(s) > _MOST_PIECES:
             raise InputError(
                 f"a {type(segment).__name__} of length {segment.length:g} m at {data.p[0].tolist()} cannot be followed "
                 "to 1 nm: it bends too sharply, or is too far from the origin"

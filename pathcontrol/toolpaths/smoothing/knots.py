@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.geometry.quintic import CurvePoint, quintic_spline
+from pathcontrol.geometry.hermite import CurvePoint, hermite_polynomials
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.smoothing.blends import Arm, Junction, blend_length
@@ -104,7 +104,7 @@ def _ring(parts: Sequence[Knots], gaps: Sequence[float]) -> Knots:
     if gap == 0:
         return _chain([*parts, Knots(*(column[:1] for column in first))], gaps)
     ends = np.array([[values[0][-1], values[1][0]] for values in zip(last[1:], first[1:], strict=True)])
-    seam, half = quintic_spline(np.array([0.0, gap]), np.moveaxis(ends, 0, 1)), np.array([0.5 * gap])
+    seam, half = hermite_polynomials(np.array([0.0, gap]), ends), np.array([0.5 * gap])
     middle = Knots(np.zeros(1), seam(half), seam.derivative(1)(half), seam.derivative(2)(half))
     return _chain([middle, *parts, middle], [0.5 * gap, *gaps[:-1], 0.5 * gap])
 

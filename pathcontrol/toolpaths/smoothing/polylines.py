@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.geometry.quintic import CurvePoint
+from pathcontrol.geometry.hermite import CurvePoint
 from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.toolpaths.smoothing.blends import Blends, blend_length, straight_trims
 from pathcontrol.toolpaths.smoothing.corners import angles
