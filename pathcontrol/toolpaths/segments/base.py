@@ -12,9 +12,9 @@ from scipy.spatial import cKDTree
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol.errors import InputError
+from pathcontrol.geometry.arc_length import ArcLength
 from pathcontrol.geometry.box_hierarchy import BoxHierarchy
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
-from pathcontrol.toolpaths.lengths import ArcLength
 
 _SAMPLES = 1025
 _SHORTEST = 1e-10  # m, edges up to this have no direction to rely on
@@ -57,7 +57,7 @@ class Segment(ABC):
     @cached_property
     def arc_length(self) -> ArcLength:
         """The arc length as a function of u, and its inverse."""
-        return ArcLength(self.derivative)
+        return ArcLength(self.derivative, 0.0, 1.0, cusps=True)
 
     @cached_property
     def length(self) -> float:

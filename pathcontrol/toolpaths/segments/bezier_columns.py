@@ -17,7 +17,12 @@ from pathcontrol.toolpaths.segments.bezier import Bezier
 
 _AT_ONCE = 512  # curves
 _HIGHEST_DEGREE = 3  # curves whose lengths are computed together
-_FIRST_CELLS, _NARROWEST, _ACCURACY, _TURN = 4, 2.0**-40, 1e-13, 0.9  # as in lengths.ArcLength, except for the first
+_FIRST_CELLS, _NARROWEST, _ACCURACY, _TURN = (
+    4,
+    2.0**-40,
+    1e-13,
+    0.9,
+)  # as in ArcLength, but for the first and the accuracy
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 

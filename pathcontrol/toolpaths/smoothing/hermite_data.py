@@ -54,7 +54,7 @@ class ByLength:
 
     def at(self, length: ArrayLike) -> CurvePoint:
         """Return position and derivatives by arc length, at ``length`` (*batch,) from the start [m]."""
-        u = self.segment.arc_length.parameter(length)
+        u = self.segment.arc_length.inverse(np.asarray(length, dtype=np.float64))
         first, second = self.segment.derivative(u), self.segment.derivative(u, 2)
         speed = np.linalg.norm(first, axis=-1, keepdims=True)
         moves = speed > _STILL * self.segment.length
