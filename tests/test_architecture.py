@@ -85,6 +85,13 @@ def test_imports_run_down(name):
             assert theirs is None or theirs <= mine, f"{name} imports {target}, which is on a floor above"
 
 
+def test_saved_runs_find_classes_by_the_registry():
+    storage = [name for name in MODULES if name.startswith("pathcontrol.simulation.storage")]
+    used = {".".join(target.split(".")[:2]) for name in storage for target in GRAPH[name]}
+    assert storage
+    assert used & {f"pathcontrol.{package}" for package in ("cartesian", "profiles", "toolpaths")} == set()
+
+
 def test_only_robot_knows_pinocchio():
     knowing = {name.split(".")[1] for name, path in MODULES.items() if "import pinocchio" in path.read_text("utf-8")}
     assert knowing == {"robot"}

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 
 from pathcontrol._arrays import Array, rigid
+from pathcontrol.arguments import parameters_of
 from pathcontrol.cartesian.links import smooth_open
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.toolpaths.contour import Contour, Toolpath
+from pathcontrol.toolpaths.recipes import contour_of, contour_recipe
 from pathcontrol.toolpaths.smoothing.smooth import Corners, Smoothed
 
 
@@ -36,6 +39,9 @@ class RecordedToolpath(ToolpathTask):
         rotations: how many rotations of the tool are prescribed; older files do not say.
         posture: which posture was chosen, in words.
     """
+
+    #: how items of arguments are written to a saved run and read from it
+    codecs: ClassVar = {"placed": (contour_recipe, contour_of)}
 
     def __init__(
         self,
@@ -66,6 +72,16 @@ class RecordedToolpath(ToolpathTask):
         back = np.linalg.inv(self.workpiece)
         self.drawing = Toolpath(tuple(contour.placed(back) for contour in placed), source, unit)
         self.contours = tuple(placed[i] for i in followed)
+
+    @classmethod
+    def arguments_of(cls, task: ToolpathTask) -> dict[str, Any]:
+        """Return the arguments that rebuild a task."""
+        placed = list(dict.fromkeys(task.contours))
+        rank = {contour: i for i, contour in enumerate(placed)}
+        made = {"paths": task.paths, "placed": placed, "followed": [rank[contour] for contour in task.contours]}
+        drawing = {"source": task.drawing.source, "unit": task.drawing.unit}
+        others = [name for name in parameters_of(cls) if name not in made | drawing]
+        return made | drawing | {name: getattr(task, name) for name in others}
 
     @property
     def deviation(self) -> float:

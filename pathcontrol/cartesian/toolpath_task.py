@@ -62,6 +62,7 @@ class ToolpathTask(PathSequence):
         TaskError: a contour cannot be followed; the message says which, where and why.
     """
 
+    kept_as = "RecordedToolpath"
     frame: str
 
     def __init__(

@@ -31,6 +31,8 @@ class TabulatedProfile(VelocityProfile):
         period: as given.
     """
 
+    kept_as = "TabulatedProfile"
+
     def __init__(self, s: ArrayLike, squared: ArrayLike, period: float | None = None) -> None:
         self.s = _check_knots(s)
         self.squared = _check_squares(self.s, finite("squared", as_array("squared", squared)))

@@ -52,6 +52,7 @@ class Task(ABC):
         rollouts: for how many rollouts it has a task each; ``None`` for one task that is that of any.
         kept_by_arguments: whether a saved run keeps it by the arguments of its constructor, which are attributes of the
             same names; others are kept by samples.
+        kept_as: the class of the library that a saved run keeps it as, by its name; empty for its own.
     """
 
     s0: float = 0.0
@@ -62,6 +63,7 @@ class Task(ABC):
     rotations: int = 0
     rollouts: int | None = None
     kept_by_arguments: ClassVar[bool] = False
+    kept_as: ClassVar[str] = ""
 
     def __init_subclass__(cls, single: bool | None = None, **options: Any) -> None:
         super().__init_subclass__(**options)

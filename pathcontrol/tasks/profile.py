@@ -43,9 +43,11 @@ class VelocityProfile(ABC):
     Attributes:
         kept_by_arguments: whether a saved run keeps it by the arguments of its constructor, which are attributes of the
             same names; others are kept by samples.
+        kept_as: the class of the library that a saved run keeps it as, by its name; empty for its own.
     """
 
     kept_by_arguments: ClassVar[bool] = False
+    kept_as: ClassVar[str] = ""
 
     @abstractmethod
     def theta(self, path: Path, s: Array) -> Array:

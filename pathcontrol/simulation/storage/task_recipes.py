@@ -7,15 +7,13 @@ to the last bit. Any other path is kept as samples, a :class:`RecordedPath`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pathcontrol._arrays import as_array, finite
 from pathcontrol.arguments import parameters_of
-from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.errors import InputError
-from pathcontrol.profiles.tabulated import TabulatedProfile
 from pathcontrol.registry import PROFILES, TASKS, load
 from pathcontrol.simulation.storage.array_store import ArrayStore
 from pathcontrol.simulation.storage.recipe_size import check_extent
@@ -26,12 +24,10 @@ from pathcontrol.tasks.profile import ConstantRate, VelocityProfile
 from pathcontrol.tasks.recorded import RecordedPath, recorded_profile
 from pathcontrol.tasks.task import PathSection, PathTask, Reprofiled
 
-if TYPE_CHECKING:
-    from pathcontrol.cartesian.toolpath_task import ToolpathTask
-
 #: modules of classes that no experiment file names, but that saved runs make again from their arguments
 _PLACES = {
     "TabulatedProfile": "profiles.tabulated:TabulatedProfile",
+    "RecordedToolpath": "cartesian.recorded_toolpath:RecordedToolpath",
     "Reprofiled": "tasks.task:Reprofiled",
     "Laps": "tasks.laps:Laps",
     "RecordedPath": "tasks.recorded:RecordedPath",
@@ -42,17 +38,6 @@ _PLACES = {
     "ScaledPath": "tasks.task:ScaledPath",
     "ShiftedPath": "tasks.task:ShiftedPath",
 }
-_TOOLPATH = (
-    "frame",
-    "workpiece",
-    "feed",
-    "rapid_speed",
-    "acceleration",
-    "tolerance",
-    "corner",
-    "deviation",
-    "rotations",
-)
 
 
 def task_recipe(task: PathTask, store: ArrayStore, upto: float | None = None, rated: bool = True) -> dict[str, Any]:
@@ -71,8 +56,8 @@ def _task_recipe(task: PathTask, store: ArrayStore, upto: float | None, rated: b
     """Return the recipe of a task of any kind."""
     if isinstance(task, TaskBatch):
         return {"class": "TaskBatch"} | share_parts([task_recipe(one, store, upto) for one in task])
-    if (toolpath := as_toolpath(task)) is not None:
-        return _toolpath_recipe(toolpath, store)
+    if task.kept_as:
+        return _recipe(_class_of(task.kept_as), task, store, None)
     if isinstance(task, PathSequence):
         return _recipe(PathSequence, task, store, upto, rated)
     if isinstance(task, Reprofiled):
@@ -103,9 +88,18 @@ def task_of(recipe: Any, store: ArrayStore) -> PathTask:
 
 
 def _recipe(cls: type, made: Any, store: ArrayStore, upto: float | None, rated: bool = True) -> dict[str, Any]:
-    """Return the recipe of an object that is made again from its constructor's arguments."""
-    values = {name: _value(getattr(made, name), store, upto, rated) for name in parameters_of(cls)}
-    return {"class": cls.__name__} | values
+    """Return the recipe from which ``cls`` makes an object again: the arguments of its constructor."""
+    if hasattr(cls, "arguments_of"):
+        given = cls.arguments_of(made)
+    else:
+        given = {name: getattr(made, name) for name in parameters_of(cls)}
+    own = {name: [write(item, store.put) for item in given[name]] for name, (write, _) in _codecs_of(cls).items()}
+    return {"class": cls.__name__} | {name: _value(value, store, upto, rated) for name, value in (given | own).items()}
+
+
+def _codecs_of(cls: type) -> Mapping[str, tuple[Any, Any]]:
+    """Return the functions of a class that write and read the items of its arguments, by their names."""
+    return getattr(cls, "codecs", {})
 
 
 def _value(value: Any, store: ArrayStore, upto: float | None, rated: bool) -> Any:
@@ -122,8 +116,8 @@ def _value(value: Any, store: ArrayStore, upto: float | None, rated: bool) -> An
 def _profile_recipe(task: Reprofiled, store: ArrayStore, upto: float | None) -> dict[str, Any]:
     """Return the profile of a task if it is one of the library that needs nothing else, or else samples of ϑ."""
     profile = task.profile
-    if isinstance(profile, TabulatedProfile):  # or one that knows more, as TimeOptimal
-        return _recipe(TabulatedProfile, profile, store, upto)
+    if profile.kept_as:
+        return _recipe(_class_of(profile.kept_as), profile, store, upto)
     known = profile if _class_of(type(profile).__name__) is type(profile) else recorded_profile(task, upto)
     return _recipe(type(known), known, store, upto)
 
@@ -142,24 +136,6 @@ def _has_own_domain(task: PathTask) -> bool:
     return (twin.s0, twin.s_end, twin.period) == (task.s0, task.s_end, task.period)
 
 
-def _toolpath_recipe(task: ToolpathTask, store: ArrayStore) -> dict[str, Any]:
-    """Return the recipe of a task that follows a toolpath."""
-    from pathcontrol.toolpaths.recipes import contour_recipe
-
-    placed = list(dict.fromkeys(task.contours))
-    rank = {contour: i for i, contour in enumerate(placed)}
-    return {
-        "class": "RecordedToolpath",
-        "paths": [task_recipe(path, store) for path in task.paths],
-        "placed": [contour_recipe(contour, store.put) for contour in placed],
-        "followed": [rank[contour] for contour in task.contours],
-        **{name: _value(getattr(task, name), store, None, True) for name in _TOOLPATH},
-        "source": task.drawing.source,
-        "unit": task.drawing.unit,
-        "posture": task.posture,
-    }
-
-
 def _make(recipe: Any, store: ArrayStore, parts: Sequence[Any] = ()) -> Any:
     """Return the value of a recipe: an object, an array, a list, a JSON value, or one of ``parts`` made before."""
     if isinstance(recipe, list):
@@ -176,24 +152,13 @@ def _make(recipe: Any, store: ArrayStore, parts: Sequence[Any] = ()) -> Any:
             made.append(_make(part, store, made))
         return TaskBatch(_make(recipe["tasks"], store, made))
     values = {name: value for name, value in recipe.items() if name != "class"}
-    if recipe["class"] == "RecordedToolpath":
-        return _make_toolpath(values, store, parts)
     cls = _class_of(recipe["class"])
     if cls is None:
         names = [place.rpartition(":")[2] for kind in (TASKS, PROFILES) for place in kind.members.values()]
         known = [*filter(_class_of, names), *_PLACES]
         raise InputError(f"class {recipe['class']!r} of a task, expected one of {', '.join(known)}")
-    return _try_out(cls(**{name: _make(value, store, parts) for name, value in values.items()}))
-
-
-def _make_toolpath(values: dict[str, Any], store: ArrayStore, parts: Sequence[Any]) -> PathTask:
-    """Return the toolpath of a recipe."""
-    from pathcontrol.cartesian.recorded_toolpath import RecordedToolpath
-    from pathcontrol.toolpaths.recipes import contour_of
-
-    contours = [contour_of(contour, store.get) for contour in values.pop("placed")]
-    arguments = {name: _make(value, store, parts) for name, value in values.items()}
-    return RecordedToolpath(placed=contours, **arguments)
+    own = {name: [read(item, store.get) for item in values.pop(name)] for name, (_, read) in _codecs_of(cls).items()}
+    return _try_out(cls(**own, **{name: _make(value, store, parts) for name, value in values.items()}))
 
 
 def _try_out(made: Any) -> Any:
