@@ -115,9 +115,9 @@ RECORDED = ("q", "qd", "q_measured", "qd_measured", "tau_demand", "tau", "s", "s
 
 
 class Record(Structure):
-    """Addresses at which the next samples are written."""
+    """Addresses at which the next samples are written, and the bytes from one sample to the next."""
 
-    _fields_ = [(name, c_void_p) for name in RECORDED]
+    _fields_ = [*((name, c_void_p) for name in RECORDED), ("stride", c_longlong)]
 
 
 class Span(Structure):

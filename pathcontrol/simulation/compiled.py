@@ -154,7 +154,7 @@ class CompiledArm:
         width = lanes(self._library)
         noise = None if self._noise is None else self._noise.samples(count)
         arrays = recorder.reserve(count + last)
-        record = Record(**{name: arrays[name].ctypes.data for name in RECORDED})
+        record = Record(**{name: arrays[name].ctypes.data for name in RECORDED}, stride=arrays["q"].strides[0])
         state = State(**{name: self._state[name].ctypes.data for name in STATE + STATE_NUMBERS})
         span = Span(done, self._ticks, count, rollouts, last, rollouts <= width)
         pointers = [addressof(setup), addressof(state), addressof(record)]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import prod
-
 import numpy as np
 
 from pathcontrol._arrays import Array
@@ -17,6 +15,9 @@ _ROOM = 1 << 30  # bytes reserved at first; pages that are not written take no m
 class Recorder:
     """Arrays (time, rollout, …) that grow a sample at a time, returned as (rollout, time, …).
 
+    A sample of all variables and rollouts lies together in memory: one block of it takes few page faults where an array
+    for each variable takes many.
+
     Args:
         rollouts: number of rollouts.
         joints: number of joints.
@@ -26,22 +27,17 @@ class Recorder:
     def __init__(self, rollouts: int, joints: int, samples: int) -> None:
         self._most, self._samples = samples, 0
         whole = {"rollout": rollouts, "joint": joints}
-        shapes = {name: [whole[dim] for dim in dims if dim in whole] for name, (dims, _, _) in VARIABLES.items()}
-        bytes_a_sample = sum(8 * prod(shape) for shape in shapes.values())
-        self._room = min(samples, max(1, _ROOM // bytes_a_sample))
-        self._arrays = {
-            name: np.empty((self._room, *shape), dtype=bool if name == "regular" else np.float64)
-            for name, shape in shapes.items()
-        }
+        shapes = {name: tuple(whole[dim] for dim in dims if dim in whole) for name, (dims, _, _) in VARIABLES.items()}
+        fields = [(name, bool if name == "regular" else np.float64, shape) for name, shape in shapes.items()]
+        sample = np.dtype(fields, align=True)
+        self._block = np.empty(min(samples, max(1, _ROOM // max(1, sample.itemsize))), dtype=sample)
 
     def write(self, q: Array, qd: Array, reading: Reading, out: ControlOutput, tau: Array) -> None:
         """Store one more sample: true state, measurement, output of the law and the torque that acts."""
-        if self._samples == self._room:
-            self._grow()
-        i = self._samples
+        (room,) = self._reserve_block(1)
         values = (q, qd, *reading, out.tau, tau, out.s, out.sdot, out.e_p, out.e_v, out.regular)  # as in VARIABLES
-        for array, value in zip(self._arrays.values(), values, strict=True):
-            array[i] = value
+        for name, value in zip(VARIABLES, values, strict=True):
+            room[name][...] = value
         self._samples += 1
 
     @property
@@ -51,9 +47,8 @@ class Recorder:
 
     def reserve(self, samples: int) -> dict[str, Array]:
         """Return views of the room for the next ``samples``, (samples, rollout, …), to be written and then added."""
-        while self._samples + samples > self._room:
-            self._grow()
-        return {name: array[self._samples : self._samples + samples] for name, array in self._arrays.items()}
+        block = self._reserve_block(samples)
+        return {name: block[name] for name in VARIABLES}
 
     def add(self, samples: int) -> None:
         """Count ``samples`` that have been written into the room for them."""
@@ -65,15 +60,16 @@ class Recorder:
 
     def arrays(self) -> dict[str, Array]:
         """Return all samples, rollouts first, and release the room that was not needed."""
-        self._room = self._samples
-        for array in self._arrays.values():
-            array.resize((self._samples, *array.shape[1:]), refcheck=False)
-        return {name: np.moveaxis(array, 0, 1) for name, array in self._arrays.items()}
+        self._block.resize(self._samples, refcheck=False)
+        return {name: np.moveaxis(self._block[name], 0, 1) for name in VARIABLES}
 
-    def _grow(self) -> None:
-        """Double the room; a run may end long before its duration."""
-        self._room = min(2 * self._room, self._most)
-        for name, array in self._arrays.items():
-            larger = np.empty((self._room, *array.shape[1:]), dtype=array.dtype)
-            larger[: self._samples] = array[: self._samples]
-            self._arrays[name] = larger
+    def _reserve_block(self, samples: int) -> Array:
+        """Return the room for the next ``samples``, doubled as often as needed: a run may end long before its duration."""
+        room = len(self._block)
+        while self._samples + samples > room:
+            room = min(2 * room, self._most)
+        if room > len(self._block):
+            larger = np.empty(room, dtype=self._block.dtype)
+            larger[: self._samples] = self._block[: self._samples]
+            self._block = larger
+        return self._block[self._samples : self._samples + samples]

@@ -7,6 +7,7 @@
 #pragma once
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #ifndef LANES
 #define LANES 8

@@ -169,20 +169,32 @@ template <int N, class V> static NOINLINE void add_disturbances(const Setup &set
   }
 }
 
-// Write one sample, NaN for lost rollouts.
-template <class V> ALWAYS_INLINE void record_vector(double *to, integer at, const Place<V> &place, int n, const V *values, Mask<V> lost) {
+// Write one sample, `at` bytes from the beginning of the record, NaN for lost rollouts.
+template <int N, class V>
+ALWAYS_INLINE void record_vector(double *to, integer at, const Place<V> &place, int joints, const V *values, Mask<V> lost) {
   if (!to) return;
-  for (int lane = 0; lane < place.live; lane++)
-    for (int i = 0; i < n; i++) to[(at + place.first + lane) * n + i] = lane_of(lost, lane) ? NAN : lane_of(values[i], lane);
+  const int n = size<N>(joints);
+  double *row = (double *)((char *)to + at) + place.first * n, sound[room<N>()][Lanes<V>::count];
+  for (int i = 0; i < n; i++) {
+    const V value = select(lost, number<V>(NAN), values[i]);
+    memcpy(sound[i], &value, sizeof value);
+  }
+  if (place.live == Lanes<V>::count) {  // a constant number of lanes, which compilers turn into shuffles
+    for (int lane = 0; lane < Lanes<V>::count; lane++)
+      for (int i = 0; i < n; i++) row[lane * n + i] = sound[i][lane];
+  } else {
+    for (int lane = 0; lane < place.live; lane++)
+      for (int i = 0; i < n; i++) row[lane * n + i] = sound[i][lane];
+  }
 }
-template <class V>
-static void write_sample(const Record &record, integer at, const Place<V> &place, int n, const Rollouts<V> &r, const Output<V> &out, const V *acting) {
+template <int N, class V>
+static NOINLINE void write_sample(const Record &record, integer at, const Place<V> &place, int n, const Rollouts<V> &r, const Output<V> &out, const V *acting) {
   const Mask<V> lost = lost_lanes(r);
-  record_vector(record.q, at, place, n, r.q, lost), record_vector(record.qd, at, place, n, r.qd, lost);
-  record_vector(record.q_measured, at, place, n, r.q_read, lost), record_vector(record.qd_measured, at, place, n, r.qd_read, lost);
-  record_vector(record.tau_demand, at, place, n, out.tau, lost), record_vector(record.tau, at, place, n, acting, lost);
-  record_vector(record.e_p, at, place, n, out.e_p, lost), record_vector(record.e_v, at, place, n, out.e_v, lost);
-  record_vector(record.s, at, place, 1, &out.s, lost), record_vector(record.sdot, at, place, 1, &out.sdot, lost);
+  record_vector<N>(record.q, at, place, n, r.q, lost), record_vector<N>(record.qd, at, place, n, r.qd, lost);
+  record_vector<N>(record.q_measured, at, place, n, r.q_read, lost), record_vector<N>(record.qd_measured, at, place, n, r.qd_read, lost);
+  record_vector<N>(record.tau_demand, at, place, n, out.tau, lost), record_vector<N>(record.tau, at, place, n, acting, lost);
+  record_vector<N>(record.e_p, at, place, n, out.e_p, lost), record_vector<N>(record.e_v, at, place, n, out.e_v, lost);
+  record_vector<1>(record.s, at, place, 1, &out.s, lost), record_vector<1>(record.sdot, at, place, 1, &out.sdot, lost);
   if (record.regular)
     for (int lane = 0; lane < place.live; lane++) record.regular[at + place.first + lane] = !lane_of(lost, lane) && lane_of(out.regular, lane);
 }
@@ -227,7 +239,7 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
       held[i] = select(lost, V{}, held[i]);
       for (int part = 0; part < setup.parts; part++) acting[part][i] = part < setup.delayed ? queue[(head + part) % setup.delayed * n + i] : held[i];
     }
-    write_sample(record, sample * span.rollouts, place, n, r, out, acting[0]);
+    write_sample<N>(record, sample * record.stride, place, n, r, out, acting[0]);
     look_at_finish(setup, paths, r, out.s, t);
     const Mask<V> going = ~lost & (setup.ends_run && setup.finish != NEVER ? ~equal(r.finish_time, r.finish_time) : ~Mask<V>{});
     if (final || (span.stops && !any(going))) { sample++; break; }

@@ -48,8 +48,9 @@ struct State {
   double *s, *first_s, *rest_since, *lap_start, *finish_time, *diverged_time, *reason;
 };
 
-// (time, rollouts, joints) or (time, rollouts) each, from the first sample of this call on.
+// (time, rollouts, joints) or (time, rollouts) each, from the first sample of this call on, `stride` bytes from one to the next.
 struct Record {
   double *q, *qd, *q_measured, *qd_measured, *tau_demand, *tau, *s, *sdot, *e_p, *e_v;
   unsigned char *regular;
+  integer stride;
 };
