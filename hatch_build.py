@@ -25,7 +25,7 @@ ELSEWHERE = {"base": ["-DLANES=4"]}
 #: without contraction to fused operations and without reordering, all builds give the same bits; vectorising by GCC
 #: fuses all the same where it finds sums beside differences, and the kernels are written in vectors already
 FLAGS = [
-    *("-std=c++17", "-O2", "-g0", "-fPIC", "-shared", "-ffp-contract=off"),
+    *("-std=c++17", "-O3", "-g0", "-fPIC", "-shared", "-ffp-contract=off"),
     *("-fno-math-errno", "-fno-tree-vectorize", "-fno-exceptions", "-fno-rtti", "-fvisibility=hidden", "-w"),
 ]
 #: not for the processor it runs on, and without a C++ library, which it would compile first for a minute and the engine

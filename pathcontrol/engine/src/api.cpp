@@ -65,7 +65,7 @@ EXPORT void pathcontrol_evaluate(const Path *path, integer rows, const double *s
   const int n = path->joints;
   for (integer r = 0; r < rows; r++) {
     Point<double> at;
-    evaluate(&path, s[r], at);
+    evaluate<0>(&path, s[r], at);
     double *row = out + r * (3 * n + 2);
     for (int i = 0; i < n; i++) row[i] = at.q_d[i], row[n + i] = at.dq_d[i], row[2 * n + i] = at.ddq_d[i];
     row[3 * n] = at.theta, row[3 * n + 1] = at.dtheta;

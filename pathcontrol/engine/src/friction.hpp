@@ -41,20 +41,22 @@ static NOINLINE void stick_slip(int joints, V (*M)[room<N>()], const V *p, const
     largest = larger(largest, absolute(p[i]));
   }
   for (int exchange = 0; exchange < MOST_EXCHANGES; exchange++) {
-    V U[room<N>()][room<N>()], b[room<N>()], slips[room<N>()];
+    V U[room<N>()][room<N>()], b[room<N>()], slips[room<N>()], inverse[room<N>()];
     for (int i = 0; i < n; i++) {
       b[i] = p[i] - select(less(zero, sign[i]), high[i], low[i]);
       slips[i] = select(equal(sign[i], zero), zero, one);
       for (int j = 0; j < n; j++) U[i][j] = M[i][j];
     }
-    for (int k = 0; k < n - 1; k++)
+    for (int k = 0; k < n; k++) {
+      inverse[k] = 1.0 / U[k][k];
       for (int i = k + 1; i < n; i++) {
-        V share = U[k][i] / U[k][k] * slips[i] * slips[k];
-        for (int j = k + 1; j < n; j++) U[i][j] -= share * U[k][j];
+        V share = U[k][i] * inverse[k] * slips[i] * slips[k];
+        for (int j = i; j < n; j++) U[i][j] -= share * U[k][j];  // the upper triangle, which is all that is read
         b[i] -= share * b[k];
       }
+    }
     for (int k = n - 1; k >= 0; k--) {
-      v[k] = select(equal(sign[k], zero), zero, b[k] / U[k][k]);
+      v[k] = select(equal(sign[k], zero), zero, b[k] * inverse[k]);
       for (int i = 0; i < k; i++) b[i] -= U[i][k] * v[k];
     }
     V terms = zero, needed[room<N>()], wanted[room<N>()], count = zero;

@@ -26,7 +26,7 @@ static inline GammaDistance gamma_distance(const Gamma &gamma, double s, const d
   const Path &path = *gamma.path;
   const int n = path.joints;
   Point<double> at;
-  evaluate_lane(path, s, 0, at);
+  evaluate_lane<0>(path, s, 0, at);
   if (gamma.brakes && path.brakes) {
     const double left = (path.s_end - s) / path.braking, share = left < 0 ? 0.0 : left > 1 ? 1.0 : left;
     at.dtheta = at.dtheta * share + at.theta * (left < 1 ? -1.0 / path.braking : 0.0), at.theta *= share;

@@ -73,9 +73,9 @@ static void motion_law(const Setup &setup, const Arm<C> &arm, const Gains<V> &ga
 }
 
 // σ̇ = ϑ − k e_pᵀq_d' of the extended motion plan, eq. (22); k is 0 where the plan of an open path is timed.
-template <class V>
+template <int N, class V>
 static void extended_plan(const Setup &setup, const Path *const *paths, const Gains<V> &gains, const Point<V> &at, const V *qd, Output<V> &out) {
-  const int n = setup.joints;
+  const int n = size<N>(setup.joints);
   const V k = select(lanes_where(paths, out.s, is_timed), V{}, gains.plan);
   const V free = at.theta - k * dot(n, out.e_p, at.dq_d);
   const V high = select(lanes_where(paths, out.s, is_at_end), smaller(free, V{}), free);
@@ -98,24 +98,24 @@ static double projected(const Setup &setup, const Path &path, const double *q, d
 }
 
 // σ̄, dσ̄/dt and the task at σ̄, eqs. (29) and (39). Where σ̄ is not defined the last one is kept.
-template <class V>
+template <int N, class V>
 static void project(const Setup &setup, const Path *const *paths, const V *q, const V *qd, V last, Point<V> &at, Output<V> &out) {
   constexpr double STEEPEST = 1e6;
-  const int n = setup.joints;
+  const int n = size<N>(setup.joints);
   for (int lane = 0; lane < Lanes<V>::count; lane++) {
     double own[MOST_JOINTS];
     for (int i = 0; i < n; i++) own[i] = lane_of(q[i], lane);
     const bool known = isfinite(lane_of(last, lane));
     set_lane(out.s, lane, known ? projected(setup, *paths[lane], own, lane_of(last, lane)) : NAN);
   }
-  evaluate(paths, out.s, at);
+  evaluate<N>(paths, out.s, at);
   V away[MOST_JOINTS];
   for (int i = 0; i < n; i++) away[i] = at.q_d[i] - q[i];
   const V gradient = dot(n, at.dq_d, at.dq_d), denominator = gradient + dot(n, away, at.ddq_d);
   out.regular = less(gradient, denominator * STEEPEST);
   if (any(~out.regular)) {
     out.s = select(out.regular, out.s, last);
-    evaluate(paths, out.s, at);
+    evaluate<N>(paths, out.s, at);
     for (int i = 0; i < n; i++) away[i] = at.q_d[i] - q[i];
   }
   const V beyond = dot(n, away, at.dq_d);  // > 0: the arm is behind the point
@@ -126,7 +126,7 @@ static void project(const Setup &setup, const Path *const *paths, const V *q, co
   const Mask<V> timed = lanes_where(paths, last, is_timed);
   if (!any(timed)) return;
   out.s = select(timed, last, out.s), out.regular |= timed;
-  evaluate(paths, out.s, at);
+  evaluate<N>(paths, out.s, at);
   out.sdot = select(timed, at.theta, out.sdot), out.slope = select(timed, at.dtheta, V{});
 }
 
@@ -137,8 +137,8 @@ static NOINLINE void control(const Setup &setup, const Arm<C> &arm, const Fricti
   const int n = size<N>(setup.joints);
   Point<V> at;
   Body<V> bodies[room<N>()];
-  if (setup.law == PROJECTION) project(setup, paths, q, qd, last, at, out);
-  else out.s = last, evaluate(paths, last, at);
+  if (setup.law == PROJECTION) project<N>(setup, paths, q, qd, last, at, out);
+  else out.s = last, evaluate<N>(paths, last, at);
   V desired[MOST_JOINTS];
   for (int i = 0; i < n; i++) {
     desired[i] = at.dq_d[i] * at.theta;
@@ -148,7 +148,7 @@ static NOINLINE void control(const Setup &setup, const Arm<C> &arm, const Fricti
   if (setup.law < EXTENDED_MOTION_PLAN) {
     motion_law<N>(setup, arm, gains, at, qd, bodies, out);
   } else {
-    if (setup.law == EXTENDED_MOTION_PLAN) extended_plan(setup, paths, gains, at, qd, out);
+    if (setup.law == EXTENDED_MOTION_PLAN) extended_plan<N>(setup, paths, gains, at, qd, out);
     V qdd[MOST_JOINTS];
     for (int i = 0; i < n; i++)
       qdd[i] = (at.ddq_d[i] * at.theta + at.dq_d[i] * at.dtheta) * out.sdot + gains.velocity[i] * out.e_v[i] + gains.position[i] * out.e_p[i];

@@ -32,12 +32,12 @@ static inline int cell_of(const Path &path, double s) {
   return cell;
 }
 // q_d, q_d', q_d'', ϑ and ϑ' of one lane at s, which open paths bound to their domain.
-template <class V> static inline void evaluate_lane(const Path &path, double s, int lane, Point<V> &out) {
-  const int n = path.joints, columns = n + 1;
+template <int N, class V> static inline void evaluate_lane(const Path &path, double s, int lane, Point<V> &out) {
+  const int n = size<N>(path.joints), columns = n + 1;
   s = path.closed ? in_first_lap(path, s) : s < path.s0 ? path.s0 : s > path.s_end ? path.s_end : s;
   const int cell = cell_of(path, s);
   const double x = s - path.knots[cell], *c = path.coefficients + (integer)cell * 6 * columns;
-  double value[MOST_JOINTS + 1], slope[MOST_JOINTS + 1], bend[MOST_JOINTS + 1];
+  double value[room<N>() + 1], slope[room<N>() + 1], bend[room<N>() + 1];
   for (int k = 0; k < columns; k++) {
     double c5 = c[k], c4 = c[columns + k], c3 = c[2 * columns + k], c2 = c[3 * columns + k], c1 = c[4 * columns + k];
     value[k] = ((((c5 * x + c4) * x + c3) * x + c2) * x + c1) * x + c[5 * columns + k];
@@ -49,10 +49,10 @@ template <class V> static inline void evaluate_lane(const Path &path, double s, 
 }
 
 // The task at s as laws see it: on open paths ϑ comes to rest at the end, (ϑ(s)/T ϑ(s_end)) (s_end − s).
-template <class V> static NOINLINE void evaluate(const Path *const *paths, V s, Point<V> &out) {
+template <int N, class V> static NOINLINE void evaluate(const Path *const *paths, V s, Point<V> &out) {
   for (int lane = 0; lane < Lanes<V>::count; lane++) {
     const Path &path = *paths[lane];
-    evaluate_lane(path, lane_of(s, lane), lane, out);
+    evaluate_lane<N>(path, lane_of(s, lane), lane, out);
     if (!path.brakes) continue;
     double left = (path.s_end - lane_of(s, lane)) / path.braking, share = left < 0 ? 0.0 : left > 1 ? 1.0 : left;
     double theta = lane_of(out.theta, lane), slope = left < 1 ? -1.0 / path.braking : 0.0;
@@ -67,7 +67,7 @@ struct Distance { double square, slope, curvature, gradient, bend; };
 
 static inline Distance distance_at(const Path &path, double s, const double *q) {
   Point<double> point;
-  evaluate_lane(path, s, 0, point);
+  evaluate_lane<0>(path, s, 0, point);
   Distance d = {0, 0, 0, 0, 0};
   for (int k = 0; k < path.joints; k++) {
     double away = point.q_d[k] - q[k];

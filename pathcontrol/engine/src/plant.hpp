@@ -20,17 +20,24 @@ static NOINLINE void dynamics_at(const Arm<C> &arm, const Friction<V> &law, cons
   }
 }
 
-// A⁻¹ of a symmetric positive definite matrix.
+// A⁻¹ = L⁻ᵀD⁻¹L⁻¹ of a symmetric positive definite matrix.
 template <int N, class V> static NOINLINE void invert(int joints, V (*A)[room<N>()], V (*inverse)[room<N>()]) {
   const int n = size<N>(joints);
   Factors<N, V> factors;
-  V unit[room<N>()], column[room<N>()];
+  V K[room<N>()][room<N>()];  // L⁻¹ below its unit diagonal
   factorise<N>(n, A, factors);
-  for (int j = 0; j < n; j++) {
-    for (int i = 0; i < n; i++) unit[i] = number<V>(i == j);
-    solve<N>(n, factors, unit, column);
-    for (int i = 0; i < n; i++) inverse[i][j] = column[i];
-  }
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < i; j++) {
+      V sum = factors.L[i][j];
+      for (int k = j + 1; k < i; k++) sum += factors.L[i][k] * K[k][j];
+      K[i][j] = -sum;
+    }
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j <= i; j++) {
+      V sum = i == j ? factors.inverse[i] : factors.inverse[i] * K[i][j];
+      for (int k = i + 1; k < n; k++) sum += factors.inverse[k] * K[k][i] * K[k][j];
+      inverse[i][j] = inverse[j][i] = sum;
+    }
 }
 
 // Viscous friction of a step h condensed into M̃ = M + h/2 B + BXB, and XB/h; joints that do not move each for itself.
