@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -49,14 +50,16 @@ def compile_engine(root: Path, compiler: list[str]) -> list[Path]:
     """Compile all builds and return their files."""
     builds = X86_64 if platform.machine().lower() in ("x86_64", "amd64") else ELSEWHERE
     (root / LIBRARIES).mkdir(exist_ok=True)
-    files = []
-    for name, flags in builds.items():
+
+    def build(name: str) -> Path:
         file = root / LIBRARIES / f"engine_{name}.so"
         part = file.with_suffix(".part")
-        subprocess.run([*compiler, *FLAGS, *flags, str(root / SOURCE), "-o", str(part), "-lm"], check=True)
+        subprocess.run([*compiler, *FLAGS, *builds[name], str(root / SOURCE), "-o", str(part), "-lm"], check=True)
         os.replace(part, file)
-        files.append(file)
-    return files
+        return file
+
+    with ThreadPoolExecutor() as pool:
+        return list(pool.map(build, builds))
 
 
 class EngineBuildHook(BuildHookInterface):

@@ -423,6 +423,6 @@ def test_a_run_that_ends_long_before_its_time_keeps_no_room_for_the_rest(arm, ci
     )
     run = simulate(paper_law(arm, circle), START, duration=1e7, laps=1, engine=engine, progress=False)
     assert run.finish_time[0] < 5
-    kept = sum(array.nbytes for array in recorders[0].arrays().values())
-    owned = sum(array.base.nbytes for array in recorders[0].arrays().values())
-    assert owned == kept < 1e6
+    arrays = recorders[0].arrays()
+    kept, (owned,) = sum(array.nbytes for array in arrays.values()), {array.base.nbytes for array in arrays.values()}
+    assert kept <= owned < 1.1 * kept < 1e6
