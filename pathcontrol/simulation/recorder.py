@@ -64,7 +64,7 @@ class Recorder:
         return {name: np.moveaxis(self._block[name], 0, 1) for name in VARIABLES}
 
     def _reserve_block(self, samples: int) -> Array:
-        """Return the room for the next ``samples``, doubled as often as needed: a run may end long before its duration."""
+        """Return the room for the next ``samples``; it doubles, as a run may end long before its duration."""
         room = len(self._block)
         while self._samples + samples > room:
             room = min(2 * room, self._most)
