@@ -6,8 +6,12 @@ Every message names the value, what was expected and what to try.
 from __future__ import annotations
 
 import copyreg
+import sys
 import warnings
 from typing import Any
+
+#: modules whose frames stand between a warning and the code that it is for
+_PASSED = frozenset({__name__.partition(".")[0], "abc", "contextlib", "functools"})
 
 
 class PathControlError(Exception):
@@ -137,7 +141,14 @@ class SimulationError(PathControlError, RuntimeError):
         super().__init__(message, run=run, **details)
 
 
+def warn(message: str, category: type[PathControlWarning] = PathControlWarning) -> None:
+    """Warn at the line of the caller's own code that led into this package, however deep it went from there."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in _PASSED:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level)
+
+
 def warn_of_single(name: str) -> None:
     """Warn, from ``__init_subclass__``, that the class ``name`` was made with ``single``, which has no effect."""
-    message = f"class {name} is made with single=…, which is not needed any more and has no effect; leave it out"
-    warnings.warn(message, PathControlWarning, stacklevel=4)  # past __init_subclass__ and ABCMeta
+    warn(f"class {name} is made with the argument single, which is not needed any more and has no effect; leave it out")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from pathcontrol.cli.files import check_file
 from pathcontrol.cli.group import json_option, package_option
 from pathcontrol.errors import UrdfError
 
@@ -31,6 +32,8 @@ def command(
 
     FILE is a URDF file or the name of a known robot. Exits with 1 on errors.
     """
+    if not file.isidentifier():  # it is no name of a known robot
+        check_file(Path(file).expanduser(), "a robot")
     from pathcontrol.robot.catalogue import find_urdf
     from pathcontrol.robot.urdf import check_urdf
 

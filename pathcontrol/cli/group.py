@@ -17,6 +17,7 @@ from typing import Any
 import click
 
 from pathcontrol._advice import reword_advice, reword_setting
+from pathcontrol.cli.quantity import QuantityType
 from pathcontrol.errors import PathControlError, PathControlWarning
 
 
@@ -70,6 +71,8 @@ def _format_option(option: click.Option, value: str) -> str:
     flag, items = option.opts[0], _split_items(value)
     if re.fullmatch(r"\w+\(.*\)", value):
         return f"{flag} FILE"
+    if isinstance(option.type, QuantityType) and option.nargs == 1:
+        return f"{flag} {option.type.write(value)}"
     if option.multiple:
         return " ".join(f"{flag} {item}" for item in items)
     return f"{flag} {(' ' if option.nargs > 1 else ',').join(items)}"

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import click
 
 from pathcontrol._units import quantity
-from pathcontrol.errors import InputError, PathControlWarning
+from pathcontrol.errors import InputError, warn
 
 _FASTEST = 5.0  # m/s; no arm feeds faster
 
@@ -29,13 +28,16 @@ class QuantityType(click.ParamType):
         except InputError as error:
             self.fail(f"{value!r}: {error}", param, ctx)
 
+    def write(self, number: str) -> str:
+        """Return a number in the SI unit as one types it: lengths in millimetres, in quotes."""
+        try:
+            return f"'{1e3 * float(number):.10g} m{self.unit}'" if self.unit.startswith("m") else number
+        except ValueError:
+            return number
+
 
 def check_feed(feed: float | None) -> float | None:
     """Return the feed of an option [m/s]; warn of one that no arm can keep."""
     if feed is not None and feed > _FASTEST:
-        warnings.warn(
-            f"--feed {feed:g} is {feed:g} m/s, faster than arms are; did you mean --feed '{feed:g} mm/s'?",
-            PathControlWarning,
-            stacklevel=2,
-        )
+        warn(f"--feed {feed:g} is {feed:g} m/s, faster than arms are; did you mean --feed '{feed:g} mm/s'?")
     return feed

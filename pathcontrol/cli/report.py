@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from pathcontrol.cli.group import import_all, json_option, open_option, open_page
-from pathcontrol.cli.saved import check_out, load_runs, robot_option, runs_argument, sweep_of, worst_option
+from pathcontrol.cli.saved import check_out, check_runs, load_runs, robot_option, runs_argument, sweep_of, worst_option
 from pathcontrol.cli.view import layout_option, one_or_all, tell
 
 
@@ -44,6 +44,7 @@ def command(
     The page has the animation, the metrics, the figures, the whole configuration and how to make the runs again; it
     needs no network, so that it can be kept and sent.
     """
+    check_runs(runs)
     import_all()
     from pathcontrol.view.report.report import report
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pathcontrol.cli.files import check_file
 from pathcontrol.cli.group import engine_option, import_all, json_option, open_option, open_page
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ def command(
         return
     if file is None:
         raise click.UsageError("give an experiment file; --example prints one to start from")
+    check_file(file, "an experiment")
     import_all()
     from pathcontrol.experiments.runner import run_experiment
 

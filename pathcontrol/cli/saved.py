@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from pathcontrol._suffixes import check_suffix
+from pathcontrol.cli.files import check_file
 from pathcontrol.errors import InputError, PathControlError
 
 if TYPE_CHECKING:
@@ -30,13 +31,31 @@ worst_option = click.option(
 )
 
 
+def check_runs(paths: Sequence[Path], robots: bool = False) -> None:
+    """Check that the files of runs exist and are no other files, ``robots`` aside, before much is loaded for them.
+
+    Raises:
+        InputError: one is missing, or is something else.
+    """
+    for path in paths:
+        if path.is_dir():
+            continue
+        if is_robot(path) and not robots:
+            raise InputError(f"{str(path)!r} is a robot and no run; look at it with `pathcontrol view`, or name a run")
+        if robots and not path.exists() and not is_robot(path):
+            expected = "a saved run, a URDF or the name of a known robot"
+            raise InputError(f"there is no file {str(path)!r}, expected {expected}")
+        if not is_robot(path) or path.suffix:
+            check_file(path, "a robot" if is_robot(path) else "a saved run")
+
+
 def load_runs(
-    paths: Sequence[Path], robot: str | None, worst: int | None = None, package_dirs: Sequence[Path] | None = None
+    paths: Sequence[Path], robot: str | None, worst: int | None = None, package_dirs: Sequence[Path] = ()
 ) -> dict[str, Run]:
     """Load the runs by the shortest names that tell them apart: of their files, or of the folders of ``run.nc``.
 
-    Of a sweep, alone, its ``worst`` histories, by their samples and parameters. Where ``package_dirs``, the folders of
-    its meshes, are given, a URDF or a known robot may take the place of a run: its joints move in turn.
+    Of a sweep, alone, its ``worst`` histories, by their samples and parameters. A URDF, with ``package_dirs``, the
+    folders of its meshes, or a known robot may take the place of a run: its joints move in turn.
 
     Raises:
         InputError: a file is missing, is no run, or is named twice, or a run does not know its robot.
@@ -125,20 +144,22 @@ def _parts(file: Path) -> tuple[str, ...]:
 
 def is_robot(file: Path) -> bool:
     """Return whether a URDF or a known robot is named, and not a run."""
+    if file.suffix.lower() in (".urdf", ".xacro"):
+        return True
+    if file.exists() or not str(file).isidentifier():
+        return False
     from pathcontrol.robot.catalogue import known_robots
 
-    return file.suffix.lower() in (".urdf", ".xacro") or (not file.exists() and str(file) in known_robots())
+    return str(file) in known_robots()
 
 
-def _make_tour(file: Path, package_dirs: Sequence[Path] | None) -> Run:
+def _make_tour(file: Path, package_dirs: Sequence[Path]) -> Run:
     """Return a run in which the joints of a robot move in turn; those that mimic each other do not move."""
     from pathcontrol.robot.catalogue import find_urdf
     from pathcontrol.robot.loading import load_robot
     from pathcontrol.view.tour import joints_to_show, tour
 
     source = file if file.suffix else str(file)
-    if package_dirs is None:
-        raise InputError(f"{str(file)!r} is a robot and no run; look at it with `pathcontrol view`, or name a run")
     folders = tuple(package_dirs)
     return tour(load_robot(source, keep=joints_to_show(find_urdf(source, folders).text), package_dirs=folders))
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pathcontrol.cli.files import check_file
 from pathcontrol.cli.group import engine_option, json_option, uninterrupted
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ def command(
     They are in Parquet files in the folder chunks/, histories that the file asks for in runs/. After Ctrl-C, or a
     crash, finished chunks stay, and --resume computes the rest.
     """
+    check_file(file, "an experiment")
     with uninterrupted():
         from pathcontrol.experiments.sweep_runner import run_sweep
         from pathcontrol.sweeps.cluster.connection import load_security

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from pathcontrol._suffixes import refuse_suffix
+from pathcontrol.cli.files import check_file
 from pathcontrol.cli.group import json_option, uninterrupted
 from pathcontrol.cli.quantity import QuantityType, check_feed
 
@@ -63,6 +64,7 @@ from pathcontrol.cli.quantity import QuantityType, check_feed
 @json_option
 def command(file: Path, plot: Path | None, as_json: bool, **options: Any) -> None:
     """Show what is in a toolpath FILE: CSV, G-code, SVG or DXF."""
+    check_file(file, "a toolpath")
     from pathcontrol.cli.tables import toolpath_table
     from pathcontrol.toolpaths.read import read_toolpath
     from pathcontrol.toolpaths.summary import summary

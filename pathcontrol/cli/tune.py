@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pathcontrol.cli.files import check_file
 from pathcontrol.cli.group import engine_option, json_option, uninterrupted
 from pathcontrol.cli.sweep import chunk_option, out_option, resume_option
 
@@ -29,6 +30,7 @@ def command(file: Path, out: Path | None, resume: bool, chunk: int, engine: Engi
     Prints the best candidates and what the limits cost, and draws the front as front.svg and front.png in the folder,
     where every rollout is noted. After Ctrl-C it tells what was found, and --resume goes on.
     """
+    check_file(file, "an experiment")
     with uninterrupted():
         from pathcontrol.experiments.tune_runner import run_tune
         from pathcontrol.view.figures.pareto import pareto_figure

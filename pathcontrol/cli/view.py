@@ -11,7 +11,16 @@ import click
 
 from pathcontrol._suffixes import check_suffix
 from pathcontrol.cli.group import import_all, json_option, open_option, open_page, package_option, printable
-from pathcontrol.cli.saved import check_out, load_runs, robot_option, run_file, runs_argument, sweep_of, worst_option
+from pathcontrol.cli.saved import (
+    check_out,
+    check_runs,
+    load_runs,
+    robot_option,
+    run_file,
+    runs_argument,
+    sweep_of,
+    worst_option,
+)
 
 if TYPE_CHECKING:
     from pathcontrol.simulation.run import Run
@@ -64,6 +73,7 @@ def command(
     `video` and a Chromium, Chrome or Edge on this machine; the page is then written only if --out or --open asks for
     it.
     """
+    check_runs(runs, robots=True)
     import_all()
     from pathcontrol.view.animation.record import record
 

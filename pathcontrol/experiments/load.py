@@ -78,6 +78,8 @@ def read_text(path: str | Path) -> str:
     except UnicodeDecodeError as error:
         line, byte = data[: error.start].count(b"\n") + 1, data[error.start]
         raise invalid(path, [f"line {line} has the byte 0x{byte:02x}, expected text in UTF-8; save it so"]) from error
+    except ExperimentError:
+        raise
     except (OSError, ValueError) as error:  # a null character in the name is a ValueError
         raise invalid(path, [f"it cannot be read: {error}"]) from error
 

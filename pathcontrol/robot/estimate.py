@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +10,7 @@ import trimesh
 from lxml import etree
 
 from pathcontrol._arrays import LARGEST, SMALLEST, Array
-from pathcontrol.errors import PathControlWarning, UrdfError
+from pathcontrol.errors import UrdfError, warn
 from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.robot.lump import Lump, ball, combine
 from pathcontrol.robot.meshes import load_parts
@@ -70,7 +69,7 @@ def _warn_of_guesses(balls: list[str], unread: dict[str, str]) -> None:
 
 def _warn(told: str) -> None:
     """Warn about an estimate, in the name of the caller of ``load_robot``."""
-    warnings.warn(f"estimated_inertia: {told}", PathControlWarning, stacklevel=5)
+    warn(f"estimated_inertia: {told}")
 
 
 def has_mass(inertial: object) -> bool:

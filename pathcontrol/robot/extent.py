@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from pathcontrol.errors import PathControlWarning
+from pathcontrol.errors import warn
 from pathcontrol.robot.model import RobotModel
 
 _POSTURES = 32
@@ -46,11 +45,9 @@ def question_speed(name: str, speed: float, robot: RobotModel, frame: str) -> No
     """Warn of a ``speed`` of a tool [m/s] that is far beyond the arm: it is likely in millimetres per second."""
     most = extent(robot, frame).speed
     if most > 0 and speed > _MARGIN * most:
-        warnings.warn(
+        warn(
             f"{name} = {speed:g} m/s, but {frame!r} of {robot.name} does some {most:.2g} m/s with all joints at their "
-            f"limits; did you mean {speed:g} mm/s, which is {1e-3 * speed:g}?",
-            PathControlWarning,
-            stacklevel=3,
+            f"limits; did you mean {speed:g} mm/s, which is {1e-3 * speed:g}?"
         )
 
 
@@ -58,11 +55,9 @@ def question_length(name: str, length: float, robot: RobotModel, frame: str, sha
     """Warn of a ``length`` [m] beyond a ``share`` of the reach of the arm: it is likely in millimetres."""
     reach = extent(robot, frame).reach
     if reach > 0 and length > share * reach:
-        warnings.warn(
+        warn(
             f"{name} = {length:g} m, but {frame!r} of {robot.name} reaches some {reach:.2g} m; did you mean "
-            f"{length:g} mm, which is {1e-3 * length:g}?",
-            PathControlWarning,
-            stacklevel=3,
+            f"{length:g} mm, which is {1e-3 * length:g}?"
         )
 
 
@@ -72,9 +67,7 @@ def question_offset(name: str, offset: Sequence[float], robot: RobotModel) -> No
     poses = robot.frame_poses(np.zeros(robot.n), robot.frame_names)
     size = float(np.linalg.norm(poses[..., :3, 3], axis=-1).max())
     if size > 0 and length > size:
-        warnings.warn(
+        warn(
             f"{name} is {length:g} m long, but {robot.name} is some {size:.2g} m; did you mean {length:g} mm, which is "
-            f"{1e-3 * length:g}?",
-            PathControlWarning,
-            stacklevel=3,
+            f"{1e-3 * length:g}?"
         )

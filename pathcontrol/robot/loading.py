@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 from lxml import etree
 
 from pathcontrol._arrays import LARGEST, Array, quantity, readonly
-from pathcontrol.errors import PathControlWarning, UrdfError
+from pathcontrol.errors import UrdfError, warn
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.arm_dynamics import UrdfSource, build_model
 from pathcontrol.robot.catalogue import find_urdf
@@ -67,9 +66,9 @@ def load_robot(
         urdf = with_estimated_inertia(urdf, quantity("estimated_inertia", density))
     report = _check(urdf, label, tuple(locked))
     for finding in (*mended, *(finding for finding in report.warnings if finding.code in TOLD)):
-        warnings.warn(f"{label}: {finding.where}: {finding.message}", PathControlWarning, stacklevel=2)
+        warn(f"{label}: {finding.where}: {finding.message}")
     for told in locked_beyond_limits(root, locked, lock or ()):
-        warnings.warn(f"{label}: {told}", PathControlWarning, stacklevel=2)
+        warn(f"{label}: {told}")
     robot = _build(urdf, threads)
     return lock_joints(robot, locked) if locked else robot
 

@@ -5,7 +5,6 @@ Arrays have leading batch axes: q, q̇, τ are ``(*batch, n)`` in the order of `
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import as_array, physical, quantity, rigid, scalar
 from pathcontrol.arguments import Form, Point, Unit
-from pathcontrol.errors import InputError, PathControlWarning
+from pathcontrol.errors import InputError, warn
 from pathcontrol.robot.actuation import Actuation
 from pathcontrol.robot.arm_dynamics import ArmDynamics
 from pathcontrol.robot.bodies import check_spread, payload_of, scale_bodies
@@ -174,7 +173,7 @@ class RobotModel(ArmDynamics):
         root = parse_urdf(self.source.text)
         angles = {j: at for j, at in locked_angles(root, lock, keep, moving).items() if j in self.joint_names}
         for told in locked_beyond_limits(root, angles, lock or ()):
-            warnings.warn(told, PathControlWarning, stacklevel=2)
+            warn(told)
         return lock_joints(self, angles)
 
     def _with_model(self, model: Any, method: str, arguments: dict[str, Any]) -> RobotModel:

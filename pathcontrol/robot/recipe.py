@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array, readonly
-from pathcontrol.errors import InputError, MissingExtraError, PathControlError, PathControlWarning, UnknownNameError
+from pathcontrol.errors import InputError, MissingExtraError, PathControlError, UnknownNameError, warn
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.robot.catalogue import find_urdf
@@ -94,7 +93,7 @@ def _friction(description: Mapping[str, Any], n: int) -> FrictionLaw:
     try:
         law = rebuild_law(description)
     except UnknownNameError as error:
-        warnings.warn(f"the robot is rebuilt without its friction: {error}", PathControlWarning, stacklevel=2)
+        warn(f"the robot is rebuilt without its friction: {error}")
         return no_friction(n)
     if law.n != n:
         raise InputError(f"the recorded friction law is for {law.n} joints, the robot has {n}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import InputError, PathControlWarning
+from pathcontrol.errors import InputError, warn
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.storage.array_store import ArrayStore
@@ -166,7 +165,7 @@ def _recipe(task: PathTask | None, store: ArrayStore, upto: float) -> dict[str, 
     try:
         return task_recipe(task, store, upto)
     except Exception as error:  # whatever the user's own code raises
-        warnings.warn(f"the {type(task).__name__} is not kept with its run: {error}", PathControlWarning, stacklevel=3)
+        warn(f"the {type(task).__name__} is not kept with its run: {error}")
         return None
 
 

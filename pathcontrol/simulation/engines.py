@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from functools import cache
 from typing import Literal, NamedTuple, get_args
@@ -10,7 +9,7 @@ from typing import Literal, NamedTuple, get_args
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
 from pathcontrol.engine.library import load_library
-from pathcontrol.errors import EngineError, PathControlWarning, UnknownNameError
+from pathcontrol.errors import EngineError, UnknownNameError, warn
 from pathcontrol.simulation.compiled import CompiledArm, CompiledPlant
 from pathcontrol.simulation.continuous import ContinuousArm
 from pathcontrol.simulation.loops import Arm, ContinuousTime, Outside, SampledLoop
@@ -114,4 +113,4 @@ def _compile(
 @cache
 def _warn_once(message: str) -> None:
     """Warn with ``message``, once in a process."""
-    warnings.warn(message, PathControlWarning, stacklevel=6)
+    warn(message)

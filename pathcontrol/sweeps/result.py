@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import xarray as xr
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.readable import readable_parameters
 from pathcontrol.analysis.run_metrics import LABELS, UNITS
-from pathcontrol.errors import InputError, PathControlWarning
+from pathcontrol.errors import InputError, warn
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.variables import OUTCOMES
 from pathcontrol.sweeps.histories import Keep
@@ -109,7 +108,7 @@ class SweepResult:
         if not found:
             raise InputError("; ".join(lost))
         if lost:
-            warnings.warn(f"left out: {'; '.join(lost)}", PathControlWarning, stacklevel=3)
+            warn(f"left out: {'; '.join(lost)}")
         return found
 
     @property

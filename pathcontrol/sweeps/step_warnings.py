@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from numpy.typing import NDArray
 
+from pathcontrol.errors import warn
 from pathcontrol.simulation.arguments import broadcast_states, check_loop, make_plant, start_law
 from pathcontrol.simulation.checks.too_long import StepWarning, find_steps_too_long
 
@@ -39,4 +39,4 @@ class WarningFilter:
         for sentence in sentences:
             if (kind := _NUMBER.sub("#", sentence)) not in self._kinds:
                 self._kinds.add(kind)
-                warnings.warn(f"{sentence}; other samples may be alike", StepWarning, stacklevel=3)
+                warn(f"{sentence}; other samples may be alike", StepWarning)

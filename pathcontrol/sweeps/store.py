@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import warnings
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol._files import write_whole, writing
-from pathcontrol.errors import InputError, MissingExtraError, PathControlWarning
+from pathcontrol.errors import InputError, MissingExtraError, warn
 from pathcontrol.sweeps.chunk import Chunk
 from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.manifest import LOG, MANIFEST, Manifest
@@ -116,11 +115,9 @@ class Store:
     def _check(self) -> None:
         """Warn if there are no checksums, and refuse damaged chunks."""
         if not self.manifest.listed:
-            warnings.warn(
+            warn(
                 f"the sweep in {str(self.folder)!r} has no checksums, as it was begun by an earlier version: damage "
-                "would not be noticed; resume it to give it some",
-                PathControlWarning,
-                stacklevel=4,
+                "would not be noticed; resume it to give it some"
             )
         if bad := self._find_damaged("chunks"):
             raise InputError(f"the sweep in {str(self.folder)!r} is damaged: {_describe_files(bad)}; {_RESUME}")
@@ -165,21 +162,15 @@ class Store:
         for place in gone:
             self.manifest.files.pop(place, None)
         if bad:
-            warnings.warn(
-                f"the sweep in {str(self.folder)!r} is damaged, and is made again there: {_describe_files(bad)}",
-                PathControlWarning,
-                stacklevel=6,
-            )
+            warn(f"the sweep in {str(self.folder)!r} is damaged, and is made again there: {_describe_files(bad)}")
 
     def _adopt(self) -> None:
         """Give checksums to the readable files of a sweep of an earlier version, which has none."""
         if self.manifest.listed:
             return
-        warnings.warn(
+        warn(
             f"the sweep in {str(self.folder)!r} has no checksums, as it was begun by an earlier version: its "
-            f"{len(self.manifest.files)} files are taken as they are",
-            PathControlWarning,
-            stacklevel=7,
+            f"{len(self.manifest.files)} files are taken as they are"
         )
         for place in list(self.manifest.files):
             with suppress(InputError):
@@ -258,11 +249,7 @@ class Store:
         for place in gone:
             del self.manifest.files[place]
         if gone:
-            warnings.warn(
-                f"the sweep in {str(self.folder)!r} lacks histories, which are made again: {', '.join(gone[:_TOLD])}",
-                PathControlWarning,
-                stacklevel=4,
-            )
+            warn(f"the sweep in {str(self.folder)!r} lacks histories, which are made again: {', '.join(gone[:_TOLD])}")
 
     def _remove(self, places: Iterable[str]) -> None:
         """Remove files."""

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import inspect
-import warnings
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from pathcontrol.errors import InputError, PathControlWarning, ToolpathError
+from pathcontrol.errors import InputError, ToolpathError, warn
 from pathcontrol.toolpaths.contour import Toolpath
 
 #: readers by the end of a file's name: the module of this package, and the function in it
@@ -46,7 +45,7 @@ def read_toolpath(path: str | Path, **options: Any) -> Toolpath:
         raise InputError(f"{Path(path).name!r} is read by {reader.__name__}, which takes {takes}, not {wrong}")
     toolpath = reader(path, **options)
     for note in toolpath.notes:
-        warnings.warn(f"{Path(path).name}: {note}", PathControlWarning, stacklevel=2)
+        warn(f"{Path(path).name}: {note}")
     return toolpath
 
 

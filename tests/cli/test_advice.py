@@ -65,7 +65,7 @@ def test_there_are_such_messages():
 @pytest.mark.parametrize(
     ("command", "message", "said"),
     [
-        ("toolpath", "TEXT; choose layers= without it of A, B", "TEXT; choose --layer without it of A, B"),
+        ("toolpath", "TEXT; choose with layers= from A, B", "TEXT; choose with --layer from A, B"),
         ("toolpath", "'a=4', or pass it over with unknown='warn'", "'a=4', or pass it over with --lenient"),
         ("toolpath", "give unit='mm' or unit='in'", "give --unit mm or --unit in"),
         ("toolpath", "read the file with start=(x, y, z)", "read the file with --start x y z"),

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ast
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -172,11 +170,3 @@ def test_an_arm_that_stands_still_is_never_the_best_of_a_sweep_or_a_tuning(tmp_p
     slow = pc.tune(build, {"speed": [0.05, 0.06]}, "e_p_peak", population=5, generations=1, progress=False)
     assert slow.best() is None
     assert "did not get to the end" in str(slow)
-
-
-def test_every_warning_is_of_the_librarys_own_class():
-    for file in Path(pc.__file__).parent.rglob("*.py"):
-        for call in ast.walk(ast.parse(file.read_text())):
-            if isinstance(call, ast.Call) and ast.unparse(call.func) == "warnings.warn":
-                category = ast.unparse(call.args[1]) if len(call.args) > 1 else "none"
-                assert category in ("PathControlWarning", "StepWarning"), f"{file}: line {call.lineno}"

@@ -211,7 +211,7 @@ def test_the_options_on_the_command_line_and_in_experiment_files(tmp_path):
     for options in (["--skip", "POINT,TEXT"], ["--skip", "point", "--skip", "text"]):
         shown = CliRunner().invoke(main, ["toolpath", file, "--json", *options])
         assert len(json.loads(shown.stdout)["contours"]) == 2
-        assert "--gap 1.1e-05" in shown.output
+        assert "--gap '0.011 mm'" in shown.output
     joined = CliRunner().invoke(main, ["toolpath", file, "--json", "--lenient", "--gap", "0.011 mm"])
     assert len(json.loads(joined.stdout)["contours"]) == 1
     section = toolpath_section()(file=file, frame="tip", skip=["point", "text"], gap=1.1e-5)

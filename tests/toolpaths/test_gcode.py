@@ -220,7 +220,7 @@ REFUSED = {
     "G80\nX1": "no motion that it belongs to",
     "G1 X1 U90": "only the axes X, Y and Z",
     "G1 X1 E2": "extruders",
-    "G1 X1 P2": "it belongs to G4, G64, an arc or a cycle",
+    "G1 X1 P2": "nothing in the line uses it, as G4, G64, an arc or a cycle would: take it away",
     "G1 X1 H2": "H2 is not understood here: it names a tool's measure that nothing here uses",
     "G1 X1 I2": "it belongs to an arc",
     "G4 Y2": "Y2 is not understood here",

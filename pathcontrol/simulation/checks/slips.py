@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import PathControlWarning
+from pathcontrol.errors import warn
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.simulation.checks.weight import PathPostures, check_weight
 from pathcontrol.simulation.loops import Arm
@@ -33,7 +31,7 @@ def warn_of_slips(robot: Arm, task: PathTask, q: Array, first: int = 0) -> str:
     start, along = _check_start(robot, q), PathPostures.of(task)
     for sentence in (start, _check_path(robot, along), check_weight(robot, along, q)):
         if sentence:
-            warnings.warn(sentence, PathControlWarning, stacklevel=3)
+            warn(sentence)
     return start
 
 
@@ -47,11 +45,9 @@ def warn_if_still(run: Run, robot: Arm, friction: str) -> None:
     if (np.abs(q[:, -1] - q[:, 0]) > _MOVED).any():  # as most do, found without a look at all samples
         return
     if (np.ptp(q, axis=1) <= _MOVED).all():
-        warnings.warn(
+        warn(
             f"the arm did not move in {run.time[-1]:g} s: its dry friction holds it, which the law does not "
-            'compensate; give the controller friction="full"',
-            PathControlWarning,
-            stacklevel=3,
+            'compensate; give the controller friction="full"'
         )
 
 

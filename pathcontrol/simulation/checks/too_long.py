@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from math import ceil
 from typing import NamedTuple
@@ -13,7 +12,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion import PDPlus, SlotineLi
-from pathcontrol.errors import PathControlWarning
+from pathcontrol.errors import PathControlWarning, warn
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
@@ -62,7 +61,7 @@ def warn_of_steps(
     """
     told = find_steps_too_long(controllers, loop, robot, q, qd, disturbance, duration)
     for sentence in told:
-        warnings.warn(sentence, StepWarning, stacklevel=3)
+        warn(sentence, StepWarning)
     return "; ".join(told)
 
 

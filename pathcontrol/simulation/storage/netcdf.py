@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ import h5py  # type: ignore[import-untyped]
 import numpy as np
 
 from pathcontrol._files import whole_file
-from pathcontrol.errors import InputError, PathControlWarning
+from pathcontrol.errors import InputError, warn
 from pathcontrol.simulation.context import StoredContext
 from pathcontrol.simulation.samples import Samples
 from pathcontrol.simulation.storage.file_form import check_form, check_sizes
@@ -86,11 +85,9 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | No
         reason = str(error) if "file signature not found" not in str(error) else f"it is no HDF5 file{_remedy(path)}"
         raise InputError(f"{str(path)!r} is not a run saved by Run.save: {reason}") from error
     if digest is None:
-        warnings.warn(
+        warn(
             f"{str(path)!r} has no checksum, as it was written by an earlier version: damage would not be noticed; "
-            "load it and save it again to give it one",
-            PathControlWarning,
-            stacklevel=3,
+            "load it and save it again to give it one"
         )
     return data, config, stored
 

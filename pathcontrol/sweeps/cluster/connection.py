@@ -7,14 +7,13 @@ import json
 import socket
 import threading
 import time
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pathcontrol.errors import ClusterError, InputError, MissingExtraError, PathControlWarning
+from pathcontrol.errors import ClusterError, InputError, MissingExtraError, warn
 from pathcontrol.sweeps.manifest import PACKAGES, versions
 
 if TYPE_CHECKING:
@@ -156,11 +155,9 @@ def _check_workers(client: Client) -> None:
         )
     crowded = [name for name, threads in client.nthreads().items() if threads > 1]
     if crowded:
-        warnings.warn(
+        warn(
             f"{len(crowded)} workers have several threads, as {crowded[0]}, of which one computes at a time; start "
-            "them as processes: --nworkers=-1 --nthreads 1",
-            PathControlWarning,
-            stacklevel=5,
+            "them as processes: --nworkers=-1 --nthreads 1"
         )
 
 
@@ -176,11 +173,7 @@ def _ask_workers(client: Client, ask: Callable[[], dict[str, str]]) -> dict[str,
         gone = drop_silent_workers(client, _ANSWER / 2)
     except OSError:  # one has died meanwhile
         gone = []
-    warnings.warn(
-        f"{', '.join(gone) or 'a worker'} did not answer, and the sweep goes on without it",
-        PathControlWarning,
-        stacklevel=6,
-    )
+    warn(f"{', '.join(gone) or 'a worker'} did not answer, and the sweep goes on without it")
     try:
         return within(_ANSWER, lambda: client.run(ask, on_error="ignore"))
     except (NoAnswerError, OSError) as error:

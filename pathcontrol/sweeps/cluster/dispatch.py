@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-import warnings
 from collections import Counter
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import suppress
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import ClusterError, PathControlWarning
+from pathcontrol.errors import ClusterError, warn
 from pathcontrol.sweeps.chunk import Chunk, Job, Piece
 from pathcontrol.sweeps.cluster.connection import (
     GoneError,
@@ -277,11 +276,9 @@ def _can_reach_workers(client: Client) -> bool:
     try:
         client.sync(ask)
     except (OSError, TimeoutError) as error:
-        warnings.warn(
+        warn(
             f"this machine cannot reach all workers ({error!r}), so that all results go through the scheduler; start "
-            "the sweep on a machine in their network if that is too slow",
-            PathControlWarning,
-            stacklevel=5,
+            "the sweep on a machine in their network if that is too slow"
         )
         return False
     return True

@@ -178,7 +178,7 @@ def _strands(entities: Entities, layers: Layers, skip: frozenset[str], scale: Ar
         kinds = ",".join(dict.fromkeys(kind for (kind, _), _ in refused.most_common(8)))
         raise ToolpathError(
             f"{entities.source} holds what cannot be cut: {what}; take it away, leave it out with skip={kinds!r}, pass "
-            f"it over with unknown='warn', or choose layers= without it of {layers.listed}"
+            f"it over with unknown='warn', or choose with layers= from {layers.listed}"
         )
     return strands
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.gcode.modes import Modes
+from pathcontrol.toolpaths.gcode.units import Unit
 from pathcontrol.toolpaths.segments.arc import Arc
 from pathcontrol.toolpaths.text import MAX_COORDINATE
 
@@ -139,7 +140,7 @@ def _unequal(first: float, last: float, modes: Modes, *, meant: bool) -> str:
     if meant:
         advice = "as a centre relative to the start, G91.1, or an absolute one, G90.1, it would be: say which before it"
     elif error <= 0.1 * max(first, last):
-        advice = f"if the program's numbers are rounded, read it with arc_tolerance={_rounded_up(error)} (metres)"
+        advice = _if_rounded(error, unit)
     else:
         advice = "are its centre, I J K, and its end those of one arc?"
     return (
@@ -148,10 +149,11 @@ def _unequal(first: float, last: float, modes: Modes, *, meant: bool) -> str:
     )
 
 
-def _rounded_up(length: float) -> str:
-    """Write a length with two digits, not below it."""
+def _if_rounded(length: float, unit: Unit) -> str:
+    """Return the advice to allow for rounding by a length [m], which is rounded up to two digits."""
     step = 10.0 ** (math.floor(math.log10(length)) - 1)
-    return f"{math.ceil(1.001 * length / step) * step:.3g}"
+    most = math.ceil(1.001 * length / step) * step
+    return f"if the program's numbers are rounded, by up to {unit.text(most)}, read it with arc_tolerance={most:.3g}"
 
 
 def _by_radius(
@@ -167,10 +169,9 @@ def _by_radius(
     half = min(chord / 2, abs(radius))
     missing = chord / 2 - half
     if missing > max(_LEAST_RADIUS, modes.arc_tolerance or 0.0):
-        rounded = f"; if the numbers are rounded, read it with arc_tolerance={_rounded_up(missing)} (metres)"
         raise ToolpathError(
             f"an arc of radius {unit.text(abs(radius))} between points {unit.text(chord)} apart, expected a radius of "
-            f"at least half of that{rounded if missing < 0.1 * half else ''}"
+            f"at least half of that{f'; {_if_rounded(missing, unit)}' if missing < 0.1 * half else ''}"
         )
     height = math.sqrt((abs(radius) - half) * (abs(radius) + half)) / chord
     left = -height if clockwise == (radius > 0) else height

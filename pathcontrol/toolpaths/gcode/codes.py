@@ -61,7 +61,7 @@ _LETTERS = {
     **dict.fromkeys("ABCUVW", "only the axes X, Y and Z are supported"),
     **dict.fromkeys("IJKR", "it belongs to an arc, G2 or G3"),
     **dict.fromkeys("XYZ", "there is no motion that it belongs to: write G0, G1, G2 or G3"),
-    **dict.fromkeys("PQ", "nothing in the line uses it: it belongs to G4, G64, an arc or a cycle"),
+    **dict.fromkeys("PQ", "nothing in the line uses it, as G4, G64, an arc or a cycle would: take it away"),
     "L": "repetitions belong to a drilling cycle, G81 to G83",
     "O": "subprograms are not supported, and a program number stands alone at the beginning",
 }

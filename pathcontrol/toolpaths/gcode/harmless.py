@@ -62,7 +62,11 @@ def without_letters(block: Block, line: int, passed: Notes) -> Block:
     """
     found = [letter for letter in "DEH" if letter in block.words and not (letter == "H" and 430 in block.g)]
     for letter in found:
-        what = "extruders are not supported" if letter == "E" else "it names a tool's measure that nothing here uses"
+        what = (
+            "extruders are not supported; take it away"
+            if letter == "E"
+            else "it names a tool's measure that nothing here uses; take it away"
+        )
         reason = f"{letter}{block.words[letter]:g} is not understood here: {what}"
         passed.unless_refused(letter, line, reason)
     if not found:

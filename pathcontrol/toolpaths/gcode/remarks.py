@@ -39,7 +39,9 @@ def _without_brackets(text: str, line: int, passed: Notes) -> str:
     """Return the line without a text in brackets."""
     if not text.endswith("]"):
         return text
-    passed.unless_refused("a text in [ ]", line, f"{text[:40]!r} is no comment: {_COMMENT}")
+    passed.unless_refused(
+        "a text in [ ]", line, f"{text[:40]!r} is not understood: {_COMMENT}, not in [ ]: write it so"
+    )
     return ""
 
 
@@ -51,7 +53,9 @@ def _without_slashes(text: str, line: int, passed: Notes) -> str:
             f"{text[:40]!r} may be a comment, or a line that is carried out or not by a switch of the machine: delete "
             "it, or the //"
         )
-    passed.unless_refused("a text after //", line, f"{text[:40]!r} is not understood: {_COMMENT}, not after //")
+    passed.unless_refused(
+        "a text after //", line, f"{text[:40]!r} is not understood: {_COMMENT}, not after //: write it so"
+    )
     return before.rstrip()
 
 

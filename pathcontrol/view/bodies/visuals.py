@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import PathControlWarning, UrdfError
+from pathcontrol.errors import UrdfError, warn
 from pathcontrol.robot.urdf import parse_urdf
 from pathcontrol.robot.urdf.links import read_pose
 from pathcontrol.robot.urdf.mesh_files import find_mesh
@@ -84,7 +83,7 @@ def _visuals(
         mesh = element.find("geometry/mesh")
         what = "a visual" if mesh is None else f"mesh {mesh.get('filename')!r}"
         told = f"{what} of link {link!r} is left out of the picture: {error}"
-        warnings.warn(told, PathControlWarning, stacklevel=5)
+        warn(told)
         return
     for shape, own_color in shapes:
         yield LinkVisual(link, element.get("name", ""), np.eye(4) if pose is None else pose, shape, own_color or color)

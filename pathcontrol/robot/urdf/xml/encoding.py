@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import codecs
 import re
-import warnings
 
-from pathcontrol.errors import PathControlWarning, UrdfError
+from pathcontrol.errors import UrdfError, warn
 
 _DECLARED = re.compile(rb"""\s*<\?xml[^>]{0,200}?encoding\s*=\s*["']([A-Za-z0-9._-]{1,40})["']""")
 _MARKS = {
@@ -33,11 +32,9 @@ def decode(data: bytes, name: str) -> str:
         return data.decode()
     except UnicodeDecodeError as error:
         text, encoding = _decode_as_declared(data)
-        warnings.warn(
+        warn(
             f"{name}: line {data[: error.start].count(10) + 1}: this is not UTF-8 and is read as {encoding}; "
-            "save the file as UTF-8",
-            PathControlWarning,
-            stacklevel=2,
+            "save the file as UTF-8"
         )
         return text
 
