@@ -14,6 +14,7 @@ _LONGEST = 80
 _SOURCES = {
     "RobotModel": "load_robot(NAME or FILE) gives one",
     "PathTask": "Circle(radius, speed) and the other tasks, or a subclass of your own, are some",
+    "VelocityProfile": "ConstantSpeed(speed), ConstantRate(rate) and the other profiles are some",
     "Controller": "Projection(robot, task, k_p, K_v) and the other control laws are some",
     "Run": "simulate(controller, q, duration=…) gives one, and Run.load(FILE)",
     "Figure": "path_figure(run), error_figure(run) and the other figures are some",

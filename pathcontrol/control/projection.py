@@ -65,8 +65,9 @@ class Projection(Controller):
         **options: Any,
     ) -> None:
         # an open path may end close to where it begins, and an arm at its begin be nearer to the end
-        ends = np.all(np.isfinite(getattr(task, "s_end", np.inf)))  # the base class refuses what is no task
-        super().__init__(robot, task, **({"start": "s0" if ends else "nearest"} | options))
+        super().__init__(robot, task, **options)
+        if "start" not in options:
+            self.start_at = "s0" if np.all(np.isfinite(task.s_end)) else "nearest"
         self.branches = BranchPolicy(branch, capture)
         self.k_p, self.K_v = scalar_gain("k_p", k_p), diagonal_gain("K_v", K_v, robot.n, robot.joint_names)
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, finite, joint_array
+from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.errors import InputError, PathControlError
 from pathcontrol.robot.batch import RobotBatch
@@ -167,6 +168,20 @@ def _count_rows(torque: Callable[[], Any]) -> int:
     except Exception:  # code of the user
         return 1
     return max(1, shape[0]) if len(shape) == 2 else 1
+
+
+def check_controller(name: str, controller: Any) -> None:
+    """Check that an argument is a control law, and that its class has made it whole.
+
+    Raises:
+        InputError: it is none, or its ``__init__`` does not call that of its base class.
+    """
+    expect(name, controller, Controller)
+    if not hasattr(controller, "task"):
+        kind = type(controller).__name__
+        raise InputError(
+            f"{kind}.__init__ does not call super().__init__(robot, task), which gives a law its arm and task"
+        )
 
 
 def check_rollout_number(first: Any) -> int:

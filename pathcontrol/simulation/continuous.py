@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller, ControlOutput
-from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.arm.disturbance import Disturbance, jump_times
 from pathcontrol.simulation.arm.sensors import Reading
 from pathcontrol.simulation.divergence import CRAWLED, NO_NUMBERS, STOPPED, Divergence, is_bounded
 from pathcontrol.simulation.finish import Finish
@@ -116,7 +116,7 @@ class _SteadyDisturbance:
 
     def until_next_jump(self, t: float, end: float) -> float:
         """Return the time of the next jump after t [s], or ``end``; until then the value before the jump counts."""
-        after = self._disturbance.jumps - self._began
+        after = jump_times(self._disturbance) - self._began
         after = after[(after > t) & (after < end)]
         self._before = float(np.nextafter(after.min(), -np.inf)) if after.size else np.inf
         return float(after.min()) if after.size else end

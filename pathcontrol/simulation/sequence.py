@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite
-from pathcontrol._expect import describe, expect
+from pathcontrol._expect import describe
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arguments import (
+    check_controller,
     check_joints,
     check_law,
     check_length,
@@ -167,7 +168,7 @@ def _check_controllers(controllers: Iterable[Controller]) -> list[Controller]:
     if not laws or isinstance(controllers, str | PathTask):
         raise InputError(f"controllers {describe(controllers)}, expected a list with one controller for each path")
     for i, law in enumerate(laws):
-        expect(f"controllers[{i}]", law, Controller)
+        check_controller(f"controllers[{i}]", law)
         refuse_batch(f"the task of controllers[{i}]", law.task)
     return laws
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import scalar
-from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arguments import (
     broadcast_states,
+    check_controller,
     check_joints,
     check_length,
     check_loop,
@@ -86,7 +86,7 @@ def simulate(
         InputError: an argument has the wrong shape or value.
         SimulationError: all rollouts diverged, as a single one does; its ``run`` holds what happened until then.
     """
-    expect("controller", controller, Controller)
+    check_controller("controller", controller)
     check_engine(engine)
     duration = scalar("duration", duration, positive=True)
     robot, first = make_plant(plant, controller), check_rollout_number(first_rollout)

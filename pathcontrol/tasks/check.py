@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 from collections.abc import Callable
 from typing import Any
 
@@ -18,8 +19,12 @@ _SAMPLES = 129
 _GOLDEN = (5**0.5 - 1) / 2
 
 
-def check_task(task: PathTask, n: int) -> None:
-    """Check shapes and values of a task, or of each in a batch, for ``n`` joints, on samples of its domain.
+def check_task(task: PathTask, n: int | None = None) -> None:
+    """Check shapes and values of a task, or of each in a batch, on samples of its domain.
+
+    Args:
+        task: the task.
+        n: the number of joints; those of q_d if it is left out.
 
     Raises:
         TaskError: it is not a path for ``n`` joints, returns a wrong shape or NaN, or ϑ is not positive somewhere.
@@ -33,6 +38,8 @@ def check_task(task: PathTask, n: int) -> None:
     name = type(task).__name__
     _check_domain(task, name)
     lower, upper = task.sampled_interval
+    if n is None:
+        n = _count_joints(task, name, lower)
     s = np.linspace(lower, upper, _SAMPLES)
     _check_values(f"{name}.q_d", task.q_d, s, n)
     theta = _check_values(f"{name}.theta", task.theta, s, None)
@@ -48,11 +55,21 @@ def check_task(task: PathTask, n: int) -> None:
     for method in ("dq_d", "ddq_d", "dtheta"):
         _check_values(f"{name}.{method}", getattr(task, method), s, None if method == "dtheta" else n)
     check_moves(task)
+    if not type(task).__module__.startswith("pathcontrol."):
+        _check_projection(task, name, s[1:-1:16])
     for function, derivative in (("q_d", "dq_d"), ("dq_d", "ddq_d"), ("theta", "dtheta")):
         _check_derivative(task, name, s, function, derivative)
 
 
-def _check_each(batch: TaskBatch, n: int) -> None:
+def _count_joints(task: PathTask, name: str, s: float) -> int:
+    """Return the number of joints that q_d is for."""
+    posture = _evaluate(f"{name}.q_d", task.q_d, np.float64(s))
+    if posture.ndim != 1:
+        raise TaskError(f"{name}.q_d of a number s has shape {posture.shape}, expected (n,): a value for each joint")
+    return len(posture)
+
+
+def _check_each(batch: TaskBatch, n: int | None) -> None:
     """Check each different task of a batch."""
     for task, rows in batch.groups():
         try:
@@ -63,12 +80,44 @@ def _check_each(batch: TaskBatch, n: int) -> None:
 
 def _check_domain(task: PathTask, name: str) -> None:
     """Check the domain of a task."""
+    for end in ("s0", "s_end", *(["period"] if task.period is not None else [])):
+        value = getattr(task, end)
+        if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+            raise TaskError(f"{name} has {end} = {value!r}, expected a number", value=value)
     if not np.isfinite(task.s0) or not task.s_end > task.s0:
         raise TaskError(f"{name} has s0 = {task.s0} and s_end = {task.s_end}, expected a finite s0 < s_end")
     if task.period is not None and not (0 < task.period < np.inf and task.s_end == np.inf):
         raise TaskError(
             f"{name} has period = {task.period} and s_end = {task.s_end}; a closed path has a period > 0 and no s_end"
         )
+
+
+def _check_projection(task: PathTask, name: str, s: Array) -> None:
+    """Check that the projection of a class of one's own finds postures of the path on the path."""
+    if type(task).sigma_bar is PathTask.sigma_bar:
+        return
+    label, q = f"{name}.sigma_bar", np.asarray(task.q_d(s), dtype=np.float64)
+    for near in (None, s):
+        try:
+            found = np.asarray(task.sigma_bar(q, near), dtype=np.float64)
+        except (TypeError, ValueError, IndexError) as error:
+            raise TaskError(
+                f"{label}(q, near) fails for q of shape {q.shape}: {error}; work on arrays with the joints last, "
+                "q[..., 0], or leave sigma_bar out and have it computed"
+            ) from error
+        if found.shape != s.shape:
+            raise TaskError(
+                f"{label} of q with shape {q.shape} has shape {found.shape}, expected {s.shape}; joints come last: "
+                "q[..., 0]"
+            )
+        off = np.abs(np.asarray(task.q_d(found)) - q).max(-1)
+        if not (worst := off.max()) <= 1e-3 * (1 + np.abs(q).max()):  # it may be found numerically
+            i = int(off.argmax())
+            raise TaskError(
+                f"{label}(q_d(s={s[i]:g})) = {found[i]:g}, where the path is {worst:.3g} away from q; correct it, or "
+                "leave sigma_bar out and have it computed",
+                s=float(s[i]),
+            )
 
 
 def _check_derivative(task: PathTask, name: str, s: Array, function: str, derivative: str) -> None:
@@ -107,15 +156,7 @@ def _check_values(label: str, function: Callable[[Any], Any], s: Array, n: int |
     """Check that values at s and at a single s have the shapes of the batch convention; return them."""
     for argument in (s, s[0]):
         expected = np.shape(argument) + (() if n is None else (n,))
-        try:
-            value = np.asarray(function(argument))
-        except TaskError:
-            raise
-        except (TypeError, ValueError, IndexError) as error:
-            raise TaskError(
-                f"{label} fails for s of shape {np.shape(argument)}: {error}; work on arrays, with np.cos rather than "
-                "math.cos and np.where rather than if"
-            ) from error
+        value = _evaluate(label, function, argument)
         # ϑ may be a constant that broadcasts
         if value.shape != expected and not (n is None and value.shape == ()):
             raise TaskError(_shape_message(label, np.shape(argument), value.shape, expected, n))
@@ -128,6 +169,29 @@ def _check_values(label: str, function: Callable[[Any], Any], s: Array, n: int |
             s=float(s[i]),
         )
     return values
+
+
+def _evaluate(label: str, function: Callable[[Any], Any], s: Any) -> Array:
+    """Return what a method of the task gives at s, an array of real numbers."""
+    try:
+        value = function(s)
+        array = np.asarray(value)
+    except TaskError:
+        raise
+    except (TypeError, ValueError, IndexError) as error:
+        raise TaskError(
+            f"{label} fails for s of shape {np.shape(s)}: {error}; work on arrays, with np.cos rather than math.cos "
+            "and np.where rather than if"
+        ) from error
+    if value is None:
+        raise TaskError(f"{label} returns None, expected an array; does it end without a return?")
+    if array.dtype.kind not in "biufO":
+        raise TaskError(
+            f"{label} gives {array.dtype} numbers, expected real ones"
+            if array.dtype.kind == "c"
+            else f"{label} gives {value!r:.80}, expected an array of numbers"
+        )
+    return array
 
 
 def _shape_message(label: str, given: Any, got: Any, expected: Any, n: int | None) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol._expect import expect
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.geometry.arc_length import curvature_vector, drop_coincident
 from pathcontrol.geometry.periodic import wrap
@@ -82,6 +83,7 @@ class Reprofiled(PathTask):
     """A path with another velocity profile than its own; made by :meth:`PathTask.with_profile`."""
 
     def __init__(self, path: PathTask, profile: VelocityProfile) -> None:
+        expect("profile", profile, VelocityProfile)
         self.path, self.profile = path, profile
         self.s0, self.s_end, self.period = path.s0, path.s_end, path.period
         self.keep_tool(path)

@@ -18,6 +18,16 @@ READERS = {
     (".svg",): ("svg", "read_svg"),
     (".dxf",): ("dxf", "read_dxf"),
 }
+#: what to do about files of other programs
+_EXPORTS = {
+    ".dwg": "save the DWG drawing as DXF in ASCII, R2000 or later",
+    **dict.fromkeys((".ai", ".eps", ".pdf", ".cdr", ".odg"), "export the drawing as SVG or DXF"),
+    **dict.fromkeys(
+        (".stl", ".step", ".stp", ".iges", ".igs", ".obj", ".3mf"), "let a CAM program make G-code of the body"
+    ),
+    **dict.fromkeys((".xlsx", ".xls", ".ods"), "save the table as CSV"),
+    **dict.fromkeys((".png", ".jpg", ".jpeg", ".bmp"), "trace the image, and save it as SVG"),
+}
 
 
 def read_toolpath(path: str | Path, **options: Any) -> Toolpath:
@@ -66,4 +76,5 @@ def _reader(path: Path) -> Callable[..., Toolpath]:
         if path.suffix.lower() in suffixes:
             return _load(*place)
     known = ", ".join(suffix for suffixes in READERS for suffix in suffixes)
-    raise ToolpathError(f"{str(path)!r} ends in {path.suffix or 'nothing'!r}, expected one of {known}")
+    advice = f"; {_EXPORTS[path.suffix.lower()]}" if path.suffix.lower() in _EXPORTS else ""
+    raise ToolpathError(f"{str(path)!r} ends in {path.suffix or 'nothing'!r}, expected one of {known}{advice}")

@@ -58,7 +58,7 @@ class _Sum(Disturbance):
 
     @property
     def jumps(self) -> Array:
-        return np.concatenate([term.jumps for term in self.terms])
+        return np.concatenate([jump_times(term) for term in self.terms])
 
     def describe(self) -> dict[str, Any]:
         return {"disturbance": "sum", "terms": [term.describe() for term in self.terms]}
@@ -185,15 +185,40 @@ def check_disturbance(disturbance: Any, q: Array, qd: Array) -> None:
         return
     if not isinstance(disturbance, Disturbance):
         raise InputError(f"disturbance = {disturbance!r}, expected a Disturbance, such as Push(...) or a sum of them")
+    for term in list_terms(disturbance):
+        _check_term(term, q, qd)
+
+
+def _check_term(disturbance: Disturbance, q: Array, qd: Array) -> None:
+    """Check the torques and the jumps of one disturbance."""
     name = type(disturbance).__name__
     try:
         torque = np.asarray(disturbance.torque(0.0, q, qd), dtype=np.float64)
-    except ValueError as error:
+    except (TypeError, ValueError, IndexError) as error:
         raise InputError(
             f"{name}.torque fails for {len(q)} rollouts of {q.shape[1]} joints: {error}", argument=name
         ) from error
     if torque.shape not in ((), q.shape[1:], (1, q.shape[1]), q.shape):
         raise InputError(f"{name}.torque has shape {torque.shape}, expected {q.shape}: rollouts and joints")
+    if not np.isfinite(torque).all():
+        raise InputError(f"{name}.torque gives {torque.tolist()} at the start, expected numbers", argument=name)
+    jump_times(disturbance)
+
+
+def jump_times(disturbance: Disturbance) -> Array:
+    """Return the times [s] at which a disturbance jumps, (k,), however its class says them.
+
+    Raises:
+        InputError: they are no numbers.
+    """
+    jumps = disturbance.jumps
+    try:
+        if callable(jumps):
+            raise TypeError("it is a method: write @property before it")
+        return np.atleast_1d(as_array("jumps", jumps)).ravel()
+    except (TypeError, ValueError) as error:
+        name = type(disturbance).__name__
+        raise InputError(f"{name}.jumps cannot be used: {error}; expected times [s], (k,)", argument=name) from error
 
 
 def _check_each(name: str, value: ArrayLike) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.robot.friction import FrictionLaw, levels_vary
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.arm.disturbance import Disturbance, jump_times
 
 _NUDGE = 1e-5  # rad and rad/s, the step of finite differences
 _TRIED_SPEED, _TRIED_ANGLE = 0.1, 1e-3  # rad/s and rad, the differences at which a disturbance is evaluated
@@ -84,7 +84,7 @@ def rates_of_disturbance(
 
 def _sample_times(disturbance: Disturbance, duration: float) -> Iterator[float]:
     """Yield times [s] at which a disturbance is evaluated: evenly spread, and between its jumps."""
-    jumps = disturbance.jumps
+    jumps = jump_times(disturbance)
     ends = np.concatenate([[0.0], jumps[(jumps > 0) & (jumps < duration)], [duration]])
     between = 0.5 * (ends[1:] + ends[:-1])
     yield from np.union1d(np.linspace(0.0, duration, _TIMES), between[:_TIMES]).tolist()

@@ -29,7 +29,7 @@ def warn_of_slips(robot: Arm, task: PathTask, q: Array, first: int = 0) -> str:
     if first:
         return ""
     start, along = _check_start(robot, q), PathPostures.of(task)
-    for sentence in (start, _check_path(robot, along), check_weight(robot, along, q)):
+    for sentence in (start, _check_path(robot, along, _is_bounded(task)), check_weight(robot, along, q)):
         if sentence:
             warn(sentence)
     return start
@@ -57,24 +57,37 @@ def _check_start(robot: Arm, q: Array) -> str:
     row, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
     if beyond[row, joint] > 0:
         return _describe_excess("the start has", robot, int(row), int(joint), q[min(int(row), len(q) - 1)], "")
-    turns = np.where(np.array(robot.position_units) == "rad", np.abs(q), 0.0)
-    row, joint = np.unravel_index(int(turns.argmax()), turns.shape)
-    if turns[row, joint] <= _TURNS:
-        return ""
-    name, value = robot.joint_names[int(joint)], q[row, joint]
-    return f"the start has {name} at {value:.4g} rad, which is {abs(value) / 2 / np.pi:.3g} turns{_DEGREES}"
+    return _describe_turns("the start has", robot, q[None])
 
 
-def _check_path(robot: Arm, along: PathPostures) -> str:
-    """Return the sentence about the worst joint along the path, or an empty text."""
+def _check_path(robot: Arm, along: PathPostures, ends: bool) -> str:
+    """Return the sentence about the worst joint along a path that ends or repeats, or an empty text.
+
+    One that goes on for ever may turn a joint as often as it likes.
+    """
     beyond = _excess(robot, along.q)
     sample, row, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
     if beyond[sample, row, joint] <= 0:
-        return ""
+        return _describe_turns("the path goes to", robot, along.q if ends else along.q[:1])
     path = min(int(row), along.q.shape[1] - 1)
     of = f" of rollout {row}" if beyond.shape[1] > 1 else ""
     where = f" at s = {along.s[sample, path]:.4g}"
     return _describe_excess(f"the path{of} has", robot, int(row), int(joint), along.q[sample, path], where)
+
+
+def _describe_turns(begin: str, robot: Arm, q: Array) -> str:
+    """Return the sentence about a joint that is many turns away in postures (samples, N, n), or an empty text."""
+    turns = np.where(np.array(robot.position_units) == "rad", np.abs(q), 0.0)
+    place = np.unravel_index(int(turns.argmax()), turns.shape)
+    if turns[place] <= _TURNS:
+        return ""
+    name, value = robot.joint_names[int(place[-1])], q[place]
+    return f"{begin} {name} at {value:.4g} rad, which is {abs(value) / 2 / np.pi:.3g} turns{_DEGREES}"
+
+
+def _is_bounded(task: PathTask) -> bool:
+    """Return whether a path, or each of a batch, ends or repeats."""
+    return bool(np.all(task.closed | np.isfinite(task.s_end)))
 
 
 _DEGREES = "; did you mean degrees? Then give np.deg2rad(…)"

@@ -1,0 +1,157 @@
+"""Slips in classes of one's own are told by what was given, what was expected and what to do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pathcontrol as pc
+from pathcontrol import InputError, TaskError
+from pathcontrol.errors import PathControlWarning
+
+TWO = pc.load_robot("cicese_2dof")
+CIRCLE = pc.Circle(1.0, 2.0)
+LAW = pc.Projection(TWO, CIRCLE, 800.0, [45.0, 100.0])
+
+
+class Round(pc.PathTask):
+    period = 2 * np.pi
+
+    def q_d(self, s):
+        return np.stack([np.cos(s), np.sin(s)], axis=-1)
+
+    def theta(self, s):
+        return 1.5 + 0 * s
+
+
+def task_with(**body):
+    return type("Own", (Round,), body)()
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ({"period": "2*pi"}, r"has period = '2\*pi', expected a number"),
+        ({"period": np.array([6.28])}, "has period = array.*, expected a number"),
+        ({"period": True}, "has period = True, expected a number"),
+        ({"period": None, "s_end": "3"}, "has s_end = '3', expected a number"),
+        ({"s0": None}, "has s0 = None, expected a number"),
+        ({"q_d": lambda self, s: None}, "q_d returns None, expected an array; does it end without a return"),
+        ({"theta": lambda self, s: None}, "theta returns None, expected an array; does it end without a return"),
+        ({"dq_d": lambda self, s: None}, "dq_d returns None"),
+        ({"q_d": lambda self, s: np.stack([np.exp(1j * s)] * 2, -1)}, "q_d gives complex128 numbers, expected real"),
+        ({"theta": lambda self, s: "fast"}, "theta gives 'fast', expected an array of numbers"),
+        ({"sigma_bar": lambda self, q, near=None: np.arctan2(q[1], q[0])}, r"sigma_bar of q .*; joints come last"),
+        ({"sigma_bar": lambda self, q: np.arctan2(q[..., 1], q[..., 0])}, "sigma_bar.* positional argument"),
+        ({"sigma_bar": lambda self, q, near=None: np.arctan2(q[..., 0], q[..., 1])}, "away from q; correct it"),
+        ({"sigma_bar": lambda self, q, near=None: 0.0}, r"sigma_bar of q .* has shape \(\), expected"),
+    ],
+)
+@pytest.mark.parametrize("law", [pc.Projection, pc.ExtendedMotionPlan])
+def test_a_task_of_ones_own(body, said, law):
+    gains = (800.0, [45.0, 100.0], 2.0)[: 2 + (law is pc.ExtendedMotionPlan)]
+    with pytest.raises(TaskError, match=rf"Own.*{said}"):
+        law(TWO, task_with(**body), *gains)
+
+
+def test_right_ones_are_taken():
+    closed_form = {"sigma_bar": lambda self, q, near=None: np.arctan2(q[..., 1], q[..., 0])}
+    for body in ({}, {"period": np.float64(2 * np.pi)}, {"theta": lambda self, s: 2}, closed_form):
+        pc.check_task(task_with(**body))
+        pc.check_task(task_with(**body), 2)
+    with pytest.raises(TaskError, match="the path is for 2 joints, the arm has 3"):
+        pc.check_task(task_with(), 3)
+    with pytest.raises(TaskError, match=r"shape \(\), expected \(n,\)"):
+        pc.check_task(task_with(q_d=lambda self, s: s))
+
+
+class Own(pc.Disturbance):
+    def torque(self, t, q, qd):
+        return np.zeros(2)
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ({"torque": lambda self, t, q, qd: None}, r"Own.torque .*"),
+        ({"torque": lambda self, q, qd: q}, r"Own.torque fails for 1 rollouts of 2 joints: .*argument"),
+        ({"torque": lambda self, t, q, qd: q[:, 5]}, r"Own.torque fails for 1 rollouts of 2 joints: index 5"),
+        ({"torque": lambda self, t, q, qd: np.full(2, np.nan)}, r"Own.torque gives \[nan, nan\] at the start"),
+        ({"jumps": "now"}, "Own.jumps cannot be used: jumps = 'now', expected numbers"),
+        ({"jumps": lambda self: [1.0]}, "Own.jumps cannot be used: it is a method: write @property"),
+    ],
+)
+@pytest.mark.parametrize("loop", [None, pc.ContinuousTime()])
+@pytest.mark.parametrize("more", [False, True])
+def test_a_disturbance_of_ones_own(body, said, loop, more):
+    disturbance = type("Own", (pc.Disturbance,), {"torque": Own.torque} | body)()
+    if more:
+        disturbance = pc.Push([1.0, 1.0]) + disturbance
+    with pytest.raises(InputError, match=said):
+        pc.simulate(LAW, [0.9, 0.1], duration=0.01, loop=loop, disturbance=disturbance, progress=False)
+
+
+@pytest.mark.parametrize("jumps", [0.003, [0.003], (0.003,), np.array([0.003])])
+def test_jumps_may_be_said_in_any_form(jumps):
+    def step(self, t, q, qd):
+        return np.array([5.0, 0.0]) * (t >= 0.003)
+
+    own = type("Step", (pc.Disturbance,), {"torque": step, "jumps": jumps})()
+    ends = [
+        pc.simulate(LAW, [0.9, 0.1], duration=0.01, loop=pc.ContinuousTime(), disturbance=one, progress=False)["q"][
+            0, -1
+        ]
+        for one in (own, pc.Push([5.0, 0.0], start=0.003))
+    ]
+    np.testing.assert_allclose(*ends, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("profile", [1.0, pc.ConstantSpeed, "fast", None])
+def test_a_profile_that_is_none(profile):
+    with pytest.raises(InputError, match=r"profile .* expected a VelocityProfile: "):
+        CIRCLE.with_profile(profile)
+
+
+def test_a_law_that_forgets_its_base_class():
+    class Forgetful(pc.MotionController):
+        def __init__(self, robot, task):
+            self.gain = 1.0
+
+        def torque(self, q, qd, ref):
+            return q
+
+    law = Forgetful(TWO, CIRCLE)
+    for run in (
+        lambda: pc.simulate(law, [0.9, 0.1], duration=0.1),
+        lambda: pc.simulate_sequence([law], [0.9, 0.1], duration=0.1),
+    ):
+        with pytest.raises(InputError, match=r"Forgetful.__init__ does not call super\(\).__init__\(robot, task\)"):
+            run()
+
+
+@pytest.mark.parametrize(
+    ("task", "turns"),
+    [
+        (pc.Circle(57.3, 114.59), "9.12"),
+        (pc.WaypointPath([[0, 0], [30, 40], [60, 20]], speed=20.0), "9.55"),
+        (pc.Line([0, 0], [30, 40], speed=20.0), "6.37"),
+    ],
+)
+def test_a_path_in_degrees_is_told_where_joints_have_no_limits(task, turns):
+    law = pc.ExtendedMotionPlan(TWO, task, 800.0, [45.0, 100.0], k=2.0)
+    with pytest.warns(PathControlWarning, match=rf"the path goes to joint_. at .* {turns} turns; did you mean degrees"):
+        pc.simulate(law, [0.1, 0.1], duration=0.01, progress=False)
+
+
+def test_paths_in_radians_and_those_without_an_end_are_not_questioned(recwarn):
+    class Winding(pc.PathTask):
+        def q_d(self, s):
+            return np.stack([s, 0.1 * np.sin(s)], axis=-1)
+
+        def theta(self, s):
+            return 1.0
+
+    for task in (CIRCLE, pc.Line([0, 0], [3, 4], speed=1.0), Winding()):
+        law = pc.ExtendedMotionPlan(TWO, task, 800.0, [45.0, 100.0], k=2.0)
+        pc.simulate(law, [0.1, 0.1], duration=0.01, progress=False)
+    assert not [w for w in recwarn if "turns" in str(w.message)]
