@@ -71,11 +71,10 @@ def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braki
         )
     if known.work > _MOST_WORK:
         raise EngineError(f"{known.work} pieces of Γ may be nearest to a state on it, expected at most {_MOST_WORK}")
-    *series, rows, joints = q.shape
-    states = np.empty((*series, rows, 2 * joints))
-    states[..., :joints], states[..., joints:] = q, weight * qd
+    *series, rows, _ = q.shape
+    states = [np.ascontiguousarray(values, dtype=np.float64) for values in (q, qd)]
     distance, s = np.empty((2, *series, rows))
-    pointers = (array.ctypes.data for array in (states, distance, s))
+    pointers = (array.ctypes.data for array in (*states, distance, s))
     library.pathcontrol_gamma(addressof(known.gamma), prod(series), rows, *pointers)
     return distance, s
 

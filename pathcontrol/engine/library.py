@@ -78,7 +78,7 @@ def _declare(library: CDLL) -> None:
         "mass_matrix": [c_void_p, c_longlong, array, array],
         "stick_slip": [c_int, c_longlong, array, array, array, array, array, array],
         "evaluate": [c_void_p, c_longlong, array, array],
-        "gamma": [c_void_p, c_longlong, c_longlong, array, array, array],
+        "gamma": [c_void_p, c_longlong, c_longlong, array, array, array, array],
         "nearest": [c_void_p, c_longlong, array, array, array],
         "control_tick": [c_void_p, c_void_p],
     }.items():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, copy_vectors
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class _Cut(Mapping[str, Array]):
 
     def __getitem__(self, name: str) -> Array:
         if name not in self._copied:
-            self._copied[name] = np.ascontiguousarray(self._whole[name][self._rows, self._moments])
+            self._copied[name] = copy_vectors(self._whole[name][self._rows, self._moments])
         return self._copied[name]
 
     def __contains__(self, name: object) -> bool:

@@ -75,12 +75,12 @@ EXPORT void pathcontrol_nearest(const Path *path, integer rows, const double *q,
   for (integer r = 0; r < rows; r++) s[r] = near ? followed_point(*path, q + r * path->joints, near[r]) : nearest_point(*path, q + r * path->joints);
 }
 
-// Distances to Γ of several series of states, (series, rows, 2 joints) each.
-EXPORT void pathcontrol_gamma(const Gamma *gamma, integer series, integer rows, const double *states, double *distance, double *parameter) {
+// Distances to Γ of several series of states, q and q̇ (series, rows, joints) each.
+EXPORT void pathcontrol_gamma(const Gamma *gamma, integer series, integer rows, const double *q, const double *qd, double *distance, double *parameter) {
   const int joints = gamma->path->joints;
   const auto one = joints == 2 ? distances_to_gamma<2> : joints == 6 ? distances_to_gamma<6> : joints == 7 ? distances_to_gamma<7> : distances_to_gamma<0>;
   for (integer k = 0; k < series; k++)
-    one(*gamma, rows, states + k * rows * 2 * joints, distance + k * rows, parameter + k * rows);
+    one(*gamma, rows, q + k * rows * joints, qd + k * rows * joints, distance + k * rows, parameter + k * rows);
 }
 
 // One tick of the law alone: `io` holds q, q̇ and s, and then gets τ, with s one period on in its place.

@@ -186,24 +186,25 @@ template <int N> static inline Nearest follow(const Gamma &gamma, const double *
   }
   return {INFINITY, NAN};
 }
-// Distances of states, (rows, 2 joints) each [q; w q̇], to Γ, and the parameters there; NaN where squares are not finite.
+// Distances of states, q and q̇ (rows, joints) each, to Γ, and the parameters there; NaN where squares are not finite.
 constexpr double FARTHEST = 1e150;  // as in geometry/closest_point/global_search.py
 template <int N>
-static void distances_to_gamma(const Gamma &gamma, integer rows, const double *states, double *distance, double *parameter) {
+static void distances_to_gamma(const Gamma &gamma, integer rows, const double *q, const double *qd, double *distance, double *parameter) {
   const Path &path = *gamma.path;
-  const int m = 2 * size<N>(path.joints), cells = path.cells;
+  const int n = size<N>(path.joints), m = 2 * n, cells = path.cells;
+  double x[2 * room<N>()], last[2 * room<N>()];  // the state [q; w q̇] and the one before
   Buffer<double> bounds(cells);
   Reach reach = {0, 0, -1};
   double moved = 0, s = 0, step = 0;  // how far the state has moved in this reach, and s from sample to sample
   for (integer row = 0; row < rows; row++) {
-    const double *x = states + row * m;
+    for (int k = 0; k < n; k++) x[k] = q[row * n + k], x[n + k] = gamma.weight * qd[row * n + k];
     bool finite = true;
     for (int k = 0; k < m; k++) finite = finite && fabs(x[k]) < FARTHEST;
     if (!finite) { distance[row] = parameter[row] = NAN, reach.others = -1; continue; }
     Nearest best = {INFINITY, NAN};
     if (reach.others > 0) {
       double square = 0;
-      for (int k = 0; k < m; k++) { const double y = x[k] - x[k - m]; square += y * y; }
+      for (int k = 0; k < m; k++) { const double y = x[k] - last[k]; square += y * y; }
       moved += sqrt(square);
       best = follow<N>(gamma, x, reach, s + step);
     }
@@ -216,6 +217,7 @@ static void distances_to_gamma(const Gamma &gamma, integer rows, const double *s
       }
       if (reach.others < 0) best = search_all(gamma, x, bounds), reach = reach_around(gamma, x, best, bounds);
     }
+    for (int k = 0; k < m; k++) last[k] = x[k];
     step = followed ? best.s - s : 0.0, s = best.s;
     distance[row] = sqrt(best.square), parameter[row] = path.closed ? in_first_lap(path, s) : s;
   }
