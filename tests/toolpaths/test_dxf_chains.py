@@ -19,14 +19,14 @@ NEAR = 1e-6  # m
 def read(tmp_path_factory):
     folder = tmp_path_factory.mktemp("chains")
 
-    def reader(pieces, layers=None):
+    def reader(pieces, layers=None, **options):
         """The toolpath of lines (a, b), arcs (a, b, bulge) and curves [a, b, c, …] between complex points [m]."""
         document = ezdxf.new("R2010", units=6)
         layers = layers or ["0"] * len(pieces)
         for piece, layer in zip(pieces, layers, strict=True):
             _add(document.modelspace(), piece, {"layer": str(layer)})
         document.saveas(folder / "drawing.dxf")
-        return read_dxf(folder / "drawing.dxf")
+        return read_dxf(folder / "drawing.dxf", **options)
 
     return reader
 
@@ -201,3 +201,21 @@ def test_files_that_are_too_large_are_not_loaded(tmp_path, monkeypatch):
     monkeypatch.setattr("pathcontrol.toolpaths.drawing.pieces.MAX_SEGMENTS", 39)
     with pytest.raises(ToolpathError, match="more than 39 lines"):
         read_dxf(path)
+
+
+@pytest.mark.parametrize("gap", [4e-5, 1e-4, 1e-3])
+def test_a_gap_wider_than_the_lines_of_a_chain_joins_them_all_the_same(read, gap):
+    """A small circle of a hundred lines, each shorter than the gap, is one contour; a wide gap elsewhere is closed."""
+    corners = 0.5e-3 * np.exp(2j * np.pi * np.arange(100) / 100)
+    circle = list(zip(corners, np.roll(corners, -1), strict=True))
+    corner = [(0.05, 0.06), (0.06 + 3e-6, 0.06 + 0.01j)]
+    found = read([*circle, *corner], gap=gap)
+    assert [contour.closed for contour in found.contours] == [True, False]
+    lengths = [sum(segment.length for segment in contour.segments) for contour in found.contours]
+    assert lengths[0] == pytest.approx(100 * 1e-3 * np.sin(np.pi / 100), rel=1e-6)
+    assert lengths[1] == pytest.approx(0.02, rel=1e-3)
+
+
+def test_a_line_shorter_than_the_gap_that_stays_alone_is_told(read):
+    found = read([(0.0, 1e-5), (0.05, 0.06)], gap=1e-4)
+    assert any("shorter than the gap of 100 µm stays alone once" in str(note) for note in found.notes)

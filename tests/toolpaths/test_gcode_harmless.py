@@ -188,3 +188,26 @@ def test_a_program_without_a_feed_takes_the_one_that_is_given():
     assert [c.feed for c in toolpath] == pytest.approx([0.02, 0.001])
     with pytest.raises(ToolpathError, match=r"there is a feed: write F, .* or read the file with feed="):
         read(HEAD + "G1 X5")
+
+
+def test_the_progress_of_a_printer_is_passed_over_and_the_mode_m73_is_not():
+    """M73 with P or R shows progress; alone it restores the modes of the program that called."""
+    moves = "G1 X10 F600\n{}\nG1 Y5\n"
+    plain = read(HEAD + moves.format("(-)"))
+    for progress in ("M73 P5 R10", "M73 P100", "M73 R0"):
+        with pytest.raises(ToolpathError, match=r"unknown='warn'"):
+            read(HEAD + moves.format(progress))
+        same(read(HEAD + moves.format(progress), unknown="warn"), plain)
+    with pytest.raises(ToolpathError, match="modes in force"):
+        read(HEAD + moves.format("M73"), unknown="warn")
+
+
+@pytest.mark.parametrize("cut", ["G1 X10 C90", "G2 X10 I5 A-30", "G1 Z-1 B5"])
+def test_an_axis_that_turns_in_the_first_cut_is_refused(cut):
+    """An axis stands at 0 until a move without a cut says where it is."""
+    letter = next(c for c in cut if c in "ABC")
+    with pytest.raises(ToolpathError, match=f"turns {letter} from 0"):
+        read(HEAD + "F600\n" + cut + "\n", unknown="warn")
+    turned = cut[cut.index(letter) :]
+    found = read(HEAD + f"F600\nG0 X0 Y0 Z0 {turned}\n" + cut + "\n")
+    same(found, read(HEAD + "F600\n" + cut[: cut.index(letter)] + "\n"))

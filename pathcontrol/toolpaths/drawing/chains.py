@@ -77,14 +77,26 @@ def chain_strands(strands: Sequence[Strand], gap: float | None, passed: Notes) -
 
     Ends meet if they lie within the gap of each other and of no third one. Where they do not coincide both are moved
     half-way: the end of a line alone, a curve as a whole by an amount that fades towards its other end. A closed chain
-    begins where its first strand does. Crumbs, smaller than the gap and 1 µm, are left out.
+    begins where its first strand does. Crumbs, smaller than the gap and 1 µm, are left out. What touches is joined
+    before wider gaps are closed, so that short strands of a chain are no obstacle; what is still shorter than the gap
+    stays alone.
 
     Args:
         strands: the curves.
         gap: [m]; by default 1 µm, or 0.01 % of the drawing's diagonal if that is less.
         passed: takes note of crumbs, and of gaps up to 50 µm that stay open.
     """
-    tolerance = max(min(_NEAR, _NEAR_SHARE * _size(strands)) if gap is None else gap, NOTHING)
+    near = min(_NEAR, _NEAR_SHARE * _size(strands))
+    widest = max(near if gap is None else gap, NOTHING)
+    chains = list(strands)
+    for tolerance in sorted({max(min(near, widest), NOTHING), widest}):
+        chains = _join_within(tolerance, chains, passed)
+    _note_gaps(chains, widest, passed)
+    return chains
+
+
+def _join_within(tolerance: float, strands: Sequence[Strand], passed: Notes) -> list[Strand]:
+    """Join the strands whose ends are within the ``tolerance`` [m] of each other, but for those that are shorter."""
     loose: dict[str, list[Strand]] = {}
     done = []
     for strand in strands:
@@ -96,9 +108,10 @@ def chain_strands(strands: Sequence[Strand], gap: float | None, passed: Notes) -
         elif apart > NOTHING and extent > tolerance:
             loose.setdefault(strand.layer, []).append(strand)
         else:
+            if apart > NOTHING:
+                passed.over(f"a curve shorter than the gap of {1e6 * tolerance:.3g} µm", strand.name, "stays alone")
             done.append(strand)
     chains = [chain for layer in loose.values() for chain in _chains(layer, tolerance)]
-    _note_gaps(chains, tolerance, passed)
     return sorted([*done, *chains], key=lambda strand: strand.place)
 
 

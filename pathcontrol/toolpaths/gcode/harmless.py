@@ -79,12 +79,17 @@ def _smooths(code: int, block: Block) -> bool:
     return code not in (50, 51) or (_SMOOTHING[code][0] in block.words and _PLACES.isdisjoint(block.words))
 
 
+def _shows_progress(code: int, block: Block) -> bool:
+    """Return whether an M73 is of a printer: P % done, R minutes left; M73 alone restores modes."""
+    return code == 73 and not {"P", "R"}.isdisjoint(block.words)
+
+
 def _of_m(code: int, block: Block, line: int, passed: Notes) -> set[str]:
     """Return the letters that belong to an M code which is passed over."""
     if code in _OUTPUTS:
         passed.over(f"M{code}", line)
         return {*_OUTPUTS[code]}
-    if (reason := reason_to_refuse(code)) is not None:
+    if (reason := reason_to_refuse(code)) is not None and not _shows_progress(code, block):
         raise ToolpathError(f"M{code} is not understood: {reason}")
     if code in _PRINTERS and not block.g:
         letters = {*block.words}

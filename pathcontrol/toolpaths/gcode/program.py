@@ -53,9 +53,8 @@ class Program:
         self._frame.select(codes.get("coordinate system"))
         elsewhere = codes.get("elsewhere")
         if elsewhere is None:
-            self._move(
-                self._frame.without_rotary(block, self.modes.absolute, self.strokes.begun, line), codes, line, name
-            )
+            begun = self.strokes.begun or self._is_cutting(block)
+            self._move(self._frame.without_rotary(block, self.modes.absolute, begun, line), codes, line, name)
         elif elsewhere == _DWELL:
             _check_dwell(block)
         elif elsewhere in (_SHIFT, _NO_SHIFT):
@@ -63,6 +62,10 @@ class Program:
         else:
             self._leave(block, codes, name)
         return PROGRAM_END.isdisjoint(block.m)
+
+    def _is_cutting(self, block: Block) -> bool:
+        """Return whether the tool moves at feed in the block."""
+        return self.modes.motion not in (None, _RAPID) and not {*"XYZ"}.isdisjoint(block.words)
 
     def follow(self, texts: Sequence[str], first: int) -> int:
         """Carry out the lines from the index ``first`` on that continue the last move; return their number."""
