@@ -8,6 +8,7 @@ from pathcontrol.analysis.limit_shares import RATIOS, find_worst_shares, is_pass
 from pathcontrol.analysis.progress import ENOUGH, progress
 from pathcontrol.analysis.window import samples_of
 from pathcontrol.errors import InputError
+from pathcontrol.robot.friction import levels_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.config import laws
 from pathcontrol.simulation.run import Run
@@ -74,7 +75,7 @@ def _has_dry_friction(run: Run) -> bool:
         robot: RobotModel = run.robot
     except InputError:
         return False
-    return any(bool(np.any(level > 0)) for level in robot.friction.levels(np.zeros(robot.n)))
+    return any(bool(np.any(level > 0)) for level in levels_of(robot.friction, np.zeros(robot.n)))
 
 
 def _gather(rows: list[tuple[int, str]], rollouts: int) -> str:

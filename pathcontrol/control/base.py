@@ -13,6 +13,7 @@ from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly, 
 from pathcontrol._expect import expect
 from pathcontrol.control.ending import Ending
 from pathcontrol.errors import InputError, UnknownNameError, warn_of_single
+from pathcontrol.robot.friction import levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.check import check_task
@@ -75,7 +76,7 @@ class Controller(ABC):
         check_task(task, robot.n)
         self.robot, self.task, self.friction, self.start_at = robot, task, friction, start
         self.ending = Ending.of(task)
-        self._viscous = robot.friction.viscous
+        self._viscous = viscous_of(robot.friction)
 
     def __init_subclass__(cls, single: bool | None = None, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -160,7 +161,7 @@ class Controller(ABC):
         if self.friction == "none":
             return 0.0
         direction = qd if desired is None else np.where(qd == 0, desired, qd)
-        plus, minus = self.robot.friction.levels(qd)
+        plus, minus = levels_of(self.robot.friction, qd)
         return self._viscous * qd + np.where(direction > 0, plus, 0.0) - np.where(direction < 0, minus, 0.0)
 
 

@@ -24,7 +24,7 @@ from pathcontrol.experiments.reproduce import (
     K,
     paper_task,
 )
-from pathcontrol.robot.friction import Coulomb, Viscous
+from pathcontrol.robot.friction import Coulomb, Viscous, levels_of, viscous_of
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.loops import SampledLoop
@@ -160,8 +160,10 @@ class Combinations:
     def _arm(self, viscous: Array, coulomb: Array) -> RobotModel:
         """The arm with its friction times factors (k, n)."""
         friction = self.robot.friction
-        plus, minus = friction.levels(np.zeros(self.robot.n))
-        return self.robot.with_friction(Viscous(friction.viscous * viscous) + Coulomb(plus * coulomb, minus * coulomb))
+        plus, minus = levels_of(friction, np.zeros(self.robot.n))
+        return self.robot.with_friction(
+            Viscous(viscous_of(friction) * viscous) + Coulomb(plus * coulomb, minus * coulomb)
+        )
 
     def describe(self) -> dict[str, Any]:
         """What the numbers depend on, so that a folder of other versions is refused."""

@@ -65,14 +65,14 @@ class FrictionLaw(ABC):
 
     def torque(self, qd: Array) -> Array:
         """Return the friction torque f(q̇) [N m], (*batch, n); where q̇ = 0 the dry part is given as 0."""
-        plus, minus = self.levels(qd)
-        return self.viscous * qd + np.where(qd > 0, plus, 0.0) - np.where(qd < 0, minus, 0.0)
+        plus, minus = levels_of(self, qd)
+        return viscous_of(self) * qd + np.where(qd > 0, plus, 0.0) - np.where(qd < 0, minus, 0.0)
 
     def smoothed(self, qd: Array, width: float) -> Array:
         """Return the friction torque [N m] with the step at zero replaced by tanh(q̇/width); ``width`` in rad/s."""
-        plus, minus = self.levels(qd)
+        plus, minus = levels_of(self, qd)
         blend = np.tanh(qd / width)
-        return self.viscous * qd + 0.5 * ((plus + minus) * blend + (plus - minus) * blend**2)
+        return viscous_of(self) * qd + 0.5 * ((plus + minus) * blend + (plus - minus) * blend**2)
 
     def select(self, joints: Sequence[int]) -> Self:
         """Return the same law for some of the joints."""
@@ -190,10 +190,10 @@ class FrictionSum(FrictionLaw):
 
     @property
     def viscous(self) -> Array:
-        return sum((term.viscous for term in self.terms), np.zeros(self.n))
+        return sum((viscous_of(term) for term in self.terms), np.zeros(self.n))
 
     def levels(self, qd: Array) -> tuple[Array, Array]:
-        levels = [term.levels(qd) for term in self.terms]
+        levels = [levels_of(term, qd) for term in self.terms]
         zero = np.zeros(self.n)
         return sum((p for p, _ in levels), zero), sum((m for _, m in levels), zero)
 
@@ -219,12 +219,12 @@ class FrictionOfGroups(FrictionLaw):
     def viscous(self) -> Array:
         together = np.empty((self.rows, self.n))
         for law, rows in self.parts:
-            together[rows] = law.viscous
+            together[rows] = viscous_of(law)
         return together
 
     def levels(self, qd: Array) -> tuple[Array, Array]:
         qd = np.broadcast_to(qd, (self.rows, self.n))
-        found = [law.levels(qd[rows]) for law, rows in self.parts]
+        found = [levels_of(law, qd[rows]) for law, rows in self.parts]
         plus, minus = np.empty((2, self.rows, self.n))
         for (_, rows), (p, m) in zip(self.parts, found, strict=True):
             plus[rows], minus[rows] = p, m
@@ -277,6 +277,18 @@ def select_rollout(law: FrictionLaw, row: int) -> FrictionLaw:
         return law
     values = (np.asarray(getattr(law, field.name)) for field in fields(law))
     return type(law)(*(value[row % len(value)] if value.ndim > 1 else value for value in values))
+
+
+def viscous_of(law: FrictionLaw) -> Array:
+    """Return the viscous coefficients [N m s/rad], (*batch, n); a law of one's own may give a number or a tuple."""
+    array = np.asarray(law.viscous, dtype=np.float64)
+    return array if array.ndim else np.full(law.n, array)
+
+
+def levels_of(law: FrictionLaw, qd: Array) -> tuple[Array, Array]:
+    """Return the dry levels (F⁺, F⁻) [N m] at ``qd`` as arrays; a law of one's own may give numbers or tuples."""
+    plus, minus = law.levels(qd)
+    return np.asarray(plus, dtype=np.float64), np.asarray(minus, dtype=np.float64)
 
 
 def levels_vary(law: FrictionLaw) -> bool:

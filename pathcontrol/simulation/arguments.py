@@ -17,6 +17,7 @@ from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.errors import InputError, PathControlError
 from pathcontrol.robot.batch import RobotBatch
+from pathcontrol.robot.friction import levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.loops import Arm, ContinuousTime, SampledLoop
@@ -89,7 +90,7 @@ def make_plant(plant: RobotModel | Sequence[RobotModel] | None, controller: Cont
 def _count_friction_rows(robot: RobotModel) -> int | None:
     """Return the number of rollouts for which a robot has friction coefficients; ``None`` if all have the same."""
     law = robot.friction
-    arrays = np.broadcast_arrays(law.viscous, *law.levels(np.zeros(robot.n)))
+    arrays = np.broadcast_arrays(viscous_of(law), *levels_of(law, np.zeros(robot.n)))
     return len(arrays[0]) if arrays[0].ndim > 1 else None
 
 

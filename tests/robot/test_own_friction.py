@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from pathcontrol.control.projection import Projection
 from pathcontrol.errors import InputError
-from pathcontrol.robot.friction import FrictionLaw, Stribeck
+from pathcontrol.robot.friction import Coulomb, FrictionLaw, Stribeck, Viscous
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.simulation.arm.plant import Plant
+from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
+from pathcontrol.simulation.simulate import simulate
+from pathcontrol.tasks.curves import Circle
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,3 +115,20 @@ def test_methods_that_agree_may_all_be_overridden():
         smoothed=smoothed,
     )
     assert load_robot("cicese_2dof").with_friction(law).friction is law
+
+
+@pytest.mark.parametrize("form", [tuple, list, np.array, float])
+@pytest.mark.parametrize("loop", [SampledLoop(), ContinuousTime(output_period=2.5e-3)], ids=["sampled", "continuous"])
+def test_methods_may_return_numbers_tuples_and_lists(form, loop):
+    """A law of the same values in another form moves the arm as the library's own does, in the plant and the law."""
+    b, f = ([2.0, 2.0], [1.5, 1.5]) if form is float else ([2.0, 0.5], [1.0, 3.0])
+    give = (lambda values: values[0]) if form is float else form
+    mine = two_joints(viscous=give(b), levels=lambda self, qd: (give(f), give(f)))
+    runs = []
+    for law in (Viscous(b) + Coulomb(f, f), mine, mine + Viscous([0.0, 0.0])):
+        robot = load_robot("cicese_2dof").with_friction(law)
+        assert_allclose(robot.friction.torque(np.array([[1.0, -2.0]])), [[b[0] + f[0], -2 * b[1] - f[1]]])
+        controller = Projection(robot, Circle(0.5, 2.0), 400.0, [40.0, 40.0], friction="viscous")
+        runs.append(simulate(controller, [0.45, 0.02], duration=0.1, loop=loop, progress=False))
+    for run in runs[1:]:
+        assert_allclose(run.array("q"), runs[0].array("q"), atol=1e-6)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
-from pathcontrol.robot.friction import FrictionLaw
+from pathcontrol.robot.friction import FrictionLaw, levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.profile import Path
 
@@ -98,7 +98,7 @@ def torques(robot: RobotModel, samples: Samples) -> Torques:
     a = (robot.inverse_dynamics(q, rest, rate * dq) - c) / rate
     b = (robot.inverse_dynamics(q, rate * dq, rate**2 * ddq) - c) / rate**2
     bulge = (robot.inverse_dynamics(q[:-1], rest, rate**2 * samples.bulge) - c[:-1]) / rate**2
-    return Torques(a, b, c, robot.friction.viscous * dq, *dry_friction(robot.friction, samples), bulge)
+    return Torques(a, b, c, viscous_of(robot.friction) * dq, *dry_friction(robot.friction, samples), bulge)
 
 
 def dry_friction(law: FrictionLaw, samples: Samples) -> tuple[Array, Array]:
@@ -107,7 +107,7 @@ def dry_friction(law: FrictionLaw, samples: Samples) -> tuple[Array, Array]:
     Where a joint turns back it is all between −F⁻ and F⁺; where one stands still, none. Levels that vary with velocity
     are taken to lie between those at rest and at infinite velocity.
     """
-    levels = [law.levels(np.full(law.n, speed)) for speed in (0.0, np.inf)]
+    levels = [levels_of(law, np.full(law.n, speed)) for speed in (0.0, np.inf)]
     plus, minus = (np.stack(sides) for sides in zip(*levels, strict=True))
     sign = np.sign(samples.dq)
     least = np.where(sign > 0, plus.min(0), np.where(sign < 0, -minus.max(0), 0.0))

@@ -12,6 +12,7 @@ from pathcontrol.profiles.topp.dynamics import Samples, Torques
 from pathcontrol.profiles.topp.fastest_pair import fastest_pair
 from pathcontrol.profiles.topp.joint_limits import JointLimits
 from pathcontrol.profiles.topp.passes import Allowed
+from pathcontrol.robot.friction import viscous_of
 
 _ACCEPTED = 1 + 7e-4  # largest share at the samples, a little below what is promised between them
 _KEPT = 0.1  # share kept of the margin that standstill leaves
@@ -70,7 +71,7 @@ def _inside(limits: JointLimits, samples: Samples, torques: Torques, x: Array) -
     x_inside = x[:-1, None, None] + np.diff(x)[:, None, None] * _shares(samples)
     u = (np.diff(x) / (2 * samples.widths))[:, None, None]
     qd, qdd = dq * np.sqrt(x_inside), dq * u + ddq * x_inside
-    tau = limits.robot.inverse_dynamics(q, qd, qdd) + limits.robot.friction.viscous * qd
+    tau = limits.robot.inverse_dynamics(q, qd, qdd) + viscous_of(limits.robot.friction) * qd
     rows = limits.shares(qdd, tau + torques.most[:, None], tau + torques.least[:, None])
     return rows, (np.abs(qd) / limits.velocity).max((1, 2))
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.robot.batch import RobotBatch
+from pathcontrol.robot.friction import levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.damping import Damping
 from pathcontrol.simulation.arm.dry_friction import stick_slip
@@ -47,7 +48,7 @@ class Plant:
     def __init__(self, robot: RobotModel | RobotBatch, step: float) -> None:
         expect("robot", robot, RobotModel, RobotBatch)
         self.robot, self.step = robot, step
-        self._viscous = robot.friction.viscous
+        self._viscous = viscous_of(robot.friction)
         self._inertia = robot.with_armature(0.5 * step * self._viscous)
         self._strong = has_strong_friction(robot)
         self._damps = bool(self._strong.any())
@@ -75,7 +76,7 @@ class Plant:
 
         The first two broadcast against q̇ (N, n); where q̇ is 0 the third is either of them.
         """
-        forward, minus = self.robot.friction.levels(qd)
+        forward, minus = levels_of(self.robot.friction, qd)
         backward = np.subtract(0.0, minus)
         return forward, backward, np.where(qd > 0, forward, backward)
 
@@ -126,7 +127,7 @@ class Plant:
 
 def has_strong_friction(robot: RobotModel | RobotBatch) -> NDArray[np.bool_]:
     """Return for which arms the trapezoidal rule of viscous friction does not suffice, (N,), or (1,) for one arm."""
-    viscous = np.atleast_2d(robot.friction.viscous)
+    viscous = np.atleast_2d(viscous_of(robot.friction))
     if not viscous.any():
         return np.zeros(1, dtype=bool)
     return np.asarray((mobility(robot) * viscous).sum(-1).max(0) > _WEAK)

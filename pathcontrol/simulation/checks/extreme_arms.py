@@ -6,7 +6,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.robot.batch import RobotBatch
-from pathcontrol.robot.friction import levels_vary, select_rollout
+from pathcontrol.robot.friction import levels_vary, select_rollout, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.checks.fast_modes import steepest_fall
 from pathcontrol.simulation.loops import Arm
@@ -28,7 +28,7 @@ def find_extreme_arms(robot: Arm, q: Array) -> list[int]:
     if not isinstance(robot, RobotBatch):
         return [0]
     mobility = _mobility(robot, q)
-    viscous = np.broadcast_to(np.atleast_2d(robot.friction.viscous), mobility.shape)
+    viscous = np.broadcast_to(np.atleast_2d(viscous_of(robot.friction)), mobility.shape)
     felt = [mobility, viscous * mobility, -viscous]
     if levels_vary(robot.friction):
         felt.append(steepest_fall(robot.friction) * mobility)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.robot.friction import FrictionLaw, levels_vary
+from pathcontrol.robot.friction import FrictionLaw, levels_of, levels_vary, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance, jump_times
 
@@ -23,7 +23,7 @@ _SPEEDS = np.geomspace(1e-4, 10.0, 41)  # rad/s, between which the slope of fric
 
 def add_damping(robot: RobotModel, step: float) -> RobotModel:
     """Return the arm with M̂ = M + hB/2, a lower bound of the inertia in a ``step`` of h [s]."""
-    return robot.with_armature(0.5 * step * np.atleast_2d(robot.friction.viscous)[0])
+    return robot.with_armature(0.5 * step * np.atleast_2d(viscous_of(robot.friction))[0])
 
 
 def rate_of_arm(arm: RobotModel, q: Array, qd: Array) -> float:
@@ -55,7 +55,7 @@ def steepest_fall(friction: FrictionLaw) -> Array:
     """Return −F'(q̇) [N m s/rad] at the steepest fall of dry friction with speed, (n,), or (N, n) for N rollouts."""
     falls = []
     for side, sign in enumerate((1.0, -1.0)):
-        level = np.array([friction.levels(np.full((1, friction.n), sign * v))[side] for v in _SPEEDS])
+        level = np.array([levels_of(friction, np.full((1, friction.n), sign * v))[side] for v in _SPEEDS])
         steps = np.diff(_SPEEDS).reshape(-1, *[1] * (level.ndim - 1))
         falls.append((-np.diff(level, axis=0) / steps).max(0))
     found = np.maximum(0.0, np.maximum(*falls))

@@ -13,6 +13,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
+from pathcontrol.robot.friction import viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.damping import Damping
 from pathcontrol.tasks.task import PathTask
@@ -69,7 +70,7 @@ def longest_period(feedback: Feedback, robot: RobotModel, uncompensated: Array, 
         period: h [s].
     """
     M = robot.mass_matrix(q)
-    damping = np.broadcast_to(np.atleast_2d(robot.friction.viscous)[0], (len(q), robot.n))
+    damping = np.broadcast_to(np.atleast_2d(viscous_of(robot.friction))[0], (len(q), robot.n))
     G_v = feedback.G_v + _repeat_diagonal(uncompensated, M)
 
     def stable(h: float) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import warn
 from pathcontrol.robot.batch import RobotBatch
+from pathcontrol.robot.friction import levels_of
 from pathcontrol.simulation.checks.weight import PathPostures, check_weight
 from pathcontrol.simulation.loops import Arm
 from pathcontrol.simulation.run import Run
@@ -38,7 +39,7 @@ def warn_of_slips(robot: Arm, task: PathTask, q: Array, first: int = 0) -> str:
 def warn_if_still(run: Run, robot: Arm, friction: str) -> None:
     """Warn of an arm that has not moved at all, held by dry friction that its law does not compensate."""
     arm = robot.robots[0] if isinstance(robot, RobotBatch) else robot
-    dry = any(bool(np.any(level > 0)) for level in arm.friction.levels(np.zeros(arm.n)))
+    dry = any(bool(np.any(level > 0)) for level in levels_of(arm.friction, np.zeros(arm.n)))
     if not dry or friction == "full" or run.time[-1] < _LONG or (run.status != "running").any():
         return
     q = run.array("q")

@@ -14,6 +14,7 @@ from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion import PDPlus, SlotineLi
 from pathcontrol.errors import PathControlWarning, warn
 from pathcontrol.robot.batch import RobotBatch
+from pathcontrol.robot.friction import viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.checks.extreme_arms import arm_of, find_extreme_arms
@@ -130,7 +131,7 @@ def _check_gains(law: Controller, period: float, robot: Arm, rows: list[int], q:
     compensated, longest, worst = np.atleast_2d(law.compensated), np.inf, 0
     for one in linearize_law(law, q, rows if isinstance(robot, RobotBatch) else ()):
         arm = arm_of(robot, one.rollout)
-        left = np.atleast_2d(arm.friction.viscous)[0] - compensated[one.rollout % len(compensated)]
+        left = np.atleast_2d(viscous_of(arm.friction))[0] - compensated[one.rollout % len(compensated)]
         if (found := longest_period(one, arm, left, q, period)) < longest:
             longest, worst = found, one.rollout
     if period < longest:
