@@ -139,8 +139,11 @@ def test_a_law_that_forgets_its_base_class():
 )
 def test_a_path_in_degrees_is_told_where_joints_have_no_limits(task, turns):
     law = pc.ExtendedMotionPlan(TWO, task, 800.0, [45.0, 100.0], k=2.0)
-    with pytest.warns(PathControlWarning, match=rf"the path goes to joint_. at .* {turns} turns; did you mean degrees"):
+    with pytest.warns(
+        PathControlWarning, match=rf"the path goes to joint_. at .* {turns} turns; did you mean degrees"
+    ) as told:
         pc.simulate(law, [0.1, 0.1], duration=0.01, progress=False)
+    assert all(way in str(told[0].message) for way in ("np.deg2rad(…)", "'… deg' in a file"))
 
 
 def test_paths_in_radians_and_those_without_an_end_are_not_questioned(recwarn):

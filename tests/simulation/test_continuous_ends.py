@@ -36,6 +36,37 @@ def test_the_projection_does_not_jump_where_the_timed_end_takes_over(free, start
     assert (np.diff(s[late]) > 0).all()
 
 
+BENT = np.array([0.0, -1.2, 1.5, -0.3, 0.8, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("arm", "task", "offset"),
+    [
+        ("cicese_2dof", Circle(0.5, 2.0).between(0.3, 1.5), [0.1, 0.2]),
+        ("cicese_2dof", WaypointPath([[0.0, 0.0], [0.4, 0.1], [0.5, 0.5]], speed=1.5), [-0.15, 0.1]),
+        (
+            "ur5",
+            Line(BENT, BENT + np.array([0.3, 0.1, -0.2, 0.1, 0.2, -0.3]), speed=1.0),
+            [0.1, -0.1, 0.2, 0.1, -0.2, 0.1],
+        ),
+    ],
+    ids=["arc", "spline", "six joints"],
+)
+def test_the_timed_end_takes_over_without_a_jump_on_any_path(arm, task, offset):
+    """V falls all the way, and σ does not go back where the end begins to be timed, from a start off the path."""
+    robot = load_robot(arm).with_friction(None)
+    law = Projection(robot, task, 400.0, np.linspace(45.0, 100.0, robot.n))
+    begin = task.q_d(np.array(task.s0))
+    loop = ContinuousTime(output_period=2e-3)
+    run = simulate(law, begin + offset, 0.3 * np.ones(robot.n), duration=1.2, loop=loop, progress=False)
+    V, s = lyapunov(law, run)[0][0], run.array("s")[0]
+    assert s.min() < law.ending.begin < s.max()
+    assert (np.diff(V) <= 1e-12 * V[0]).all()
+    timed = s > law.ending.begin
+    assert timed[np.argmax(timed) :].all()
+    assert (np.diff(s[timed]) > -1e-12).all()
+
+
 def test_a_run_from_the_centre_of_a_circle_is_given_up_with_a_reason(free):
     law = Projection(free, Circle(1.0, 2.0), 800.0, [45.0, 100.0])
     with pytest.raises(SimulationError, match="crawls") as error:

@@ -91,7 +91,7 @@ def _is_bounded(task: PathTask) -> bool:
     return bool(np.all(task.closed | np.isfinite(task.s_end)))
 
 
-_DEGREES = "; did you mean degrees? Then give np.deg2rad(…)"
+_DEGREES = "; did you mean degrees? Then give np.deg2rad(…), or '… deg' in a file"
 
 
 def _describe_excess(begin: str, robot: Arm, row: int, joint: int, q: Array, where: str) -> str:
