@@ -157,7 +157,7 @@ def _part_of(target: Path) -> Iterator[Path]:
         _parts.discard(temporary)
 
 
-def _remove_own_parts() -> None:
+def remove_own_parts() -> None:
     """Remove the temporary files that Ctrl-C has kept this process from removing at once."""
     for temporary in list(_parts):
         with contextlib.suppress(OSError):
@@ -165,7 +165,7 @@ def _remove_own_parts() -> None:
         _parts.discard(temporary)
 
 
-atexit.register(_remove_own_parts)
+atexit.register(remove_own_parts)
 
 
 def _remove_left_parts(target: Path) -> None:

@@ -4,27 +4,29 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import repeat
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from pathcontrol._files import whole_file
+from pathcontrol._files import remove_own_parts, whole_file
 from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.analysis.run_metrics import peak, steady_state
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.projection import Projection
-from pathcontrol.errors import EngineError
+from pathcontrol.errors import EngineError, SimulationError
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.engines import Engine
@@ -131,8 +133,33 @@ def _mapped() -> Iterator[Callable[..., Iterable[Part]]]:
     if threading.active_count() > 1 or len(os.sched_getaffinity(0)) < len(PAPER):
         yield map
         return
-    with ProcessPoolExecutor(len(PAPER), get_context("fork")) as pool:
-        yield pool.map
+    with ProcessPoolExecutor(len(PAPER), get_context("fork"), _leave_at_signals) as pool:
+        try:
+            yield pool.map
+        except KeyboardInterrupt:
+            for process in active_children():  # of a Ctrl-C that only this process got
+                process.terminate()
+            raise
+        except BrokenProcessPool as error:
+            raise SimulationError(
+                "a process that ran an experiment has ended before it was done, as when it is killed or memory runs "
+                "out; free some, or run it with one core, as `taskset 1 pathcontrol reproduce` does on Linux"
+            ) from error
+
+
+def _leave_at_signals() -> None:
+    """Have this process leave at once at Ctrl-C and when it is terminated.
+
+    An exception, which Python raises else, is lost and printed where it comes while an object is cleared away.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _leave)
+
+
+def _leave(number: int, frame: object) -> None:
+    """Remove files that are half written, and leave."""
+    remove_own_parts()
+    os._exit(128 + number)
 
 
 def _reproduce_one(name: str, out: Path) -> Part:

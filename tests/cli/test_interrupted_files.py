@@ -46,7 +46,7 @@ def test_an_interrupt_before_any_instruction_leaves_the_old_file_or_the_new_one(
         target.write_bytes(b"old")
         if not interrupted_at(step, lambda: write_whole(target, b"new")):
             break
-        _files._remove_own_parts()  # as the interpreter does at its end
+        _files.remove_own_parts()  # as the interpreter does at its end
         assert [file.name for file in tmp_path.iterdir()] == ["run.nc"], step
         found.add(target.read_bytes())
     assert found == {b"old", b"new"}

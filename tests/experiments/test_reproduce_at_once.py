@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
+from patience import PATIENCE, wait_until
 
 from pathcontrol.experiments import reproduce as module
 
+TWO_CORES = pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="there is one core only")
 COMMAND = [sys.executable, "-m", "pathcontrol", "reproduce", "--out"]
 
 
@@ -25,7 +30,7 @@ def run(out, cores):
     )
 
 
-@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="there is one core only")
+@TWO_CORES
 def test_files_are_the_same_to_the_last_bit_on_one_core_and_on_two(tmp_path):
     cores = sorted(os.sched_getaffinity(0))[:2]
     for name, some in (("one", cores[:1]), ("two", cores)):
@@ -62,3 +67,49 @@ def test_a_program_with_threads_is_not_forked():
     finally:
         over.set()
         waiting.join()
+
+
+def started(out):
+    """The command in a group of its own, and the processes that it has started, once they have their signals set."""
+    command = subprocess.Popen(
+        [*COMMAND, str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    wait_until(lambda: len(children(command.pid)) == 2 and all(map(leaves_at_once, children(command.pid))))
+    return command, children(command.pid)
+
+
+def children(pid):
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def leaves_at_once(pid):
+    """Whether a process catches the signal that ends it, which other processes here do not."""
+    caught = next(line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("SigCgt"))
+    return bool(int(caught.split()[1], 16) >> (signal.SIGTERM - 1) & 1)
+
+
+@TWO_CORES
+@pytest.mark.parametrize("everyone", [True, False])
+@pytest.mark.parametrize("later", [0.0, 1.0, 2.0])
+def test_ctrl_c_is_told_in_one_line_and_leaves_nothing(tmp_path, everyone, later):
+    command, processes = started(tmp_path)
+    with suppress(subprocess.TimeoutExpired):
+        command.wait(later)
+    if command.poll() is not None:
+        pytest.skip("it has ended before")
+    (os.killpg if everyone else os.kill)(command.pid, signal.SIGINT)
+    _, told = command.communicate(timeout=PATIENCE)
+    assert (command.returncode, told) == (130, "interrupted; no half-written file is left behind\n")
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+    assert not (tmp_path / "summary.json").exists()
+    assert not any(Path(f"/proc/{pid}").exists() for pid in processes)
+
+
+@TWO_CORES
+def test_a_process_that_is_killed_is_told_in_one_sentence(tmp_path):
+    command, processes = started(tmp_path)
+    os.kill(processes[0], signal.SIGKILL)
+    _, told = command.communicate(timeout=PATIENCE)
+    assert command.returncode == 2
+    assert told.startswith("error: a process that ran an experiment has ended before it was done")
+    assert told.count("\n") == 1

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
+from pathcontrol.view.figures.style import apply_style, new_figure, style
 from pathcontrol.view.figures.ticks import label_plainly
 
 
@@ -37,3 +41,20 @@ def test_numbers_far_from_1_are_powers_of_ten():
     assert any("^{6}" in text for text in found.values())
     assert all("mathdefault" not in text for place, text in found.items() if 1e-3 <= place < 1e4)
     assert np.isclose(min(found), 1e-6)
+
+
+@settings(max_examples=25, deadline=None)
+@given(low=st.floats(1e-2, 100), decades=st.floats(0.15, 4), width=st.floats(1.2, 5))
+def test_numbers_along_a_horizontal_axis_do_not_touch(low, decades, width):
+    with style():
+        figure = new_figure(width, 1.0)
+        figure.set_layout_engine("none")
+        axes = apply_style(figure.add_axes((0.1, 0.4, 0.8, 0.5)))
+        axes.set(xscale="log", xlim=(low, low * 10**decades))
+        apply_style(axes)
+        axes.xaxis.set_major_locator(LogLocator())
+        figure.canvas.draw()
+        shown = [label for label in axes.get_xticklabels(which="both") if label.get_text()]
+        boxes = sorted((label.get_window_extent().x0, label.get_window_extent().x1) for label in shown)
+    inside = [box for box in boxes if axes.bbox.x0 <= sum(box) / 2 <= axes.bbox.x1]
+    assert all(right <= left for (_, right), (left, _) in pairwise(inside)), boxes

@@ -15,10 +15,11 @@ from pathcontrol.simulation.run import Run
 from pathcontrol.view.figures.limits import extent, over_time
 from pathcontrol.view.figures.lines import drawable, series
 from pathcontrol.view.figures.shown import Runs, shown
-from pathcontrol.view.figures.style import BEYOND, COLUMN, apply_style, new_figure, style
+from pathcontrol.view.figures.style import BEYOND, COLUMN, INK, apply_style, new_figure, style
 from pathcontrol.view.figures.words import legend
 
 _LOOKS: dict[str, Any] = {"position": "-", "velocity": (0, (5, 1.5)), "torque": (0, (1.5, 1))}
+_ROW = 0.1  # in, of the legend
 
 
 def limits_figure(run: Runs, rollout: int = 0) -> Figure:
@@ -38,13 +39,13 @@ def limits_figure(run: Runs, rollout: int = 0) -> Figure:
     if not drawn:
         raise InputError("limits_figure: no joint of the run has a limit of position, velocity or torque")
     with style():
-        figure = new_figure(COLUMN, 2.3)
-        axes, several = apply_style(figure.add_subplot()), len(runs) > 1
-        names = {}
+        figure = new_figure(COLUMN, 2.2 + _ROW * len(runs))
+        axes = apply_style(figure.add_subplot())
+        names = {one.label: Line2D([], [], color=one.colour) for one, _, _ in drawn} if len(runs) > 1 else {}
         for one, kind, share in drawn:
             look: dict[str, Any] = {"color": one.colour, "linestyle": _LOOKS[kind]}
             series(axes, one.run.time, drawable(share), **look)
-            names[f"{one.label}, {kind}" if several else kind] = Line2D([], [], **look)
+            names.setdefault(kind, Line2D([], [], **look | ({"color": INK} if len(runs) > 1 else {})))
         axes.axhline(100.0, color=BEYOND, linewidth=1.1)
         over_time(axes, [one.run.time for one in runs])
         top = max(extent([share for _, _, share in drawn])[1], 100.0)

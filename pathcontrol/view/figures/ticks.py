@@ -6,12 +6,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axis import Axis
+from matplotlib.axis import Axis, XAxis
 from matplotlib.ticker import AutoLocator, LogFormatterSciNotation, ScalarFormatter
 
 _DIGIT = 0.64  # width of a digit in the default font, of its size
 _GAP = 1.2  # digits between numbers
 _MATHEMATICS = (r"$\mathdefault{", "}$")  # the marks that Matplotlib puts around numbers
+_PREFERRED = "3264"  # first digits of numbers between powers of ten, that which divides the decade best first
 _PLAIN = (1e-3, 1e4)  # range in which numbers along a logarithmic axis are written out
 
 
@@ -55,18 +56,46 @@ class PlainFormatter(ScalarFormatter):
 
 
 class PlainLogFormatter(LogFormatterSciNotation):
-    """Numbers along a logarithmic axis as one writes them, ``6`` or ``0.02``; only far from 1 as powers of ten."""
+    """Numbers along a logarithmic axis as one writes them, ``6`` or ``0.02``; only far from 1 as powers of ten.
+
+    Args:
+        between: whether they stand between powers of ten; of those along a horizontal axis some are left out where not
+            all have room.
+    """
+
+    def __init__(self, between: bool = False) -> None:
+        super().__init__(labelOnlyBase=not between)
+        self._between = between
+
+    def format_ticks(self, values: list[float]) -> list[str]:
+        texts = super().format_ticks(values)
+        return _thin(self.axis, values, texts) if self._between and isinstance(self.axis, XAxis) else texts
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         text = super().__call__(x, pos)
         return f"{x:.4g}" if text and _PLAIN[0] <= abs(x) < _PLAIN[1] else text
 
 
+def _thin(axis: XAxis, values: Sequence[float], texts: list[str]) -> list[str]:
+    """Return the texts at values between powers of ten without those that would touch another one."""
+    low, high = np.log10(sorted(axis.get_view_interval()))
+    width = (high - low) * _DIGIT / (3 * max(1, axis.get_tick_space()))  # of a digit, in decades
+    powers = range(math.ceil(low - 1e-9), math.floor(high + 1e-9) + 1)
+    taken = [(float(power), len(f"{10.0**power:.4g}")) for power in powers]
+    kept = [""] * len(texts)
+    for i in sorted(range(len(texts)), key=lambda i: _PREFERRED.find(f"{values[i]:e}"[0]) % 10):
+        place = math.log10(values[i])
+        if texts[i] and all(abs(place - at) >= width * ((len(texts[i]) + n) / 2 + _GAP) for at, n in taken):
+            taken.append((place, len(texts[i])))
+            kept[i] = texts[i]
+    return kept
+
+
 def label_plainly(axis: Axis) -> None:
     """Write plain numbers along an axis; of a logarithmic one between powers of ten too where these are few."""
     if axis.get_scale() == "log":
         axis.set_major_formatter(PlainLogFormatter())
-        axis.set_minor_formatter(PlainLogFormatter(labelOnlyBase=False))
+        axis.set_minor_formatter(PlainLogFormatter(between=True))
     else:
         axis.set_major_formatter(PlainFormatter())
 
