@@ -12,6 +12,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import click
@@ -19,6 +20,8 @@ import click
 from pathcontrol._advice import reword_advice, reword_setting
 from pathcontrol.cli.quantity import QuantityType
 from pathcontrol.errors import PathControlError, PathControlWarning
+
+_SOON = 1e-3  # s
 
 
 class Group(click.Group):
@@ -35,7 +38,7 @@ class Group(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            with warnings_in_one_line(lambda: _find_command(ctx)):
+            with warnings_in_one_line(lambda: _find_command(ctx)), interrupts_kept():
                 return super().invoke(ctx)
         except PathControlError as error:
             click.echo(f"error: {printable(in_options(str(error), _find_command(ctx)))}", err=True)
@@ -110,6 +113,32 @@ def warnings_in_one_line(command: Callable[[], click.Command | None] = lambda: N
         warnings.simplefilter("default", PathControlWarning)
         warnings.showwarning = show
         yield
+
+
+@contextlib.contextmanager
+def interrupts_kept() -> Iterator[None]:
+    """Repeat a Ctrl-C that comes while an object is cleared away, where Python loses and prints the exception."""
+
+    def again(number: int, frame: FrameType | None) -> None:
+        if frame is not None and frame.f_code is keep.__code__:
+            signal.setitimer(signal.ITIMER_REAL, _SOON)
+        else:
+            raise KeyboardInterrupt
+
+    def keep(lost: sys.UnraisableHookArgs) -> None:
+        if lost.exc_type is KeyboardInterrupt:
+            signal.setitimer(signal.ITIMER_REAL, _SOON)
+        else:
+            before(lost)
+
+    before, handler = sys.unraisablehook, signal.signal(signal.SIGALRM, again)
+    sys.unraisablehook = keep
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        sys.unraisablehook = before
+        signal.signal(signal.SIGALRM, handler)
 
 
 @contextlib.contextmanager

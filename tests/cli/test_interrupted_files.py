@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
+import time
 
+import click
 import pytest
+from click.testing import CliRunner
 from patience import PATIENCE
 
 from pathcontrol import _files
 from pathcontrol._files import whole_file, write_whole
+from pathcontrol.cli.group import Group
 
 
 def interrupted_at(step, act):
@@ -91,3 +97,30 @@ def test_a_whole_file_is_written_after_one_that_was_interrupted(tmp_path):
     assert not list(tmp_path.iterdir())
     write_whole(target, b"whole")
     assert [file.read_bytes() for file in tmp_path.iterdir()] == [b"whole"]
+
+
+@pytest.mark.parametrize("times", [1, 3])
+def test_an_interrupt_that_python_would_lose_is_kept(times):
+    """In a callback of the garbage collector Python prints the exception and goes on."""
+
+    class Dying:
+        def __del__(self):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0)
+
+    @click.group(cls=Group)
+    def main():
+        """A command line."""
+
+    @main.command()
+    def work():
+        """Work until it is interrupted, while objects are cleared away."""
+        for _ in range(times):
+            Dying()
+        for _ in range(100):
+            time.sleep(0.1)
+
+    before = sys.unraisablehook
+    done = CliRunner().invoke(main, ["work"])
+    assert (done.exit_code, done.stderr) == (130, "interrupted; no half-written file is left behind\n")
+    assert sys.unraisablehook is before
