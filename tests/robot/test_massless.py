@@ -399,3 +399,21 @@ def test_the_check_locks_as_loading_does(tmp_path):
     assert "mesh-missing" in runner.invoke(main, ["check", str(tmp_path / "elsewhere.urdf")]).stdout
     found = runner.invoke(main, ["check", str(tmp_path / "elsewhere.urdf"), "--package-dir", str(tmp_path / "store")])
     assert "mesh-missing" not in found.stdout
+
+
+def test_an_experiment_file_says_how_to_give_masses_in_it(tmp_path):
+    block = shape(SHAPES["box"][0])
+    (tmp_path / "arm.urdf").write_text(arm("", block, block))
+    text = (
+        'duration = 0.01\n[robot]\nsource = "arm.urdf"\n{}\n[task]\ntype = "line"\nstart = [0.1, 0.1]\n'
+        "end = [0.3, 0.2]\nspeed = 1.0\n"
+        '[controller]\ntype = "projection"\nk_p = 100.0\nK_v = [20.0, 20.0]\n[start]\nq = [0.1, 0.1]\n'
+    )
+    (tmp_path / "bare.toml").write_text(text.format(""))
+    with pytest.raises(ExperimentError, match=r"robot: no link of .* has a mass.*estimated_inertia = true") as caught:
+        pc.run_experiment(tmp_path / "bare.toml", tmp_path / "out")
+    assert "load_robot" not in str(caught.value)
+    for advice in ("estimated_inertia = true", "estimated_inertia = 2700.0"):
+        assert advice in str(caught.value)
+        (tmp_path / "given.toml").write_text(text.format(advice))
+        pc.run_experiment(tmp_path / "given.toml", tmp_path / "out")

@@ -45,7 +45,13 @@ def build_models(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, Ro
         ExperimentError: a robot, joint or frame does not exist, or a value is out of range.
     """
     bare = _with_tool(_load(experiment, base_dir), experiment)
-    return bare, _carrying("robot.payload", bare, experiment.robot.payload)
+    model = _carrying("robot.payload", bare, experiment.robot.payload)
+    if not model.has_mass:
+        raise ExperimentError(
+            f"robot: no link of {model.name} has a mass, so there are kinematics and no dynamics; give "
+            "estimated_inertia = true, a density as in estimated_inertia = 2700.0, or <inertial> in the URDF"
+        )
+    return bare, model
 
 
 def build_plant(experiment: Experiment, bare: RobotModel, model: RobotModel, base_dir: Path) -> RobotModel:
