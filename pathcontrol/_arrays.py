@@ -104,6 +104,15 @@ def whole(name: str, value: Any, least: int, most: int) -> int:
     return int(array)
 
 
+def check_whole(name: str, value: Any, least: int = 1) -> int:
+    """Check that a count or a seed is an integer not below ``least``; return it."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise InputError(
+            f"{name} = {value!r}, expected a whole number from {least}", argument=name, value=value, limit=least
+        )
+    return int(value)
+
+
 def quantity(name: str, value: Any) -> float:
     """Convert ``value`` to a float from 1e-12 to 1e30, such as a mass, so that dynamics can compute with it."""
     number = scalar(name, value, positive=True)

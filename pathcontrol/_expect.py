@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import reprlib
+from collections.abc import Sequence
 from os import PathLike
 from typing import Any
 
-from pathcontrol.errors import InputError, PathControlError
+from pathcontrol.errors import InputError, PathControlError, UnknownNameError
 
 _LONGEST = 80
 
@@ -62,6 +63,21 @@ def expect(name: str, value: Any, *kinds: type, error: type[PathControlError] = 
         argument=name,
         value=value,
     )
+
+
+def expect_choice(name: str, value: Any, choices: Sequence[str], also: str = "") -> None:
+    """Check that the argument ``name`` is one of the ``choices``; ``also`` says what else may be.
+
+    Raises:
+        UnknownNameError: it is not.
+    """
+    if value not in choices:
+        raise UnknownNameError(
+            f"{name} = {value!r}, expected one of {', '.join(map(repr, choices))}{also}",
+            argument=name,
+            value=value,
+            choices=tuple(choices),
+        )
 
 
 def describe(value: Any) -> str:

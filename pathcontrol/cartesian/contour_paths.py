@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect_choice
 from pathcontrol.cartesian.orientation import NormalOrientation, Orientation, TangentOrientation
 from pathcontrol.cartesian.path import CartesianPath
 from pathcontrol.cartesian.turning import TurningOrientation
-from pathcontrol.errors import InputError, TaskError, UnknownNameError
+from pathcontrol.errors import InputError, TaskError
 from pathcontrol.profiles.limited.limited import limited
 from pathcontrol.profiles.limited.motion_limit import MotionLimit
 from pathcontrol.profiles.motion import ToolMotion
@@ -58,9 +59,8 @@ class ContourPaths:
     acceleration: float
 
     def __post_init__(self) -> None:
-        if not isinstance(self.held, Orientation) and self.held not in get_args(Held):
-            choices = ", ".join(map(repr, get_args(Held)))
-            raise UnknownNameError(f"orientation = {self.held!r}, expected one of {choices}, or an Orientation")
+        if not isinstance(self.held, Orientation):
+            expect_choice("orientation", self.held, get_args(Held), ", or an Orientation")
 
     def along(
         self, whole: Sequence[tuple[Contour, Smoothed]], start: ArrayLike | None

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly, strip_labels
-from pathcontrol._expect import expect
+from pathcontrol._expect import expect, expect_choice
 from pathcontrol.control.ending import Ending
-from pathcontrol.errors import InputError, UnknownNameError, warn_of_single
+from pathcontrol.errors import InputError, warn_of_single
 from pathcontrol.robot.friction import levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint
@@ -70,8 +70,8 @@ class Controller(ABC):
         friction: FrictionCompensation = "viscous",
         start: Start = "s0",
     ) -> None:
-        _check_choice("friction", friction, get_args(FrictionCompensation))
-        _check_choice("start", start, get_args(Start))
+        expect_choice("friction", friction, get_args(FrictionCompensation))
+        expect_choice("start", start, get_args(Start))
         expect("robot", robot, RobotModel)
         check_task(task, robot.n)
         self.robot, self.task, self.friction, self.start_at = robot, task, friction, start
@@ -246,9 +246,3 @@ def _check_positive(name: str, array: Array) -> Array:
     if (array <= 0).any():
         raise InputError(f"{name} = {array.tolist()}, expected gains greater than 0")
     return readonly(array)
-
-
-def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    """Check that ``value`` is one of ``choices``."""
-    if value not in choices:
-        raise UnknownNameError(f"{name} = {value!r}, expected one of {', '.join(map(repr, choices))}")

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from pathcontrol._arrays import Array, scalar
-from pathcontrol.errors import UnknownNameError
+from pathcontrol._expect import expect_choice
 from pathcontrol.tasks.batch.task_batch import select_rows
 from pathcontrol.tasks.task import PathTask
 
@@ -42,9 +42,7 @@ class BranchPolicy:
     capture: float = 0.1
 
     def __post_init__(self) -> None:
-        if self.branch not in get_args(Branch):
-            choices = ", ".join(map(repr, get_args(Branch)))
-            raise UnknownNameError(f"branch = {self.branch!r}, expected one of {choices}")
+        expect_choice("branch", self.branch, get_args(Branch))
         object.__setattr__(self, "capture", scalar("capture", self.capture, positive=True))
 
     def sigma_bar(self, task: PathTask, q: Array, last: Array) -> Array:

@@ -185,13 +185,6 @@ def check_controller(name: str, controller: Any) -> None:
         )
 
 
-def check_rollout_number(first: Any) -> int:
-    """Check that the number of the first rollout is a whole number from 0; return it."""
-    if isinstance(first, bool) or not isinstance(first, int | np.integer) or first < 0:
-        raise InputError(f"first_rollout = {first!r}, expected a whole number from 0")
-    return int(first)
-
-
 def check_law(controller: Controller, q: Array, qd: Array, z: Array) -> None:
     """Check that the law returns a :class:`ControlOutput` whose shapes fit the initial states, with finite numbers."""
     name, out = type(controller).__name__, _call_law(controller, q, controller.law, 0.0, q, qd, z)

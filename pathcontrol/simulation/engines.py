@@ -7,9 +7,10 @@ from functools import cache
 from typing import Literal, NamedTuple, get_args
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect_choice
 from pathcontrol.control.base import Controller
 from pathcontrol.engine.library import load_library
-from pathcontrol.errors import EngineError, UnknownNameError, warn
+from pathcontrol.errors import EngineError, warn
 from pathcontrol.simulation.compiled import CompiledArm, CompiledPlant
 from pathcontrol.simulation.continuous import ContinuousArm
 from pathcontrol.simulation.loops import Arm, ContinuousTime, Outside, SampledLoop
@@ -36,8 +37,7 @@ def check_engine(engine: str) -> None:
     Raises:
         UnknownNameError: it is not.
     """
-    if engine not in get_args(Engine):
-        raise UnknownNameError(f"engine = {engine!r}, expected one of {', '.join(map(repr, get_args(Engine)))}")
+    expect_choice("engine", engine, get_args(Engine))
 
 
 def settle_engine(engine: Engine) -> Engine:

@@ -8,9 +8,10 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, check_whole
+from pathcontrol._expect import expect_choice
 from pathcontrol.control.ending import arrival_parameter
-from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.errors import InputError
 from pathcontrol.tasks.batch.task_batch import map_tasks
 from pathcontrol.tasks.task import PathTask
 
@@ -110,8 +111,7 @@ def make_finish(task: PathTask, laps: int | None, until: Until, rollouts: int) -
         InputError: ``laps`` is no whole number from 1, or the path is not closed.
         UnknownNameError: ``until`` is none of its choices.
     """
-    if until not in get_args(Until):
-        raise UnknownNameError(f"until = {until!r}, expected one of {', '.join(map(repr, get_args(Until)))}")
+    expect_choice("until", until, get_args(Until))
     if laps is not None:
         _check_laps(task, laps)
         return AfterLaps(task, laps, rollouts, until == "end")
@@ -120,8 +120,7 @@ def make_finish(task: PathTask, laps: int | None, until: Until, rollouts: int) -
 
 def _check_laps(task: PathTask, laps: Any) -> None:
     """Check that ``laps`` is a whole number from 1 and the path is closed."""
-    if isinstance(laps, bool) or not isinstance(laps, int | np.integer) or laps < 1:
-        raise InputError(f"laps = {laps!r}, expected a whole number from 1")
+    check_whole("laps", laps)
     if not task.closed:
         raise InputError(f"laps = {laps}, but {type(task).__name__} is no closed path; leave laps out")
 

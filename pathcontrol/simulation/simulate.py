@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import scalar
+from pathcontrol._arrays import check_whole, scalar
 from pathcontrol.control.base import Controller
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arguments import (
@@ -16,7 +16,6 @@ from pathcontrol.simulation.arguments import (
     check_joints,
     check_length,
     check_loop,
-    check_rollout_number,
     make_config,
     make_plant,
     map_position_units,
@@ -89,7 +88,7 @@ def simulate(
     check_controller("controller", controller)
     check_engine(engine)
     duration = scalar("duration", duration, positive=True)
-    robot, first = make_plant(plant, controller), check_rollout_number(first_rollout)
+    robot, first = make_plant(plant, controller), check_whole("first_rollout", first_rollout, 0)
     check_joints(controller, robot)
     loop = check_loop(loop)
     q0, qd0, z0 = start_law(controller, *broadcast_states(q, qd, robot, controller.task), disturbance)

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.random import SeedSequence, default_rng
 from numpy.typing import NDArray
 
-from pathcontrol._arrays import Array
-from pathcontrol.errors import InputError
+from pathcontrol._arrays import Array, check_whole
 
 _STREAM = 0x6B656570  # a random stream apart from those of the design and of the sensors
 
@@ -33,9 +32,7 @@ class Keep:
 
     def __post_init__(self) -> None:
         for name in ("worst", "random", "diverged"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-                raise InputError(f"keep.{name} = {value!r}, expected a whole number from 0")
+            object.__setattr__(self, name, check_whole(f"keep.{name}", getattr(self, name), 0))
 
     def at_random(self, samples: int, seed: int) -> NDArray[np.intp]:
         """Return the samples that are chosen at random."""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.random import SeedSequence, default_rng
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, check_whole
 from pathcontrol.errors import InputError
 
 MOST_SAMPLES, MOST_NUMBERS = 10**7, 10**8  # limits of what is in memory together
@@ -227,10 +227,3 @@ def _check_parameter(name: str, given: Any) -> Choice | Distribution:
     if values.dtype.kind == "f" and not np.isfinite(values).all():
         raise InputError(f"{name} holds {values[~np.isfinite(values)][0]}, expected finite numbers")
     return Choice(values)
-
-
-def check_whole(name: str, value: Any, least: int = 1) -> int:
-    """Check that a value is a whole number not below ``least``; return it."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise InputError(f"{name} = {value!r}, expected a whole number from {least}")
-    return int(value)

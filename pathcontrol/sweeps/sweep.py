@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, check_whole
 from pathcontrol._expect import expect
 from pathcontrol._files import hold_lock, writing
 from pathcontrol._progress import progress_bar
@@ -84,8 +84,7 @@ def sweep(
         MissingExtraError: the extra ``sweep`` or, for a cluster, ``cluster`` is not installed.
     """
     expect("space", space, Space)
-    if isinstance(chunk, bool) or not isinstance(chunk, int) or chunk < 1:
-        raise InputError(f"chunk = {chunk!r}, expected a whole number from 1")
+    chunk = check_whole("chunk", chunk)
     engine = settle_engine(engine)
     keep, measure, seed = Keep() if keep is None else keep, make_measure(metrics), check_seed(seed)
     if not isinstance(keep, Keep):

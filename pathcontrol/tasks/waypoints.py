@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol._expect import expect_choice
 from pathcontrol.arguments import Form, Speed, Unit
-from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.errors import InputError
 from pathcontrol.tasks.spline import SplinePath
 
 Parametrisation = Literal["centripetal", "chord", "uniform"]
@@ -80,9 +81,7 @@ def _check_points(points: ArrayLike, closed: bool) -> Array:
 def _parameters(ring: Array, parametrisation: Parametrisation | ArrayLike) -> Array:
     """Return the parameters of the points."""
     if isinstance(parametrisation, str):
-        if parametrisation not in _POWER:
-            choices = ", ".join(map(repr, get_args(Parametrisation)))
-            raise UnknownNameError(f"parametrisation = {parametrisation!r}, expected one of {choices}, or an array")
+        expect_choice("parametrisation", parametrisation, get_args(Parametrisation), ", or an array")
         steps = np.linalg.norm(np.diff(ring, axis=0), axis=-1) ** _POWER[parametrisation]
         return np.concatenate([[0.0], np.cumsum(steps)])
     values = finite("parametrisation", as_array("parametrisation", parametrisation))

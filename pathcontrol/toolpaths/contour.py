@@ -11,11 +11,9 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, rigid
 from pathcontrol.errors import InputError
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
+from pathcontrol.toolpaths.segments.base import SAME_POINT, Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier_columns import measure_bounds, measure_lengths
 from pathcontrol.toolpaths.segments.nearest import Cubics, is_cubic
-
-_MEET = 1e-9  # m, how near the ends of neighbouring segments are
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,7 +45,7 @@ class Contour:
         gap = np.linalg.norm(ends[:-1] - starts[1:], axis=-1).max(initial=0.0)
         if self.closed:
             gap = max(gap, float(np.linalg.norm(ends[-1] - starts[0])))
-        if gap > _MEET * (1 + np.abs(starts).max()):
+        if gap > SAME_POINT * (1 + np.abs(starts).max()):
             raise InputError(f"the segments of contour {self.name!r} do not meet: there is a gap of {gap:g} m")
 
     def __repr__(self) -> str:

@@ -11,16 +11,16 @@ from typing import Any, get_args
 import numpy as np
 import xarray as xr
 
-from pathcontrol._arrays import Array
-from pathcontrol._expect import expect
+from pathcontrol._arrays import Array, check_whole
+from pathcontrol._expect import expect, expect_choice
 from pathcontrol._progress import progress_bar
-from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.errors import InputError
 from pathcontrol.simulation.engines import Engine, settle_engine
 from pathcontrol.sweeps.chunk import OUTCOME, Build, Job, Measure, make_measure
 from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.objectives import Limits, Objectives, check_limits, check_objectives
 from pathcontrol.sweeps.result import dataset
-from pathcontrol.sweeps.space import MOST_NUMBERS, MOST_SAMPLES, Space, check_seed, check_whole, digest
+from pathcontrol.sweeps.space import MOST_NUMBERS, MOST_SAMPLES, Space, check_seed, digest
 from pathcontrol.sweeps.store import Store
 from pathcontrol.sweeps.sweep import fingerprint, open_store
 from pathcontrol.tuning.cases import Cases
@@ -196,11 +196,6 @@ def _make_space(given: Space | Mapping[str, Any], method: str) -> Space:
 
 def _check_reduce(given: Any) -> Reduce:
     """Check the choice of the reduction; return it."""
-    if given not in get_args(Reduce):
-        raise UnknownNameError(
-            f"reduce = {given!r}, expected one of {', '.join(map(repr, get_args(Reduce)))}",
-            argument="reduce",
-            value=given,
-            choices=get_args(Reduce),
-        )
-    return given
+    expect_choice("reduce", given, get_args(Reduce))
+    reduce: Reduce = given
+    return reduce

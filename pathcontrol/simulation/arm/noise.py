@@ -9,7 +9,7 @@ import numpy as np
 from numpy.random import SeedSequence, default_rng
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, finite
+from pathcontrol._arrays import Array, check_whole, finite
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError
 
@@ -40,8 +40,7 @@ class SensorNoise:
             deviation = finite(f"noise of the {name}", np.asarray(getattr(self, name), dtype=np.float64))
             if (deviation < 0).any() or deviation.ndim > 2:
                 raise InputError(f"noise of the {name} = {deviation.tolist()}, expected standard deviations ≥ 0")
-        if isinstance(self.seed, bool) or not isinstance(self.seed, int | np.integer) or self.seed < 0:
-            raise InputError(f"seed = {self.seed!r}, expected a whole number from 0")
+        check_whole("seed", self.seed, 0)
 
     @property
     def on_velocity(self) -> bool:

@@ -18,10 +18,8 @@ from pathcontrol.toolpaths.csv.names import CONTOUR, UNITS, hint_of_unit
 from pathcontrol.toolpaths.csv.rows import Rows
 from pathcontrol.toolpaths.csv.table import Table, decimal_mark
 from pathcontrol.toolpaths.notes import Notes
-from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.segments.base import SAME_POINT, Polyline
 from pathcontrol.toolpaths.text import read_lines
-
-_NOTHING = 1e-9  # m, points nearer than this are the same, as are tool axes
 
 
 def read_csv(
@@ -120,13 +118,13 @@ def _contour(table: Table, first: int, end: int, feed: float | None) -> Contour:
             f"an empty line, or another value in the column {CONTOUR!r}, begins the next contour",
             line=int(table.lines[first]),
         )
-    closed = len(kept) > 2 and math.dist(points[0], points[kept[-1]]) <= _NOTHING
+    closed = len(kept) > 2 and math.dist(points[0], points[kept[-1]]) <= SAME_POINT
     axes = None
     if table.axes is not None:
         axes = table.axes[first:end]
         _check_axes(axes, kept, table.lines[first:end])
         axes = axes[kept]
-        closed = closed and bool(np.abs(axes[0] - axes[-1]).max() <= _NOTHING)
+        closed = closed and bool(np.abs(axes[0] - axes[-1]).max() <= SAME_POINT)
     name = table.labels[first] if table.labels else f"line {table.lines[first]}"
     return Contour((Polyline(points[kept]),), closed, feed, name=name, normals=axes)
 
@@ -135,7 +133,7 @@ def _distinct_indices(points: Array) -> Array:
     """Return the indices of the points that do not repeat the last one kept before them."""
     places, kept = points.tolist(), [0]
     for index, place in enumerate(places):
-        if math.dist(place, places[kept[-1]]) > _NOTHING:
+        if math.dist(place, places[kept[-1]]) > SAME_POINT:
             kept.append(index)
     return np.array(kept)
 
@@ -143,7 +141,7 @@ def _distinct_indices(points: Array) -> Array:
 def _check_axes(axes: Array, kept: Array, lines: list[int]) -> None:
     """Check that no point that is left out turns the tool."""
     stays = np.repeat(kept, np.diff([*kept, len(axes)]))
-    turned = np.abs(axes - axes[stays]).max(1) > _NOTHING
+    turned = np.abs(axes - axes[stays]).max(1) > SAME_POINT
     if turned.any():
         line = lines[int(np.argmax(turned))]
         raise ToolpathError(

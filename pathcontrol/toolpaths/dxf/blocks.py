@@ -78,7 +78,8 @@ class Entities:
         """Yield the entities of the block, once for each place in the rows and columns of the insert."""
         with self.at(insert, layer):
             block = self._block(insert, depth)
-            places = _places(insert, vector(block.block, "base_point"))
+            vector(insert, "insert"), vector(block.block, "base_point")  # are finite
+            places = _places(insert)
             attributes = [a for a in insert.attribs if not (a.is_invisible or a.dxf.get("invisible", 0))]
         for place in places:
             self._counted()
@@ -102,23 +103,18 @@ class Entities:
             raise ToolpathError(f"{self.source} draws more than {_MOST_ENTITIES} entities; split the drawing")
 
 
-def _places(insert: Any, base: Array) -> Iterator[Array]:
-    """Yield the maps of a block's coordinates to those it is inserted in, (4, 4) each."""
+def _places(insert: Any) -> Iterator[Array]:
+    """Return the maps of a block's coordinates to those it is inserted in, (4, 4) each."""
+    for name in ("xscale", "yscale", "zscale"):
+        number(insert, name)
     axes, angle = object_axes(insert), np.radians(number(insert, "rotation"))
-    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
-    scale = [number(insert, f"{axis}scale") for axis in "xyz"]
-    spacing = number(insert, "column_spacing"), number(insert, "row_spacing")
+    across = number(insert, "column_spacing") * axes @ [np.cos(angle), np.sin(angle), 0.0]
+    along = number(insert, "row_spacing") * axes @ [-np.sin(angle), np.cos(angle), 0.0]
     columns, rows = (max(1, int(number(insert, name))) for name in ("column_count", "row_count"))
-    origin, linear = vector(insert, "insert"), axes @ turn @ np.diag(scale)
-    return (
-        _affine(linear, axes @ (origin + turn @ [column * spacing[0], row * spacing[1], 0.0]) - linear @ base)
-        for row in range(rows)
-        for column in range(columns)
-    )
+    first = np.reshape([*insert.matrix44()], (4, 4)).T  # ezdxf multiplies rows from the left
+    return (_shifted(first, row * along + column * across) for row in range(rows) for column in range(columns))
 
 
-def _affine(linear: Array, shift: Array) -> Array:
-    """Return the affine map with a linear part and a shift, (4, 4)."""
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = linear, shift
-    return matrix
+def _shifted(matrix: Array, shift: Array) -> Array:
+    """Return an affine map, followed by a shift."""
+    return np.column_stack([matrix[:, :3], matrix[:, 3] + [*shift, 0.0]])

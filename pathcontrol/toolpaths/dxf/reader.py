@@ -1,7 +1,7 @@
 """Reader of DXF drawings.
 
-ezdxf reads the file; the geometry is worked out here, so that curves stay exact under any block transform, and what
-ezdxf would fill in, such as a missing radius or the unit of a file without header, is asked for instead of guessed.
+ezdxf reads the file and places blocks; the curves are worked out here, so that they stay exact under any transform, and
+what ezdxf would fill in, such as a missing radius or the unit of a file without header, is asked for, not guessed.
 """
 
 from __future__ import annotations

@@ -62,14 +62,10 @@ def vector(entity: Any, name: str) -> Array:
 def object_axes(entity: Any) -> Array:
     """Return the axes of the object coordinate system, as columns (3, 3), by the arbitrary axis algorithm."""
     normal = vector(entity, "extrusion")
-    size = np.linalg.norm(normal)
-    if not 0 < size < np.inf:
+    if not 0 < np.linalg.norm(normal) < np.inf:
         raise ToolpathError(f"its extrusion is {normal.tolist()}, expected a direction")
-    z = normal / size
-    helper = [0.0, 1.0, 0.0] if max(abs(z[0]), abs(z[1])) < 1 / 64 else [0.0, 0.0, 1.0]
-    x = np.cross(helper, z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
+    system = entity.ocs()
+    return np.column_stack([system.ux, system.uy, system.uz])
 
 
 def in_space(plane: Array) -> Array:

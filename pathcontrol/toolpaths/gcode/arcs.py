@@ -9,13 +9,13 @@ from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.gcode.modes import Modes
 from pathcontrol.toolpaths.gcode.units import Unit
 from pathcontrol.toolpaths.segments.arc import Arc
+from pathcontrol.toolpaths.segments.base import SAME_POINT
 from pathcontrol.toolpaths.text import MAX_COORDINATE
 
 #: axes of each plane, first, second and normal: counter-clockwise, seen from the normal's tip, is from first to second
 PLANES = {170: (0, 1, 2), 180: (2, 0, 1), 190: (1, 2, 0)}
 _NAMES = {170: "G17", 180: "G18", 190: "G19"}
 _LEAST_RADIUS = 1.27e-6  # m, LinuxCNC's radius tolerance
-_NOTHING = 1e-9  # m
 _MOST_TURNS = 1000
 
 
@@ -74,7 +74,7 @@ def _check_normal(start: float, end: float, words: Mapping[str, float], modes: M
     letter = "IJK"[PLANES[modes.plane][2]]
     value = modes.length(letter, words.get(letter, 0.0))
     allowed = (0.0, start, end) if modes.absolute_centers else (0.0,)
-    if min(abs(value - level) for level in allowed) > _NOTHING:
+    if min(abs(value - level) for level in allowed) > SAME_POINT:
         raise ToolpathError(
             f"{letter}{words[letter]:g} leads out of the plane of {_NAMES[modes.plane]}, where the arc's centre is: "
             "leave it out; the pitch of a helix follows from its end"
@@ -86,7 +86,7 @@ def _sweep(first: Sequence[float], last: Sequence[float], center: Sequence[float
     begin = math.atan2(first[1] - center[1], first[0] - center[0])
     angle = math.atan2(last[1] - center[1], last[0] - center[0]) - begin
     sweep = (-angle if clockwise else angle) % math.tau
-    if sweep * math.dist(first, center) <= _NOTHING:
+    if sweep * math.dist(first, center) <= SAME_POINT:
         sweep = math.tau
     return -sweep if clockwise else sweep
 
@@ -164,7 +164,7 @@ def _by_radius(
         raise ToolpathError("an arc with R and with I, J or K, expected one of the two")
     unit = modes.known_unit("the arc")
     radius, chord = unit.scale * words["R"], math.dist(first, last)
-    if chord <= _NOTHING:
+    if chord <= SAME_POINT:
         raise ToolpathError("an arc with R ends in the plane where it begins; write a full circle with its centre")
     half = min(chord / 2, abs(radius))
     missing = chord / 2 - half

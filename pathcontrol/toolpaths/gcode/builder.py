@@ -11,9 +11,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
-
-_NOTHING = 1e-9  # m, shorter moves are ignored
+from pathcontrol.toolpaths.segments.base import SAME_POINT, Polyline, Segment
 
 
 class ContourBuilder:
@@ -46,14 +44,14 @@ class ContourBuilder:
     def line_to(self, point: Sequence[float] | Array) -> None:
         """Add a straight move; one without length is left out."""
         target = _point("point", point)
-        if math.dist(target, self._corners[-1]) > _NOTHING:
+        if math.dist(target, self._corners[-1]) > SAME_POINT:
             self._corners.append(target)
 
     def lines_to(self, points: Array) -> None:
         """Add straight moves to finite points (k, 3), one after another; those without length are left out."""
         steps = np.diff(np.concatenate([self._corners[-1:], points]), axis=0)
         targets = map(tuple, points.tolist())
-        if (np.abs(steps) > _NOTHING).any(1).all():
+        if (np.abs(steps) > SAME_POINT).any(1).all():
             self._corners.extend(targets)
             return
         for target in targets:
@@ -73,7 +71,7 @@ class ContourBuilder:
     def contour(self, **attributes: Any) -> Contour:
         """Return the contour, with ``attributes`` of :class:`Contour`; by default ``closed`` follows from the ends."""
         self._end_polyline()
-        closed = bool(self._segments) and math.dist(self._corners[-1], self._start) <= _NOTHING
+        closed = bool(self._segments) and math.dist(self._corners[-1], self._start) <= SAME_POINT
         return Contour(tuple(self._segments), **({"closed": closed} | attributes))
 
     def _end_polyline(self) -> None:

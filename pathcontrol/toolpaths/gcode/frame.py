@@ -9,10 +9,10 @@ from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.gcode.codes import GROUPS
 from pathcontrol.toolpaths.gcode.words import Block
 from pathcontrol.toolpaths.notes import Notes
+from pathcontrol.toolpaths.segments.base import SAME_POINT
 
 _SYSTEMS = GROUPS["coordinate system"]
 _FIRST_SYSTEM = 540
-_NOTHING = 1e-9  # m
 
 
 class Frame:
@@ -54,7 +54,7 @@ class Frame:
         Raises:
             ToolpathError: it is another place, and there were moves.
         """
-        same = all(math.isnan(b) or abs(a - b) <= _NOTHING for a, b in zip(here, place, strict=True))
+        same = all(math.isnan(b) or abs(a - b) <= SAME_POINT for a, b in zip(here, place, strict=True))
         if begun and not same:
             raise ToolpathError(
                 "G92 after the first move shifts the coordinates: refer the program to one origin, and say G92 at its "

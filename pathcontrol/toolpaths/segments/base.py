@@ -16,6 +16,7 @@ from pathcontrol.geometry.arc_length import ArcLength
 from pathcontrol.geometry.box_hierarchy import BoxHierarchy
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 
+SAME_POINT = 1e-9  # m, points nearer than this are one
 _SAMPLES = 1025
 _SHORTEST = 1e-10  # m, edges up to this have no direction to rely on
 

@@ -7,14 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
+from pathcontrol.toolpaths.segments.base import SAME_POINT, Polyline, Segment
 from pathcontrol.toolpaths.smoothing.corners import angles, end_tangent, start_tangent
 
 _BETWEEN = 64  # points of each piece at which a polyline is compared with the segment it replaces
 _FIRST_PIECES = 32
 _TURN = 0.2  # rad over a piece
 _NARROWEST = 2.0**-40
-_NOTHING = 1e-9  # m, points nearer than this are one
 _TINY = np.finfo(float).tiny
 
 
@@ -33,7 +32,7 @@ def regularize(segment: Segment, tolerance: float) -> tuple[Segment, float]:
         return segment, 0.0
     while (coarse := (pieces.sagitta > tolerance) & (pieces.size > tolerance)).any():
         pieces = pieces.halved(segment, coarse)
-    least = max(_NOTHING, min(0.1 * tolerance, 0.01 * segment.length))
+    least = max(SAME_POINT, min(0.1 * tolerance, 0.01 * segment.length))
     polyline = Polyline(_thin_out(segment.point(pieces.u), least))
     shares = np.linspace(0.0, 1.0, _BETWEEN, endpoint=False)[:, None]
     between = segment.point(pieces.u[:-1] + np.diff(pieces.u) * shares)

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from pathcontrol._arrays import Array, scalar
-from pathcontrol._expect import expect
-from pathcontrol.errors import UnknownNameError
+from pathcontrol._expect import expect, expect_choice
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.curve import ToolCurve
 from pathcontrol.toolpaths.smoothing.bends import regularize
@@ -58,13 +57,7 @@ def smooth(contour: Contour, tolerance: float = 1e-4, corner: Corners = "blend")
     """
     expect("contour", contour, Contour)
     tolerance = scalar("tolerance", tolerance, positive=True)
-    if corner not in get_args(Corners):
-        raise UnknownNameError(
-            f"corner = {corner!r}, expected one of {', '.join(map(repr, get_args(Corners)))}",
-            argument="corner",
-            value=corner,
-            choices=get_args(Corners),
-        )
+    expect_choice("corner", corner, get_args(Corners))
     parts = split(contour, TURN_BACK if corner == "blend" else SHARP)
     done = [piece for part in parts for piece in _pieces(part, tolerance)]
     curves, deviations, normals = zip(*done, strict=True)

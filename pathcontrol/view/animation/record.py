@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import UnknownNameError
+from pathcontrol._expect import expect_choice
 from pathcontrol.view.animation.animation import Animation
 from pathcontrol.view.animation.charts.plane import plane
 from pathcontrol.view.animation.charts.quantities import charts
@@ -60,8 +60,7 @@ def record(
             there is no such rollout, or no run at all.
         UnknownNameError: the robot has no frame ``tool``, or there is no such layout.
     """
-    if layout not in get_args(Layout):
-        raise UnknownNameError(f"layout = {layout!r}, expected one of {', '.join(map(repr, get_args(Layout)))}")
+    expect_choice("layout", layout, get_args(Layout))
     recordings = make_recordings(run, robot, task, rollout, tool)
     drawn_rollouts, film = draw_rollouts(recordings), Film()
     ghosted = layout == "ghosted" and len(recordings) > 1
