@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect_choice
-from pathcontrol.cartesian.orientation import NormalOrientation, Orientation, TangentOrientation
+from pathcontrol.cartesian.orientation import NormalOrientation, Orientation, TangentOrientation, TurningOrientation
 from pathcontrol.cartesian.path import CartesianPath
-from pathcontrol.cartesian.turning import TurningOrientation
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.profiles.limited.limited import limited
 from pathcontrol.profiles.limited.motion_limit import MotionLimit

@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol.arguments import Direction, Form, Unit
@@ -241,3 +241,19 @@ def _scale_axis(axis: Array, cosine: Array) -> Array:
     sine = np.linalg.norm(axis, axis=-1)
     factor = np.divide(np.arctan2(sine, cosine), sine, out=np.ones_like(sine), where=sine > _NO_SINE)
     return factor[..., None] * axis
+
+
+class TurningOrientation(Orientation):
+    """A turn from one rotation to another about one axis, with gentle ends: twice continuously differentiable.
+
+    Args:
+        first: rotation matrix at the beginning of the curve, (3, 3).
+        last: rotation matrix at its end, (3, 3).
+    """
+
+    def __init__(self, first: Array, last: Array) -> None:
+        self._slerp = Slerp([0.0, 1.0], Rotation.from_matrix([first, last]))
+
+    def frames(self, curve: ToolCurve, s: Array) -> Array:
+        u = np.clip((np.asarray(s) - curve.s0) / curve.length, 0.0, 1.0)
+        return self._slerp(np.clip(u**3 * (10 - 15 * u + 6 * u**2), 0.0, 1.0)).as_matrix()

@@ -25,9 +25,8 @@ from pathcontrol import (
     load_robot,
     simulate,
 )
-from pathcontrol.profiles.distance import distance
 from pathcontrol.profiles.jerk.s_curve import Approach, SCurve
-from pathcontrol.profiles.jerk.start_stop import SmoothStartStop
+from pathcontrol.profiles.jerk.start_stop import SmoothStartStop, distance
 from pathcontrol.profiles.limited.limited import limited
 from pathcontrol.profiles.limited.motion_limit import MotionLimit
 from pathcontrol.profiles.motion import JointMotion, ToolMotion

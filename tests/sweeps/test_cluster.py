@@ -585,7 +585,7 @@ def test_a_module_that_workers_lack_is_named(address, tmp_path):
 def test_workers_keep_freed_memory_for_the_next_arrays():
     code = (
         "import resource, numpy as np\n"
-        "from pathcontrol.sweeps.memory import keep_freed_memory\n"
+        "from pathcontrol.sweeps.cluster.shipping import keep_freed_memory\n"
         "{told}\n"
         "faults = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
         "np.ones(100_000)\n"

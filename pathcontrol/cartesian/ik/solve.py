@@ -7,21 +7,24 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
 from pathcontrol._arrays import Array, finite, joint_array
-from pathcontrol.cartesian.ik.closing import close_lap
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
-from pathcontrol.cartesian.ik.continuation import SINGULAR, Stop, Trail, follow
+from pathcontrol.cartesian.ik.continuation import SINGULAR, Stop, Trail, follow, verdicts
+from pathcontrol.cartesian.ik.correction import correct
 from pathcontrol.cartesian.ik.failure import closing_error, trail_error
 from pathcontrol.cartesian.ik.inverse_kinematics import InverseKinematics, Samples
 from pathcontrol.cartesian.ik.joint_range import distance_to_limits, is_outside
 from pathcontrol.cartesian.ik.path_report import CartesianReport, measure
 from pathcontrol.cartesian.ik.preference import sort_by_preference
-from pathcontrol.cartesian.ik.redundancy import rest_curve
+from pathcontrol.cartesian.ik.redundancy import PostureCost, rest_curve
 from pathcontrol.cartesian.ik.refinement import Refined, refine
 from pathcontrol.cartesian.ik.start_posture import move_start, rewind_starts, search_starts
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 
 _REWINDS = 3  # joints that are wound back one after another
+_SAME = 1e-6  # rad, between the first and the last posture of a lap
+_LEFT = 3.0  # rad, largest gap that is closed; half a turn and more would change the number of turns
+_PACE = 0.1  # rad, closed in one step
 
 
 def solve(constraint: ToolConstraint, start: Array | None, closed: bool) -> tuple[BSpline, CartesianReport]:
@@ -99,3 +102,23 @@ def _stop_error(constraint: ToolConstraint, refined: Refined, s: float, stop: St
     """Return the error for a spline that fails at s between its knots."""
     q = refined.spline(s)
     return trail_error(constraint, Trail([s], [q], stop=stop, beyond=q))
+
+
+def close_lap(constraint: ToolConstraint, s: Array, q: Array) -> Array | None:
+    """Close a lap: change postures q (K, n) at s (K,) so that the last is the first; None if that fails.
+
+    Where there is a choice of postures, the difference that a lap of least motion leaves is taken back little by little
+    and evenly along the curve, each time by the nearest postures that hold the tool.
+    """
+    left, limits = q[-1] - q[0], constraint.tool.robot.limits
+    size = float(np.abs(left).max())
+    if constraint.freedom and size < _LEFT:
+        share = ((s - s[0]) / (s[-1] - s[0]))[:, None]
+        closing, times = q, int(np.ceil(size / _PACE))
+        for i in range(1, times + 1):
+            found = correct(constraint, PostureCost.nearest(q - i / times * share * left, limits), closing, s)
+            if (verdicts(constraint, found) != Stop.NONE).any():
+                return None
+            closing = found.q
+        q = closing
+    return q if np.abs(q[-1] - q[0]).max() < _SAME else None

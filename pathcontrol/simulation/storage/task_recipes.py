@@ -6,6 +6,7 @@ to the last bit. Any other path is kept as samples, a :class:`RecordedPath`.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,7 +18,6 @@ from pathcontrol.errors import InputError
 from pathcontrol.registry import PROFILES, TASKS, load
 from pathcontrol.simulation.storage.array_store import ArrayStore
 from pathcontrol.simulation.storage.recipe_size import check_extent
-from pathcontrol.simulation.storage.shared_recipes import share_parts
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.joined.sequence import PathSequence
 from pathcontrol.tasks.profile import ConstantRate, VelocityProfile
@@ -168,3 +168,42 @@ def _try_out(made: Any) -> Any:
         for asked, shape in ((made.q_d, (3, made.n)), (made.dq_d, (3, made.n)), (made.theta, (3,))):
             finite(f"{type(made).__name__}.{asked.__name__}", np.broadcast_to(as_array("values", asked(s)), shape))
     return made
+
+
+def share_parts(recipes: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return ``{"parts": …, "tasks": …}``: the recipes of tasks, and of the objects found in them more than once.
+
+    Such an object is replaced by ``{"part": i}``; parts may refer to parts before them.
+    """
+    uses: Counter[int] = Counter()
+    _count(list(recipes), uses)
+    parts: list[dict[str, Any]] = []
+    places: dict[int, int] = {}
+
+    def write(value: Any) -> Any:
+        if isinstance(value, list):
+            return [write(item) for item in value]
+        if not isinstance(value, dict):
+            return value
+        if id(value) in places:
+            return {"part": places[id(value)]}
+        recipe = {name: write(item) for name, item in value.items()}
+        if "class" not in value or uses[id(value)] < 2:
+            return recipe
+        places[id(value)] = len(parts)
+        parts.append(recipe)
+        return {"part": places[id(value)]}
+
+    tasks = write(list(recipes))
+    return {"parts": parts, "tasks": tasks}
+
+
+def _count(value: Any, uses: Counter[int]) -> None:
+    """Count how often each recipe is found, by its id."""
+    if isinstance(value, list):
+        for item in value:
+            _count(item, uses)
+    elif isinstance(value, dict):
+        uses[id(value)] += 1
+        if uses[id(value)] == 1:
+            _count(list(value.values()), uses)

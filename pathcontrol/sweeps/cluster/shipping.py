@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import shutil
 import sys
@@ -9,7 +10,7 @@ import sysconfig
 import tempfile
 import weakref
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
@@ -21,9 +22,10 @@ from pathcontrol.simulation.context import RunContext
 from pathcontrol.simulation.run import Run
 from pathcontrol.sweeps.chunk import Chunk, Job, Piece
 from pathcontrol.sweeps.cluster.user_code import PackedBuilder
-from pathcontrol.sweeps.memory import keep_freed_memory
 
 _OURS = __name__.partition(".")[0]
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # glibc's names for what mallopt sets
+_KEPT, _LARGE = 256 << 20, 32 << 20  # bytes
 
 
 class _UnpackedJob(NamedTuple):
@@ -126,3 +128,15 @@ def _is_own(module: ModuleType) -> bool:
     stdlib, others = sysconfig.get_path("stdlib"), {"site-packages", "dist-packages"}
     installed = file.is_relative_to(stdlib) or others.intersection(file.parts)
     return file.suffix == ".py" and not installed and module.__name__.partition(".")[0] not in (_OURS, "__main__")
+
+
+def keep_freed_memory() -> None:
+    """Keep up to 256 MiB of freed memory for the next arrays; arrays above 32 MiB are returned at once.
+
+    Dask starts its workers with a ``malloc`` that gives everything back, and fetches the memory of every array anew,
+    page by page. Without glibc nothing is changed.
+    """
+    with suppress(OSError, AttributeError):
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(_TRIM_THRESHOLD, _KEPT)
+        mallopt(_MMAP_THRESHOLD, _LARGE)
