@@ -52,7 +52,7 @@ def _import_all(sensitivity: bool) -> None:
         import pathcontrol.view.page.html  # noqa: F401
 
         if sensitivity:
-            from pathcontrol.sweeps.store import load_parquet
+            from pathcontrol.sweeps.parquet import load_parquet
 
             load_parquet()
 

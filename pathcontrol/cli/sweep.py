@@ -57,7 +57,7 @@ def command(
     with uninterrupted():
         from pathcontrol.experiments.sweep_runner import run_sweep
         from pathcontrol.sweeps.cluster.connection import load_security
-        from pathcontrol.sweeps.store import load_parquet
+        from pathcontrol.sweeps.parquet import load_parquet
 
         load_parquet()
     folder = Path("results") / file.stem if out is None else out

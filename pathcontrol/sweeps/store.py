@@ -8,11 +8,9 @@ the next process which writes to the folder removes.
 from __future__ import annotations
 
 import hashlib
-import io
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -20,28 +18,16 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol._files import write_whole, writing
-from pathcontrol.errors import InputError, MissingExtraError, warn
+from pathcontrol.errors import InputError, warn
 from pathcontrol.sweeps.chunk import Chunk
 from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.manifest import LOG, MANIFEST, Manifest
+from pathcontrol.sweeps.parquet import decode_table, encode_table, join_tables, load_parquet
 
 _HEX = "[0-9a-f]" * 8
 _UNFINISHED = (f".manifest-{_HEX}.json", f"chunks/.*-{_HEX}.parquet", f"runs/.*-{_HEX}.nc")  # as whole_file has them
 _RESUME = "resume the sweep to make it again"
 _TOLD = 5  # damaged files that a message names
-
-
-def load_parquet() -> ModuleType:
-    """Return the module that reads and writes Parquet.
-
-    Raises:
-        MissingExtraError: it is not installed.
-    """
-    try:
-        import pyarrow.parquet
-    except ImportError as error:
-        raise MissingExtraError("pyarrow", "sweep", "the table of a sweep") from error
-    return pyarrow.parquet
 
 
 class Store:
@@ -64,7 +50,7 @@ class Store:
         self.folder = Path(folder)
         self.manifest = Manifest(self.folder, mending)
         self.samples = self.manifest.samples
-        self._parquet = load_parquet()
+        load_parquet()  # or tell now that it is missing
         self._known: dict[tuple[str, tuple[str, ...]], dict[str, Array]] = {}
         if not mending:
             self._check()
@@ -213,17 +199,14 @@ class Store:
 
     def _write_table(self, columns: Mapping[str, Array]) -> dict[str, str]:
         """Write the table of a chunk, and return its checksum by its place."""
-        import pyarrow as pa
-
-        sample, memory = columns["sample"], io.BytesIO()
-        self._parquet.write_table(pa.table({name: _column(values) for name, values in columns.items()}), memory)
+        sample, content = columns["sample"], encode_table(columns)
         place = f"chunks/{sample[0]:09d}-{sample[-1]:09d}.parquet"
-        write_whole(self.folder / place, memory.getbuffer())
-        return {place: hashlib.sha256(memory.getbuffer()).hexdigest()}
+        write_whole(self.folder / place, content)
+        return {place: hashlib.sha256(content).hexdigest()}
 
     def columns(self, names: list[str] | None = None) -> dict[str, Array]:
         """Return the columns of the finished samples in order, (k,) or (k, d) each; NaN or "" without a value."""
-        return _join([self._read(place, names) for place in self._chunks()])
+        return join_tables([self._read(place, names) for place in self._chunks()])
 
     def tidy(self, keep: Keep, at_random: NDArray[np.intp]) -> None:
         """Remove histories that need not be kept, and the remains of a killed process.
@@ -264,7 +247,7 @@ class Store:
             return set(at_random.tolist())
         names = ["sample", "status"] + ([keep.by] if keep.worst else [])
         chunks = [self._read_once(place, names) for place in self._chunks()]
-        found = _join(chunks + ([] if more is None else [{name: more[name] for name in names}]))
+        found = join_tables(chunks + ([] if more is None else [{name: more[name] for name in names}]))
         count = len(found["sample"])
         diverged = found["status"] == "diverged" if count else np.zeros(0, dtype=bool)
         by = found.get(keep.by, np.full(count, np.nan))
@@ -308,19 +291,10 @@ class Store:
 
     def _read(self, place: str, names: list[str] | None) -> dict[str, Array]:
         """Read columns of a chunk and check them."""
-        import pyarrow as pa
-
         try:
-            with self._parquet.ParquetFile(pa.BufferReader(self._content(place))) as opened:
-                if opened.metadata.num_rows != len(_samples(place)):
-                    raise InputError(f"it has {opened.metadata.num_rows} rows")
-                there = opened.schema_arrow.names
-                some = None if names is None else [name for name in names if name in there]
-                # threads of the pool that are still at work when Python ends abort the process
-                table = opened.read(columns=some, use_threads=False)
-            columns = {name: _values(table.column(name)) for name in table.column_names}
+            columns = decode_table(self._content(place), names, len(_samples(place)))
             _check_samples(columns.get("sample"), self.samples)
-        except (InputError, OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
+        except InputError as error:
             raise InputError(f"{str(self.folder / place)!r} cannot be read: {error}; {_RESUME}") from error
         return columns
 
@@ -367,46 +341,3 @@ def _describe_files(bad: Mapping[str, str]) -> str:
     told = [f"{place} ({what})" for place, what in list(bad.items())[:_TOLD]]
     more = len(bad) - len(told)
     return ", ".join(told) + (f" and {more} more" if more else "")
-
-
-def _join(chunks: list[dict[str, Array]]) -> dict[str, Array]:
-    """Return the rows of all chunks in the order of their samples."""
-    if not chunks:
-        return {"sample": np.empty(0, dtype=np.int64)}
-    every = dict.fromkeys(name for chunk in chunks for name in chunk)
-    found = {name: np.concatenate([_fill_column(chunk, name, chunks) for chunk in chunks]) for name in every}
-    _, order = np.unique(found["sample"], return_index=True)
-    return {name: values[order] for name, values in found.items()}
-
-
-def _column(values: Array) -> Any:
-    """Return values as a column of Arrow."""
-    import pyarrow as pa
-
-    if values.ndim == 1:
-        return pa.array(values.tolist() if values.dtype.kind in "UO" else values)
-    flat = values.reshape(-1)
-    return pa.FixedSizeListArray.from_arrays(
-        pa.array(flat.tolist() if flat.dtype.kind in "UO" else flat), values.shape[1]
-    )
-
-
-def _values(column: Any) -> Array:
-    """Return a column of Arrow as an array."""
-    import pyarrow as pa
-
-    combined = column.combine_chunks()
-    if isinstance(combined, pa.ChunkedArray):
-        combined = pa.concat_arrays(combined.chunks)
-    if pa.types.is_fixed_size_list(combined.type):
-        return _values(pa.chunked_array([combined.flatten()])).reshape(-1, combined.type.list_size)
-    values = combined.to_numpy(zero_copy_only=False)
-    return values.astype(str) if values.dtype == object else values
-
-
-def _fill_column(chunk: Mapping[str, Array], name: str, chunks: list[dict[str, Array]]) -> Array:
-    """Return a column of a chunk, without values where only other chunks have it."""
-    if name in chunk:
-        return chunk[name]
-    like = next(other[name] for other in chunks if name in other)
-    return np.full((len(chunk["sample"]), *like.shape[1:]), "" if like.dtype.kind == "U" else np.nan)

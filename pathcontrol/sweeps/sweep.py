@@ -23,10 +23,11 @@ from pathcontrol.sweeps.cluster.connection import connect
 from pathcontrol.sweeps.cluster.dispatch import Dispatcher
 from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.manifest import MANIFEST
+from pathcontrol.sweeps.parquet import load_parquet
 from pathcontrol.sweeps.result import SweepResult
 from pathcontrol.sweeps.space import Space, check_seed, digest
 from pathcontrol.sweeps.step_warnings import WarningFilter
-from pathcontrol.sweeps.store import Store, load_parquet
+from pathcontrol.sweeps.store import Store
 
 if TYPE_CHECKING:
     from distributed import Client, Security
