@@ -13,9 +13,9 @@ from time import perf_counter
 import numpy as np
 
 from pathcontrol import RobotModel, load_robot
+from pathcontrol.cartesian.cartesian_path import CartesianPath
 from pathcontrol.cartesian.orientation import FixedOrientation, NormalOrientation, Orientation
-from pathcontrol.cartesian.path import CartesianPath
-from pathcontrol.toolpaths.curve import ToolCurve
+from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 FINGERS = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}

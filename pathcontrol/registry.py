@@ -49,9 +49,9 @@ LAWS = Kind(
     {
         "extended_motion_plan": "control.extended_motion_plan:ExtendedMotionPlan",
         "projection": "control.projection:Projection",
-        "computed_torque": "control.motion:ComputedTorque",
-        "pd_plus": "control.motion:PDPlus",
-        "slotine_li": "control.motion:SlotineLi",
+        "computed_torque": "control.motion_control:ComputedTorque",
+        "pd_plus": "control.motion_control:PDPlus",
+        "slotine_li": "control.motion_control:SlotineLi",
     },
     ("robot", "task"),
 )
@@ -63,8 +63,8 @@ TASKS = Kind(
         "lissajous": "tasks.curves:Lissajous",
         "line": "tasks.curves:Line",
         "waypoint_path": "tasks.waypoints:WaypointPath",
-        "symbolic_path": "tasks.symbolic.path:SymbolicPath",
-        "cartesian_path": "cartesian.path:CartesianPath",
+        "symbolic_path": "tasks.symbolic.symbolic_path:SymbolicPath",
+        "cartesian_path": "cartesian.cartesian_path:CartesianPath",
     },
     ("robot",),
 )
@@ -86,12 +86,12 @@ MOTIONS = Kind(
     ("robot",),
 )
 CURVES = Kind(
-    "toolpaths.curve:ToolCurve",
+    "toolpaths.tool_curve:ToolCurve",
     {
-        "line": "toolpaths.curve:ToolCurve.line",
-        "circle": "toolpaths.curve:ToolCurve.circle",
-        "spline": "toolpaths.curve:ToolCurve.spline",
-        "polyline": "toolpaths.curve:ToolCurve.polyline",
+        "line": "toolpaths.tool_curve:ToolCurve.line",
+        "circle": "toolpaths.tool_curve:ToolCurve.circle",
+        "spline": "toolpaths.tool_curve:ToolCurve.spline",
+        "polyline": "toolpaths.tool_curve:ToolCurve.polyline",
     },
 )
 ORIENTATIONS = Kind(

@@ -8,10 +8,10 @@ import numpy as np
 from hypothesis import strategies as st
 
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.curve import ToolCurve
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.segment import Polyline, Segment
+from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 SEEDS = st.integers(0, 10**6)
 KINDS = ("lines", "arc", "helix", "ellipse", "bezier", "rational", "degenerate", "near cusp")

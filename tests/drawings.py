@@ -10,7 +10,7 @@ import numpy as np
 
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.dxf.reader import read_dxf
-from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.segments.segment import Polyline
 
 U = np.linspace(0.0, 1.0, 9)
 MM_PAGE = 'width="100mm" height="50mm" viewBox="0 0 100 50"'

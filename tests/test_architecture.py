@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -83,6 +84,11 @@ def test_imports_run_down(name):
             assert theirs is None, f"{name} stands below all floors and imports {target}"
         else:
             assert theirs is None or theirs <= mine, f"{name} imports {target}, which is on a floor above"
+
+
+def test_a_module_is_found_by_its_name():
+    count = Counter(path.name for path in MODULES.values())
+    assert {name for name, times in count.items() if times > 1} <= {"__init__.py", "base.py", "reader.py"}
 
 
 def test_saved_runs_find_classes_by_the_registry():

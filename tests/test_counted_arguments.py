@@ -11,7 +11,7 @@ from pathcontrol.profiles.topp.time_optimal import time_optimal
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.tasks.curves import Line
 from pathcontrol.tasks.waypoints import WaypointPath
-from pathcontrol.toolpaths.curve import ToolCurve
+from pathcontrol.toolpaths.tool_curve import ToolCurve
 from pathcontrol.view.video import _clip
 
 LINE = Line([0.0, 0.0], [0.6, 0.4], speed=1.0)

@@ -10,12 +10,12 @@ import numpy as np
 
 from pathcontrol.analysis.coverage import Points, even_points, measure_coverage, refine, traverse
 from pathcontrol.analysis.metric_helpers import apply_where_finite
-from pathcontrol.analysis.tool import PlannedToolCurve, feed_along, find_tool, tool_speed
+from pathcontrol.analysis.tool_following import PlannedToolCurve, feed_along, find_tool, tool_speed
 from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def feed_of(contour: Contour | PlannedToolCurve, task: PathSequence, paths: Sequ
 
 def _feed_of_path(path: PathTask, robot: RobotModel) -> float:
     """Return the commanded speed [m/s] of the tool on a path, its mean over s where it changes."""
-    from pathcontrol.cartesian.path import CartesianPath
+    from pathcontrol.cartesian.cartesian_path import CartesianPath
 
     if isinstance(path, CartesianPath):
         return path.speed
@@ -157,7 +157,7 @@ def _feed_of_path(path: PathTask, robot: RobotModel) -> float:
 
 def contour_points(contour: Contour, tolerance: float) -> Points:
     """Return points on a contour [m], (k, 3), at most half of the ``tolerance`` apart."""
-    from pathcontrol.toolpaths.segments.base import Polyline
+    from pathcontrol.toolpaths.segments.segment import Polyline
 
     parts = []
     for segment in contour.segments:

@@ -13,13 +13,13 @@ from pathcontrol.analysis.contours import contour_numbers
 from pathcontrol.analysis.limit_shares import limit_ratios
 from pathcontrol.analysis.metric_helpers import apply_by_task, apply_where_finite, resolve_task, resolve_toolpath
 from pathcontrol.analysis.progress import progress
-from pathcontrol.analysis.tool import PlannedToolCurve, orientation_error, require_tool, tool_speed
+from pathcontrol.analysis.tool_following import PlannedToolCurve, orientation_error, require_tool, tool_speed
 from pathcontrol.analysis.window import Samples, Window, own_samples, samples_of
 from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 
 if TYPE_CHECKING:

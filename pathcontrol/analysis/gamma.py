@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, joint_array, scalar
 from pathcontrol._expect import expect
 from pathcontrol.control.ending import Ending
-from pathcontrol.engine.gamma import distances_to_gamma
+from pathcontrol.engine.gamma_distance import distances_to_gamma
 from pathcontrol.errors import EngineError, InputError, TaskError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.batch.task_batch import TaskBatch
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 
 

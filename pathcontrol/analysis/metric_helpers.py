@@ -16,7 +16,7 @@ from pathcontrol.geometry.closest_point.cells import FARTHEST
 from pathcontrol.simulation.context import check_sequence
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.batch.task_batch import TaskBatch
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 
 if TYPE_CHECKING:

@@ -12,10 +12,10 @@ from pathcontrol._arrays import Array, scalar
 from pathcontrol._expect import expect
 from pathcontrol.analysis.coverage import measure_coverage, path_points
 from pathcontrol.analysis.gamma import distance_to_gamma, planned_rate
-from pathcontrol.analysis.laps import lap_time
+from pathcontrol.analysis.lap_table import lap_time
 from pathcontrol.analysis.limit_shares import RATIOS, limit_ratios
 from pathcontrol.analysis.metric_helpers import apply_by_task, apply_where_finite, resolve_task, split_by_task
-from pathcontrol.analysis.names import LABELS, UNITS
+from pathcontrol.analysis.metric_names import LABELS, UNITS
 from pathcontrol.analysis.progress import progress
 from pathcontrol.analysis.tool_metrics import NAMES as TOOL_METRICS
 from pathcontrol.analysis.tool_metrics import tool_metrics
@@ -167,8 +167,8 @@ def metrics(
 
     Contour error, coverage and distance to Γ are left out for paths that neither end nor repeat. Open paths have the
     time [s] after which they were finished, and the :func:`end_error` [rad], each NaN where they were not; closed ones
-    ``lap_time`` [s], the mean of their whole laps, see :func:`~pathcontrol.analysis.laps.lap_times`. All numbers of a
-    rollout that diverged are NaN. Of these, those that ``only`` names; the distance to Γ takes the most time.
+    ``lap_time`` [s], the mean of their whole laps, see :func:`~pathcontrol.analysis.lap_table.lap_times`. All numbers
+    of a rollout that diverged are NaN. Of these, those that ``only`` names; the distance to Γ takes the most time.
 
     Rollouts with a task each have the numbers of their own.
 

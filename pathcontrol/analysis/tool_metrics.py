@@ -9,7 +9,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import contour_deviation, geometry_of
-from pathcontrol.analysis.tool import tool_signals
+from pathcontrol.analysis.tool_following import tool_signals
 from pathcontrol.analysis.window import Samples
 from pathcontrol.errors import TaskError
 from pathcontrol.simulation.run import Run
@@ -33,7 +33,7 @@ def tool_metrics(run: Run, task: PathTask, counted: Samples, only: Collection[st
     signals = tool_signals(run, task, *(counted.within(run.array(name)) for name in ("s", "q", "qd")))
     if signals is None:
         return {}
-    from pathcontrol.cartesian.path import CartesianPath  # loaded already if there is a tool
+    from pathcontrol.cartesian.cartesian_path import CartesianPath  # loaded already if there is a tool
 
     values = {
         "tool_speed_mean": counted.reduce(np.mean, signals.speed),

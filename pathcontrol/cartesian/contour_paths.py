@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect_choice
+from pathcontrol.cartesian.cartesian_path import CartesianPath
 from pathcontrol.cartesian.orientation import NormalOrientation, Orientation, TangentOrientation, TurningOrientation
-from pathcontrol.cartesian.path import CartesianPath
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.profiles.limited.limited import limited
 from pathcontrol.profiles.limited.motion_limit import MotionLimit
@@ -20,8 +20,8 @@ from pathcontrol.profiles.motion import ToolMotion
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.curve import ToolCurve
 from pathcontrol.toolpaths.smoothing.smooth import Smoothed
+from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 _START_TIME = 0.1  # s
 

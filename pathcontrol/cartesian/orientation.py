@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol.arguments import Direction, Form, Unit
 from pathcontrol.errors import InputError
-from pathcontrol.toolpaths.curve import ToolCurve
+from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 _PARALLEL = 1e-6  # sine of an angle that counts as zero
 _NO_SINE = 1e-12  # rounding error of the sine of no turn, or of half a turn

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 
 if TYPE_CHECKING:
     from pathcontrol.cartesian.toolpath_task import ToolpathTask

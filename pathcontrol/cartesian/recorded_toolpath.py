@@ -10,9 +10,9 @@ import numpy as np
 
 from pathcontrol._arrays import Array, rigid
 from pathcontrol.arguments import parameters_of
-from pathcontrol.cartesian.links import smooth_open
+from pathcontrol.cartesian.contour_links import smooth_open
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.toolpaths.contour import Contour, Toolpath
 from pathcontrol.toolpaths.recipes import contour_of, contour_recipe

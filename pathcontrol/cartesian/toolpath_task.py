@@ -10,17 +10,17 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, rigid, scalar
 from pathcontrol._expect import expect
 from pathcontrol.arguments import Distance, Feed, Form, Length, Unit
+from pathcontrol.cartesian.contour_links import link_contours
 from pathcontrol.cartesian.contour_paths import ContourPaths, Held, rotations_of
-from pathcontrol.cartesian.links import link_contours
 from pathcontrol.cartesian.orientation import Orientation
 from pathcontrol.errors import InputError
 from pathcontrol.robot.extent import question_length
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.toolpaths.contour import Contour, Toolpath
-from pathcontrol.toolpaths.curve import ToolCurve
-from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.segments.segment import Polyline
 from pathcontrol.toolpaths.smoothing.smooth import Corners, smooth
+from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 
 class ToolpathTask(PathSequence):

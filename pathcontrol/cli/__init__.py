@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import click
 
-from pathcontrol.cli import check, report, reproduce, run, sweep, toolpath, tune, view
+from pathcontrol.cli import (
+    check_command,
+    report_command,
+    reproduce_command,
+    run_command,
+    sweep_command,
+    toolpath_command,
+    tune_command,
+    view_command,
+)
 from pathcontrol.cli.group import Group
 
 
@@ -14,5 +23,14 @@ def main() -> None:
     """Path control of robot arms: tasks as a path and a velocity profile, not as a schedule."""
 
 
-for _part in (reproduce, run, sweep, tune, view, report, check, toolpath):
+for _part in (
+    reproduce_command,
+    run_command,
+    sweep_command,
+    tune_command,
+    view_command,
+    report_command,
+    check_command,
+    toolpath_command,
+):
     main.add_command(_part.command)

@@ -53,7 +53,7 @@ def metric_lines(metrics: dict[str, Any], run: Run) -> list[str]:
 
 def remark_lines(run: Run) -> list[str]:
     """Return red lines on what must not be overlooked: limits passed, and an arm that did not get there."""
-    from pathcontrol.analysis.remarks import remarks
+    from pathcontrol.analysis.run_remarks import remarks
 
     return [red(printable(sentence)) for sentence in remarks(run)]
 
@@ -66,7 +66,7 @@ def red(text: str) -> str:
 def contour_lines(run: Run) -> list[Table]:
     """Return the table of contours of a toolpath, or of laps; empty for another run."""
     from pathcontrol.analysis.contours import contour_table
-    from pathcontrol.analysis.laps import lap_table
+    from pathcontrol.analysis.lap_table import lap_table
 
     heads, *rows = contour_table(run) or lap_table(run) or [[]]
     if not rows:

@@ -16,8 +16,8 @@ from pathcontrol.errors import InputError, warn_of_single
 from pathcontrol.robot.friction import levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint
-from pathcontrol.tasks.check import check_task
 from pathcontrol.tasks.task import PathTask
+from pathcontrol.tasks.task_check import check_task
 
 FrictionCompensation = Literal["none", "viscous", "full"]
 Start = Literal["s0", "nearest"]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, joint_array, scalar
 from pathcontrol.control.base import Controller
 from pathcontrol.engine.library import load_library
-from pathcontrol.engine.settings import add_law
+from pathcontrol.engine.run_settings import add_law
 from pathcontrol.engine.structs import Memory, Setup
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.batch.task_batch import TaskBatch

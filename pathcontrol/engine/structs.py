@@ -32,7 +32,7 @@ class Arm(Structure):
 
 
 class Path(Structure):
-    """The table of a task; see :class:`~pathcontrol.engine.table.PathTable`."""
+    """The table of a task; see :class:`~pathcontrol.engine.path_table.PathTable`."""
 
     _fields_ = [
         *((name, c_int) for name in ("joints", "cells", "buckets", "closed", "brakes")),

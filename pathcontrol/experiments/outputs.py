@@ -70,13 +70,13 @@ def _write_summary(numbers: dict[str, Any], path: Path) -> Path:
 
 
 def _write_figures(run: Run, setup: Setup, path: Path) -> dict[str, Path]:
-    from pathcontrol.view.figures.run import add_name, run_figure
+    from pathcontrol.view.figures.run_figures import add_name, run_figure
 
     pair = setup.output.figure_joints
     joints = None if pair is None else (pair[0], pair[1])
     figures = run_figure(run, path, setup.task, joints=joints, limits=setup.plant.limits.effort)
     if isinstance(setup.task, ToolpathTask):
-        from pathcontrol.view.figures.deviation import deviation_figure
+        from pathcontrol.view.figures.deviation_figure import deviation_figure
         from pathcontrol.view.figures.style import save_figure
 
         figures += save_figure(deviation_figure(run, setup.plant, setup.task), add_name(path, "deviation"))

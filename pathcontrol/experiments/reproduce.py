@@ -186,8 +186,8 @@ def compare_engines(reference: Experiment, robot: RobotModel) -> dict[str, Any]:
 def _write(experiment: Experiment, robot: RobotModel, out: Path) -> None:
     """Data, figures and animation of one experiment."""
     from pathcontrol.view.animation.record import record
-    from pathcontrol.view.figures.errors import error_figure
-    from pathcontrol.view.figures.path import path_figure
+    from pathcontrol.view.figures.error_figures import error_figure
+    from pathcontrol.view.figures.path_figures import path_figure
     from pathcontrol.view.figures.style import save_figure
 
     run, task = experiment.run, experiment.controller.task

@@ -13,7 +13,7 @@ from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.sequence import simulate_sequence
 from pathcontrol.simulation.simulate import simulate
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 
 
 class Outcome(NamedTuple):

@@ -48,7 +48,7 @@ def sensitivity(out: str | Path, samples: int = SAMPLES, progress: bool = True) 
         MissingExtraError: the extra ``sweep`` is not installed.
     """
     from pathcontrol.view.figures.style import save_figure
-    from pathcontrol.view.report.sensitivity import sensitivity_page
+    from pathcontrol.view.report.sensitivity_section import sensitivity_page
 
     out = refuse_suffix(out, "a folder")
     peaks = peaks_of(run_combinations(out / "sensitivity", samples, progress))

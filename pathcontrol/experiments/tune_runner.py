@@ -14,8 +14,8 @@ from pathcontrol.experiments.schema.sweep_sections import TuneSection
 from pathcontrol.experiments.sweep_runner import of_samples, values_of
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.sweeps.space import Space
-from pathcontrol.tuning.result import Tuning
 from pathcontrol.tuning.tune import tune
+from pathcontrol.tuning.tuning_result import Tuning
 
 
 def run_tune(

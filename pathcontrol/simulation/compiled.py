@@ -11,9 +11,9 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
-from pathcontrol.engine.arms import arm_struct
+from pathcontrol.engine.arm_constants import arm_struct
 from pathcontrol.engine.library import lanes, load_library
-from pathcontrol.engine.settings import add_law, add_plant, rows_or_none
+from pathcontrol.engine.run_settings import add_law, add_plant, rows_or_none
 from pathcontrol.engine.structs import (
     RECORDED,
     STATE,

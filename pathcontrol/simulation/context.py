@@ -15,7 +15,7 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.storage.array_store import ArrayStore
 from pathcontrol.tasks.batch.task_batch import TaskBatch
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.task import PathTask
 

@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
-from pathcontrol.simulation.arguments import Loop
 from pathcontrol.simulation.arm.disturbance import check_disturbance
 from pathcontrol.simulation.checks.slips import warn_of_slips
 from pathcontrol.simulation.checks.too_long import warn_of_steps
 from pathcontrol.simulation.engines import Engine, choose_engine
 from pathcontrol.simulation.loops import Arm, Outside
+from pathcontrol.simulation.run_arguments import Loop
 from pathcontrol.tasks.task import PathTask
 
 

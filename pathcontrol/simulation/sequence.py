@@ -13,7 +13,14 @@ from pathcontrol._expect import describe
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.arguments import (
+from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.divergence import Divergence
+from pathcontrol.simulation.engines import Engine, check_engine
+from pathcontrol.simulation.finish import Finish, make_finish
+from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
+from pathcontrol.simulation.prepare import prepare
+from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.run_arguments import (
     check_controller,
     check_joints,
     check_law,
@@ -25,15 +32,8 @@ from pathcontrol.simulation.arguments import (
     map_position_units,
     sample_period,
 )
-from pathcontrol.simulation.arm.disturbance import Disturbance
-from pathcontrol.simulation.divergence import Divergence
-from pathcontrol.simulation.engines import Engine, check_engine
-from pathcontrol.simulation.finish import Finish, make_finish
-from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
-from pathcontrol.simulation.prepare import prepare
-from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.base import refuse_batch
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.task import PathTask
 

@@ -10,7 +10,14 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import check_whole, scalar
 from pathcontrol.control.base import Controller
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.arguments import (
+from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.checks.slips import warn_if_still
+from pathcontrol.simulation.engines import Engine, check_engine
+from pathcontrol.simulation.finish import Until, count_laps, first_and_last, make_finish
+from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
+from pathcontrol.simulation.prepare import prepare
+from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.run_arguments import (
     broadcast_states,
     check_controller,
     check_joints,
@@ -22,13 +29,6 @@ from pathcontrol.simulation.arguments import (
     sample_period,
     start_law,
 )
-from pathcontrol.simulation.arm.disturbance import Disturbance
-from pathcontrol.simulation.checks.slips import warn_if_still
-from pathcontrol.simulation.engines import Engine, check_engine
-from pathcontrol.simulation.finish import Until, count_laps, first_and_last, make_finish
-from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
-from pathcontrol.simulation.prepare import prepare
-from pathcontrol.simulation.run import Run
 
 
 def simulate(

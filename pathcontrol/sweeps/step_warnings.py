@@ -9,8 +9,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from pathcontrol.errors import warn
-from pathcontrol.simulation.arguments import broadcast_states, check_loop, make_plant, start_law
 from pathcontrol.simulation.checks.too_long import StepWarning, find_steps_too_long
+from pathcontrol.simulation.run_arguments import broadcast_states, check_loop, make_plant, start_law
 
 _ROLLOUT = re.compile(r" \(rollout (\d+)\)")
 _NUMBER = re.compile(r"[0-9][0-9.e+-]*")

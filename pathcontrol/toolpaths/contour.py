@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, rigid
 from pathcontrol.errors import InputError
-from pathcontrol.toolpaths.segments.base import SAME_POINT, Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier_columns import measure_bounds, measure_lengths
 from pathcontrol.toolpaths.segments.nearest import Cubics, is_cubic
+from pathcontrol.toolpaths.segments.segment import SAME_POINT, Polyline, Segment
 
 
 @dataclass(frozen=True, eq=False, repr=False)

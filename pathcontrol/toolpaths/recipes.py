@@ -11,8 +11,8 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.segment import Polyline, Segment
 
 _NEAR = 1e-7  # m, from segments of any other kind to the polylines that are kept of them
 _FINEST = 1 << 20

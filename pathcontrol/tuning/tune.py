@@ -26,7 +26,7 @@ from pathcontrol.sweeps.sweep import fingerprint, open_store
 from pathcontrol.tuning.cases import Cases
 from pathcontrol.tuning.optimizer import Search
 from pathcontrol.tuning.problem import Reduce, Terms
-from pathcontrol.tuning.result import Tuning
+from pathcontrol.tuning.tuning_result import Tuning
 
 
 def tune(

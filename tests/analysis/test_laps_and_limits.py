@@ -7,9 +7,9 @@ import pytest
 from test_film import reel
 
 import pathcontrol as pc
-from pathcontrol.analysis.laps import lap_table, lap_times
+from pathcontrol.analysis.lap_table import lap_table, lap_times
 from pathcontrol.view.animation.record import record
-from pathcontrol.view.figures.shares import largest_shares
+from pathcontrol.view.figures.limits_figure import largest_shares
 
 ROBOT = pc.load_robot("cicese_2dof")
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import pathcontrol as pc
 from pathcontrol.analysis.contours import HEADS, contour_table
-from pathcontrol.analysis.tool import angle_between
+from pathcontrol.analysis.tool_following import angle_between
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.laps import Laps
 

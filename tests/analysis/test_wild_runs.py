@@ -10,7 +10,7 @@ import pytest
 
 import pathcontrol as pc
 from pathcontrol.analysis.coverage import even_points
-from pathcontrol.engine import gamma as engine_gamma
+from pathcontrol.engine import gamma_distance as engine_gamma
 from pathcontrol.engine.library import load_library
 from pathcontrol.errors import EngineError, InputError, TaskError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve

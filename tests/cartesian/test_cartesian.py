@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pathcontrol import ExtendedMotionPlan, Projection, RobotModel, check_task, load_robot, simulate
+from pathcontrol.cartesian.cartesian_path import CartesianPath
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.correction import correct
 from pathcontrol.cartesian.ik.redundancy import PostureCost
 from pathcontrol.cartesian.orientation import FixedOrientation, FreeOrientation, NormalOrientation, TangentOrientation
-from pathcontrol.cartesian.path import CartesianPath
 from pathcontrol.cartesian.tool import Tool
-from pathcontrol.toolpaths.curve import ToolCurve
+from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 UP = np.array([0.0, 0.0, 1.0])

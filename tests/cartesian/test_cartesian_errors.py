@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol import InputError, RobotModel, TaskError, UnknownNameError, load_robot
+from pathcontrol.cartesian.cartesian_path import CartesianPath
 from pathcontrol.cartesian.orientation import FixedOrientation, NormalOrientation, TangentOrientation
-from pathcontrol.cartesian.path import CartesianPath
-from pathcontrol.toolpaths.curve import ToolCurve
+from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 UP = np.array([0.0, 0.0, 1.0])

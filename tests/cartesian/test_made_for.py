@@ -11,7 +11,7 @@ from pathcontrol.simulation.storage.array_store import ArrayStore
 from pathcontrol.simulation.storage.task_recipes import task_of, task_recipe
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.view.animation.recorded_runs import make_recordings
-from pathcontrol.view.tool import default_tool, with_tool
+from pathcontrol.view.default_tool import default_tool, with_tool
 
 TIP = np.array([0.0, 0.02, -0.1])
 CURVE = pc.ToolCurve.circle([0.4, -0.05, 0.9], 0.08, [0.0, 1.0, 0.0])

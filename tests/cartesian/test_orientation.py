@@ -17,7 +17,7 @@ from pathcontrol.cartesian.orientation import (
     Orientation,
     TangentOrientation,
 )
-from pathcontrol.toolpaths.curve import ToolCurve
+from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 CURVE = ToolCurve.spline([[0.0, 0.0, 0.0], [0.1, 0.05, 0.0], [0.2, -0.05, 0.05], [0.3, 0.0, 0.0], [0.4, 0.1, 0.1]])
 CIRCLE = ToolCurve.circle([0.3, 0.2, 0.1], 0.1)

@@ -26,7 +26,7 @@ from pathcontrol import (
     tool_deviation,
     toolpath_metrics,
 )
-from pathcontrol.cartesian.links import link_contours
+from pathcontrol.cartesian.contour_links import link_contours
 from pathcontrol.toolpaths.gcode.builder import ContourBuilder
 from pathcontrol.toolpaths.segments.arc import Arc
 

@@ -7,7 +7,7 @@ import pytest
 
 import pathcontrol as pc
 from pathcontrol.engine import library
-from pathcontrol.engine.gamma import distances_to_gamma
+from pathcontrol.engine.gamma_distance import distances_to_gamma
 from pathcontrol.engine.library import BUILDS, load_library
 
 ROBOT, TASK = pc.load_robot("cicese_2dof"), pc.Circle(1.0, 2.0)
@@ -118,7 +118,7 @@ def test_bits_of_distances_do_not_depend_on_instructions(monkeypatch):
     q, qd = rng.normal(0, 1, (500, 2)), rng.normal(0, 2, (500, 2))
     found = []
     for build in _available():
-        monkeypatch.setattr("pathcontrol.engine.gamma.load_library", lambda build=build: load_library(build))
+        monkeypatch.setattr("pathcontrol.engine.gamma_distance.load_library", lambda build=build: load_library(build))
         found.append(np.array(distances_to_gamma(TASK, q, qd, 1.0, True)))
     assert all(np.array_equal(one, found[0]) for one in found)
 

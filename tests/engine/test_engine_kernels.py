@@ -10,7 +10,7 @@ import pytest
 from random_arms import random_arm
 
 from pathcontrol import FrameForce, load_robot
-from pathcontrol.engine.arms import arm_struct, inverse_dynamics, mass_matrix
+from pathcontrol.engine.arm_constants import arm_struct, inverse_dynamics, mass_matrix
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.structs import Memory
 from pathcontrol.errors import EngineError
@@ -47,7 +47,7 @@ def test_an_arm_that_the_engine_gets_wrong_is_refused_by_joint(monkeypatch):
     robot = random_arm(3, 4)
     wrong = arm_constants(robot)
     wrong.mass[2] *= 1.001
-    monkeypatch.setattr("pathcontrol.engine.arms.arm_constants", lambda _: wrong)
+    monkeypatch.setattr("pathcontrol.engine.arm_constants.arm_constants", lambda _: wrong)
     with pytest.raises(EngineError, match=r"joint 'j\d' of tree3"):
         arm_struct(robot)
 

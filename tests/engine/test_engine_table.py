@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import pathcontrol as pc
-from pathcontrol.engine.gamma import distances_to_gamma
+from pathcontrol.engine.gamma_distance import distances_to_gamma
 from pathcontrol.engine.library import load_library
-from pathcontrol.engine.table import has_same_projection, make_table, path_struct
+from pathcontrol.engine.path_table import has_same_projection, make_table, path_struct
 from pathcontrol.errors import EngineError
 
 

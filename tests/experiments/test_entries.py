@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol import Contour, RobotModel, Toolpath, ToolpathTask, load_robot, read_gcode, smooth
-from pathcontrol.cartesian.links import link_contours
+from pathcontrol.cartesian.contour_links import link_contours
 from pathcontrol.toolpaths.gcode.builder import ContourBuilder
-from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.segments.segment import Polyline
 
 UP, TOLERANCE, CLEARANCE = np.array([0.0, 0.0, 1.0]), 1e-4, 0.01
 SURFACE = 0.0  # m, the top of the stock

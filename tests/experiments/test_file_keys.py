@@ -113,7 +113,9 @@ CURVES = {
 def test_curves_of_tools_are_those_of_python(name, setup, monkeypatch):
     section, by_hand = CURVES[name]
     made = []
-    monkeypatch.setattr("pathcontrol.cartesian.path.solve", lambda constraint, *rest: made.append(constraint.curve))
+    monkeypatch.setattr(
+        "pathcontrol.cartesian.cartesian_path.solve", lambda constraint, *rest: made.append(constraint.curve)
+    )
     with pytest.raises(ExperimentError):  # nothing is solved
         setup({"task": {"type": "cartesian_path", "frame": "tool", "curve": section}, "start": {}})
     s = np.linspace(made[0].s0, made[0].s_end, 40)

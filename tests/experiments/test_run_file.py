@@ -46,8 +46,8 @@ from pathcontrol.tasks.laps import Laps
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.recipes import contour_of, contour_recipe
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.segment import Polyline, Segment
 
 GAINS = {"K_p": 800.0, "K_v": [45.0, 100.0], "k": 20.0}
 

@@ -224,8 +224,8 @@ def test_a_negative_moment_that_counts_stays_an_error():
 
 @given(st.integers(0, 2**32 - 1))
 def test_dynamics_of_the_checks_are_those_of_pinocchio(seed):
-    from pathcontrol.robot.urdf.dynamics import dynamics, postures
     from pathcontrol.robot.urdf.model_values import moving_bodies, read_arm
+    from pathcontrol.robot.urdf.posture_dynamics import dynamics, postures
 
     rng = np.random.default_rng(seed)
     text = arm("", *(solid(rng.uniform(0.1, 5), *rng.uniform(0.01, 0.1, 3)) for _ in range(4)))

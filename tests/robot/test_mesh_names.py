@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import pathcontrol as pc
 from pathcontrol.errors import InputError, PathControlWarning, UrdfError
 from pathcontrol.robot.urdf.mesh_files import find_mesh
-from pathcontrol.view.bodies.visuals import link_visuals
+from pathcontrol.view.bodies.body_visuals import link_visuals
 
 ENVIRONMENT = ("ROS_PACKAGE_PATH", "GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH", "AMENT_PREFIX_PATH")
 POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n"

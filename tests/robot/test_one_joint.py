@@ -9,7 +9,7 @@ import pytest
 
 import pathcontrol as pc
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.segments.segment import Polyline
 
 RADIUS, SWEEP = 0.4, 1.2
 KINDS = ("revolute", "continuous", "prismatic")

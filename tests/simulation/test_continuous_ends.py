@@ -13,9 +13,9 @@ from pathcontrol.errors import SimulationError, TaskError
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.simulation.loops import ContinuousTime
 from pathcontrol.simulation.simulate import simulate
-from pathcontrol.tasks.check import check_task
 from pathcontrol.tasks.curves import Circle, Line
 from pathcontrol.tasks.function import FunctionPath
+from pathcontrol.tasks.task_check import check_task
 from pathcontrol.tasks.waypoints import WaypointPath
 
 

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
-from pathcontrol.control.motion import ComputedTorque
+from pathcontrol.control.motion_control import ComputedTorque
 from pathcontrol.robot.friction import Coulomb, Viscous
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.simulation.arm.damping import Damping

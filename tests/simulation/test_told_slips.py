@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 import pathcontrol as pc
-from pathcontrol.analysis.remarks import remarks
+from pathcontrol.analysis.run_remarks import remarks
 from pathcontrol.errors import PathControlWarning
 from pathcontrol.simulation.checks.slips import warn_of_slips
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
-from pathcontrol.control.motion import ComputedTorque, PDPlus, SlotineLi
+from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
 from pathcontrol.errors import PathControlWarning, SimulationError
 from pathcontrol.robot.friction import Stribeck, Viscous

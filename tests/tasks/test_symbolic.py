@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from strategies import floats
 
 from pathcontrol import Circle, ExtendedMotionPlan, InputError, TaskError, UnknownNameError, check_task, simulate
-from pathcontrol.tasks.symbolic.path import SymbolicPath
+from pathcontrol.tasks.symbolic.symbolic_path import SymbolicPath
 
 S = np.linspace(-2.0, 2.0, 41)
 s = sympy.Symbol("s")

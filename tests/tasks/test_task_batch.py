@@ -393,7 +393,7 @@ def test_figures_films_and_reports_show_the_path_of_their_rollout():
     from pathcontrol.view.animation.recorded_runs import make_recordings
     from pathcontrol.view.figures.shown import shown
     from pathcontrol.view.report.reproduction import script
-    from pathcontrol.view.report.summary import facts, measure
+    from pathcontrol.view.report.run_summary import facts, measure
 
     tasks = ALIKE["circles"]
     run = ran(LAWS["plan"](TaskBatch(tasks)), begin(tasks))

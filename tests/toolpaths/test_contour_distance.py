@@ -7,8 +7,8 @@ import pytest
 
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.segment import Polyline
 
 
 def chain(degree: int, count: int, seed: int = 0) -> Contour:

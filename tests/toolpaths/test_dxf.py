@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pathcontrol.errors import InputError, ToolpathError, UnknownNameError
 from pathcontrol.toolpaths.dxf.reader import UNITS
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.segments.segment import Polyline
 
 TURN = 2 * np.pi
 

@@ -17,7 +17,7 @@ from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.contour import Toolpath
 from pathcontrol.toolpaths.gcode import read_gcode
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.segments.segment import Polyline
 
 HEAD = "G21 G90\nG0 X0 Y0 Z0\n"
 

@@ -15,7 +15,7 @@ from pathcontrol.toolpaths.contour import Toolpath
 from pathcontrol.toolpaths.gcode import read_gcode
 from pathcontrol.toolpaths.gcode.runs import read_run
 from pathcontrol.toolpaths.gcode.words import PLAIN, parse
-from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.segments.segment import Polyline
 
 lengths = st.sampled_from(["1", "2", "-3.5", "+2.5", "-.25", "007", "1.", "-0", ".0000001", "1.0000001", "12", "0"])
 numbers = st.one_of(*[lengths] * 4, st.sampled_from(["1e-3", "1e2", "9999999", "20000000", "2..3", ""]))

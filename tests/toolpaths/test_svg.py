@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.segment import Polyline
 from pathcontrol.toolpaths.svg.reader import read_svg
 
 TURN = 2 * np.pi

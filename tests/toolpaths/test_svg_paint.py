@@ -7,7 +7,7 @@ import pytest
 from drawings import MM_PAGE, svg, write
 
 from pathcontrol.errors import InputError, ToolpathError, UnknownNameError
-from pathcontrol.toolpaths.svg import style
+from pathcontrol.toolpaths.svg import style_sheet as style
 from pathcontrol.toolpaths.svg.reader import read_svg
 
 SEEN = '<path id="seen" d="M0 0H10" stroke="black"/>'

@@ -11,8 +11,8 @@ from strategies import floats
 from pathcontrol import Contour, InputError, ToolCurve, UnknownNameError, smooth
 from pathcontrol.toolpaths.gcode.builder import ContourBuilder
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline
 from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.segment import Polyline
 
 U = np.linspace(0.0, 1.0, 41)
 SEEDS = st.integers(0, 10**6)

@@ -12,7 +12,7 @@ from strategies import floats
 
 from pathcontrol import InputError, ToolCurve
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.segments.segment import Polyline
 from pathcontrol.toolpaths.smoothing.bends import regularize
 from pathcontrol.toolpaths.smoothing.hermite_data import ByLength, curved_stretch
 

@@ -17,8 +17,8 @@ from pathcontrol.geometry.arc_length import ArcLength
 from pathcontrol.geometry.box_hierarchy import BoxHierarchy
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.segment import Polyline, Segment
 
 U = np.linspace(0.0, 1.0, 33)
 CURVED = tuple(kind for kind in KINDS if kind != "lines")

@@ -16,8 +16,8 @@ from test_film import Reel, made_up_run, played, reel
 
 from pathcontrol import Circle, RobotModel, Run, load_robot
 from pathcontrol.view.animation.record import MOST_GHOSTS, record
+from pathcontrol.view.animation.scene.arm_layout import shifts
 from pathcontrol.view.animation.scene.camera import picture_axes
-from pathcontrol.view.animation.scene.layout import shifts
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -18,7 +18,7 @@ from pathcontrol import (
     simulate_sequence,
     tool_deviation,
 )
-from pathcontrol.toolpaths.segments.base import Polyline
+from pathcontrol.toolpaths.segments.segment import Polyline
 from pathcontrol.view.animation.path_error import PathError, in_fitting_units
 from pathcontrol.view.animation.record import record
 from pathcontrol.view.animation.scene.tube import distinct

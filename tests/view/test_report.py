@@ -24,9 +24,9 @@ from pathcontrol.analysis.run_metrics import LABELS, UNITS
 from pathcontrol.simulation.context import RunContext
 from pathcontrol.view.report.pictures import pictures
 from pathcontrol.view.report.report import report
+from pathcontrol.view.report.run_summary import Row, measure, rows
 from pathcontrol.view.report.sections import _section
-from pathcontrol.view.report.settings import settings as groups_of
-from pathcontrol.view.report.summary import Row, measure, rows
+from pathcontrol.view.report.settings_table import settings as groups_of
 
 HOSTILE = "</script><img src=x onerror=alert(1)>&amp;\"'<b>"
 SI = {"deg": np.pi / 180, "deg/s": np.pi / 180, "s": 1.0, "N m": 1.0, "N m/rad": 1.0, "": 1.0, "mm": 1e-3, "µm": 1e-6}

@@ -7,7 +7,7 @@ import pytest
 
 import pathcontrol as pc
 from pathcontrol.analysis.readable import readable_number
-from pathcontrol.view.report.summary import measure, rows
+from pathcontrol.view.report.run_summary import measure, rows
 
 ARM = pc.load_robot("cicese_2dof")
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from pathcontrol import load_robot
 from pathcontrol.cli import main
-from pathcontrol.view.bodies.shapes import Box, Cylinder
+from pathcontrol.view.bodies.body_shapes import Box, Cylinder
 from pathcontrol.view.bodies.sticks import stick_figure
 from pathcontrol.view.tour import joints_to_show, tour
 

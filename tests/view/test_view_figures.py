@@ -25,9 +25,9 @@ from pathcontrol import (
     torque_figure,
 )
 from pathcontrol.experiments.schema.experiment import Output
-from pathcontrol.view.figures.errors import quantiles
+from pathcontrol.view.figures.error_figures import quantiles
 from pathcontrol.view.figures.lines import select_by_cell, select_by_column
-from pathcontrol.view.figures.run import run_figure
+from pathcontrol.view.figures.run_figures import run_figure
 from pathcontrol.view.figures.style import RUN_COLOURS
 
 START = np.deg2rad([40.0, 70.0])

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from test_film import played
 
-from pathcontrol.view.animation.scene.builder import ground_grid
 from pathcontrol.view.animation.scene.camera import HIGHEST, LOWEST, Camera, picture_axes, view_direction
 from pathcontrol.view.animation.scene.keyframes import line_keys
+from pathcontrol.view.animation.scene.scene_builder import ground_grid
 from pathcontrol.view.animation.scene.trace import FRAME, MOST_RINGS, trace
 from pathcontrol.view.animation.scene.tracks import Track, continuous_quaternions
 from pathcontrol.view.animation.scene.tube import SIDES, dashes, distinct, join_meshes, simplify, tube

@@ -32,7 +32,7 @@ from pathcontrol import (
 from pathcontrol.view.animation.animation import Animation
 from pathcontrol.view.animation.record import record
 from pathcontrol.view.animation.scene.camera import picture_axes
-from pathcontrol.view.tool import default_tool
+from pathcontrol.view.default_tool import default_tool
 
 HOSTILE = "</script><script>alert(1)</script>"
 ESCAPED = HOSTILE.replace("<", "&lt;").replace(">", "&gt;")

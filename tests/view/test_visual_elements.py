@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.robot.urdf import parse_urdf
-from pathcontrol.view.bodies.shapes import Box, Cylinder
-from pathcontrol.view.bodies.visuals import UNPAINTED, link_visuals
+from pathcontrol.view.bodies.body_shapes import Box, Cylinder
+from pathcontrol.view.bodies.body_visuals import UNPAINTED, link_visuals
 
 lengths = st.floats(1e-3, 10).map(repr)
 signed = st.floats(-7, 7).map(repr)
@@ -100,7 +100,7 @@ def test_an_arm_of_simple_shapes_is_filmed_without_a_library_of_meshes(arm):
     assert parse_urdf(arm.source.text).find("link/visual/geometry/mesh") is None
     code = (
         "import sys, pathcontrol as pc; from pathcontrol.view.animation.record import record; "
-        "from pathcontrol.view.bodies.visuals import link_visuals; "
+        "from pathcontrol.view.bodies.body_visuals import link_visuals; "
         "assert link_visuals(pc.load_robot('cicese_2dof').source); print({'trimesh', 'yourdfpy'} & {*sys.modules})"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"

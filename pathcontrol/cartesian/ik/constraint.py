@@ -11,7 +11,7 @@ from pathcontrol.cartesian.ik.joint_range import spread_postures
 from pathcontrol.cartesian.orientation import Orientation
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.errors import InputError
-from pathcontrol.toolpaths.curve import ToolCurve
+from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 _SAMPLES = 64
 _NO_RANK = 1e-6  # singular values below this share of the largest count as zero

@@ -2,7 +2,7 @@
 #pragma once
 #include "arm.hpp"
 
-// A table that is made once of any task; see engine/table.py. All parameters s are those of the task.
+// A table that is made once of any task; see engine/path_table.py. All parameters s are those of the task.
 struct Path {
   int joints, cells, buckets, closed, brakes;
   double s0, s_end, period;          // s_end is that of the first lap of a closed path

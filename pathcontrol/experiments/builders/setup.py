@@ -25,7 +25,7 @@ from pathcontrol.simulation.arm.noise import NoiseSource
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.finish import Until
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop, torque_limits
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 
 _MOST_SAMPLES = 10_000_000

@@ -16,9 +16,9 @@ from pathcontrol.experiments.schema.experiment import Experiment
 from pathcontrol.experiments.schema.task_sections import ToolpathSection
 from pathcontrol.registry import PROFILES, TASKS
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.check import check_task
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
+from pathcontrol.tasks.task_check import check_task
 from pathcontrol.toolpaths.read import read_toolpath
 
 _SAMPLES = 4001

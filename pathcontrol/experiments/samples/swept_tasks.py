@@ -16,7 +16,7 @@ from pathcontrol.experiments.schema.experiment import Experiment
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.batch.checks import kind_of
 from pathcontrol.tasks.batch.task_batch import TaskBatch
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
-from pathcontrol.profiles.topp.cells import Cells, static_shares
+from pathcontrol.profiles.topp.cell_constraints import Cells, static_shares
 from pathcontrol.profiles.topp.dynamics import Samples, Torques
 from pathcontrol.profiles.topp.joint_limits import JointLimits
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.profiles.topp.cells import Cells
+from pathcontrol.profiles.topp.cell_constraints import Cells
 
 _TRIALS = 60
 _CLOSE = 1e-6

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.profiles.topp.cells import Cells
+from pathcontrol.profiles.topp.cell_constraints import Cells
 
 _NEGLIGIBLE = 1e-6  # share of a limit
 _UNBOUNDED = 1e-100

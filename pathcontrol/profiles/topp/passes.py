@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.profiles.topp.cells import Cells
+from pathcontrol.profiles.topp.cell_constraints import Cells
 from pathcontrol.profiles.topp.one_pass import steps_of, sweep
 
 _FIRST_INSTANT = 2.5e-3  # s

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.profiles.topp.cells import Cells
+from pathcontrol.profiles.topp.cell_constraints import Cells
 from pathcontrol.profiles.topp.dynamics import Samples, Torques
 from pathcontrol.profiles.topp.fastest_pair import fastest_pair
 from pathcontrol.profiles.topp.joint_limits import JointLimits

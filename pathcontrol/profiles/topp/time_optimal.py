@@ -13,7 +13,7 @@ from pathcontrol.errors import InputError, TaskError
 from pathcontrol.profiles.tabulated import MOST_POINTS, TabulatedProfile
 from pathcontrol.profiles.topp.dynamics import sample, torques
 from pathcontrol.profiles.topp.joint_limits import LimitChoice, VelocityLimit, joint_limits
-from pathcontrol.profiles.topp.solve import Demand, fastest
+from pathcontrol.profiles.topp.traversal import Demand, fastest
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.profile import Path
 from pathcontrol.tasks.task import PathTask

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
-from pathcontrol.control.motion import ComputedTorque, PDPlus, SlotineLi
+from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
 from pathcontrol.robot.friction import viscous_of
 from pathcontrol.robot.model import RobotModel

@@ -11,7 +11,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
-from pathcontrol.control.motion import PDPlus, SlotineLi
+from pathcontrol.control.motion_control import PDPlus, SlotineLi
 from pathcontrol.errors import PathControlWarning, warn
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import viscous_of

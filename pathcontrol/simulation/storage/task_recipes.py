@@ -19,7 +19,7 @@ from pathcontrol.registry import PROFILES, TASKS, load
 from pathcontrol.simulation.storage.array_store import ArrayStore
 from pathcontrol.simulation.storage.recipe_size import check_extent
 from pathcontrol.tasks.batch.task_batch import TaskBatch
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.profile import ConstantRate, VelocityProfile
 from pathcontrol.tasks.recorded import RecordedPath, recorded_profile
 from pathcontrol.tasks.task import PathSection, PathTask, Reprofiled
@@ -32,7 +32,7 @@ _PLACES = {
     "Laps": "tasks.laps:Laps",
     "RecordedPath": "tasks.recorded:RecordedPath",
     "RecordedProfile": "tasks.recorded:RecordedProfile",
-    "PathSequence": "tasks.joined.sequence:PathSequence",
+    "PathSequence": "tasks.joined.path_sequence:PathSequence",
     "PathSection": "tasks.task:PathSection",
     "ReversedPath": "tasks.task:ReversedPath",
     "ScaledPath": "tasks.task:ScaledPath",

@@ -18,7 +18,7 @@ from pathcontrol.toolpaths.csv.names import CONTOUR, UNITS, hint_of_unit
 from pathcontrol.toolpaths.csv.rows import Rows
 from pathcontrol.toolpaths.csv.table import Table, decimal_mark
 from pathcontrol.toolpaths.notes import Notes
-from pathcontrol.toolpaths.segments.base import SAME_POINT, Polyline
+from pathcontrol.toolpaths.segments.segment import SAME_POINT, Polyline
 from pathcontrol.toolpaths.text import read_lines
 
 

@@ -17,8 +17,8 @@ from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.drawing.pieces import NOTHING, contour_of, drop_repeated, ends_of
 from pathcontrol.toolpaths.notes import Notes
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.segment import Polyline, Segment
 
 _NEAR, _NEAR_SHARE = 1e-6, 1e-4  # m and of the drawing's diagonal, how near ends that belong together lie
 _WIDEST_TOLD = 5e-5  # m, larger gaps are not noted

@@ -11,8 +11,8 @@ from pathcontrol._arrays import Array
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.notes import Notes
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.segment import Polyline, Segment
 
 _GRID = 1e-7  # m, points in one cell of it are the same
 _OFFSET = 0.3127  # of a cell, so that round coordinates lie inside cells

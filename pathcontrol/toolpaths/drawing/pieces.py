@@ -13,9 +13,9 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
 from pathcontrol.toolpaths.segments.cusps import is_plain, straight_turns, without_cusps
+from pathcontrol.toolpaths.segments.segment import Polyline, Segment
 from pathcontrol.toolpaths.text import MAX_COORDINATE, MAX_SEGMENTS
 
 NOTHING = 1e-9  # m, a shorter piece has no length

@@ -25,9 +25,9 @@ from pathcontrol.toolpaths.drawing.pieces import Budget
 from pathcontrol.toolpaths.drawing.skip import kinds_to_skip, names_of
 from pathcontrol.toolpaths.dxf.blocks import Entities
 from pathcontrol.toolpaths.dxf.entities import DRAWN, pieces
-from pathcontrol.toolpaths.dxf.layers import Layers
+from pathcontrol.toolpaths.dxf.visible_layers import Layers
 from pathcontrol.toolpaths.notes import Notes
-from pathcontrol.toolpaths.segments.base import Segment
+from pathcontrol.toolpaths.segments.segment import Segment
 from pathcontrol.toolpaths.text import read_text
 
 #: units of length by name [m]

@@ -9,7 +9,7 @@ from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.gcode.modes import Modes
 from pathcontrol.toolpaths.gcode.units import Unit
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import SAME_POINT
+from pathcontrol.toolpaths.segments.segment import SAME_POINT
 from pathcontrol.toolpaths.text import MAX_COORDINATE
 
 #: axes of each plane, first, second and normal: counter-clockwise, seen from the normal's tip, is from first to second

@@ -11,7 +11,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.segments.base import SAME_POINT, Polyline, Segment
+from pathcontrol.toolpaths.segments.segment import SAME_POINT, Polyline, Segment
 
 
 class ContourBuilder:

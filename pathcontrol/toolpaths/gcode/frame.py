@@ -9,7 +9,7 @@ from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.gcode.codes import GROUPS
 from pathcontrol.toolpaths.gcode.words import Block
 from pathcontrol.toolpaths.notes import Notes
-from pathcontrol.toolpaths.segments.base import SAME_POINT
+from pathcontrol.toolpaths.segments.segment import SAME_POINT
 
 _SYSTEMS = GROUPS["coordinate system"]
 _FIRST_SYSTEM = 540

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
 from pathcontrol.errors import InputError
-from pathcontrol.toolpaths.segments.base import Segment
+from pathcontrol.toolpaths.segments.segment import Segment
 
 
 @dataclass(frozen=True, eq=False)

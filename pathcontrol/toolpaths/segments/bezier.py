@@ -10,7 +10,7 @@ from scipy.interpolate import BPoly
 
 from pathcontrol._arrays import Array, as_array, finite, readonly
 from pathcontrol.errors import InputError
-from pathcontrol.toolpaths.segments.base import Segment
+from pathcontrol.toolpaths.segments.segment import Segment
 
 
 @dataclass(frozen=True, eq=False)

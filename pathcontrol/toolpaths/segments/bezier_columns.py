@@ -12,8 +12,8 @@ import numpy as np
 from scipy.special import comb
 
 from pathcontrol._arrays import Array
-from pathcontrol.toolpaths.segments.base import Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.segment import Segment
 
 _AT_ONCE = 512  # curves
 _HIGHEST_DEGREE = 3  # curves whose lengths are computed together

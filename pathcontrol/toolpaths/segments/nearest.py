@@ -9,8 +9,8 @@ from scipy.interpolate import BPoly, PPoly
 
 from pathcontrol._arrays import Array
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
-from pathcontrol.toolpaths.segments.base import Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.segment import Segment
 
 _DEGREE = 3  # the degree that lower ones are raised to
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.toolpaths.segments.base import SAME_POINT, Polyline, Segment
+from pathcontrol.toolpaths.segments.segment import SAME_POINT, Polyline, Segment
 from pathcontrol.toolpaths.smoothing.corners import angles, end_tangent, start_tangent
 
 _BETWEEN = 64  # points of each piece at which a polyline is compared with the segment it replaces

@@ -9,8 +9,8 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier_columns import end_tangents, measure_lengths
+from pathcontrol.toolpaths.segments.segment import Polyline, Segment
 
 TURN_BACK = np.radians(150.0)  # rad; sharper than this nothing can be blended without nearly standing still
 SHARP = np.radians(5.0)  # rad, turns above this are corners: counted, shown and stopped at

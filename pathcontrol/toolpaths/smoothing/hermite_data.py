@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.hermite import CurvePoint, hermite_polynomials
-from pathcontrol.toolpaths.segments.base import Segment
+from pathcontrol.toolpaths.segments.segment import Segment
 from pathcontrol.toolpaths.smoothing.corners import end_tangent, start_tangent
 
 _ACCURACY = 1e-9  # m, between a segment and the quintics in its place

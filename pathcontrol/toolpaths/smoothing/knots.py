@@ -11,11 +11,11 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.geometry.hermite import CurvePoint, hermite_polynomials
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
+from pathcontrol.toolpaths.segments.segment import Polyline, Segment
 from pathcontrol.toolpaths.smoothing.blends import Arm, Junction, blend_length
 from pathcontrol.toolpaths.smoothing.corners import angles
 from pathcontrol.toolpaths.smoothing.hermite_data import ByLength, Knots, Stretch, curved_stretch
-from pathcontrol.toolpaths.smoothing.polylines import round_polyline
+from pathcontrol.toolpaths.smoothing.rounded_polylines import round_polyline
 
 
 class SmoothKnots(NamedTuple):

@@ -9,10 +9,10 @@ from typing import Literal, get_args
 from pathcontrol._arrays import Array, scalar
 from pathcontrol._expect import expect, expect_choice
 from pathcontrol.toolpaths.contour import Contour
-from pathcontrol.toolpaths.curve import ToolCurve
 from pathcontrol.toolpaths.smoothing.bends import regularize
 from pathcontrol.toolpaths.smoothing.corners import SHARP, TURN_BACK, Corner, corners, split
 from pathcontrol.toolpaths.smoothing.knots import smooth_knots
+from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 Corners = Literal["blend", "stop"]
 

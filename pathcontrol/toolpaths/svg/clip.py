@@ -13,8 +13,8 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.drawing.pieces import EllipticArc, Lines, Piece
 from pathcontrol.toolpaths.segments.arc import Arc
-from pathcontrol.toolpaths.segments.base import Polyline, Segment
 from pathcontrol.toolpaths.segments.bezier import Bezier
+from pathcontrol.toolpaths.segments.segment import Polyline, Segment
 from pathcontrol.toolpaths.svg.attributes import Viewport, transform
 from pathcontrol.toolpaths.svg.document import Document, tag_of
 from pathcontrol.toolpaths.svg.paint import Paint, is_black

@@ -10,7 +10,7 @@ from typing import Any
 
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.svg.shapes import Attributes
-from pathcontrol.toolpaths.svg.style import StyleSheet
+from pathcontrol.toolpaths.svg.style_sheet import StyleSheet
 from pathcontrol.toolpaths.text import read_text
 
 _LONGEST = 300  # characters of a message of the parser that are shown

@@ -18,7 +18,7 @@ from pathcontrol.toolpaths.svg.document import Document, label_of, tag_of
 from pathcontrol.toolpaths.svg.layers import Chosen, layer_name
 from pathcontrol.toolpaths.svg.paint import Paint
 from pathcontrol.toolpaths.svg.shapes import SHAPES, Attributes, subpaths
-from pathcontrol.toolpaths.svg.style import REFUSED
+from pathcontrol.toolpaths.svg.style_sheet import REFUSED
 from pathcontrol.toolpaths.svg.viewport import nested_view, page_view
 
 _GROUPS = frozenset({"g", "a", "svg", "switch", "use"})

@@ -11,8 +11,8 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.view.animation.path_error import PathError, in_fitting_units, path_error
 from pathcontrol.view.animation.rollout import Recording
-from pathcontrol.view.animation.scene.builder import swept
 from pathcontrol.view.animation.scene.desired_path import Line, desired_lines
+from pathcontrol.view.animation.scene.scene_builder import swept
 
 LINE_WIDTH = 0.002  # radius of the line the tool has drawn, of the diagonal of what is seen of its arm …
 FINE_LINE_WIDTH = 0.012  # … or of that of the line, if that is less: a small drawing stays legible

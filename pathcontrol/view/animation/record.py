@@ -13,14 +13,14 @@ from pathcontrol.view.animation.animation import Animation
 from pathcontrol.view.animation.charts.plane import plane
 from pathcontrol.view.animation.charts.quantities import charts
 from pathcontrol.view.animation.drawn_rollout import DrawnRollout, draw_rollouts
+from pathcontrol.view.animation.metric_tables import tables
 from pathcontrol.view.animation.payload import Film
 from pathcontrol.view.animation.recorded_runs import film_title, make_recordings
-from pathcontrol.view.animation.scene.builder import Stage
+from pathcontrol.view.animation.scene.arm_layout import Layout, shifts
 from pathcontrol.view.animation.scene.camera import Camera, view_direction
-from pathcontrol.view.animation.scene.layout import Layout, shifts
 from pathcontrol.view.animation.scene.legend import labels, legend
+from pathcontrol.view.animation.scene.scene_builder import Stage
 from pathcontrol.view.animation.scene.tool_lines import add_lines, add_markers
-from pathcontrol.view.animation.tables import tables
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel

@@ -16,9 +16,9 @@ from pathcontrol.tasks.batch.task_batch import select_rows
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.animation.rollout import Recording
 from pathcontrol.view.animation.scene.palette import run_color
+from pathcontrol.view.bodies.body_visuals import LinkVisual, link_visuals
 from pathcontrol.view.bodies.sticks import stick_figure
-from pathcontrol.view.bodies.visuals import LinkVisual, link_visuals
-from pathcontrol.view.tool import with_tool
+from pathcontrol.view.default_tool import with_tool
 
 if TYPE_CHECKING:
     from pathcontrol.robot.arm_dynamics import UrdfSource

@@ -12,8 +12,8 @@ from pathcontrol._arrays import Array
 from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.batch.task_batch import TaskBatch
-from pathcontrol.view.bodies.shapes import Color
-from pathcontrol.view.bodies.visuals import LinkVisual
+from pathcontrol.view.bodies.body_shapes import Color
+from pathcontrol.view.bodies.body_visuals import LinkVisual
 
 if TYPE_CHECKING:
     from pathcontrol.cartesian.toolpath_task import ToolpathTask

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 from pathcontrol._arrays import Array
 from pathcontrol.robot.urdf import parse_urdf
 from pathcontrol.robot.urdf.numbers import read_numbers
-from pathcontrol.view.bodies.links import joint_offset
-from pathcontrol.view.bodies.shapes import Box, Color, Cylinder, Sphere
-from pathcontrol.view.bodies.visuals import LinkVisual
+from pathcontrol.view.bodies.body_links import joint_offset
+from pathcontrol.view.bodies.body_shapes import Box, Color, Cylinder, Sphere
+from pathcontrol.view.bodies.body_visuals import LinkVisual
 
 if TYPE_CHECKING:
     from pathcontrol.robot.arm_dynamics import UrdfSource

@@ -5,7 +5,7 @@ from __future__ import annotations
 import fast_simplification
 import numpy as np
 
-from pathcontrol.view.bodies.shapes import Mesh
+from pathcontrol.view.bodies.body_shapes import Mesh
 
 _ROUNDING = 1 / 16  # share of the detail, far below a pixel; numbers with fewer digits compress better
 

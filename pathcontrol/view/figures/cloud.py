@@ -13,8 +13,8 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
+from pathcontrol.view.figures.lettering import legend
 from pathcontrol.view.figures.style import BLUE, DASHED, GREY, INK, ORANGE, PAGE, Look, apply_style, new_figure, style
-from pathcontrol.view.figures.words import legend
 
 _OTHER: Look = {"marker": "o", "linestyle": "none", "markersize": 2.4, "color": GREY, "alpha": 0.6, "mew": 0}
 _NEAR: Look = {"marker": "o", "linestyle": "none", "markersize": 2.8, "color": BLUE, "alpha": 0.8, "mew": 0}

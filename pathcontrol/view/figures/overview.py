@@ -9,9 +9,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from pathcontrol.analysis.run_metrics import LABELS
-from pathcontrol.view.figures.columns import readable_metric
-from pathcontrol.view.figures.pareto import pareto_figure
-from pathcontrol.view.figures.sweep import basin_figure, robustness_figure
+from pathcontrol.view.figures.pareto_figure import pareto_figure
+from pathcontrol.view.figures.sweep_columns import readable_metric
+from pathcontrol.view.figures.sweep_figures import basin_figure, robustness_figure
 
 _MOST = 6  # parameters with a figure each
 _COSTS = ("tau_noise", "tau_demand_ratio", "tau_demand_peak", "tau_peak")  # the price of small errors

@@ -15,11 +15,11 @@ from pathcontrol.errors import InputError, TaskError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.batch.task_batch import select_rows
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
+from pathcontrol.view.figures.lettering import plain
 from pathcontrol.view.figures.lines import drawable
 from pathcontrol.view.figures.style import RUN_COLOURS
-from pathcontrol.view.figures.words import plain
 
 #: one run, or several by the names they have in the legend
 Runs = Run | Mapping[str, Run]

@@ -19,7 +19,7 @@ from pathcontrol._expect import expect
 from pathcontrol._files import whole_file
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.errors import InputError
-from pathcontrol.view.figures.layout import SettledLayout, laid_out
+from pathcontrol.view.figures.panel_layout import SettledLayout, laid_out
 from pathcontrol.view.figures.ticks import SpacedLocator, label_plainly
 
 # Okabe and Ito's colours, told apart with any colour vision; their yellow is too pale on white

@@ -43,14 +43,14 @@ def pictures(runs: Mapping[str, Run]) -> list[Picture]:
 
 def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
     """Yield figures of runs of the same joints, with their captions."""
-    from pathcontrol.view.figures.comparison import comparison_figure
-    from pathcontrol.view.figures.deviation import deviation_figure
-    from pathcontrol.view.figures.errors import error_bands_figure, error_figure
-    from pathcontrol.view.figures.path import path_figure, phase_figure
-    from pathcontrol.view.figures.shares import largest_shares, limits_figure
-    from pathcontrol.view.figures.speed import speed_figure
-    from pathcontrol.view.figures.tool import tool_figure
-    from pathcontrol.view.figures.torque import torque_figure
+    from pathcontrol.view.figures.comparison_figure import comparison_figure
+    from pathcontrol.view.figures.deviation_figure import deviation_figure
+    from pathcontrol.view.figures.error_figures import error_bands_figure, error_figure
+    from pathcontrol.view.figures.limits_figure import largest_shares, limits_figure
+    from pathcontrol.view.figures.path_figures import path_figure, phase_figure
+    from pathcontrol.view.figures.speed_figure import speed_figure
+    from pathcontrol.view.figures.tool_figure import tool_figure
+    from pathcontrol.view.figures.torque_figure import torque_figure
 
     one = next(iter(runs.values()))
     shown = runs if len(runs) > 1 else one

@@ -15,7 +15,7 @@ from pathcontrol.simulation.run import Run
 
 if TYPE_CHECKING:
     from pathcontrol.sweeps.result import SweepResult
-    from pathcontrol.view.animation.scene.layout import Layout
+    from pathcontrol.view.animation.scene.arm_layout import Layout
 
 
 def report(

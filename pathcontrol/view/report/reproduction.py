@@ -11,9 +11,9 @@ from pathcontrol.simulation.config import laws, table
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.summaries import is_whole
 from pathcontrol.view.report.code import Name, call, class_code
-from pathcontrol.view.report.disturbance import disturbance_code
+from pathcontrol.view.report.disturbance_code import disturbance_code
 from pathcontrol.view.report.downloads import Download, file_name, text_file
-from pathcontrol.view.report.settings import Setting
+from pathcontrol.view.report.settings_table import Setting
 
 _LOOPS = {"sampled": "SampledLoop", "continuous": "ContinuousTime"}
 _NOT_ARGUMENTS = ("controller", "robot", "task")

@@ -14,20 +14,20 @@ import xarray as xr
 from markupsafe import Markup, escape
 
 from pathcontrol.analysis.contours import contour_table
-from pathcontrol.analysis.laps import lap_table
-from pathcontrol.analysis.remarks import remarks
+from pathcontrol.analysis.lap_table import lap_table
 from pathcontrol.analysis.run_metrics import LABELS, UNITS
+from pathcontrol.analysis.run_remarks import remarks
 from pathcontrol.analysis.window import describe_window
 from pathcontrol.simulation.run import Run
 from pathcontrol.sweeps.result import SweepResult
-from pathcontrol.view.figures.columns import never, readable_metric
 from pathcontrol.view.figures.overview import overview
+from pathcontrol.view.figures.sweep_columns import never, readable_metric
 from pathcontrol.view.page.html import Section
 from pathcontrol.view.report.downloads import Download, json_file, signals_file
 from pathcontrol.view.report.pictures import picture, pictures
 from pathcontrol.view.report.reproduction import recipe, versions
-from pathcontrol.view.report.settings import settings
-from pathcontrol.view.report.summary import Cell, Row, facts, measure, rows
+from pathcontrol.view.report.run_summary import Cell, Row, facts, measure, rows
+from pathcontrol.view.report.settings_table import settings
 
 _NOT_METRICS = ("finish_time", "diverged_time")
 

@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 
 from pathcontrol.robot.urdf.checks.finding import Finding, Level, place
-from pathcontrol.robot.urdf.dynamics import dynamics, postures
 from pathcontrol.robot.urdf.links import Link
 from pathcontrol.robot.urdf.model_values import Arm, axis_inertia, has_direction, moving_bodies
+from pathcontrol.robot.urdf.posture_dynamics import dynamics, postures
 
 INERTIA_TOLERANCE = 1e-6  # of the largest principal moment: what rounding in a file may cost
 NO_INERTIA = 1e-15  # kg m^2, far below any finger joint

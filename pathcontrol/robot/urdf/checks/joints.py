@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from pathcontrol.robot.urdf.checks.finding import Finding, place, quote
-from pathcontrol.robot.urdf.dynamics import dynamics, postures
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES
 from pathcontrol.robot.urdf.links import Joint, Limit
 from pathcontrol.robot.urdf.model_values import Arm, has_direction, moving_bodies
 from pathcontrol.robot.urdf.numbers import ABSURD
+from pathcontrol.robot.urdf.posture_dynamics import dynamics, postures
 
 UNIT_TOLERANCE = 1e-3
 

@@ -10,7 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.limit_shares import RATIOS, limit_shares
 from pathcontrol.analysis.readable import in_degrees
-from pathcontrol.analysis.tool import feed_along, find_tool, tool_speed
+from pathcontrol.analysis.tool_following import feed_along, find_tool, tool_speed
 from pathcontrol.analysis.torque_limits import torque_limits
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.animation.charts.chart import Chart, Curve

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.bodies.shapes import directions
+from pathcontrol.view.bodies.body_shapes import directions
 
 LOWEST, HIGHEST = np.deg2rad([22.0, 42.0])
 ASIDE = np.deg2rad(20.0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
-from pathcontrol.tasks.joined.sequence import PathSequence
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.animation.rollout import Recording
 from pathcontrol.view.animation.scene.tube import distinct
@@ -81,7 +81,7 @@ def _drawing(task: ToolpathTask) -> list[Line]:
 
 def _outline(contour: Contour) -> Array:
     """Return points of a contour [m], (k, 3), near enough for a picture."""
-    from pathcontrol.toolpaths.segments.base import Polyline
+    from pathcontrol.toolpaths.segments.segment import Polyline
 
     u = np.linspace(0.0, 1.0, _CURVE_SAMPLES + 1)
     parts = [segment.points if isinstance(segment, Polyline) else segment.point(u) for segment in contour.segments]

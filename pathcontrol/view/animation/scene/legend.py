@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.view.animation.drawn_rollout import DrawnRollout
 from pathcontrol.view.animation.path_error import PathError
 from pathcontrol.view.animation.scene.palette import DESIRED, DESIRED_POINT, PLAIN, RAPID, scale_colors
-from pathcontrol.view.bodies.shapes import Color
+from pathcontrol.view.bodies.body_shapes import Color
 
 _STEPS = 9  # colours of a scale, between which the page blends
 _ABOVE, _APART = 0.06, 0.05  # shares of the visible height: labels above the arm, and above one another

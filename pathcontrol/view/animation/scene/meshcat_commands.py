@@ -11,7 +11,7 @@ import numpy as np
 import umsgpack
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.bodies.shapes import Box, Color, Cylinder, Mesh, Shape, Sphere
+from pathcontrol.view.bodies.body_shapes import Box, Color, Cylinder, Mesh, Shape, Sphere
 
 _BACK, _BOTH = 1, 2  # three.js: which side of a triangle is drawn
 # three.js has cylinders along y, URDF along z

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.bodies.shapes import Color
+from pathcontrol.view.bodies.body_shapes import Color
 
 #: Okabe and Ito's colours, for the runs in the order that figures have, too; the last is pale on white
 RUNS: tuple[Color, ...] = (

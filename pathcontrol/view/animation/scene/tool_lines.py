@@ -8,10 +8,10 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.view.animation.drawn_rollout import DrawnRollout
-from pathcontrol.view.animation.scene.builder import Stage
 from pathcontrol.view.animation.scene.desired_path import look_alike
 from pathcontrol.view.animation.scene.legend import tops
 from pathcontrol.view.animation.scene.palette import DESIRED_POINT, PLAIN, scale_colors
+from pathcontrol.view.animation.scene.scene_builder import Stage
 from pathcontrol.view.animation.scene.trace import trace
 
 _HALO, _DOT = 6.0, 2.8  # radii of the desired point and of the tool, of that of the tool's line

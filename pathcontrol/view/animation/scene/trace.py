@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.view.animation.scene.keyframes import Indices, inside, interpolate, key_samples
 from pathcontrol.view.animation.scene.tube import SIDES, distinct_rows, tube
-from pathcontrol.view.bodies.shapes import Mesh
+from pathcontrol.view.bodies.body_shapes import Mesh
 
 MOST_RINGS = 2500
 FRAME = 1 / 60  # s between rings while the tool moves, so that the line grows in steps too small to see

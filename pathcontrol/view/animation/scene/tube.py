@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.bodies.shapes import Mesh
+from pathcontrol.view.bodies.body_shapes import Mesh
 
 SIDES = 6
 

@@ -1,0 +1,95 @@
+"""The figure of torques beside their limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, joint_array
+from pathcontrol.analysis.torque_limits import torque_limits as clamped_limits
+from pathcontrol.view.figures.lettering import joint_label, legend
+from pathcontrol.view.figures.limits import extent, over_time, span
+from pathcontrol.view.figures.lines import drawable, series
+from pathcontrol.view.figures.shown import Runs, Shown, check_joints, own_robot, readable, shown
+from pathcontrol.view.figures.style import COLUMN, LIMIT_LOOK, PAGE, SMALL, apply_style, new_figure, style
+
+_BEYOND = "#ECECEC"  # the region beyond a limit
+_TALL_COLUMN = 3  # panels
+
+
+def torque_figure(run: Runs, limits: ArrayLike | None = None, rollout: int = 0) -> Figure:
+    """Draw applied torques [N m] over time, one panel for each joint, with their limits and the used share.
+
+    Sliding joints have forces [N]. The limits are always inside the panel, so that the margin is seen.
+
+    Args:
+        run: a run, or several of one arm by their names.
+        limits: largest torques (n,); by default those it was clamped to, else its robot's. Infinite ones are not drawn.
+        rollout: which rollout of each run.
+
+    Raises:
+        InputError: there is no such rollout, or the limits are not one for each joint.
+    """
+    runs = shown(run, rollout=rollout)
+    names = check_joints(runs)
+    largest_torques = torque_limits(runs[0], limits)
+    columns = 1 if len(names) <= _TALL_COLUMN else 2
+    rows = -(-len(names) // columns)
+    with style():
+        figure = new_figure(COLUMN if columns == 1 else PAGE, 0.6 + 1.35 * rows)
+        for k in range(len(names)):
+            # down the columns, so that neighbours on the page are neighbours on the arm
+            axes = apply_style(figure.add_subplot(rows, columns, 1 + columns * (k % rows) + k // rows))
+            _draw_joint(axes, runs, k, float(largest_torques[k]))
+            last = k % rows == rows - 1 or k == len(names) - 1
+            axes.set_xlabel("time [s]" if last else "")
+            axes.tick_params(labelbottom=last)
+        figure.align_ylabels()
+        entries = {one.label: Line2D([], [], **one.look) for one in runs if one.name}
+        bounded = np.isfinite(largest_torques).any()
+        legend(figure, entries | ({"limit": Line2D([], [], **LIMIT_LOOK)} if bounded else {}))
+    return figure
+
+
+def torque_limits(one: Shown, limits: ArrayLike | None = None) -> Array:
+    """Return the largest torques (n,): given, set by the loop, or the robot's own; infinite where unknown."""
+    if limits is None:
+        return clamped_limits(one.run, own_robot(one.run))
+    given = np.abs(joint_array("limits", limits, len(one.joints), tuple(one.joints)))
+    return np.where(drawable(given) > 0, given, np.inf)
+
+
+def torque_share(one: Shown, limits: Array) -> Array:
+    """Return the largest over the joints of |τ_j| over its limit [%], (time,), of the first rollout."""
+    return 100.0 * (np.abs(drawable(one.run.array("tau")[0])) / limits).max(-1)
+
+
+def _draw_joint(axes: Axes, runs: Sequence[Shown], k: int, limit: float) -> None:
+    """Draw the torque of one joint."""
+    found = [readable(one.run, "tau", k) for one in runs]
+    values, unit = [v[0] for v, _ in found], found[0][1]
+    for one, v in zip(runs, values, strict=True):
+        series(axes, one.run.time, v, **one.look)
+    over_time(axes, [one.run.time for one in runs])
+    axes.set_ylabel(rf"$\tau_{{{k + 1}}}$ [{unit}]")
+    axes.set_title(joint_label(k, runs[0].joints) if len(runs[0].joints) > 2 else "", fontsize=SMALL, loc="left", pad=3)
+    bounded = np.isfinite(limit)
+    axes.set_ylim(span([*values, np.array([-limit, limit]) if bounded else np.zeros(1)]))
+    if bounded:
+        _draw_limits(axes, limit)
+        share = 100.0 * max(map(abs, extent(values))) / limit
+        axes.set_title(f"peak {share:.3g} % of {limit:.4g} {unit}", fontsize=SMALL, loc="right", pad=3)
+
+
+def _draw_limits(axes: Axes, limit: float) -> None:
+    """Draw a line at each limit, and grey beyond it."""
+    low, high = axes.get_ylim()
+    for sign, end in ((1.0, high), (-1.0, low)):
+        axes.axhline(sign * limit, **LIMIT_LOOK)
+        axes.axhspan(sign * limit, end, color=_BEYOND, linewidth=0, zorder=0.5)
+    axes.set_ylim(low, high)
