@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 # matrices here are small: threads of BLAS would wait for each other, busily, on cores that other tests need
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
+from experiment_files import BASE, DRAWING, OWN_TASK, document, merged
 from hypothesis import HealthCheck, settings
 
 from pathcontrol import Circle, RobotModel, Viscous, load_robot
@@ -51,3 +53,21 @@ def ideal_arm(arm: RobotModel) -> RobotModel:
 def circle() -> Circle:
     """The paper's task."""
     return Circle(np.deg2rad(57.3), np.deg2rad(114.59))
+
+
+@pytest.fixture
+def write_experiment(tmp_path: Path) -> Callable[..., Path]:
+    """A function that writes the base experiment with changes and gives the path."""
+
+    def write(changes: dict | str | None = None, name: str = "experiment.toml") -> Path:
+        path = tmp_path / name
+        if isinstance(changes, str):
+            path.write_text(changes, encoding="utf-8")
+        else:
+            data = merged(BASE, changes or {})
+            path.write_text(document(data), encoding="utf-8")
+        (tmp_path / "tasks.py").write_text(OWN_TASK, encoding="utf-8")
+        (tmp_path / "drawing.svg").write_text(DRAWING, encoding="utf-8")
+        return path
+
+    return write

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -18,7 +15,6 @@ from pathcontrol import (
     Lissajous,
     PathTask,
     Projection,
-    Run,
     SampledLoop,
     SimulationError,
     distance_to_gamma,
@@ -26,9 +22,7 @@ from pathcontrol import (
     simulate,
 )
 from pathcontrol.experiments.reproduce import paper_controllers
-from pathcontrol.simulation import recorder
 from pathcontrol.simulation.arm.sensors import Sensors
-from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sampled import _split_delay
 
 START = np.deg2rad([40.0, 70.0])
@@ -269,83 +263,6 @@ def test_a_figure_of_eight_is_followed_branch_by_branch(arm):
     assert run.norm("e_p")[0, run.time > 2].max() < np.deg2rad(4)
 
 
-# --- what comes out -----------------------------------------------------------------------------------------------
-
-
-def test_a_run_is_labelled(arm, circle):
-    run = simulate(paper_law(arm, circle), [START, START + 0.1, START - 0.1], duration=0.1, progress=False)
-    assert dict(run.data.sizes) == {"rollout": 3, "time": 41, "joint": 2}
-    assert run["q"].dims == ("rollout", "time", "joint")
-    assert list(run["joint"].to_numpy()) == ["joint_1", "joint_2"]
-    assert run["tau"].attrs["units"] == "N m"
-    assert run["time"].attrs["units"] == "s"
-    assert run.time[-1] == pytest.approx(0.1)
-    assert run.config["controller"]["k"] == 20.0
-    assert run.config["controller"]["task"]["radius"] == circle.radius
-    assert run.config["plant"]["friction"]["law"] == "FrictionSum"
-    assert np.array_equal(run.rollout(1).array("q")[0], run.array("q")[1])
-
-
-def test_a_run_survives_the_disk(arm, circle, tmp_path):
-    run = simulate(paper_law(arm, circle), START, duration=0.1, progress=False)
-    path = run.save(tmp_path / "deep" / "run.nc")
-    again = Run.load(path)
-    assert again.data.identical(run.data)
-    assert again.config == json.loads(json.dumps(run.config))
-    assert path.read_bytes()[:8] == b"\x89HDF\r\n\x1a\n"  # plain netCDF-4, nothing pickled
-    assert [p.name for p in path.parent.iterdir()] == ["run.nc"]
-
-
-def test_a_file_is_whole_or_not_there(arm, circle, tmp_path, monkeypatch):
-    run = simulate(paper_law(arm, circle), START, duration=0.1, progress=False)
-    path = run.save(tmp_path / "run.nc")
-    before = path.read_bytes()
-
-    def interrupted(self, target):
-        self.write_bytes(b"half")
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(Path, "replace", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        run.save(path)
-    assert path.read_bytes() == before
-    assert [p.name for p in tmp_path.iterdir()] == ["run.nc"]
-
-
-def test_loading_something_else(tmp_path):
-    with pytest.raises(InputError, match="there is no file"):
-        Run.load(tmp_path / "none.nc")
-    (tmp_path / "text.nc").write_text("not a run")
-    with pytest.raises(InputError, match="not a run saved by"):
-        Run.load(tmp_path / "text.nc")
-
-
-def test_a_law_that_knows_the_time_is_recorded_as_it_acted(ideal_arm, circle):
-    class Clock(ComputedTorque):
-        def law(self, t, q, qd, z):
-            return super().law(t, q, qd, z)._replace(tau=np.full(q.shape, t))
-
-    for loop in (SampledLoop(), ContinuousTime()):
-        run = simulate(Clock(ideal_arm, circle, 1.0, 1.0), START, duration=0.1, loop=loop, progress=False)
-        assert np.allclose(run.array("tau")[0, :, 0], run.time)
-
-
-def test_a_task_may_carry_anything(ideal_arm):
-    """What cannot be written into the record of a run is left out of it, and never costs the run."""
-
-    class Loaded(Circle):
-        def __init__(self):
-            super().__init__(1.0, 1.0)
-            self.ragged, self.function, self.label = [[1], [1, 2]], np.sin, "inner contour"
-
-    run = simulate(Projection(ideal_arm, Loaded(), 100.0, 20.0), START, duration=0.01, progress=False)
-    described = run.config["controller"]["task"]
-    assert described["label"] == "inner contour"
-    assert described["radius"] == 1.0
-    assert "ragged" not in described
-    json.dumps(run.config)
-
-
 # --- bad input ----------------------------------------------------------------------------------------------------
 
 
@@ -399,30 +316,3 @@ def test_bad_loops(options, word):
 def test_bad_hardware(arm, circle, options, word):
     with pytest.raises(InputError, match=word):
         simulate(paper_law(arm, circle), START, duration=0.1, loop=SampledLoop(**options))
-
-
-# --- room for what is recorded ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("room", [1, 3000, 1 << 20])
-def test_a_run_is_the_same_however_often_its_room_grows(arm, circle, room, monkeypatch):
-    def run():
-        return simulate(paper_law(arm, circle), [START, START / 2], duration=0.3, progress=False)
-
-    plenty = run()
-    monkeypatch.setattr(recorder, "_ROOM", room)
-    for name in plenty.data.data_vars:
-        np.testing.assert_array_equal(run().array(name), plenty.array(name), err_msg=name)
-
-
-@pytest.mark.parametrize("engine", ["compiled", "pinocchio"])
-def test_a_run_that_ends_long_before_its_time_keeps_no_room_for_the_rest(arm, circle, engine, monkeypatch):
-    recorders, module = [], {"compiled": "compiled", "pinocchio": "sampled"}[engine]
-    monkeypatch.setattr(
-        f"pathcontrol.simulation.{module}.Recorder", lambda *a: recorders.append(Recorder(*a)) or recorders[-1]
-    )
-    run = simulate(paper_law(arm, circle), START, duration=1e7, laps=1, engine=engine, progress=False)
-    assert run.finish_time[0] < 5
-    arrays = recorders[0].arrays()
-    kept, (owned,) = sum(array.nbytes for array in arrays.values()), {array.base.nbytes for array in arrays.values()}
-    assert kept <= owned < 1.1 * kept < 1e6
