@@ -28,7 +28,7 @@ def as_array(name: str, value: ArrayLike) -> Array:
         raise InputError(f"{name} = {value!r}, expected numbers", argument=name, value=value) from error
 
 
-def joint_array(name: str, value: Any, n: int, joints: Sequence[str] | None = None) -> Array:
+def as_joint_array(name: str, value: Any, n: int, joints: Sequence[str] | None = None) -> Array:
     """Convert ``value`` to an array (*batch, n), put in the order of ``joints`` if it is labelled by their names."""
     if type(value) is np.ndarray and value.dtype == np.float64:
         array: Array = value
@@ -53,7 +53,7 @@ def strip_labels(name: str, value: Any, joints: Sequence[str]) -> Any:
     return value if found is None else order_by_name(name, found, joints)
 
 
-def finite(name: str, array: Array) -> Array:
+def check_finite(name: str, array: Array) -> Array:
     """Check that all of ``array`` is finite, and return it."""
     if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
@@ -65,9 +65,9 @@ def finite(name: str, array: Array) -> Array:
     return array
 
 
-def physical(name: str, array: Array) -> Array:
+def check_physical(name: str, array: Array) -> Array:
     """Check that ``array`` is finite and below 1e30 in size, so that dynamics can compute with it; return it."""
-    finite(name, array)
+    check_finite(name, array)
     if (np.abs(array) >= LARGEST).any():
         where = tuple(int(i) for i in np.argwhere(np.abs(array) >= LARGEST)[0])
         raise InputError(
@@ -76,7 +76,7 @@ def physical(name: str, array: Array) -> Array:
     return array
 
 
-def scalar(name: str, value: Any, *, positive: bool = False, least: float | None = None) -> float:
+def as_scalar(name: str, value: Any, *, positive: bool = False, least: float | None = None) -> float:
     """Convert ``value`` to a finite float, optionally positive or not below ``least``."""
     array = as_array(name, value)
     if array.ndim != 0 or not np.isfinite(array):
@@ -91,7 +91,7 @@ def scalar(name: str, value: Any, *, positive: bool = False, least: float | None
     return number
 
 
-def whole(name: str, value: Any, least: int, most: int) -> int:
+def as_whole(name: str, value: Any, least: int, most: int) -> int:
     """Convert ``value`` to a whole number from ``least`` to ``most``, such as one that sets how much is allocated."""
     array = as_array(name, value)
     if array.ndim != 0 or not least <= array <= most or array != np.floor(array):
@@ -113,9 +113,9 @@ def check_whole(name: str, value: Any, least: int = 1) -> int:
     return int(value)
 
 
-def quantity(name: str, value: Any) -> float:
+def as_quantity(name: str, value: Any) -> float:
     """Convert ``value`` to a float from 1e-12 to 1e30, such as a mass, so that dynamics can compute with it."""
-    number = scalar(name, value, positive=True)
+    number = as_scalar(name, value, positive=True)
     if not SMALLEST <= number < LARGEST:
         raise InputError(
             f"{name} = {number:g}, expected SI units, from {SMALLEST:g} to {LARGEST:g}",
@@ -126,7 +126,7 @@ def quantity(name: str, value: Any) -> float:
     return number
 
 
-def readonly(array: Array) -> Array:
+def freeze(array: Array) -> Array:
     """Return a copy that cannot be written to, so that values stay values."""
     copy = np.array(array)
     copy.setflags(write=False)
@@ -138,19 +138,19 @@ def merge_rows(values: Sequence[Array]) -> Array:
     if all(value is values[0] for value in values):
         return values[0]
     rows = np.stack(values)
-    return readonly(rows[0] if (rows == rows[0]).all() else rows)
+    return freeze(rows[0] if (rows == rows[0]).all() else rows)
 
 
-def rigid(name: str, pose: ArrayLike, tolerance: float = 1e-9) -> Array:
+def check_rigid(name: str, pose: ArrayLike, tolerance: float = 1e-9) -> Array:
     """Check that ``pose`` is a homogeneous transform (4, 4) of a rigid motion up to ``tolerance``; errors name it."""
-    transform = finite(name, as_array(name, pose))
+    transform = check_finite(name, as_array(name, pose))
     if transform.shape != (4, 4):
         raise InputError(f"{name} has shape {transform.shape}, expected (4, 4), a homogeneous transform")
     turn = transform[:3, :3]
     proper = np.allclose(turn @ turn.T, np.eye(3), atol=tolerance) and np.linalg.det(turn) > 0
     if not proper or not np.allclose(transform[3], [0, 0, 0, 1]):
         raise InputError(f"{name} is no rigid motion: its rotation is not orthonormal, or its last row not 0 0 0 1")
-    return readonly(transform)
+    return freeze(transform)
 
 
 def copy_vectors(array: Array) -> Array:

@@ -70,15 +70,15 @@ class Quantity(float):
     unit: str
 
     def __new__(cls, value: float, unit: str) -> Quantity:
-        quantity = super().__new__(cls, value)
-        quantity.unit = unit
-        return quantity
+        made = super().__new__(cls, value)
+        made.unit = unit
+        return made
 
     def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]
         return float(self), self.unit
 
 
-def quantity(text: str, *units: str) -> Quantity:
+def parse_quantity(text: str, *units: str) -> Quantity:
     """Convert ``text``, a number and a unit, to the one of the SI ``units`` that has its dimension.
 
     Raises:

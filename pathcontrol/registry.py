@@ -128,7 +128,7 @@ def load(place: str) -> Any:
     return resolve_name(f"{__package__}.{place}")
 
 
-def kind_of(base: Any) -> Kind | None:
+def find_kind(base: Any) -> Kind | None:
     """Return the kind whose base a class is, or ``None``."""
     place = f"{getattr(base, '__module__', '')}:{getattr(base, '__qualname__', '')}"
     return next((kind for kind in KINDS if place == f"{__package__}.{kind.base}"), None)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, joint_array, scalar
+from pathcontrol._arrays import Array, as_joint_array, as_scalar
 from pathcontrol._expect import expect
 from pathcontrol.control.ending import Ending
 from pathcontrol.engine.gamma_distance import distances_to_gamma
@@ -48,8 +48,8 @@ def distance_to_gamma(
         TaskError: the path goes on for ever without repeating.
     """
     expect("task", task, PathTask, error=TaskError)
-    w = scalar("weight", weight, least=0.0)
-    q, qd = joint_array("q", q, task.n), joint_array("qd", qd, task.n)
+    w = as_scalar("weight", weight, least=0.0)
+    q, qd = as_joint_array("q", q, task.n), as_joint_array("qd", qd, task.n)
     if q.shape != qd.shape:
         raise InputError(f"q has shape {q.shape} and qd {qd.shape}, expected the same")
     if isinstance(task, TaskBatch):

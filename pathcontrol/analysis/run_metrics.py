@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol._expect import expect
 from pathcontrol.analysis.coverage import measure_coverage, path_points
 from pathcontrol.analysis.gamma import distance_to_gamma, planned_rate
@@ -101,7 +101,7 @@ def settling_time(values: Array, time: Array, band: float) -> Array:
 
     It is inf where they never do, and NaN where some are NaN.
     """
-    outside = np.abs(values) > scalar("band", band, positive=True)
+    outside = np.abs(values) > as_scalar("band", band, positive=True)
     last = values.shape[-1] - 1 - np.argmax(outside[:, ::-1], axis=-1)
     after = np.append(time, np.inf)[last + 1]
     return np.where(np.isnan(values).any(-1), np.nan, np.where(outside.any(-1), after, time[0]))
@@ -186,7 +186,7 @@ def metrics(
         UnknownNameError: a variable is missing in the run.
         TaskError: the task returns something it must not.
     """
-    band = scalar("band", band, positive=True)
+    band = as_scalar("band", band, positive=True)
     values: dict[str, Array] = {}
     for part, own, rows in split_by_task(run, resolve_task(run, task)):
         counted = samples_of(part, window, fraction)

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.finish import detection_times
 from pathcontrol.simulation.run import Run
@@ -101,7 +101,7 @@ def describe_window(window: Window | None = None, fraction: float = 0.5) -> str:
 def _share(window: str | None, fraction: float) -> float:
     """Return the share of the time that counts."""
     if window is None:
-        fraction = scalar("fraction", fraction, positive=True)
+        fraction = as_scalar("fraction", fraction, positive=True)
         if fraction > 1:
             raise InputError(f"fraction = {fraction:g}, expected a number from 0 to 1")
         return fraction

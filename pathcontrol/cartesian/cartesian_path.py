@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, readonly, scalar
+from pathcontrol._arrays import Array, as_array, as_scalar, freeze
 from pathcontrol._expect import expect
 from pathcontrol.arguments import Form, Length, Points, Unit
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
@@ -88,9 +88,9 @@ class CartesianPath(SplinePath):
         expect("robot", robot, RobotModel)
         self.frame = frame
         self.curve = curve if isinstance(curve, ToolCurve) else ToolCurve.spline(as_array("curve", curve))
-        self.tolerance = scalar("tolerance", tolerance, least=_FINEST)
-        self.angle_tolerance = scalar("angle_tolerance", angle_tolerance, least=_FINEST)
-        speed, closed = scalar("speed", speed, positive=True), _is_closed(self.curve, closed)
+        self.tolerance = as_scalar("tolerance", tolerance, least=_FINEST)
+        self.angle_tolerance = as_scalar("angle_tolerance", angle_tolerance, least=_FINEST)
+        speed, closed = as_scalar("speed", speed, positive=True), _is_closed(self.curve, closed)
         carried, first = Tool(robot, frame, tool), None if start is None else check_posture(robot, start)
         self._question(speed, carried)
         self.orientation = _orientation(orientation, carried, first)
@@ -101,7 +101,7 @@ class CartesianPath(SplinePath):
         super().__init__(spline, speed, closed)
         self.tool_pose, self.rotations = carried.pose, self.orientation.rows
         self.posture = self.report.posture
-        self.start_posture = readonly(self.q_d(np.array(self.s0)))
+        self.start_posture = freeze(self.q_d(np.array(self.s0)))
 
     def theta(self, s: Array) -> Array:
         return self._feed(s)[0]

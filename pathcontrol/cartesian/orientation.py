@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation, Slerp
 
-from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol._arrays import Array, as_array, check_finite, freeze
 from pathcontrol.arguments import Direction, Form, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.tool_curve import ToolCurve
@@ -74,7 +74,7 @@ class FixedOrientation(Orientation):
     """
 
     def __init__(self, rotation: Annotated[ArrayLike, Form.ARRAY]) -> None:
-        given = finite("rotation", as_array("rotation", rotation))
+        given = check_finite("rotation", as_array("rotation", rotation))
         if given.shape not in ((3, 3), (4,)):
             raise InputError(f"rotation has shape {given.shape}, expected a matrix (3, 3) or a quaternion (x, y, z, w)")
         if given.shape == (4,) and not abs(np.linalg.norm(given) - 1) < 1e-6:
@@ -82,7 +82,7 @@ class FixedOrientation(Orientation):
         matrix = Rotation.from_quat(given).as_matrix() if given.shape == (4,) else given
         if not (np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) and np.linalg.det(matrix) > 0):
             raise InputError("rotation is no rotation matrix: its columns are not orthonormal and right-handed")
-        self.rotation = readonly(Rotation.from_matrix(matrix).as_matrix())
+        self.rotation = freeze(Rotation.from_matrix(matrix).as_matrix())
 
     def frames(self, curve: ToolCurve, s: Array) -> Array:
         return np.broadcast_to(self.rotation, (*np.shape(s), 3, 3))
@@ -102,7 +102,7 @@ class TangentOrientation(Orientation):
     """
 
     def __init__(self, up: Direction = (0.0, 0.0, 1.0)) -> None:
-        self.up = readonly(_direction("up", up))
+        self.up = freeze(_direction("up", up))
 
     def frames(self, curve: ToolCurve, s: Array) -> Array:
         x = curve.tangent(s)
@@ -133,9 +133,9 @@ class NormalOrientation(Orientation):
         at: Annotated[ArrayLike, Form.NUMBERS, Unit("m")] | None = None,
         reference: Direction | None = None,
     ) -> None:
-        self.reference = None if reference is None else readonly(_direction("reference", reference))
+        self.reference = None if reference is None else freeze(_direction("reference", reference))
         self.rows = 2 if reference is None else 3
-        self.at = None if at is None else readonly(finite("at", as_array("at", at)))
+        self.at = None if at is None else freeze(check_finite("at", as_array("at", at)))
         self._normals = normals if callable(normals) else _interpolate(as_array("normals", normals), self.at)
 
     def frames(self, curve: ToolCurve, s: Array) -> Array:
@@ -157,7 +157,7 @@ class NormalOrientation(Orientation):
 
 def _interpolate(normals: Array, at: Array | None) -> Callable[[Array], Array]:
     """Return the normals as a function of s."""
-    finite("normals", normals)
+    check_finite("normals", normals)
     if normals.shape == (3,):
         return partial(_constant, _direction("normals", normals))
     if normals.ndim != 2 or normals.shape[1] != 3 or at is None or at.shape != normals.shape[:1] or len(at) < 2:
@@ -182,7 +182,7 @@ def _constant(direction: Array, s: Array) -> Array:
 
 def _direction(name: str, value: ArrayLike) -> Array:
     """Check that a direction is a vector (3,) with a length; return it with unit length."""
-    vector = finite(name, as_array(name, value))
+    vector = check_finite(name, as_array(name, value))
     if vector.shape != (3,) or not np.linalg.norm(vector) > 0:
         raise InputError(f"{name} = {np.asarray(value).tolist()}, expected a direction (3,) with a length")
     return vector / np.linalg.norm(vector)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from pathcontrol._arrays import Array, rigid
+from pathcontrol._arrays import Array, check_rigid
 from pathcontrol.arguments import parameters_of
 from pathcontrol.cartesian.contour_links import smooth_open
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
@@ -63,7 +63,7 @@ class RecordedToolpath(ToolpathTask):
         posture: str = "",
     ) -> None:
         PathSequence.__init__(self, paths)
-        self.frame, self.workpiece, self.feed = frame, rigid("workpiece", workpiece), feed
+        self.frame, self.workpiece, self.feed = frame, check_rigid("workpiece", workpiece), feed
         self.rotations = rotations
         self.rapid_speed, self.acceleration = rapid_speed, acceleration
         self.tolerance, self.corner = tolerance, corner

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol._arrays import Array, as_array, check_finite, freeze
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 
@@ -37,7 +37,7 @@ class Tool:
     _offset: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_offset", readonly(_transform(self.offset)))
+        object.__setattr__(self, "_offset", freeze(_transform(self.offset)))
         self.robot.frame_pose(np.zeros(self.robot.n), self.frame)  # raises for an unknown frame
 
     @property
@@ -60,7 +60,7 @@ def _transform(offset: ArrayLike | None) -> Array:
     transform = np.eye(4)
     if offset is None:
         return transform
-    given = finite("tool", as_array("tool", offset))
+    given = check_finite("tool", as_array("tool", offset))
     if given.shape == (3,):
         transform[:3, 3] = given
         return transform

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, rigid, scalar
+from pathcontrol._arrays import Array, as_scalar, check_rigid
 from pathcontrol._expect import expect
 from pathcontrol.arguments import Distance, Feed, Form, Length, Unit
 from pathcontrol.cartesian.contour_links import link_contours
@@ -83,14 +83,14 @@ class ToolpathTask(PathSequence):
     ) -> None:
         expect("robot", robot, RobotModel)
         expect("toolpath", toolpath, Toolpath)
-        pose = rigid("workpiece", np.eye(4) if workpiece is None else workpiece)
+        pose = check_rigid("workpiece", np.eye(4) if workpiece is None else workpiece)
         _check_feeds(toolpath, feed)
         self.frame, self.workpiece, self.feed = frame, pose, feed
         self.rotations = rotations_of(orientation)
-        self.rapid_speed = scalar("rapid_speed", rapid_speed, positive=True)
-        self.acceleration = scalar("acceleration", acceleration, positive=True)
-        self.tolerance, self.corner = scalar("tolerance", tolerance, positive=True), corner
-        height = scalar("clearance", clearance, least=0.0)
+        self.rapid_speed = as_scalar("rapid_speed", rapid_speed, positive=True)
+        self.acceleration = as_scalar("acceleration", acceleration, positive=True)
+        self.tolerance, self.corner = as_scalar("tolerance", tolerance, positive=True), corner
+        height = as_scalar("clearance", clearance, least=0.0)
         question_length("clearance", height, robot, frame, share=1.0)
         question_length("tolerance", self.tolerance, robot, frame, share=0.1)
         whole = link_contours(toolpath.placed(pose).contours, height, pose[:3, 2], self.tolerance, corner)
@@ -128,7 +128,7 @@ def _tour(toolpath: Toolpath, pose: Array) -> ToolCurve:
 def _check_feeds(toolpath: Toolpath, feed: float | None) -> None:
     """Check that every contour has a feed."""
     if feed is not None:
-        scalar("feed", feed, positive=True)
+        as_scalar("feed", feed, positive=True)
         return
     for i, contour in enumerate(toolpath):
         if not contour.rapid and contour.feed is None:

@@ -39,12 +39,12 @@ def check_file(path: Path, expected: Kind) -> None:
         raise InputError(f"{str(path)!r} is a folder, expected the file of {expected}")
     if not path.exists():
         raise InputError(f"there is no file {str(path)!r}, expected {expected}{_ABSENT.get(expected, '')}")
-    kind = kind_of(path)
+    kind = recognise_file(path)
     if kind not in ("", expected):
         raise InputError(f"{str(path)!r} is {kind}, expected {expected}: {_COMMANDS[kind].format(file=path)}")
 
 
-def kind_of(path: Path) -> str:
+def recognise_file(path: Path) -> str:
     """Return what a file is, by its content or the end of its name; an empty text where that is not known."""
     suffix = path.suffix.lower()
     kinds = {".toml": "an experiment", ".py": "a Python program", ".html": "a page", ".htm": "a page"}

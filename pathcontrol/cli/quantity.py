@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from pathcontrol._units import quantity
+from pathcontrol._units import parse_quantity
 from pathcontrol.errors import InputError, warn
 
 _FASTEST = 5.0  # m/s; no arm feeds faster
@@ -24,7 +24,7 @@ class QuantityType(click.ParamType):
         except ValueError:
             pass
         try:
-            return float(quantity(str(value), self.unit))
+            return float(parse_quantity(str(value), self.unit))
         except InputError as error:
             self.fail(f"{value!r}: {error}", param, ctx)
 

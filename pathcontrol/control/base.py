@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pathcontrol._arrays import Array, as_array, finite, joint_array, readonly, strip_labels
+from pathcontrol._arrays import Array, as_array, as_joint_array, check_finite, freeze, strip_labels
 from pathcontrol._expect import expect, expect_choice
 from pathcontrol.control.ending import Ending
 from pathcontrol.errors import InputError, warn_of_single
@@ -89,8 +89,8 @@ class Controller(ABC):
 
     def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """Return the state z, (*batch, 1), for an arm that starts at (q, q̇)."""
-        q = joint_array("q", q, self.robot.n, self.robot.joint_names)
-        joint_array("qd", qd, self.robot.n)
+        q = as_joint_array("q", q, self.robot.n, self.robot.joint_names)
+        as_joint_array("qd", qd, self.robot.n)
         s = np.full(q.shape[:-1], self.task.s0) if self.start_at == "s0" else self.task.sigma_bar(q)
         return np.asarray(s)[..., None]
 
@@ -193,7 +193,7 @@ def diagonal_gain(name: str, value: ArrayLike, n: int, joints: Sequence[str] | N
         InputError: it has another shape, is not positive, or is a matrix that is not diagonal.
     """
     given = value if joints is None else strip_labels(name, value, joints)
-    array = _diagonal_of_matrix(name, finite(name, as_array(name, given)), n)
+    array = _diagonal_of_matrix(name, check_finite(name, as_array(name, given)), n)
     if array.ndim and array.shape[-1] not in (1, n):
         raise InputError(
             f"{name} has shape {array.shape}, expected a scalar, its diagonal ({n},) or a diagonal matrix ({n}, {n})"
@@ -207,7 +207,7 @@ def scalar_gain(name: str, value: ArrayLike) -> Array:
     Raises:
         InputError: it has another shape, is not positive, or is a matrix other than kI.
     """
-    array = finite(name, as_array(name, value))
+    array = check_finite(name, as_array(name, value))
     array = _diagonal_of_matrix(name, array, array.shape[-1] if array.ndim > 1 else 1)
     if np.ndim(value) > 1 and array.ndim == 1 and (array == array[0]).all():
         array = array[:1]
@@ -245,4 +245,4 @@ def _check_positive(name: str, array: Array) -> Array:
     """Check that all gains are greater than 0; return them read-only."""
     if (array <= 0).any():
         raise InputError(f"{name} = {array.tolist()}, expected gains greater than 0")
-    return readonly(array)
+    return freeze(array)

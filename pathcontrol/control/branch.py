@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol._expect import expect_choice
 from pathcontrol.tasks.batch.task_batch import select_rows
 from pathcontrol.tasks.task import PathTask
@@ -43,7 +43,7 @@ class BranchPolicy:
 
     def __post_init__(self) -> None:
         expect_choice("branch", self.branch, get_args(Branch))
-        object.__setattr__(self, "capture", scalar("capture", self.capture, positive=True))
+        object.__setattr__(self, "capture", as_scalar("capture", self.capture, positive=True))
 
     def sigma_bar(self, task: PathTask, q: Array, last: Array) -> Array:
         """Return σ̄ (*batch,) for the arm at q (*batch, n), before a push to another branch is considered."""

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol._arrays import Array, as_array, check_finite, freeze
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
 from pathcontrol.errors import InputError
@@ -54,8 +54,8 @@ class ExtendedMotionPlan(Controller):
             diagonal_gain("K_p", K_p, robot.n, robot.joint_names),
             diagonal_gain("K_v", K_v, robot.n, robot.joint_names),
         )
-        plan_gain = finite("k", as_array("k", k))
-        self.k = readonly(plan_gain[..., 0] if plan_gain.ndim > 1 else plan_gain)
+        plan_gain = check_finite("k", as_array("k", k))
+        self.k = freeze(plan_gain[..., 0] if plan_gain.ndim > 1 else plan_gain)
         if (self.k < 0).any():
             raise InputError(
                 f"k = {self.k.tolist()}, expected k ≥ 0: a negative gain drives the path away from the arm"

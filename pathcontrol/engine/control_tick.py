@@ -7,7 +7,7 @@ from ctypes import addressof
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, joint_array, scalar
+from pathcontrol._arrays import Array, as_joint_array, as_scalar
 from pathcontrol.control.base import Controller
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.run_settings import add_law
@@ -42,7 +42,7 @@ class ControlTick:
         if isinstance(law.task, TaskBatch) or any(np.ndim(getattr(law, gain)) > 1 for gain in law.gains):
             raise InputError("the law is for several rollouts, expected one task and one set of gains")
         self.law, self._memory, self._setup = law, Memory(), Setup()
-        self._setup.period = scalar("period", period, positive=True)
+        self._setup.period = as_scalar("period", period, positive=True)
         add_law(self._setup, law, self._memory)
         n = law.robot.n
         self._io = np.zeros(3 * n + 1)
@@ -59,8 +59,8 @@ class ControlTick:
     def start(self, q: ArrayLike, qd: ArrayLike | None = None) -> None:
         """Start again with an arm at q [rad] and q̇ [rad/s], each (n,); at rest by default."""
         n = self.law.robot.n
-        position = joint_array("q", q, n)
-        velocity = np.zeros(n) if qd is None else joint_array("qd", qd, n)
+        position = as_joint_array("q", q, n)
+        velocity = np.zeros(n) if qd is None else as_joint_array("qd", qd, n)
         self._io[2 * n] = self.law.start(position, velocity)[..., 0]
 
     def __call__(self, q: Array, qd: Array) -> Array:

@@ -13,7 +13,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 
-from pathcontrol._arrays import Array, as_array, finite, scalar
+from pathcontrol._arrays import Array, as_array, as_scalar, check_finite
 from pathcontrol.errors import InputError
 
 _DEGREE = 3
@@ -23,7 +23,7 @@ _WORST = 0.25  # spans this near to the worst are divided together: where a step
 
 def fit_samples(q: ArrayLike, s: ArrayLike | None, tolerance: float, closed: bool) -> tuple[BSpline, float]:
     """Fit a cubic spline; return it and its largest deviation; see :meth:`SplinePath.from_samples`."""
-    tolerance = scalar("tolerance", tolerance, least=0.0)
+    tolerance = as_scalar("tolerance", tolerance, least=0.0)
     samples = _check_samples(q)
     if s is None:
         samples, parameters = _parametrize_by_length(samples, closed)
@@ -39,7 +39,7 @@ def fit_samples(q: ArrayLike, s: ArrayLike | None, tolerance: float, closed: boo
 
 def _check_samples(q: ArrayLike) -> Array:
     """Check that ``q`` is a finite array (m, n)."""
-    samples = finite("q", as_array("q", q))
+    samples = check_finite("q", as_array("q", q))
     if samples.ndim != 2 or not samples.shape[1]:
         raise InputError(f"q has shape {samples.shape}, expected (m, n): one sample a row")
     return samples
@@ -47,7 +47,7 @@ def _check_samples(q: ArrayLike) -> Array:
 
 def _check_parameters(s: ArrayLike, samples: Array, closed: bool) -> Array:
     """Check that ``s`` increases and has a value for each sample."""
-    parameters = finite("s", as_array("s", s))
+    parameters = check_finite("s", as_array("s", s))
     if parameters.shape != (len(samples) + closed,):
         more = ", one of them for the return to the first sample" if closed else ""
         raise InputError(

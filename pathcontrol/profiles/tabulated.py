@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol._arrays import Array, as_array, as_scalar, check_finite, freeze
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.profile import Path, VelocityProfile
 
@@ -35,7 +35,7 @@ class TabulatedProfile(VelocityProfile):
 
     def __init__(self, s: ArrayLike, squared: ArrayLike, period: float | None = None) -> None:
         self.s = _check_knots(s)
-        self.squared = _check_squares(self.s, finite("squared", as_array("squared", squared)))
+        self.squared = _check_squares(self.s, check_finite("squared", as_array("squared", squared)))
         self.period = None if period is None else _check_period(self.s, self.squared, period)
         self._acceleration = 0.5 * np.diff(self.squared) / np.diff(self.s)
 
@@ -76,13 +76,13 @@ class TabulatedProfile(VelocityProfile):
 
 
 def _check_knots(s: ArrayLike) -> Array:
-    knots = finite("s", as_array("s", s))
+    knots = check_finite("s", as_array("s", s))
     if knots.ndim != 1 or len(knots) < 2:
         raise InputError(f"s has shape {knots.shape}, expected at least two knots, (m,)")
     if not (np.diff(knots) > 0).all():
         i = int(np.argmax(np.diff(knots) <= 0))
         raise InputError(f"s[{i}] = {knots[i]:g} is followed by {knots[i + 1]:g}, expected strictly increasing knots")
-    return readonly(knots)
+    return freeze(knots)
 
 
 def _check_squares(s: Array, squared: Array) -> Array:
@@ -94,11 +94,11 @@ def _check_squares(s: Array, squared: Array) -> Array:
             f"squared[{i}] = {squared[i]:g} at s = {s[i]:g}, expected ϑ² > 0: where it is not, the motion plan "
             "ṡ = ϑ(s) stops for ever"
         )
-    return readonly(squared)
+    return freeze(squared)
 
 
 def _check_period(s: Array, squared: Array, period: float) -> float:
-    period = scalar("period", period, positive=True)
+    period = as_scalar("period", period, positive=True)
     if not np.isclose(s[-1] - s[0], period, rtol=1e-9, atol=0):
         raise InputError(f"period = {period:g}, but the knots span {s[-1] - s[0]:g}; give knots from s0 to s0 + period")
     if not np.isclose(squared[0], squared[-1], rtol=1e-9, atol=0):

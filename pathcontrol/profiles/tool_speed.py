@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import TaskError
 from pathcontrol.profiles.motion import ToolMotion, growth
@@ -37,7 +37,7 @@ class ToolSpeed(VelocityProfile):
 
     def __init__(self, robot: RobotModel, frame: str, speed: Annotated[float, Form.POSITIVE, Unit("m/s")]) -> None:
         self.motion, self.frame = ToolMotion(robot, frame), frame
-        self.speed = scalar("speed", speed, positive=True)
+        self.speed = as_scalar("speed", speed, positive=True)
         question_speed("speed", self.speed, robot, frame)
 
     def theta(self, path: Path, s: Array) -> Array:

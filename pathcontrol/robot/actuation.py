@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pathcontrol._arrays import Array, readonly
+from pathcontrol._arrays import Array, freeze
 from pathcontrol.robot.friction import FrictionLaw
 
 
@@ -20,7 +20,7 @@ class Limits:
 
     def select(self, joints: Sequence[int]) -> Limits:
         """Return the limits of some of the joints."""
-        return Limits(*(readonly(a[list(joints)]) for a in (self.lower, self.upper, self.velocity, self.effort)))
+        return Limits(*(freeze(a[list(joints)]) for a in (self.lower, self.upper, self.velocity, self.effort)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,5 +33,5 @@ class Actuation:
 
     def select(self, joints: Sequence[int]) -> Actuation:
         """Return the actuation of some of the joints."""
-        counts = None if self.encoder_counts is None else readonly(self.encoder_counts[list(joints)])
+        counts = None if self.encoder_counts is None else freeze(self.encoder_counts[list(joints)])
         return Actuation(self.limits.select(joints), self.friction.select(joints), counts)

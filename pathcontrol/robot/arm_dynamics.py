@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, joint_array
+from pathcontrol._arrays import Array, as_joint_array
 from pathcontrol.errors import InputError, UnknownNameError, UrdfError
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.bodies import idle_joints
@@ -252,7 +252,7 @@ class ArmDynamics:
 
     def _array(self, name: str, value: ArrayLike) -> Array:
         """Convert values of the joints to (*batch, n), ordered by name if they are labelled."""
-        return joint_array(name, value, self.n, self.joint_names)
+        return as_joint_array(name, value, self.n, self.joint_names)
 
     def _check_mass(self) -> None:
         """Refuse to compute dynamics of an arm in which a joint moves no mass."""

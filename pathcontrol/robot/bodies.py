@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, physical, quantity, scalar
+from pathcontrol._arrays import Array, as_array, as_quantity, as_scalar, check_physical
 from pathcontrol.errors import InputError
 from pathcontrol.robot.lump import rod
 
@@ -26,10 +26,10 @@ def body_of(mass: float, com: Array, inertia: Array) -> Any:
         InputError: they are too large or too small for dynamics in floats.
     """
     inertia = 0.5 * inertia + 0.5 * inertia.T
-    physical("com", com)
+    check_physical("com", com)
     if mass:
-        quantity("mass", mass)
-    physical("inertia", inertia)
+        as_quantity("mass", mass)
+    check_physical("inertia", inertia)
     body = pin.Inertia.Zero()
     body.mass, body.lever, body.inertia = mass, com, inertia
     return body
@@ -42,8 +42,8 @@ def payload_of(mass: float, com: ArrayLike, inertia: ArrayLike | None) -> Any:
         InputError: a shape is wrong, a number not finite, or the inertia not symmetric positive semi-definite but for
             rounding.
     """
-    mass, lever = scalar("mass", mass, least=0.0), physical("com", as_array("com", com))
-    tensor = np.zeros((3, 3)) if inertia is None else physical("inertia", as_array("inertia", inertia))
+    mass, lever = as_scalar("mass", mass, least=0.0), check_physical("com", as_array("com", com))
+    tensor = np.zeros((3, 3)) if inertia is None else check_physical("inertia", as_array("inertia", inertia))
     if lever.shape != (3,) or tensor.shape != (3, 3):
         raise InputError(f"com has shape {lever.shape} and inertia {tensor.shape}, expected (3,) and (3, 3)")
     least = -_ROUNDING * max(1.0, float(np.abs(tensor).max()))

@@ -18,7 +18,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import SMALLEST, Array, as_array, physical, readonly
+from pathcontrol._arrays import SMALLEST, Array, as_array, check_physical, freeze
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.registry import FRICTION_LAWS
@@ -26,10 +26,10 @@ from pathcontrol.registry import FRICTION_LAWS
 
 def _coefficients(name: str, value: ArrayLike) -> Array:
     """Check that coefficients are finite and not negative, one for each joint."""
-    array = physical(name, np.atleast_1d(as_array(name, value)))
+    array = check_physical(name, np.atleast_1d(as_array(name, value)))
     if (array < 0).any():
         raise InputError(f"{name} = {array.tolist()}, expected no negative value: friction takes energy out")
-    return readonly(array)
+    return freeze(array)
 
 
 @dataclass(frozen=True, eq=False)

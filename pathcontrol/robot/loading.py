@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from pathcontrol._arrays import LARGEST, Array, quantity, readonly
+from pathcontrol._arrays import LARGEST, Array, as_quantity, freeze
 from pathcontrol.errors import UrdfError, warn
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.arm_dynamics import UrdfSource, build_model
@@ -63,7 +63,7 @@ def load_robot(
         from pathcontrol.robot.estimate import DENSITY, with_estimated_inertia  # reading meshes takes half a second
 
         density = DENSITY if estimated_inertia is True else estimated_inertia
-        urdf = with_estimated_inertia(urdf, quantity("estimated_inertia", density))
+        urdf = with_estimated_inertia(urdf, as_quantity("estimated_inertia", density))
     report = _check(urdf, label, tuple(locked))
     for finding in (*mended, *(finding for finding in report.warnings if finding.code in TOLD)):
         warn(f"{label}: {finding.where}: {finding.message}")
@@ -136,7 +136,7 @@ def _limits(model: Any, names: Sequence[str], endless: set[str]) -> Limits:
 
     def magnitude(values: Any) -> Array:
         values = np.array(values, dtype=np.float64)
-        return readonly(np.where(np.abs(values) >= _UNLIMITED, np.copysign(np.inf, values), values))
+        return freeze(np.where(np.abs(values) >= _UNLIMITED, np.copysign(np.inf, values), values))
 
     lower = np.where(free, -np.inf, model.lowerPositionLimit)
     upper = np.where(free, np.inf, model.upperPositionLimit)
@@ -159,4 +159,4 @@ def _friction(root: Any, names: Sequence[str]) -> FrictionLaw:
 def _encoders(root: Any, names: Sequence[str]) -> Array | None:
     """Read the encoder resolutions [counts per revolution] of ``<pathcontrol>``; None unless every joint has one."""
     counts = extension_values(root, "encoder")
-    return readonly(np.array([counts[name][0] for name in names])) if set(names) <= set(counts) else None
+    return freeze(np.array([counts[name][0] for name in names])) if set(names) <= set(counts) else None

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import as_array, physical, quantity, rigid, scalar
+from pathcontrol._arrays import as_array, as_quantity, as_scalar, check_physical, check_rigid
 from pathcontrol.arguments import Form, Point, Unit
 from pathcontrol.errors import InputError, warn
 from pathcontrol.robot.actuation import Actuation
@@ -97,10 +97,10 @@ class RobotModel(ArmDynamics):
         """
         if name in self.frame_names:
             raise InputError(f"{self.name} has a frame {name!r} already; choose another name")
-        model, given = pin.Model(self.pinocchio_model), physical("pose", as_array("pose", pose))
+        model, given = pin.Model(self.pinocchio_model), check_physical("pose", as_array("pose", pose))
         if given.shape not in ((3,), (4, 4)):
             raise InputError(f"pose has shape {given.shape}, expected (4, 4), or (3,) for a position")
-        placement = pin.SE3(np.eye(3), given) if given.shape == (3,) else pin.SE3(rigid("pose", given, 1e-6))
+        placement = pin.SE3(np.eye(3), given) if given.shape == (3,) else pin.SE3(check_rigid("pose", given, 1e-6))
         support = model.frames[self._frame_id(parent)]
         frame = pin.Frame(name, support.parentJoint, support.placement * placement, pin.FrameType.OP_FRAME)
         model.addFrame(frame, False)
@@ -108,7 +108,7 @@ class RobotModel(ArmDynamics):
 
     def with_armature(self, armature: ArrayLike) -> RobotModel:
         """Return the same arm with rotor inertia [kg m²], shape (n,), added to the diagonal of M."""
-        added = physical("armature", self._array("armature", armature))
+        added = check_physical("armature", self._array("armature", armature))
         if added.shape != (self.n,) or (added < 0).any():
             raise InputError(f"armature = {added.tolist()}, expected {self.n} values not below 0")
         model = pin.Model(self.pinocchio_model)
@@ -149,7 +149,7 @@ class RobotModel(ArmDynamics):
                     f"each of the {self.n} joints"
                 )
             given = dict(zip(self.joint_names, values.tolist(), strict=True))
-        return {joint: quantity(f"{name} of {joint}", value) for joint, value in (given or {}).items()}
+        return {joint: as_quantity(f"{name} of {joint}", value) for joint, value in (given or {}).items()}
 
     def with_threads(self, threads: int) -> RobotModel:
         """Return the same arm whose batched calls use ``threads`` threads."""
@@ -188,7 +188,7 @@ def lock_joints(robot: RobotModel, angles: Mapping[str, float]) -> RobotModel:
         InputError: an angle is not finite, or no joint is left.
         UnknownNameError: there is no such joint.
     """
-    indices = {robot.joint_index(joint): scalar(f"angle of {joint}", angle) for joint, angle in angles.items()}
+    indices = {robot.joint_index(joint): as_scalar(f"angle of {joint}", angle) for joint, angle in angles.items()}
     if len(indices) == robot.n:
         raise InputError(f"locking all {robot.n} joints of {robot.name} leaves nothing to control; leave one free")
     q = np.zeros(robot.n)

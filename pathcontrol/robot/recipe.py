@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array, readonly
+from pathcontrol._arrays import Array, freeze
 from pathcontrol.errors import InputError, MissingExtraError, PathControlError, UnknownNameError, warn
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.arm_dynamics import UrdfSource
@@ -107,7 +107,7 @@ def _values(array: Array) -> list[float | None]:
 
 def _array(values: Sequence[float | None], n: int, missing: float) -> Array:
     """Convert values of JSON to an array (n,): null becomes ``missing``."""
-    array = readonly(np.array([missing if value is None else value for value in values], dtype=np.float64))
+    array = freeze(np.array([missing if value is None else value for value in values], dtype=np.float64))
     if array.shape != (n,):
         raise InputError(f"{array.shape} values are recorded of the joints, expected ({n},)")
     return array

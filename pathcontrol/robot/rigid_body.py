@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, joint_array
+from pathcontrol._arrays import Array, as_joint_array
 from pathcontrol.errors import InputError
 
 
@@ -40,7 +40,7 @@ class RigidBody:
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """Return M(q) [kg m²], (*batch, n, n), by the composite rigid body algorithm."""
-        array = joint_array("q", q, self.n, self._joints)
+        array = as_joint_array("q", q, self.n, self._joints)
         M = np.empty((array.size // self.n, self.n, self.n))
         for k, qi in enumerate(array.reshape(-1, self.n)):
             M[k] = pin.crba(self.model, self.data, qi)
@@ -67,7 +67,7 @@ def broadcast(n: int, arguments: Mapping[str, ArrayLike], joints: Sequence[str] 
     Raises:
         InputError: one of them has another last axis than n, or their batch axes do not fit together.
     """
-    arrays = [joint_array(name, value, n, joints) for name, value in arguments.items()]
+    arrays = [as_joint_array(name, value, n, joints) for name, value in arguments.items()]
     first = arrays[0].shape
     if all(a.shape == first for a in arrays):
         return arrays

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, scalar
+from pathcontrol._arrays import Array, as_array, as_scalar, check_finite
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import RobotBatch
@@ -66,14 +66,14 @@ class SampledLoop:
     noise: SensorNoise | None = None
 
     def __post_init__(self) -> None:
-        scalar("period", self.period, positive=True)
-        scalar("delay", self.delay, least=0.0)
+        as_scalar("period", self.period, positive=True)
+        as_scalar("delay", self.delay, least=0.0)
         if not isinstance(self.substeps, int | np.integer) or not 1 <= self.substeps <= MOST_SUBSTEPS:
             raise InputError(f"substeps = {self.substeps!r:.80}, expected a whole number from 1 to {MOST_SUBSTEPS}")
         if self.velocity not in ("exact", "difference"):
             raise InputError(f"velocity = {self.velocity!r}, expected 'exact' or 'difference'")
         if self.filter_hz is not None:
-            scalar("filter_hz", self.filter_hz, positive=True)
+            as_scalar("filter_hz", self.filter_hz, positive=True)
         if self.noise is not None and not isinstance(self.noise, SensorNoise):
             raise InputError(f"noise = {self.noise!r}, expected a SensorNoise(...)")
         if self.noise is not None and self.noise.on_velocity and self.velocity == "difference":
@@ -125,7 +125,7 @@ class ContinuousTime:
 
     def __post_init__(self) -> None:
         for name in ("output_period", "rtol", "atol", "friction_width"):
-            scalar(name, getattr(self, name), positive=True)
+            as_scalar(name, getattr(self, name), positive=True)
 
     def describe(self) -> dict[str, Any]:
         """Return all settings, for the configuration of a run."""
@@ -167,7 +167,7 @@ def _per_joint(
         )
     if infinite and not np.isnan(array).any():
         return array
-    return finite(name, array)
+    return check_finite(name, array)
 
 
 def _to_plain(settings: dict[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, finite, joint_array
+from pathcontrol._arrays import Array, as_joint_array, check_finite
 from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.errors import InputError, PathControlError
@@ -107,8 +107,8 @@ def initial_state(
 ) -> tuple[Array, Array]:
     """Return q and q̇ as (N, n) each, broadcast against each other; one state serves all ``rollouts``."""
     n = len(joints)
-    position = finite("q", joint_array("q", q, n, joints))
-    velocity = np.zeros(n) if qd is None else finite("qd", joint_array("qd", qd, n, joints))
+    position = check_finite("q", as_joint_array("q", q, n, joints))
+    velocity = np.zeros(n) if qd is None else check_finite("qd", as_joint_array("qd", qd, n, joints))
     try:
         pair = np.broadcast_arrays(position, velocity)
     except ValueError as error:

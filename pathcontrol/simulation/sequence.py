@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite
+from pathcontrol._arrays import Array, as_array, check_finite
 from pathcontrol._expect import describe
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError
@@ -202,7 +202,7 @@ def _make_finish(law: Controller, laps: int) -> Finish:
 
 def _check_durations(duration: ArrayLike, paths: int) -> Array:
     """Check the durations; return one for each path, (paths,)."""
-    durations = finite("duration", as_array("duration", duration))
+    durations = check_finite("duration", as_array("duration", duration))
     if durations.shape not in ((), (paths,)):
         raise InputError(f"duration has shape {durations.shape}, expected one number or one for each of {paths} paths")
     if (durations <= 0).any():

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import check_whole, scalar
+from pathcontrol._arrays import as_scalar, check_whole
 from pathcontrol.control.base import Controller
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
@@ -87,7 +87,7 @@ def simulate(
     """
     check_controller("controller", controller)
     check_engine(engine)
-    duration = scalar("duration", duration, positive=True)
+    duration = as_scalar("duration", duration, positive=True)
     robot, first = make_plant(plant, controller), check_whole("first_rollout", first_rollout, 0)
     check_joints(controller, robot)
     loop = check_loop(loop)

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol._arrays import Array, as_array, as_scalar, check_finite, freeze
 from pathcontrol.arguments import Form, Posture, Speed, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import PathPoint
@@ -23,7 +23,7 @@ class JointCurve(PathTask):
     """A curve given by closed forms of q_d, q_d' and q_d'', at the path speed ``speed`` = ‖q_d'‖ϑ [rad/s]."""
 
     def __init__(self, speed: float) -> None:
-        self.speed = scalar("speed", speed, positive=True)
+        self.speed = as_scalar("speed", speed, positive=True)
         self._profile = ConstantSpeed(self.speed)
 
     @abstractmethod
@@ -71,10 +71,10 @@ class Ellipse(JointCurve):
         clockwise: bool = False,
     ) -> None:
         super().__init__(speed)
-        axes = finite("semi_axes", as_array("semi_axes", semi_axes))
+        axes = check_finite("semi_axes", as_array("semi_axes", semi_axes))
         if axes.shape != (2,) or (axes <= 0).any():
             raise InputError(f"semi_axes = {semi_axes!r}, expected two lengths greater than 0")
-        self.semi_axes = readonly(axes)
+        self.semi_axes = freeze(axes)
         self.center = _posture("center", center)
         self.joints = _two_joints(joints, len(self.center))
         self.clockwise = bool(clockwise)
@@ -123,7 +123,7 @@ class Circle(Ellipse):
         joints: Annotated[Sequence[int], Form.WHOLES] = (0, 1),
         clockwise: bool = False,
     ) -> None:
-        self.radius = scalar("radius", radius, positive=True)
+        self.radius = as_scalar("radius", radius, positive=True)
         super().__init__((self.radius, self.radius), speed, center, joints, clockwise)
         self._rate = np.array(self.speed / self.radius)
 
@@ -173,7 +173,7 @@ class Lissajous(JointCurve):
         given = {"amplitudes": amplitudes, "frequencies": frequencies, "phases": phases, "center": center}
         arrays = [_posture(name, value) for name, value in given.items()]
         try:
-            arrays = [readonly(a) for a in np.broadcast_arrays(*arrays)]
+            arrays = [freeze(a) for a in np.broadcast_arrays(*arrays)]
         except ValueError as error:
             shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
             raise InputError(f"one value per joint is needed of each; got {shapes}") from error
@@ -245,10 +245,10 @@ class Line(JointCurve):
 
 def _posture(name: str, given: ArrayLike) -> Array:
     """Check that there is one finite value for each joint, (n,)."""
-    posture = finite(name, np.atleast_1d(as_array(name, given)))
+    posture = check_finite(name, np.atleast_1d(as_array(name, given)))
     if posture.ndim != 1:
         raise InputError(f"{name} has shape {posture.shape}, expected (n,): one value for each joint")
-    return readonly(posture)
+    return freeze(posture)
 
 
 def _two_joints(joints: Sequence[int], n: int) -> tuple[int, int]:

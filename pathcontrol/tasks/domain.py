@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import as_array, scalar
+from pathcontrol._arrays import as_array, as_scalar
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.task import PathTask
 
@@ -17,9 +17,9 @@ def take_domain(task: PathTask, s0: Any, s_end: Any, period: Any) -> None:
     Raises:
         InputError: the domain is empty, begins at infinity, or both ends and repeats.
     """
-    task.s0 = scalar("s0", s0)
+    task.s0 = as_scalar("s0", s0)
     if period is not None:
-        task.period = scalar("period", period, positive=True)
+        task.period = as_scalar("period", period, positive=True)
     end = as_array("s_end", s_end)
     if end.ndim != 0 or not end > task.s0:
         raise InputError(f"s0 = {task.s0:g} and s_end = {s_end}, expected a number s_end > s0")

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.differentiation import Differentiator
 from pathcontrol.tasks.base import PathPoint
@@ -70,7 +70,7 @@ class FunctionPath(PathTask):
         if speed is not None:
             self._profile = ConstantSpeed(speed)
         elif not callable(theta):
-            self._profile = ConstantRate(scalar("theta", theta, positive=True))
+            self._profile = ConstantRate(as_scalar("theta", theta, positive=True))
         else:
             rate = vectorize("theta", theta, probes, ())
             slope = vectorize("theta_derivative", theta_derivative, probes, ()) if theta_derivative else None

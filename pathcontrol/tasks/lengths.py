@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite
+from pathcontrol._arrays import Array, as_array, check_finite
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.geometry.arc_length import ArcLength, curvature_vector
@@ -66,7 +66,7 @@ def last_parameter(task: Task) -> float:
 
 def _check_inside(task: Task, name: str, s: ArrayLike) -> Array:
     """Check that ``s`` is in the domain of the path."""
-    s = finite(name, as_array(name, s))
+    s = check_finite(name, as_array(name, s))
     slack = 1e-12 * (1 + np.abs(s))
     outside = (s < task.s0 - slack) | (s > task.s_end + slack)
     if not task.closed and outside.any():

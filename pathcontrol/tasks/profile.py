@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.arguments import Rate, Speed
 
 #: time constant [s] T with which every controller brings its plan to rest on the end of an open path, ṡ ∝ (s_end − s)/T
@@ -78,7 +78,7 @@ class ConstantRate(VelocityProfile):
     rate: Rate
 
     def __post_init__(self) -> None:
-        scalar("rate", self.rate, positive=True)
+        as_scalar("rate", self.rate, positive=True)
 
     def theta(self, path: Path, s: Array) -> Array:
         return np.full_like(s, self.rate, dtype=np.float64)
@@ -95,7 +95,7 @@ class ConstantSpeed(VelocityProfile):
     speed: Speed
 
     def __post_init__(self) -> None:
-        scalar("speed", self.speed, positive=True)
+        as_scalar("speed", self.speed, positive=True)
 
     def theta(self, path: Path, s: Array) -> Array:
         return self.speed / np.linalg.norm(path.dq_d(s), axis=-1)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol._arrays import Array, as_array, as_scalar, check_finite, freeze
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
 from pathcontrol.geometry.hermite import hermite_polynomials, sample_adaptively
@@ -233,17 +233,17 @@ def _check_period(s: Array, period: float | None) -> float | None:
     """Check that the samples of a closed path reach from s0 to s0 + period."""
     if period is None:
         return None
-    if not np.isclose(s[-1] - s[0], scalar("period", period, positive=True), rtol=1e-6, atol=0):
+    if not np.isclose(s[-1] - s[0], as_scalar("period", period, positive=True), rtol=1e-6, atol=0):
         raise InputError(f"period = {period:g}, but the samples span {s[-1] - s[0]:g}, expected them over one period")
     return float(period)
 
 
 def _check_knots(given: ArrayLike) -> Array:
     """Check that the knots are a finite array (K,)."""
-    knots = finite("knots", as_array("knots", given))
+    knots = check_finite("knots", as_array("knots", given))
     if knots.ndim != 1:
         raise InputError(f"knots have shape {knots.shape}, expected (K,)")
-    return readonly(knots)
+    return freeze(knots)
 
 
 def _check_rotations(rotations: int) -> int:
@@ -259,17 +259,17 @@ def _check_tool(frame: str | None, tool_pose: ArrayLike | None) -> tuple[str | N
         raise InputError(f"frame = {frame!r}, expected the name of a frame, or None")
     if tool_pose is None:
         return frame, None
-    pose = finite("tool_pose", as_array("tool_pose", tool_pose))
+    pose = check_finite("tool_pose", as_array("tool_pose", tool_pose))
     if pose.shape != (4, 4):
         raise InputError(f"tool_pose has shape {pose.shape}, expected (4, 4)")
-    return frame, readonly(pose)
+    return frame, freeze(pose)
 
 
 def _check_samples(s: ArrayLike, jets: ArrayLike, order: int) -> tuple[Array, Array]:
     """Check that parameters increase and that jets have their shape."""
-    knots, values = finite("s", as_array("s", s)), finite("jets", as_array("jets", jets))
+    knots, values = check_finite("s", as_array("s", s)), check_finite("jets", as_array("jets", jets))
     if knots.ndim != 1 or len(knots) < 2 or not (np.diff(knots) > 0).all():
         raise InputError(f"s has shape {knots.shape}, expected two or more increasing parameters")
     if values.ndim != order or values.shape[:2] != (order, len(knots)):
         raise InputError(f"jets have shape {values.shape}, expected ({order}, {len(knots)}{', n' * (order == 3)})")
-    return readonly(knots), readonly(values)
+    return freeze(knots), freeze(values)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol._arrays import Array, as_array, as_scalar, check_finite, freeze
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.geometry.arc_length import curvature_vector, drop_coincident
@@ -239,7 +239,7 @@ class ShiftedPath(_MovedPath):
     """A path moved by an ``offset`` [rad], (n,)."""
 
     def __init__(self, path: PathTask, offset: ArrayLike) -> None:
-        self.offset = readonly(finite("offset", as_array("offset", offset)))
+        self.offset = freeze(check_finite("offset", as_array("offset", offset)))
         if self.offset.shape != (path.n,):
             raise InputError(
                 f"offset has shape {self.offset.shape}, expected ({path.n},): the path has {path.n} joints"
@@ -254,11 +254,11 @@ class ScaledPath(_MovedPath):
     """
 
     def __init__(self, path: PathTask, factor: ArrayLike, about: ArrayLike | None = None) -> None:
-        self.factor = readonly(finite("factor", as_array("factor", factor)))
+        self.factor = freeze(check_finite("factor", as_array("factor", factor)))
         if self.factor.shape not in ((), (path.n,)) or not self.factor.all():
             raise InputError(f"factor = {self.factor.tolist()}, expected a number other than 0, or {path.n} of them")
         centre = path.q_d(np.asarray(path.s0)) if about is None else about
-        self.about = readonly(finite("about", as_array("about", centre)))
+        self.about = freeze(check_finite("about", as_array("about", centre)))
         if self.about.shape != (path.n,):
             raise InputError(f"about has shape {self.about.shape}, expected ({path.n},): the path has {path.n} joints")
         factors = np.broadcast_to(self.factor, path.n)
@@ -273,7 +273,7 @@ class PathSection(_SameParameter):
 
     def __init__(self, path: PathTask, s0: float, s_end: float) -> None:
         super().__init__(path)
-        self.s0, self.s_end = scalar("s0", s0), scalar("s_end", s_end)
+        self.s0, self.s_end = as_scalar("s0", s0), as_scalar("s_end", s_end)
         slack = 1e-12 * (1 + abs(self.s0) + abs(self.s_end))
         inside = path.closed or (self.s0 >= path.s0 - slack and self.s_end <= path.s_end + slack)
         if not (self.s0 < self.s_end and inside):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
 
-from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol._arrays import Array, as_array, as_scalar, check_finite, freeze
 from pathcontrol._expect import expect_choice
 from pathcontrol.arguments import Form, Speed, Unit
 from pathcontrol.errors import InputError
@@ -44,10 +44,10 @@ class WaypointPath(SplinePath):
         tolerance: Annotated[float, Form.NOT_NEGATIVE, Unit("rad")] = 0.0,
         parametrisation: Parametrisation | Annotated[ArrayLike, Form.NUMBERS] = "centripetal",
     ) -> None:
-        self.points = readonly(_check_points(points, closed))
-        self.tolerance = scalar("tolerance", tolerance, least=0.0)
+        self.points = freeze(_check_points(points, closed))
+        self.tolerance = as_scalar("tolerance", tolerance, least=0.0)
         ring = np.concatenate([self.points, self.points[:1]]) if closed else self.points
-        self.parameters = readonly(_parameters(ring, parametrisation))
+        self.parameters = freeze(_parameters(ring, parametrisation))
         if self.tolerance:
             ring = _smooth(self.parameters, ring, self.tolerance, closed)
         super().__init__(_interpolant(self.parameters, ring, closed), speed, closed)
@@ -65,7 +65,7 @@ class WaypointPath(SplinePath):
 
 def _check_points(points: ArrayLike, closed: bool) -> Array:
     """Check the waypoints."""
-    array = finite("points", as_array("points", points))
+    array = check_finite("points", as_array("points", points))
     least = 3 if closed else 2
     if array.ndim != 2 or len(array) < least:
         raise InputError(f"points have shape {array.shape}, expected (m, n) with at least {least} waypoints")
@@ -84,7 +84,7 @@ def _parameters(ring: Array, parametrisation: Parametrisation | ArrayLike) -> Ar
         expect_choice("parametrisation", parametrisation, get_args(Parametrisation), ", or an array")
         steps = np.linalg.norm(np.diff(ring, axis=0), axis=-1) ** _POWER[parametrisation]
         return np.concatenate([[0.0], np.cumsum(steps)])
-    values = finite("parametrisation", as_array("parametrisation", parametrisation))
+    values = check_finite("parametrisation", as_array("parametrisation", parametrisation))
     if values.shape != (len(ring),) or not (np.diff(values) > 0).all():
         raise InputError(f"parametrisation has shape {values.shape}, expected {len(ring)} increasing parameters")
     return values

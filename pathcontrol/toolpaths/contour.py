@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, rigid
+from pathcontrol._arrays import Array, as_array, check_rigid
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.segments.bezier_columns import measure_bounds, measure_lengths
 from pathcontrol.toolpaths.segments.nearest import Cubics, is_cubic
@@ -101,7 +101,7 @@ class Contour:
 
     def placed(self, pose: ArrayLike) -> Contour:
         """Return the contour moved from the workpiece's frame by a homogeneous transform (4, 4)."""
-        transform = rigid("pose", pose)
+        transform = check_rigid("pose", pose)
         normals = None if self.normals is None else self.normals @ transform[:3, :3].T
         return replace(self, segments=tuple(s.placed(transform) for s in self.segments), normals=normals)
 

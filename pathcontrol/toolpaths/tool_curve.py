@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 
-from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol._arrays import Array, as_array, as_scalar, check_finite, freeze
 from pathcontrol.arguments import Direction, Length, Point, Points
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.closest_point import ClosestPoint, Curve
@@ -40,8 +40,8 @@ class ToolCurve:
     """
 
     def __init__(self, s: ArrayLike, p: ArrayLike, dp: ArrayLike, ddp: ArrayLike, closed: bool = False) -> None:
-        self.knots = readonly(finite("s", as_array("s", s)))
-        values = np.stack([finite(name, as_array(name, v)) for name, v in (("p", p), ("dp", dp), ("ddp", ddp))])
+        self.knots = freeze(check_finite("s", as_array("s", s)))
+        values = np.stack([check_finite(name, as_array(name, v)) for name, v in (("p", p), ("dp", dp), ("ddp", ddp))])
         if self.knots.ndim == 1 and (np.diff(self.knots) <= 0).any():
             i = int(np.argmax(np.diff(self.knots) <= 0))
             raise InputError(
@@ -123,7 +123,11 @@ class ToolCurve:
             normal: normal of its plane, (3,), of any length.
             start: direction from the centre in which the circle begins, (3,); its part in the plane is taken.
         """
-        c, r, axis, towards = _vector("center", center), scalar("radius", radius, positive=True), *_frame(normal, start)
+        c, r, axis, towards = (
+            _vector("center", center),
+            as_scalar("radius", radius, positive=True),
+            *_frame(normal, start),
+        )
         pieces = max(16, int(np.ceil(2 * np.pi / (4.6e-5 / r) ** (1 / 6))))  # to 1 nm, see hermite.py
         angle = np.linspace(0.0, 2 * np.pi, pieces + 1)
         cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
@@ -139,7 +143,7 @@ class ToolCurve:
             points: m ≥ 4 points, or 5 for a closed curve, no two neighbours the same; the first is not repeated.
             closed: whether the curve returns to the first point.
         """
-        given = finite("points", as_array("points", points))
+        given = check_finite("points", as_array("points", points))
         least = 5 if closed else 4
         if given.ndim != 2 or given.shape[1:] != (3,) or len(given) < least:
             raise InputError(f"points have shape {given.shape}, expected (m, 3) with at least {least} points")
@@ -173,11 +177,11 @@ class ToolCurve:
                 f"the edges turn back by {np.rad2deg(sharpest.turn):.0f}° at {sharpest.point.tolist()}, expected 150° "
                 "at most; end a curve there and begin another"
             )
-        return cls(*smooth_knots(contour, scalar("tolerance", tolerance, positive=True)).knots, closed=closed)
+        return cls(*smooth_knots(contour, as_scalar("tolerance", tolerance, positive=True)).knots, closed=closed)
 
 
 def _vector(name: str, value: ArrayLike) -> Array:
-    vector = finite(name, as_array(name, value))
+    vector = check_finite(name, as_array(name, value))
     if vector.shape != (3,):
         raise InputError(f"{name} has shape {vector.shape}, expected (3,)")
     return vector

@@ -16,7 +16,7 @@ from pathlib import Path
 from threading import Event
 from typing import IO, TYPE_CHECKING, Any, NamedTuple, cast
 
-from pathcontrol._arrays import scalar
+from pathcontrol._arrays import as_scalar
 from pathcontrol._expect import expect
 from pathcontrol._files import scratch_folder, whole_file
 from pathcontrol._progress import progress_bar
@@ -84,7 +84,7 @@ def save_video(
 
     expect("animation", animation, Animation)
     path = check_suffix(path, "a video (H.264 in MP4)", ".mp4")
-    clip = _clip(animation.duration, size, scalar("fps", fps, positive=True), speed)
+    clip = _clip(animation.duration, size, as_scalar("fps", fps, positive=True), speed)
     for package in ("playwright", "imageio_ffmpeg"):
         if find_spec(package) is None:
             raise MissingExtraError(package, "video", "a video")
@@ -135,7 +135,7 @@ def _clip(duration: float, size: tuple[int, int], fps: float, speed: float) -> _
             f"size = {size!r:.80}, expected width and height in pixels, two even numbers up to {_LARGEST} "
             "such as (1280, 720)"
         )
-    step = scalar("speed", speed, positive=True) / fps
+    step = as_scalar("speed", speed, positive=True) / fps
     if not step * _MOST_FRAMES >= duration:
         raise InputError(
             f"fps = {fps:g} and speed = {speed:g} make more than {_MOST_FRAMES} frames of a film of {duration:g} s; "

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import pathcontrol as pc
 from pathcontrol.cli import main
-from pathcontrol.cli.files import kind_of
+from pathcontrol.cli.files import recognise_file
 
 URDF = "<robot name='r'><link name='a'/></robot>"
 FILES = {
@@ -51,7 +51,7 @@ def called(*arguments):
 
 @pytest.mark.parametrize("name", FILES)
 def test_the_kind_of_a_file_is_known(folder, name):
-    assert kind_of(folder / name) == FILES[name][0]
+    assert recognise_file(folder / name) == FILES[name][0]
 
 
 @pytest.mark.parametrize("command", TAKES)
@@ -79,7 +79,7 @@ def test_a_missing_file_and_a_folder_are_told_as_such(tmp_path, command):
 @pytest.mark.parametrize("content", [b"", b"CDF\x01\0\0", b"\x89HDg\r\n\x1a\n\0\0"])
 def test_a_damaged_run_is_not_taken_for_a_toolpath(tmp_path, content):
     (tmp_path / "run.nc").write_bytes(content)
-    assert kind_of(tmp_path / "run.nc") == ""
+    assert recognise_file(tmp_path / "run.nc") == ""
     code, err = called("view", tmp_path / "run.nc")
     assert code == 2
     assert "is not a run saved by Run.save" in err

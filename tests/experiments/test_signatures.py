@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from pathcontrol._units import quantity
+from pathcontrol._units import parse_quantity
 from pathcontrol.arguments import Form, Unit, parameters_of
 from pathcontrol.experiments.template import example_text
 from pathcontrol.registry import KINDS, LOOPS, Kind
@@ -28,7 +28,7 @@ def test_units_of_docstrings_are_those_of_annotations(kind: Kind, name: str):
         mark = parameter.unit
         if units and mark is not None:
             for unit in units:
-                quantity(f"1 {unit}", *mark.names, *([mark.tool] if mark.tool else []))
+                parse_quantity(f"1 {unit}", *mark.names, *([mark.tool] if mark.tool else []))
         formulas = parameter.form in (Form.FORMULA, Form.FORMULAS)
         assert formulas or bool(units) <= (mark is not None), f"{name}.{argument} in {units} has no Unit"
 
@@ -38,7 +38,7 @@ def test_a_unit_is_of_a_quantity():
     for kind, name in EVERY:
         for parameter in parameters_of(kind.find(name)).values():
             for unit in () if parameter.unit is None else parameter.unit.names:
-                assert quantity(f"2 {unit}", unit) == 2.0
+                assert parse_quantity(f"2 {unit}", unit) == 2.0
 
 
 def test_the_example_shows_every_argument():

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pathcontrol as pc
-from pathcontrol._units import quantity
+from pathcontrol._units import parse_quantity
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.load import load_experiment
 from pathcontrol.experiments.runner import load_setup
@@ -24,7 +24,7 @@ TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
 
 @given(st.floats(-1e6, 1e6), st.sampled_from(sorted(LENGTH)), st.sampled_from(sorted(TIME)), st.sampled_from(["", " "]))
 def test_a_speed_is_a_length_over_a_time(value, length, time, space):
-    found = quantity(f"{value!r}{space}{length}/{time}", "m/s")
+    found = parse_quantity(f"{value!r}{space}{length}/{time}", "m/s")
     assert found == pytest.approx(value * LENGTH[length] / TIME[time], rel=1e-14)
 
 
@@ -55,8 +55,8 @@ def test_a_speed_is_a_length_over_a_time(value, length, time, space):
     ],
 )
 def test_a_text_is_the_number_that_a_person_would_write_in_si_units(text, unit, value):
-    assert quantity(text, unit) == value
-    assert pickle.loads(pickle.dumps(quantity(text, unit))).unit == unit
+    assert parse_quantity(text, unit) == value
+    assert pickle.loads(pickle.dumps(parse_quantity(text, unit))).unit == unit
 
 
 @pytest.mark.parametrize(
@@ -65,13 +65,13 @@ def test_a_text_is_the_number_that_a_person_would_write_in_si_units(text, unit, 
 @pytest.mark.parametrize("more", ["", " x", "//s", "^99", "9" * 400])
 def test_what_is_no_speed_is_refused_with_the_units_that_are(text, more):
     with pytest.raises(pc.InputError, match=r"m/s \(mm/s, m/min, mm/min, in/min\)"):
-        quantity(text + more, "m/s")
+        parse_quantity(text + more, "m/s")
 
 
 @given(st.text(max_size=80))
 def test_any_text_is_a_quantity_or_refused(text):
     with contextlib.suppress(pc.InputError):
-        assert math.isfinite(quantity(text, "m/s", "rad"))
+        assert math.isfinite(parse_quantity(text, "m/s", "rad"))
 
 
 SI = """

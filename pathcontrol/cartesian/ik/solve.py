@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
-from pathcontrol._arrays import Array, finite, joint_array
+from pathcontrol._arrays import Array, as_joint_array, check_finite
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.continuation import SINGULAR, Stop, Trail, follow, verdicts
 from pathcontrol.cartesian.ik.correction import correct
@@ -61,7 +61,7 @@ def _follow(constraint: ToolConstraint, starts: Array) -> list[Trail]:
 
 def check_posture(robot: RobotModel, start: ArrayLike) -> Array:
     """Check that ``start`` is a posture (n,) within the joint limits."""
-    q = finite("start", joint_array("start", start, robot.n, robot.joint_names))
+    q = check_finite("start", as_joint_array("start", start, robot.n, robot.joint_names))
     if q.shape != (robot.n,):
         raise InputError(f"start has shape {q.shape}, expected one posture ({robot.n},)")
     if is_outside(robot, q):

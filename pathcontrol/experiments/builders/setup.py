@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pathcontrol._arrays import Array, finite, joint_array
+from pathcontrol._arrays import Array, as_joint_array, check_finite
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.builders.arms import build_arms
@@ -159,8 +159,8 @@ def _state(experiment: Experiment, controller: Controller) -> tuple[Array, Array
     n, given = controller.robot.n, experiment.start.arguments(experiment.to_radians)
     with keyed("start", ("q", "qd")):
         begin = controller.task.q_d(np.array(controller.task.s0))
-        q = finite("q", joint_array("q", given.get("q", begin), n))
-        qd = finite("qd", joint_array("qd", given.get("qd", np.zeros(n)), n))
+        q = check_finite("q", as_joint_array("q", given.get("q", begin), n))
+        qd = check_finite("qd", as_joint_array("qd", given.get("qd", np.zeros(n)), n))
     for name, per in (("q", ""), ("qd", "/s")):
         for i, (value, unit) in enumerate(zip(given.get(name, ()), controller.robot.position_units, strict=False)):
             refuse_unit(f"start.{name}[{i}]", value, unit + per)

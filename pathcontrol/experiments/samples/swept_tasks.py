@@ -14,7 +14,7 @@ from pathcontrol.experiments.builders.making import Place
 from pathcontrol.experiments.builders.tasks import build_duration, build_task
 from pathcontrol.experiments.schema.experiment import Experiment
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.batch.checks import kind_of
+from pathcontrol.tasks.batch.checks import classify_end
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
@@ -57,7 +57,7 @@ def rows_together(tasks: Sequence[SweptTask]) -> list[NDArray[np.intp]]:
     """The rows that one batch takes: all closed or all open, and of one duration; an endless path is for itself."""
     groups: dict[Hashable, list[int]] = {}
     for row, (task, duration, _) in enumerate(tasks):
-        kind = kind_of(task)
+        kind = classify_end(task)
         groups.setdefault((id(task) if kind == "endless" else kind, duration), []).append(row)
     return [np.array(rows) for rows in groups.values()]
 

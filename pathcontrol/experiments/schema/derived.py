@@ -16,7 +16,7 @@ from pydantic_core import PydanticCustomError
 from pathcontrol.arguments import Form, Parameter, parameters_of
 from pathcontrol.experiments.schema.section import Section, choose
 from pathcontrol.experiments.schema.validators import Text, check, did_you_mean, expected
-from pathcontrol.registry import Kind, kind_of, load
+from pathcontrol.registry import Kind, find_kind, load
 
 _OWN = re.compile(r"(?P<file>.+\.py|[^\W\d]\w*(\.[^\W\d]\w*)*):(?P<name>[^\W\d]\w*)")
 _FORMS = {float: Form.NUMBER, int: Form.WHOLE, bool: Form.FLAG, str: Form.TEXT}
@@ -132,7 +132,7 @@ def _annotation(parameter: Parameter) -> Any:
 
 def _table_of(kind: Any) -> Callable[[Any], Any] | None:
     """Return what makes a section of a table for an object that a parameter may be, if it may be one."""
-    if (known := kind_of(kind)) is not None:
+    if (known := find_kind(kind)) is not None:
         return chooser(known)
     return section_of(kind).model_validate if isinstance(kind, type) and is_dataclass(kind) else None
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from pathcontrol._units import Quantity, is_quantity, list_units, quantity
+from pathcontrol._units import Quantity, is_quantity, list_units, parse_quantity
 from pathcontrol.arguments import Unit
 from pathcontrol.errors import InputError
 from pathcontrol.experiments.schema.validators import did_you_mean, expected, shown
@@ -106,7 +106,7 @@ def in_si(at: tuple[int | str, ...], value: Any, units: tuple[str, ...], wrong: 
         try:
             if len(wrong) > _MOST_TOLD:
                 return value
-            return quantity(value, *units)
+            return parse_quantity(value, *units)
         except InputError as error:
             wrong[at] = _explained(at, value, f" = {shown(value)}, {error}")
     return value

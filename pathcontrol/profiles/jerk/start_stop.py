@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import TaskError
 from pathcontrol.profiles.jerk.ramps import Course
@@ -60,10 +60,10 @@ class SmoothStartStop(VelocityProfile):
     ) -> None:
         _check_open(path)
         self.profile, self.motion = profile, JointMotion() if motion is None else motion
-        self.acceleration = scalar("acceleration", acceleration, positive=True)
-        self.jerk = scalar("jerk", jerk, positive=True)
+        self.acceleration = as_scalar("acceleration", acceleration, positive=True)
+        self.jerk = as_scalar("jerk", jerk, positive=True)
         self._least = 0.5 * self.jerk * _FIRST_INSTANT**2
-        self.start_speed = self._least if start_speed is None else scalar("start_speed", start_speed, positive=True)
+        self.start_speed = self._least if start_speed is None else as_scalar("start_speed", start_speed, positive=True)
         s = edges(path, _CELLS)
         self._distance = distance(path, self.motion, s)
         course = Course(s, lambda s: profile.theta(path, s) * self.motion.stretch(path, s)[0], self._distance)

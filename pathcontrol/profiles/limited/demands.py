@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pathcontrol._arrays import Array, joint_array, scalar
+from pathcontrol._arrays import Array, as_joint_array, as_scalar
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.limited.grid import excess
 from pathcontrol.profiles.limited.motion_limit import MotionLimit
@@ -33,7 +33,7 @@ class Demands:
         self.first, self.last = np.inf, np.inf
         if path.period is None:
             first = self._rate_after(_START, path.s0)
-            self.first = first if start_rate is None else scalar("start_rate", start_rate, positive=True)
+            self.first = first if start_rate is None else as_scalar("start_rate", start_rate, positive=True)
             self.last = self._rate_after(_END, path.s_end)
 
     def at(self, s: Array) -> tuple[Array, list[Tangential]]:
@@ -65,7 +65,7 @@ class Demands:
 
 def _check_velocity(velocity: ArrayLike | None, n: int) -> Array:
     """Check the velocity limits of the joints, (n,); ``inf`` for none."""
-    fastest = joint_array("velocity", np.full(n, np.inf) if velocity is None else velocity, n)
+    fastest = as_joint_array("velocity", np.full(n, np.inf) if velocity is None else velocity, n)
     if not (fastest > 0).all():
         raise InputError(f"velocity = {fastest.tolist()}, expected speeds greater than 0; inf for no limit")
     return fastest

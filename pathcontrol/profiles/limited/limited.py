@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import whole
+from pathcontrol._arrays import as_whole
 from pathcontrol._expect import expect
 from pathcontrol.arguments import Form, Rate, Unit
 from pathcontrol.errors import InputError
@@ -57,7 +57,7 @@ def limited(
     expect("path", path, PathTask)
     for i, limit in enumerate(limits):
         expect(f"limits[{i}]", limit, MotionLimit)
-    cells = edges(path, whole("points", points, 1, MOST_POINTS))
+    cells = edges(path, as_whole("points", points, 1, MOST_POINTS))
     demands = Demands(path, limits, velocity, start_rate)
     s = refine(demands.resolved, cells)
     ceiling, tangential = demands.at(quarters(s))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.motion import JointMotion, Motion, ToolMotion, growth
 from pathcontrol.robot.extent import question_speed
@@ -42,7 +42,7 @@ class MotionLimit:
         if not given:
             raise InputError(f"this MotionLimit limits nothing; give at least one of {', '.join(names)}")
         for name, value in {**given, "control_period": self.control_period}.items():
-            scalar(name, value, positive=True)
+            as_scalar(name, value, positive=True)
         if isinstance(self.motion, ToolMotion) and self.speed is not None:
             question_speed("the speed of the tool", self.speed, self.motion.robot, self.motion.frame)
 

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, scalar, strip_labels
+from pathcontrol._arrays import Array, as_array, as_scalar, strip_labels
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
@@ -67,7 +67,7 @@ def joint_limits(
     Raises:
         InputError: a limit is not positive, has a wrong shape, or there is none.
     """
-    if not 0 <= scalar("margin", margin) < 1:
+    if not 0 <= as_scalar("margin", margin) < 1:
         raise InputError(f"margin = {margin:g}, expected the share of the torque left for feedback, 0 ≤ margin < 1")
     if acceleration is True:
         raise InputError("acceleration = True, but a URDF has no acceleration limits; give one for each joint")

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array, readonly, scalar, whole
+from pathcontrol._arrays import Array, as_scalar, as_whole, freeze
 from pathcontrol._expect import expect
 from pathcontrol.arguments import Form, Rate, Unit
 from pathcontrol.errors import InputError, TaskError
@@ -34,7 +34,7 @@ class TimeOptimal(TabulatedProfile):
         self, s: Array, squared: Array, period: float | None, limiting: tuple[str, ...], used: Array, margin: float
     ) -> None:
         super().__init__(s, squared, period)
-        self.limiting, self.used, self.margin = limiting, readonly(used), margin
+        self.limiting, self.used, self.margin = limiting, freeze(used), margin
 
     @property
     def limited_by(self) -> dict[str, float]:
@@ -120,12 +120,12 @@ def _knots(path: Path, points: int) -> Array:
     end = path.s_end if path.period is None else path.s0 + path.period
     if not np.isfinite(end):
         raise TaskError(f"{type(path).__name__} neither ends nor closes, so ϑ cannot be tabulated; give it an s_end")
-    return np.linspace(path.s0, end, whole("points", points, 10, MOST_POINTS))
+    return np.linspace(path.s0, end, as_whole("points", points, 10, MOST_POINTS))
 
 
 def _ends(path: Path, **ends: float | None) -> list[float | None]:
     """Check the rates and the time asked for at the ends of a path."""
-    given = {name: scalar(name, value, positive=True) for name, value in ends.items() if value is not None}
+    given = {name: as_scalar(name, value, positive=True) for name, value in ends.items() if value is not None}
     if given and path.period is not None:
         raise InputError(f"{' and '.join(given)} for a closed path, which begins as fast as it ends; leave them out")
     if given.keys() >= {"end_rate", "end_time"}:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 from lxml import etree
 
-from pathcontrol._arrays import scalar
+from pathcontrol._arrays import as_scalar
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES
 from pathcontrol.robot.urdf.numbers import read_numbers
@@ -109,7 +109,7 @@ def _positions(lock: Mapping[str, float] | None, joints: Collection[str]) -> dic
         return {}
     if not isinstance(lock, Mapping):
         raise InputError(f"lock = {lock!r}, expected angles by joint, as {{'joint name': 0.0}}")
-    return {_check_known("lock", name, joints): scalar(f"angle of {name}", angle) for name, angle in lock.items()}
+    return {_check_known("lock", name, joints): as_scalar(f"angle of {name}", angle) for name, angle in lock.items()}
 
 
 def names_to_keep(keep: str | Sequence[str] | None) -> list[str]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol._arrays import Array, as_array, check_finite, freeze
 from pathcontrol._expect import expect
 from pathcontrol.arguments import Form, Torques, Unit
 from pathcontrol.errors import InputError
@@ -71,7 +71,7 @@ class _Timed(Disturbance):
         self.start, length = _check_each("start", start), as_array("duration", duration)
         if length.ndim > 1 or not (length > 0).all():
             raise InputError(f"duration = {length.tolist()}, expected times greater than 0 [s], one or (N,)")
-        self.duration = readonly(length)
+        self.duration = freeze(length)
 
     def share(self, t: float) -> Array:
         """Return 1 while it acts and 0 else, (), or (N, 1)."""
@@ -96,7 +96,7 @@ class Push(_Timed):
 
     def __init__(self, magnitude: Torques, start: Begin = 0.0, duration: Span = np.inf) -> None:
         super().__init__(start, duration)
-        self.magnitude = readonly(finite("magnitude", as_array("magnitude", magnitude)))
+        self.magnitude = freeze(check_finite("magnitude", as_array("magnitude", magnitude)))
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
         return self.share(t) * self.magnitude
@@ -112,7 +112,7 @@ class Harmonic(Disturbance):
     """
 
     def __init__(self, amplitude: Torques, frequency: Frequency, phase: Phase = 0.0) -> None:
-        self.amplitude = readonly(finite("amplitude", as_array("amplitude", amplitude)))
+        self.amplitude = freeze(check_finite("amplitude", as_array("amplitude", amplitude)))
         self.frequency, self.phase = _check_each("frequency", frequency), _check_each("phase", phase)
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
@@ -145,7 +145,7 @@ class FrameForce(_Timed):
         expect("robot", robot, RobotModel)
         robot.frame_pose(np.zeros(robot.n), frame)  # raises where there is no such frame
         self._robot, self.frame = robot, frame
-        self.force = readonly(finite("force", as_array("force", force)))
+        self.force = freeze(check_finite("force", as_array("force", force)))
         if self.force.shape[-1:] != (3,):
             raise InputError(f"force has shape {self.force.shape}, expected (3,), or (N, 3) for each rollout")
 
@@ -223,7 +223,7 @@ def jump_times(disturbance: Disturbance) -> Array:
 
 def _check_each(name: str, value: ArrayLike) -> Array:
     """Check a number, or one for each rollout, (N,); return it read-only."""
-    array = readonly(finite(name, as_array(name, value)))
+    array = freeze(check_finite(name, as_array(name, value)))
     if array.ndim > 1:
         raise InputError(f"{name} has shape {array.shape}, expected a number, or one for each rollout, (N,)")
     return array

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.random import SeedSequence, default_rng
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, check_whole, finite
+from pathcontrol._arrays import Array, check_finite, check_whole
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError
 
@@ -37,7 +37,7 @@ class SensorNoise:
 
     def __post_init__(self) -> None:
         for name in ("position", "velocity"):
-            deviation = finite(f"noise of the {name}", np.asarray(getattr(self, name), dtype=np.float64))
+            deviation = check_finite(f"noise of the {name}", np.asarray(getattr(self, name), dtype=np.float64))
             if (deviation < 0).any() or deviation.ndim > 2:
                 raise InputError(f"noise of the {name} = {deviation.tolist()}, expected standard deviations ≥ 0")
         check_whole("seed", self.seed, 0)

@@ -6,7 +6,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from pathcontrol._arrays import Array, readonly
+from pathcontrol._arrays import Array, freeze
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 
@@ -22,7 +22,7 @@ def mobility(robot: RobotModel | RobotBatch) -> Array:
     if isinstance(robot, RobotBatch):
         return np.concatenate([mobility(body) for body in robot.bodies], axis=1)[:, robot.body]
     if robot not in _KNOWN:
-        _KNOWN[robot] = readonly(_mobility(robot))
+        _KNOWN[robot] = freeze(_mobility(robot))
     return _KNOWN[robot]
 
 

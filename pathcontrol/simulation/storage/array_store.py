@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array, finite
+from pathcontrol._arrays import Array, check_finite
 from pathcontrol.errors import InputError
 
 _MOST_AXES = 8
@@ -59,11 +59,11 @@ class ArrayStore:
             InputError: there is no such place, or its numbers are not finite.
         """
         if "values" in place:
-            return finite("values", np.array(place["values"], dtype=np.float64))
+            return check_finite("values", np.array(place["values"], dtype=np.float64))
         (numbers,), shape, at = self._parts, place["shape"], place["at"]
         if not isinstance(shape, list) or not all(type(length) is int and length >= 0 for length in (at, *shape)):
             raise InputError(f"an array is said to have the shape {shape} and to be at {at}, expected whole numbers")
         size = math.prod(shape)
         if len(shape) > _MOST_AXES or at + size > len(numbers):
             raise InputError(f"an array of shape {shape} is said to be at {at} of {len(numbers)} numbers")
-        return finite("numbers", numbers[at : at + size].reshape(shape))
+        return check_finite("numbers", numbers[at : at + size].reshape(shape))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import as_array, finite
+from pathcontrol._arrays import as_array, check_finite
 from pathcontrol.arguments import parameters_of
 from pathcontrol.errors import InputError
 from pathcontrol.registry import PROFILES, TASKS, load
@@ -166,7 +166,9 @@ def _try_out(made: Any) -> Any:
     if isinstance(made, PathTask):
         s = np.linspace(*made.sampled_interval, 3)
         for asked, shape in ((made.q_d, (3, made.n)), (made.dq_d, (3, made.n)), (made.theta, (3,))):
-            finite(f"{type(made).__name__}.{asked.__name__}", np.broadcast_to(as_array("values", asked(s)), shape))
+            check_finite(
+                f"{type(made).__name__}.{asked.__name__}", np.broadcast_to(as_array("values", asked(s)), shape)
+            )
     return made
 
 

@@ -44,7 +44,7 @@ def check_same_kind(tasks: Sequence[PathTask]) -> None:
     Raises:
         InputError: they are not, or one neither ends nor repeats.
     """
-    first, n = kind_of(tasks[0]), _joints(tasks, 0)
+    first, n = classify_end(tasks[0]), _joints(tasks, 0)
     for rows in group_by_identity(tasks):
         i, task = rows[0], tasks[rows[0]]
         if _joints(tasks, i) != n:
@@ -52,7 +52,7 @@ def check_same_kind(tasks: Sequence[PathTask]) -> None:
                 f"tasks[{i}] is a path of {task.n} joints, tasks[0] of {n}; all rollouts are of one arm, so give each "
                 "number of joints a batch of its own"
             )
-        kind = kind_of(task)
+        kind = classify_end(task)
         if kind == "endless":
             raise InputError(
                 f"tasks[{i}], a {type(task).__name__}, neither ends nor repeats; give it a finite s_end, as "
@@ -85,7 +85,7 @@ def summarize(every: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return told
 
 
-def kind_of(task: PathTask) -> str:
+def classify_end(task: PathTask) -> str:
     """Return the kind of a path: ``"closed"``, ``"open"``, or ``"endless"``."""
     return "closed" if task.closed else "open" if np.isfinite(task.s_end) else "endless"
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.arc_length import drop_coincident
@@ -63,7 +63,7 @@ class ConcatenatedPath(PathTask):
     """Several open paths as one; see :func:`concatenated`."""
 
     def __init__(self, paths: Sequence[PathTask], blend: float | None = None) -> None:
-        self.blend = 0.0 if blend is None else scalar("blend", blend, positive=True)
+        self.blend = 0.0 if blend is None else as_scalar("blend", blend, positive=True)
         self.paths = _check_paths(paths)
         self.keep_tool(*self.paths)
         self.s0 = self.paths[0].s0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, readonly
+from pathcontrol._arrays import Array, as_array, freeze
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import refuse_batch
@@ -51,7 +51,7 @@ class PathSequence(PathTask):
         self._check_meeting()
         self.keep_tool(*self.paths)
         lengths = [path.s_end - path.s0 for path in self.paths]
-        self.starts = readonly(np.concatenate([[0.0], np.cumsum(lengths)]))
+        self.starts = freeze(np.concatenate([[0.0], np.cumsum(lengths)]))
         self.s0, self.s_end = 0.0, float(self.starts[-1])
 
     def __iter__(self) -> Iterator[PathTask]:

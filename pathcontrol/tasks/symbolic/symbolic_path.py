@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.arguments import Form, Speed
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.tasks.base import PathPoint
@@ -61,8 +61,8 @@ class SymbolicPath(PathTask):
     ) -> None:
         take_domain(self, s0, s_end, period)
         refuse_two_rates(speed, theta)
-        self.speed = None if speed is None else scalar("speed", speed, positive=True)
-        self.parameters = {str(key): scalar(f"parameters[{str(key)!r}]", v) for key, v in (parameters or {}).items()}
+        self.speed = None if speed is None else as_scalar("speed", speed, positive=True)
+        self.parameters = {str(key): as_scalar(f"parameters[{str(key)!r}]", v) for key, v in (parameters or {}).items()}
         self._s = _symbol(s, self.parameters)
         given = {f"q_d[{i}]": formula for i, formula in enumerate(_check_formulas(q_d))}
         if theta is not None:
@@ -125,7 +125,7 @@ class SymbolicPath(PathTask):
         if isinstance(formula, str):
             return parse(label, formula, names)
         if not isinstance(formula, sympy.Expr):
-            return number(scalar(label, formula))
+            return number(as_scalar(label, formula))
         unknown = sorted({symbol.name for symbol in formula.free_symbols} - set(names))
         if unknown:
             raise UnknownNameError(

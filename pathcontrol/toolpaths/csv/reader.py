@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.arguments import Feed, Form, Unit
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Contour, Toolpath
@@ -68,8 +68,8 @@ def read_csv(
     passed, chosen = Notes(unknown), check_choice(columns)
     _check_choice("unit", unit, [*UNITS])
     _check_choice("decimal", decimal, [".", ","])
-    feed = None if feed is None else scalar("feed", feed, positive=True)
-    z = None if z is None else scalar("z", z)
+    feed = None if feed is None else as_scalar("feed", feed, positive=True)
+    z = None if z is None else as_scalar("z", z)
     lines = read_lines(path, "a table of points")
     try:
         rows = Rows.of(lines, decimal)

@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.drawing.pieces import NOTHING, contour_of, drop_repeated, ends_of
@@ -67,7 +67,7 @@ def checked_gap(gap: float | None) -> float | None:
     Raises:
         InputError: it is something else.
     """
-    if gap is not None and scalar("gap", gap) < 0:
+    if gap is not None and as_scalar("gap", gap) < 0:
         raise InputError(f"gap = {gap!r} m, expected a length not less than 0")
     return gap
 

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.arguments import Distance, Feed, Names
 from pathcontrol.errors import PathControlError, ToolpathError, UnknownNameError
 from pathcontrol.toolpaths.contour import Toolpath
@@ -86,7 +86,7 @@ def read_dxf(
         InputError: ``feed`` is not greater than 0, ``gap`` is less than 0, ``unknown`` is no choice.
     """
     if feed is not None:
-        scalar("feed", feed, positive=True)
+        as_scalar("feed", feed, positive=True)
     gap, names = checked_gap(gap), names_of("layers", layers)
     passed = Notes(unknown)
     text = read_text(path, "a DXF drawing")

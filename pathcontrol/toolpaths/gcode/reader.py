@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import as_array, finite, scalar
+from pathcontrol._arrays import as_array, as_scalar, check_finite
 from pathcontrol.arguments import Feed, Length, Point
 from pathcontrol.errors import InputError, ToolpathError
 from pathcontrol.toolpaths.contour import Toolpath
@@ -66,9 +66,9 @@ def read_gcode(
     if unit is not None and unit not in UNITS:
         raise InputError(f"unit = {unit!r}, expected one of {', '.join(UNITS)}, or None")
     if feed is not None:
-        feed = scalar("feed", feed, positive=True)
+        feed = as_scalar("feed", feed, positive=True)
     if arc_tolerance is not None:
-        arc_tolerance = scalar("arc_tolerance", arc_tolerance, positive=True)
+        arc_tolerance = as_scalar("arc_tolerance", arc_tolerance, positive=True)
     passed = Notes(unknown)
     texts = [without_comments(line).strip(" \t") for line in read_lines(path, "a G-code program")]
     modes = Modes(None if unit is None else UNITS[unit], feed=feed, arc_tolerance=arc_tolerance)
@@ -88,7 +88,7 @@ def _start(start: ArrayLike | None, texts: list[str]) -> list[float]:
     if start is None:
         named = [any(axis in text or axis.lower() in text for text in texts) for axis in "XYZ"]
         return [math.nan if known else 0.0 for known in named]
-    position = finite("start", as_array("start", start))
+    position = check_finite("start", as_array("start", start))
     if position.shape != (3,):
         raise InputError(f"start has shape {position.shape}, expected (3,)")
     if np.abs(position).max() > MAX_COORDINATE:

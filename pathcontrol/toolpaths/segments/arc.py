@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, finite, readonly, scalar
+from pathcontrol._arrays import Array, as_array, as_scalar, check_finite, freeze
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.segments.segment import Segment
 
@@ -38,12 +38,12 @@ class Arc(Segment):
 
     def __post_init__(self) -> None:
         for name in ("center", "x", "y", "rise"):
-            array = finite(name, as_array(name, getattr(self, name)))
+            array = check_finite(name, as_array(name, getattr(self, name)))
             if array.shape != (3,):
                 raise InputError(f"{name} has shape {array.shape}, expected (3,)")
-            object.__setattr__(self, name, readonly(array))
-        scalar("start", self.start)
-        if scalar("sweep", self.sweep) == 0 or not _parallelogram(self.x.tolist(), self.y.tolist()) > 0:
+            object.__setattr__(self, name, freeze(array))
+        as_scalar("start", self.start)
+        if as_scalar("sweep", self.sweep) == 0 or not _parallelogram(self.x.tolist(), self.y.tolist()) > 0:
             raise InputError(f"an arc with x = {self.x}, y = {self.y} and sweep = {self.sweep:g} has no length")
 
     @property
@@ -57,7 +57,7 @@ class Arc(Segment):
     @cached_property
     def _ends(self) -> Array:
         """The first and the last point [m], (2, 3)."""
-        return readonly(self.point(np.array([0.0, 1.0])))
+        return freeze(self.point(np.array([0.0, 1.0])))
 
     @property
     def circular(self) -> bool:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import BPoly
 
-from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol._arrays import Array, as_array, check_finite, freeze
 from pathcontrol.errors import InputError
 from pathcontrol.toolpaths.segments.segment import Segment
 
@@ -26,22 +26,22 @@ class Bezier(Segment):
     weights: Array | None = None
 
     def __post_init__(self) -> None:
-        points = finite("points", as_array("points", self.points))
+        points = check_finite("points", as_array("points", self.points))
         if points.ndim != 2 or points.shape[1:] != (3,) or len(points) < 2:
             raise InputError(f"points have shape {points.shape}, expected (degree + 1, 3), degree ≥ 1")
         if not np.ptp(points, axis=0).any():
             raise InputError(f"all control points are the same, {points[0].tolist()}: the curve has no length")
-        object.__setattr__(self, "points", readonly(points))
+        object.__setattr__(self, "points", freeze(points))
         if self.weights is not None:
-            weights = finite("weights", as_array("weights", self.weights))
+            weights = check_finite("weights", as_array("weights", self.weights))
             if weights.shape != points.shape[:1] or not (weights > 0).all():
                 raise InputError(f"weights = {weights.tolist()}, expected {len(points)} weights greater than 0")
-            object.__setattr__(self, "weights", readonly(weights))
+            object.__setattr__(self, "weights", freeze(weights))
 
     @classmethod
     def of_each(cls, points: Array) -> list[Bezier]:
         """Make a polynomial curve of each of the valid control points (k, degree + 1, 3), without checks."""
-        points, curves = readonly(points), []
+        points, curves = freeze(points), []
         for row in points:
             curve = object.__new__(cls)
             curve.__dict__.update(points=row, weights=None)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from pathcontrol._arrays import Array, as_array, finite, readonly
+from pathcontrol._arrays import Array, as_array, check_finite, freeze
 from pathcontrol.errors import InputError
 from pathcontrol.geometry.arc_length import ArcLength
 from pathcontrol.geometry.box_hierarchy import BoxHierarchy
@@ -94,10 +94,10 @@ class Polyline(Segment):
     points: Array
 
     def __post_init__(self) -> None:
-        points = finite("points", as_array("points", self.points))
+        points = check_finite("points", as_array("points", self.points))
         if points.ndim != 2 or points.shape[1:] != (3,) or len(points) < 2:
             raise InputError(f"points have shape {points.shape}, expected (k, 3) with at least 2 points")
-        object.__setattr__(self, "points", readonly(points))
+        object.__setattr__(self, "points", freeze(points))
         if (self.edges <= _SHORTEST).any():
             i = int(np.argmin(self.edges))
             raise InputError(f"points {i} and {i + 1} are the same, {points[i].tolist()}; leave one of them out")

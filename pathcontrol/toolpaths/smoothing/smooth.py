@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-from pathcontrol._arrays import Array, scalar
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol._expect import expect, expect_choice
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.smoothing.bends import regularize
@@ -56,7 +56,7 @@ def smooth(contour: Contour, tolerance: float = 1e-4, corner: Corners = "blend")
         UnknownNameError: ``corner`` is neither.
     """
     expect("contour", contour, Contour)
-    tolerance = scalar("tolerance", tolerance, positive=True)
+    tolerance = as_scalar("tolerance", tolerance, positive=True)
     expect_choice("corner", corner, get_args(Corners))
     parts = split(contour, TURN_BACK if corner == "blend" else SHARP)
     done = [piece for part in parts for piece in _pieces(part, tolerance)]

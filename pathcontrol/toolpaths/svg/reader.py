@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 from typing import Annotated, Literal
 
-from pathcontrol._arrays import scalar
+from pathcontrol._arrays import as_scalar
 from pathcontrol.arguments import Distance, Feed, Form, Names
 from pathcontrol.errors import ToolpathError
 from pathcontrol.toolpaths.contour import Toolpath
@@ -60,9 +60,9 @@ def read_svg(
         UnknownNameError: there is no such layer or kind.
         InputError: ``ppi`` or ``feed`` is not greater than 0, ``gap`` is less than 0, ``unknown`` is no choice.
     """
-    scalar("ppi", ppi, positive=True)
+    as_scalar("ppi", ppi, positive=True)
     if feed is not None:
-        scalar("feed", feed, positive=True)
+        as_scalar("feed", feed, positive=True)
     gap = checked_gap(gap)
     passed, names = Notes(unknown), names_of("layers", layers)
     document = Document(path)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, joint_array
+from pathcontrol._arrays import Array, as_joint_array
 from pathcontrol.analysis.torque_limits import torque_limits as clamped_limits
 from pathcontrol.view.figures.lettering import joint_label, legend
 from pathcontrol.view.figures.limits import extent, over_time, span
@@ -60,7 +60,7 @@ def torque_limits(one: Shown, limits: ArrayLike | None = None) -> Array:
     """Return the largest torques (n,): given, set by the loop, or the robot's own; infinite where unknown."""
     if limits is None:
         return clamped_limits(one.run, own_robot(one.run))
-    given = np.abs(joint_array("limits", limits, len(one.joints), tuple(one.joints)))
+    given = np.abs(as_joint_array("limits", limits, len(one.joints), tuple(one.joints)))
     return np.where(drawable(given) > 0, given, np.inf)
 
 
