@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._labels import order_by_name, read_labels, refuse_labels
+from pathcontrol._units import is_quantity
 from pathcontrol.errors import InputError
 
 #: an array of floats; shapes are said in docstrings
@@ -25,7 +26,8 @@ def as_array(name: str, value: ArrayLike) -> Array:
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:  # OverflowError: an integer of hundreds of digits
-        raise InputError(f"{name} = {value!r}, expected numbers", argument=name, value=value) from error
+        plain = " in SI units, without a unit" if isinstance(value, str) and is_quantity(value) else ""
+        raise InputError(f"{name} = {value!r}, expected numbers{plain}", argument=name, value=value) from error
 
 
 def as_joint_array(name: str, value: Any, n: int, joints: Sequence[str] | None = None) -> Array:

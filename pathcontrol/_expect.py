@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from typing import Any
 
@@ -88,6 +88,15 @@ def describe(value: Any) -> str:
     if family not in _SOURCES:
         return f"= {reprlib.repr(_text(value))[:_LONGEST]}"
     return f"is {_article(name)} {name}" + ("" if family == name else f", which is {_article(family)} {family}")
+
+
+def did_you_mean(word: Any, choices: Iterable[str]) -> str:
+    """Return ``; did you mean …?`` with the choice closest to ``word``, or an empty text."""
+    import difflib  # only where something is wrong
+
+    by_lower = {choice.lower(): choice for choice in choices}
+    found = difflib.get_close_matches(str(word)[:80].lower(), by_lower, n=1, cutoff=0.6)
+    return f"; did you mean {by_lower[found[0]]!r}?" if found else ""
 
 
 def _article(word: str) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
 import pathcontrol as pc
-from pathcontrol import InputError, TaskError
+from pathcontrol import InputError, TaskError, UnknownNameError, UrdfError
 from pathcontrol.errors import PathControlWarning
 
 TWO = pc.load_robot("cicese_2dof")
@@ -158,3 +160,37 @@ def test_paths_in_radians_and_those_without_an_end_are_not_questioned(recwarn):
         law = pc.ExtendedMotionPlan(TWO, task, 800.0, [45.0, 100.0], k=2.0)
         pc.simulate(law, [0.1, 0.1], duration=0.01, progress=False)
     assert not [w for w in recwarn if "turns" in str(w.message)]
+
+
+@pytest.mark.parametrize("source", [123, None, ["ur5"]])
+def test_a_robot_that_is_neither_a_name_nor_a_file(source):
+    with pytest.raises(UrdfError, match=r"robot = .*, expected the name of a known robot, the path of a URDF"):
+        pc.load_robot(source)
+
+
+def test_the_closest_name_is_offered():
+    with pytest.raises(UnknownNameError, match=r"or the path of a URDF; did you mean 'cicese_2dof'\?"):
+        pc.load_robot("cicese_2fod")
+    with pytest.raises(UnknownNameError, match=r"did you mean 'tau_noise'\?"):
+        pc.tune(lambda p, samples: {}, {"K": [1.0, 2.0]}, ["tau_noize"], progress=False)
+
+
+def test_a_quantity_with_its_unit_is_told_to_be_a_number_in_python():
+    with pytest.raises(InputError, match=r"period = '2\.5 ms', expected numbers in SI units, without a unit"):
+        pc.SampledLoop(period="2.5 ms")
+    with pytest.raises(InputError, match=r"duration = 'long', expected numbers$"):
+        pc.simulate(LAW, [0.9, 0.1], duration="long")
+
+
+def test_a_law_on_all_paths_of_a_toolpath_simulates_without_a_word_of_numpy(tmp_path):
+    (tmp_path / "l.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="40mm" height="30mm" '
+        'viewBox="0 0 40 30"><path d="M5 5h20v10M10 20h20" fill="none" stroke="red"/></svg>'
+    )
+    drawing = pc.read_toolpath(tmp_path / "l.svg", feed=0.1)
+    board = [[1, 0, 0, 0.25], [0, 0, -1, -0.05], [0, 1, 0, 0.65], [0, 0, 0, 1]]
+    task = pc.ToolpathTask(TWO, "tool", drawing, board, clearance=0.0)
+    law = pc.Projection(TWO, task, 800.0, 45.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        pc.simulate(law, task.q_d(np.array(0.0)), duration=0.1, progress=False)

@@ -30,6 +30,7 @@ _VALUE, _SLOPE = 1e-11, 1e-9
 _RATE, _RATE_SLOPE = 1e-13, 1e-11
 _ROUNDING = 64 * np.finfo(np.float64).eps
 _HALVINGS, _MOST_CELLS = 40, 1 << 16
+_NARROWEST = 64 * np.finfo(np.float64).eps  # width of a cell as a share of s
 _DEGREE = 5
 _PLACES = np.modf((5**0.5 - 1) / 2 * np.arange(1, 65))[0]  # places in the domain, as shares, evenly spread
 
@@ -206,7 +207,8 @@ def _find_coarse(
     rounding = _ROUNDING * (largest + local * np.abs(right))
     apart = np.abs(value - theta).max(0, initial=0.0) > _RATE * largest + rounding
     bent = np.abs(rise - slope).max(0, initial=0.0) > _RATE_SLOPE * (steepest + local) + 8 * rounding / (right - left)
-    return cells[apart | bent]
+    wide = right - left > _NARROWEST * np.maximum(np.abs(left), np.abs(right))  # s has no more digits to halve
+    return cells[(apart | bent) & wide]
 
 
 def _agrees(table: PathTable, task: PathTask) -> bool:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from importlib import resources
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from pathcontrol._expect import did_you_mean
 from pathcontrol._files import read_bounded
 from pathcontrol.errors import MissingExtraError, UnknownNameError, UrdfError
 from pathcontrol.robot.arm_dynamics import UrdfSource
@@ -38,6 +40,8 @@ def find_urdf(source: str | Path, package_dirs: tuple[Path, ...] = ()) -> UrdfSo
         return UrdfSource(source, None, package_dirs)
     if isinstance(source, str) and source.isidentifier():  # a file of that name would have a suffix
         return _find_by_name(source, package_dirs)
+    if not isinstance(source, str | PathLike):
+        raise UrdfError(f"robot = {source!r:.80}, expected the name of a known robot, the path of a URDF or its text")
     path = Path(source).expanduser()
     try:
         text = _read(path)
@@ -73,7 +77,8 @@ def _find_by_name(name: str, package_dirs: tuple[Path, ...]) -> UrdfSource:
         raise UrdfError(f"{name!r} is a folder, expected a URDF file; give the one that is in it")
     if loader is None or not loader.urdf_filename or loader.free_flyer:
         reason = "has a floating base" if loader is not None and loader.free_flyer else "is unknown"
-        raise UnknownNameError(f"robot {name!r} {reason}; known arms: {_names()}")
+        meant = did_you_mean(name, known_robots())
+        raise UnknownNameError(f"robot {name!r} {reason}; known arms: {_names()}, or the path of a URDF{meant}")
     return _example_urdf(name, loader, package_dirs)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array
+from pathcontrol._expect import did_you_mean
 from pathcontrol.analysis.progress import is_unfinished
 from pathcontrol.analysis.run_metrics import UNITS, metrics
 from pathcontrol.analysis.window import own_samples
@@ -89,7 +90,10 @@ def make_measure(wanted: Sequence[str] | Measure | None) -> Measure:
         return wanted
     unknown = [name for name in wanted if name not in UNITS]
     if unknown or isinstance(wanted, str):
-        raise UnknownNameError(f"metrics = {wanted!r}, expected a list of {', '.join(UNITS)}, or a function of a Run")
+        meant = did_you_mean(unknown[0], UNITS) if unknown and not isinstance(wanted, str) else ""
+        raise UnknownNameError(
+            f"metrics = {wanted!r}, expected a list of {', '.join(UNITS)}, or a function of a Run{meant}"
+        )
     return lambda run: _select_metrics(metrics(run, only=wanted), wanted)
 
 

@@ -85,7 +85,10 @@ class SweepResult:
         columns = self._store.columns(["sample", "status", self.kept_by])
         kept = [i for i in self.kept if i in columns["sample"]]  # a killed process may leave one without its numbers
         if not kept:
-            raise InputError(f"the sweep in {str(self.folder)!r} keeps no histories; give it keep=Keep(worst=3)")
+            raise InputError(
+                f"the sweep in {str(self.folder)!r} keeps no histories; give it keep=Keep(worst=3), or run one of its "
+                "samples: its table has their parameters"
+            )
         rows = np.searchsorted(columns["sample"], kept)
         badness = columns.get(self.kept_by, np.zeros(len(columns["sample"])))[rows]
         if badness.ndim != 1 or badness.dtype.kind not in "biuf":

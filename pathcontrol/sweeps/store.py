@@ -64,7 +64,7 @@ class Store:
         """
         folder = Path(folder)
         if (folder / MANIFEST).exists():
-            raise InputError(f"{str(folder)!r} holds a sweep already; resume it, or name another folder")
+            raise InputError(f"{str(folder)!r} holds a sweep already; resume it (resume=True), or name another folder")
         if any(folder.glob("chunks/*.parquet")):
             raise InputError(f"{str(folder)!r} holds the chunks of a sweep without its {MANIFEST}; name another folder")
         try:

@@ -204,7 +204,7 @@ def test_the_command_writes_a_table_and_tells_it(experiment, tmp_path):
     again = ["sweep", str(file), "--out", str(tmp_path / "out")]
     refused, resumed = (CliRunner().invoke(main, [*again, *more]) for more in ([], ["--resume"]))
     assert refused.exit_code == 2
-    assert "holds a sweep already; resume it" in refused.stderr
+    assert "holds a sweep already; resume it (--resume), or name" in refused.stderr
     assert resumed.exit_code == 0
     assert "9 running" in resumed.stdout
 

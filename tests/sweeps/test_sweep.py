@@ -256,7 +256,7 @@ def test_resuming_computes_only_what_is_missing(tmp_path):
 
 def test_a_sweep_of_another_definition_is_refused_by_what_differs(tmp_path):
     pc.sweep(circle, SPACE, tmp_path, progress=False)
-    with pytest.raises(InputError, match="holds a sweep already; resume it, or name another folder"):
+    with pytest.raises(InputError, match=r"holds a sweep already; resume it \(resume=True\), or name another folder"):
         pc.sweep(circle, SPACE, tmp_path, progress=False)
     other = pc.Space.sobol({"K_p": stats.loguniform(100.0, 2e4), "k": stats.uniform(1.0, 50.0), "q": [1, 2]}, 14)
     cases = [

@@ -13,9 +13,10 @@ from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
 from pydantic import Field, PlainValidator, TypeAdapter, create_model
 from pydantic_core import PydanticCustomError
 
+from pathcontrol._expect import did_you_mean
 from pathcontrol.arguments import Form, Parameter, parameters_of
 from pathcontrol.experiments.schema.section import Section, choose
-from pathcontrol.experiments.schema.validators import Text, check, did_you_mean, expected
+from pathcontrol.experiments.schema.validators import Text, check, expected
 from pathcontrol.registry import Kind, find_kind, load
 
 _OWN = re.compile(r"(?P<file>.+\.py|[^\W\d]\w*(\.[^\W\d]\w*)*):(?P<name>[^\W\d]\w*)")

@@ -10,10 +10,11 @@ from typing import Any, ClassVar, Self
 from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from pathcontrol._expect import did_you_mean
 from pathcontrol._units import Quantity, is_quantity, list_units, parse_quantity
 from pathcontrol.arguments import Unit
 from pathcontrol.errors import InputError
-from pathcontrol.experiments.schema.validators import did_you_mean, expected, shown
+from pathcontrol.experiments.schema.validators import expected, shown
 
 #: the SI units of each field that is a quantity, one or several
 Units = Mapping[str, tuple[str, ...]]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import reprlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import partial
 from typing import Annotated, Any
 
@@ -26,13 +25,6 @@ def expected(what: str) -> PydanticCustomError:
 def shown(value: Any) -> str:
     """``value`` as an error message shows it: as TOML spells it, and not at length."""
     return str(value).lower() if isinstance(value, bool) else _REPR.repr(value)
-
-
-def did_you_mean(word: Any, choices: Iterable[str]) -> str:
-    """``; did you mean …?`` with the choice closest to ``word``, or nothing."""
-    by_lower = {choice.lower(): choice for choice in choices}
-    found = difflib.get_close_matches(str(word)[:80].lower(), by_lower, n=1, cutoff=0.6)
-    return f"; did you mean {by_lower[found[0]]!r}?" if found else ""
 
 
 def _is_number(value: Any) -> bool:
