@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from pathcontrol.simulation.run import Run
 
 _NOTHING = 1e-7  # share of the largest of several numbers that counts as 0
 _ROUNDING = 1e-9  # rad, m, N m, …: rounding of floats for an arm of usual size
+_OUTCOMES = {"running": "ran until the time was up", "unfinished": "did not get as far as asked for"}
 _VARIABLES = {"rad": "q", "rad/s": "qd", "N m": "tau_demand"}
 
 
@@ -48,6 +49,11 @@ def readable_number(value: float, unit: str) -> str:
     value = float(without_rounding(np.array(value)))
     factor, name = reading(unit, np.array([value]))
     return f"{factor * value:.4g} {name}".strip()
+
+
+def describe_outcomes(statuses: Sequence[str]) -> str:
+    """Return how many rollouts of each status there are, in words."""
+    return ", ".join(f"{statuses.count(status)} {_OUTCOMES.get(status, status)}" for status in sorted(set(statuses)))
 
 
 def unit_of(metric: str, run: Run) -> str:

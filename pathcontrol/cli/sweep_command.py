@@ -72,19 +72,20 @@ def command(
 
 def _tell(result: SweepResult, as_json: bool) -> None:
     """Print the results."""
+    from pathcontrol.analysis.readable import describe_outcomes
     from pathcontrol.analysis.run_metrics import UNITS
 
     table = result.table()
     numbers = {str(name): v for name, v in table.data_vars.items() if v.dtype.kind == "f" and name != "diverged_time"}
     spread = {name: _spread(values.to_numpy()) for name, values in numbers.items()}
     statuses = table["status"].to_numpy().tolist()
-    count = {status: statuses.count(status) for status in sorted(set(statuses))}
     if as_json:
+        count = {status: statuses.count(status) for status in sorted(set(statuses))}
         histories = {str(i): str(result.history(i)) for i in result.kept}
         told = {"out": str(result.folder), "samples": result.samples, "status": count, "metrics": spread}
         click.echo(json.dumps(told | {"histories": histories}))
         return
-    click.echo(f"{result!r}: {', '.join(f'{n} {status}' for status, n in count.items())}")
+    click.echo(f"{result!r}: {describe_outcomes(statuses)}")
     click.echo(f"  {'':22} {'least':>12} {'median':>12} {'largest':>12}")
     for name, values in spread.items():
         if values["median"] is not None:

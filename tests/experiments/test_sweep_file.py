@@ -206,7 +206,7 @@ def test_the_command_writes_a_table_and_tells_it(experiment, tmp_path):
     assert refused.exit_code == 2
     assert "holds a sweep already; resume it (--resume), or name" in refused.stderr
     assert resumed.exit_code == 0
-    assert "9 running" in resumed.stdout
+    assert "9 ran until the time was up" in resumed.stdout
 
 
 def test_after_ctrl_c_finished_chunks_stay(experiment, tmp_path):

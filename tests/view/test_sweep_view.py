@@ -87,7 +87,7 @@ def test_the_report_of_a_sweep_has_its_numbers_and_figures(kept, tmp_path, monke
     result = call("report", kept.folder, "--out", tmp_path / "r.html", "--json")
     assert result.exit_code == 0, result.stderr
     page, table = html.parse(str(tmp_path / "r.html")), kept.table()
-    assert "6 samples: 3 diverged, 3 running. It keeps 3 histories" in page.getroot().text_content()
+    assert "6 samples: 3 diverged, 3 ran until the time was up. It keeps 3 histories" in page.getroot().text_content()
     rows = {row.find("th").text_content().strip(): row for row in page.xpath("//table[@id='sweep']//tr[th and td]")}
     cells = [cell.text for cell in rows["‖ep‖ peak [deg]"].findall("td")]
     assert float(cells[2]) == pytest.approx(np.rad2deg(float(table["e_p_peak"].max())), rel=1e-3)

@@ -15,6 +15,7 @@ from markupsafe import Markup, escape
 
 from pathcontrol.analysis.contours import contour_table
 from pathcontrol.analysis.lap_table import lap_table
+from pathcontrol.analysis.readable import describe_outcomes
 from pathcontrol.analysis.run_metrics import LABELS, UNITS
 from pathcontrol.analysis.run_remarks import remarks
 from pathcontrol.analysis.window import describe_window
@@ -123,11 +124,11 @@ def sweep_content(sweep: SweepResult) -> dict[str, Any]:
 def _describe_sweep(sweep: SweepResult, table: xr.Dataset) -> str:
     """Return the sentence about a sweep."""
     statuses = table["status"].to_numpy().tolist()
-    counts = ", ".join(f"{statuses.count(status)} {status}" for status in sorted(set(statuses)))
     finished = (
         f"{sweep.finished} of {sweep.samples} samples" if sweep.finished < sweep.samples else f"{sweep.samples} samples"
     )
-    return f"{finished}: {counts}. It keeps {len(sweep.kept)} histories; above are the worst of them, the worst first."
+    kept = f"It keeps {len(sweep.kept)} histories; above are the worst of them, the worst first."
+    return f"{finished}: {describe_outcomes(statuses)}. {kept}"
 
 
 def _row(table: xr.Dataset, name: str) -> Row | None:
