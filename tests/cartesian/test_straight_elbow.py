@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from pathcontrol import CartesianPath, FixedOrientation, NormalOrientation, TaskError, ToolCurve, load_robot
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
-from pathcontrol.cartesian.ik.correction import branch_at
-from pathcontrol.cartesian.ik.singularity_side import Branch
+from pathcontrol.cartesian.ik.correction import Branch, branch_at
 from pathcontrol.cartesian.orientation import FreeOrientation
 from pathcontrol.cartesian.tool import Tool
 

@@ -15,9 +15,8 @@ from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.robot.catalogue import find_urdf, own_urdf
 from pathcontrol.robot.meshes import load_parts
 from pathcontrol.robot.urdf import check_urdf
-from pathcontrol.view.bodies.body_meshes import MOST_TRIANGLES, read_mesh
+from pathcontrol.view.bodies.body_meshes import MOST_TRIANGLES, cluster_vertices, read_mesh
 from pathcontrol.view.bodies.body_visuals import link_visuals
-from pathcontrol.view.bodies.thinning import cluster_vertices
 
 # --- the robot that was asked for -----------------------------------------------------------------------------
 

@@ -13,8 +13,8 @@ from strategies import floats
 from pathcontrol import InputError, ToolCurve
 from pathcontrol.toolpaths.segments.arc import Arc
 from pathcontrol.toolpaths.segments.segment import Polyline
-from pathcontrol.toolpaths.smoothing.bends import regularize
 from pathcontrol.toolpaths.smoothing.hermite_data import ByLength, curved_stretch
+from pathcontrol.toolpaths.smoothing.smooth import regularize
 
 X, Y, Z = np.eye(3)
 T = np.linspace(0.0, 1.0, 501)

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.view.bodies.body_links import reach
+from pathcontrol.view.bodies.body_meshes import round_vertices, thin
 from pathcontrol.view.bodies.body_shapes import Box, Cylinder, Mesh, Sphere
 from pathcontrol.view.bodies.body_visuals import leaf_links, link_visuals
 from pathcontrol.view.bodies.sticks import stick_figure
-from pathcontrol.view.bodies.thinning import round_vertices, thin
 
 seeds = st.integers(0, 2**32 - 1)
 
