@@ -56,5 +56,6 @@ def test_numbers_along_a_horizontal_axis_do_not_touch(low, decades, width):
         figure.canvas.draw()
         shown = [label for label in axes.get_xticklabels(which="both") if label.get_text()]
         boxes = sorted((label.get_window_extent().x0, label.get_window_extent().x1) for label in shown)
+    assert len({label.get_fontsize() for label in shown}) <= 1
     inside = [box for box in boxes if axes.bbox.x0 <= sum(box) / 2 <= axes.bbox.x1]
     assert all(right <= left for (_, right), (left, _) in pairwise(inside)), boxes

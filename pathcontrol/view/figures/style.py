@@ -104,6 +104,7 @@ def apply_style(axes: Axes) -> Axes:
     """Return ``axes`` with grid and ticks in the style, set here, as ticks are made when they are first drawn."""
     axes.grid(True, color="#E3E3E3", linewidth=0.6)
     axes.tick_params(labelsize=SMALL, width=0.7, length=2.5, pad=2.5)
+    axes.tick_params(which="minor", labelsize=SMALL, width=0.5, length=1.5, pad=3.5)
     for axis in (axes.xaxis, axes.yaxis):
         axis.get_offset_text().set_fontsize(SMALL)
         label_plainly(axis)
