@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 import pathcontrol as pc
 from pathcontrol import ExperimentError
 from pathcontrol.experiments.runner import load_setup, run_experiment
-from pathcontrol.experiments.samples.swept_experiment import SweptExperiment, put
+from pathcontrol.experiments.samples.dotted_keys import put
+from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
 
 RIGHT = math.pi / 2
 

@@ -20,7 +20,8 @@ import pathcontrol as pc
 from pathcontrol.cli import main
 from pathcontrol.errors import ExperimentError, InputError
 from pathcontrol.experiments.builders.setup import build
-from pathcontrol.experiments.samples.swept_experiment import SweptExperiment, put
+from pathcontrol.experiments.samples.dotted_keys import put
+from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
 from pathcontrol.experiments.schema.experiment import Experiment
 from pathcontrol.experiments.sweep_runner import run_sweep
 from pathcontrol.sweeps.manifest import LOG

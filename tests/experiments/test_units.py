@@ -177,7 +177,7 @@ def test_a_unit_of_another_dimension_is_refused_by_its_key(tmp_path, old, new, w
 
 
 def test_a_grid_of_a_sweep_may_have_units(tmp_path):
-    from pathcontrol.experiments.samples.swept_experiment import put
+    from pathcontrol.experiments.samples.dotted_keys import put
 
     data = {"task": {"speed": 1.0}}
     put(data, "task.speed", "90 deg/s")

@@ -9,7 +9,6 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
 from functools import lru_cache, partial
-from itertools import combinations, pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -28,6 +27,7 @@ from pathcontrol.experiments.builders.file_errors import keyed
 from pathcontrol.experiments.builders.making import Place, arguments_of, target_of
 from pathcontrol.experiments.builders.setup import Setup, build, law_of
 from pathcontrol.experiments.load import finding
+from pathcontrol.experiments.samples.dotted_keys import check_keys, put, section_of_key
 from pathcontrol.experiments.samples.named_files import named_files, relative
 from pathcontrol.experiments.samples.swept_tasks import SweptTask, joined, refuse_sequence, rows_together, swept_tasks
 from pathcontrol.experiments.schema.experiment import Experiment
@@ -40,8 +40,6 @@ from pathcontrol.tasks.task import PathTask
 _GAIN = re.compile(r"controller\.(?:parameters\.)?(\w+)(\[\d+\])*")
 _MAY_BE_ZERO = {Form.GAIN: False, Form.GAIN_OR_ZERO: True}
 _TOGETHER = ("start", "plant", "task")  # what may differ from rollout to rollout of a batch, as gains may
-_KEY = re.compile(r"[^\[\].]+(\[\d+\])*(\.[^\[\].]+(\[\d+\])*)*")
-_STEP = re.compile(r"([^\[\].]+)|\[(\d+)\]")
 _REMEMBERED = 16  # groups whose task and arm are kept from chunk to chunk
 
 
@@ -94,7 +92,7 @@ class SweptExperiment:
         Raises:
             ExperimentError: one is not.
         """
-        _check_keys(list(design), self._where)
+        check_keys(list(design), self._where)
         count = len(next(iter(design.values())))
         for i in range(count):
             self._check_gains(self._experiment(design, i, i), i)
@@ -107,7 +105,7 @@ class SweptExperiment:
         experiments = [self._experiment(parameters, row, int(i)) for row, i in enumerate(samples)]
         gains = set.intersection(*(set(self._gains(experiment)) for experiment in experiments))
         apart = [name for name in parameters if not self._together(name, gains, experiments)]
-        varied = {_section(name) for name in parameters.keys() - apart}
+        varied = {section_of_key(name) for name in parameters.keys() - apart}
         groups: dict[str, list[int]] = {}
         for row in range(len(samples)):
             groups.setdefault(json.dumps([parameters[name][row].tolist() for name in apart]), []).append(row)
@@ -140,9 +138,9 @@ class SweptExperiment:
 
     def _together(self, name: str, gains: set[str], experiments: list[Experiment]) -> bool:
         """Whether samples that differ in a key may be rollouts of one batch."""
-        if _section(name) == "disturbance":
+        if section_of_key(name) == "disturbance":
             return all(varies_together(name, experiment) for experiment in experiments)
-        return _section(name) in _TOGETHER or _named(name) in gains
+        return section_of_key(name) in _TOGETHER or _named(name) in gains
 
     def _law(self, model: RobotModel, experiments: list[Experiment], task: PathTask) -> Controller:
         """The law of some samples, with a row for each of them of the gains that differ."""
@@ -196,58 +194,11 @@ def _unpacked(data: dict[str, Any], moved: Mapping[str, str], inside: Path, fold
     return SweptExperiment(data, folder / inside, moved=moved)
 
 
-def put(data: dict[str, Any], key: str, value: Any, where: str = "sweep.parameters") -> None:
-    """Set the value of a dotted ``key``, in which ``[i]`` is the entry i of a list, in ``data``.
-
-    Raises:
-        ExperimentError: there is no such table or entry.
-    """
-    steps = _steps(key, where)
-    inside: Any = data
-    for step, after in pairwise(steps):
-        if isinstance(step, str) and isinstance(inside, dict) and isinstance(after, str):
-            inside = inside.setdefault(step, {})
-        else:
-            inside = _entry(inside, step, f"{where}: {key}")
-    if not isinstance(inside, dict):
-        _entry(inside, steps[-1], f"{where}: {key}")
-    inside[steps[-1]] = value
-
-
-def _steps(key: str, where: str) -> list[str | int]:
-    if not _KEY.fullmatch(key):
-        raise ExperimentError(f"{where}: {key!r}, expected a key of this file, such as 'controller.k' or 'start.q[0]'")
-    return [name or int(index) for name, index in _STEP.findall(key)]
-
-
-def _check_keys(keys: list[str], where: str) -> None:
-    for one, other in combinations(sorted(keys, key=lambda key: len(_steps(key, where))), 2):
-        outer = _steps(one, where)
-        if _steps(other, where)[: len(outer)] == outer:
-            raise ExperimentError(
-                f"{where}: {other!r} is a part of what {one!r} sets, so that one of them would not count; vary one only"
-            )
-
-
-def _entry(inside: Any, step: str | int, key: str) -> Any:
-    try:
-        return inside[step]
-    except (KeyError, IndexError, TypeError) as error:
-        raise ExperimentError(
-            f"{key}: the file has no entry {step!r} on the way there; give a value for it, or vary the whole list"
-        ) from error
-
-
 @lru_cache(maxsize=64)
 def _gains_of(law: Callable[..., Any]) -> dict[str, bool]:
     """The gains among the arguments of a law, and which of them may be 0."""
     forms = {name: one.form for name, one in parameters_of(law).items()}
     return {name: _MAY_BE_ZERO[form] for name, form in forms.items() if form in _MAY_BE_ZERO}
-
-
-def _section(key: str) -> str:
-    """The section of the file that a dotted key is in."""
-    return re.split(r"[.[]", key)[0]
 
 
 def _named(key: str) -> str:
