@@ -37,7 +37,7 @@ def load_experiment(path: str | Path) -> Experiment:
 
 
 def invalid(path: str | Path, findings: Iterable[str]) -> ExperimentError:
-    """The error that lists what is wrong in the file ``path``."""
+    """Return the error that lists what is wrong in the file ``path``."""
     told = list(findings)
     more = ["and more"] if len(told) > _MOST_TOLD else []
     lines = "\n".join([*told[:_MOST_TOLD], *more]).replace("\n", "\n  ")
@@ -48,7 +48,7 @@ def invalid(path: str | Path, findings: Iterable[str]) -> ExperimentError:
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """What a TOML file says.
+    """Return the content of a TOML file.
 
     Raises:
         ExperimentError: the file is missing, or is not TOML.
@@ -92,7 +92,7 @@ def _refuse_deep_keys(path: str | Path, text: str) -> None:
 
 
 def _read(path: Path) -> bytes:
-    """The bytes of a regular file; of a pipe or a device nothing is read, as it may never end."""
+    """Return the bytes of a regular file; of a pipe or a device nothing is read, as it may never end."""
     mode = path.stat().st_mode
     if not stat.S_ISREG(mode):
         kind = "a folder" if stat.S_ISDIR(mode) else "a pipe, a socket or a device"

@@ -39,7 +39,7 @@ def check_folder(out_dir: Path, output: Output) -> None:
 
 
 def measured(run: Run, setup: Setup) -> dict[str, Any]:
-    """The metrics of a run as JSON can hold them: those of a toolpath, or the usual ones."""
+    """Return the metrics of a run as JSON can hold them: those of a toolpath, or the usual ones."""
     if isinstance(setup.task, ToolpathTask):
         return _plain(toolpath_metrics(run, setup.plant, setup.task))
     return _plain(metrics(run, setup.task))
@@ -92,7 +92,7 @@ def _write_html(run: Run, setup: Setup, path: Path) -> Path:
 
 
 def _plain(value: Any) -> Any:
-    """``value`` as JSON can hold it: not finite, as the settling time of what never settles, is null."""
+    """Return ``value`` as JSON can hold it: not finite, as the settling time of what never settles, is null."""
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

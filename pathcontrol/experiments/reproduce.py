@@ -67,12 +67,12 @@ class Experiment:
 
 
 def paper_task() -> Circle:
-    """The circle of (9) and (10): r₀ = 57.3 deg, v₀ = 114.59 deg/s, about the origin of joint space."""
+    """Return the circle of (9) and (10): r₀ = 57.3 deg, v₀ = 114.59 deg/s, about the origin of joint space."""
     return Circle(np.deg2rad(RADIUS_DEG), np.deg2rad(SPEED_DEG_S))
 
 
 def paper_loop() -> SampledLoop:
-    """The control computer of the arm: 2.5 ms, encoders, velocity by differentiation, torque limits."""
+    """Return the control computer of the arm: 2.5 ms, encoders, velocity by differentiation, torque limits."""
     return SampledLoop(period=PERIOD, encoders=True, velocity="difference", torque_limits=True)
 
 

@@ -66,7 +66,7 @@ def _simulated(setup: Setup, progress: bool) -> Run:
 
 
 def load_setup(path: str | Path) -> Setup:
-    """The objects that an experiment file names, built and checked.
+    """Return the objects that an experiment file names, built and checked.
 
     Raises:
         ExperimentError: the file is invalid.

@@ -84,7 +84,7 @@ class EulerPlan(ExtendedMotionPlan):
 
 
 def unsaid(samples: int) -> Space:
-    """The space of what the paper leaves unsaid, each value as likely as any other of its setting."""
+    """Return the space of what the paper leaves unsaid, each value as likely as any other of its setting."""
     from scipy import stats
 
     around_one = stats.uniform([0.9, 0.9], [0.2, 0.2])  # of each joint
@@ -102,7 +102,7 @@ def unsaid(samples: int) -> Space:
 
 
 def combinations(samples: int, seed: int = 0) -> dict[str, Array]:
-    """The settings of the nominal experiment, of each of :data:`SINGLE`, and of ``samples`` of :func:`unsaid`."""
+    """Return the settings of the nominal experiment, of :data:`SINGLE`, and of ``samples`` of :func:`unsaid`."""
     cloud = unsaid(samples).design(seed)
     first = [NOMINAL | change for _, _, change in (("", "", {}), *SINGLE)]
     return {name: np.concatenate([np.array([row[name] for row in first]), values]) for name, values in cloud.items()}
@@ -133,7 +133,7 @@ class Combinations:
         return [(rows, self._arguments(dict(zip(_ALIKE, key, strict=True)), p, rows)) for key, rows in batches.items()]
 
     def _arguments(self, alike: dict[str, Any], p: Mapping[str, Array], rows: NDArray[np.intp]) -> dict[str, Any]:
-        """The arguments of :func:`simulate` for some rows, which have the settings ``alike`` in common."""
+        """Return the arguments of :func:`simulate` for some rows, which have the settings ``alike`` in common."""
         loop = SampledLoop(
             period=PERIOD,
             encoders=alike["encoders"],
@@ -158,7 +158,7 @@ class Combinations:
         return law(self.robot, task, K_P, K_V, K, start=alike["start"])
 
     def _arm(self, viscous: Array, coulomb: Array) -> RobotModel:
-        """The arm with its friction times factors (k, n)."""
+        """Return the arm with its friction times factors (k, n)."""
         friction = self.robot.friction
         plus, minus = levels_of(friction, np.zeros(self.robot.n))
         return self.robot.with_friction(
@@ -166,12 +166,12 @@ class Combinations:
         )
 
     def describe(self) -> dict[str, Any]:
-        """What the numbers depend on, so that a folder of other versions is refused."""
+        """Return what the numbers depend on, so that a folder of other versions is refused."""
         return {"experiments": "Moreno and Kelly, section 5", "versions": versions()}
 
 
 def window_peaks(run: Run) -> dict[str, Array]:
-    """The peaks of ‖e_p‖ [rad] and ‖e_v‖ [rad/s] as the controller sees them in each of :data:`WINDOWS`, (rollout,)."""
+    """Return the peaks of ‖e_p‖ [rad] and ‖e_v‖ [rad/s] that the controller sees in :data:`WINDOWS`, (rollout,)."""
     inside = {name: (run.time >= a - 1e-9) & (run.time <= b + 1e-9) for name, (a, b) in WINDOWS.items()}
     errors = {name: run.norm(name) for name in ("e_p", "e_v")}
     return {f"{error} {window}": e[:, rows].max(-1) for error, e in errors.items() for window, rows in inside.items()}

@@ -61,7 +61,7 @@ def sensitivity(out: str | Path, samples: int = SAMPLES, progress: bool = True) 
 
 
 def sensitivity_figure(peaks: Peaks) -> Figure:
-    """The peaks of all combinations of each experiment, and their ratios between the two; the paper's among them."""
+    """Return the peaks of all combinations of each experiment, the paper's too, and their ratios between the two."""
     from pathcontrol.view.figures.cloud import Panel, cloud_figure
 
     cloud, names = cloud_of(peaks), ("e_p_peak_deg", "e_v_peak_deg_s")
@@ -81,7 +81,7 @@ def _nominal(peaks: Peaks) -> dict[str, dict[str, float]]:
 
 
 def sentences(summary: dict[str, Any]) -> list[str]:
-    """What the numbers say, each a sentence."""
+    """Return sentences that say what the numbers mean."""
     count, ratio = summary["samples"], summary["e_v_ratio"]
     near, far = (summary["fractions"][f"all_four_within_{share}_percent"] for share in (10, 20))
     reached = round(count * ratio["fraction_that_reaches_the_paper"])
@@ -111,7 +111,7 @@ def _range(summary: dict[str, Any], setting: str, value: str) -> str:
 
 
 def _farthest(summary: dict[str, Any], value: str) -> float:
-    """How far the peaks with one setting are from the paper's at most, in per cent of those."""
+    """Return how far the peaks with one setting are from the paper's at most, in per cent of those."""
     [changes] = [effect["change_percent"] for effect in summary["effects"] if effect["value"] == value]
     peaks = {
         key: {peak: own[peak] * (1 + changes[key][peak] / 100) for peak in own}
@@ -121,7 +121,7 @@ def _farthest(summary: dict[str, Any], value: str) -> float:
 
 
 def tables(summary: dict[str, Any]) -> tuple[list[list[str]], list[list[str]]]:
-    """Two tables, heads first: the spread of each peak, and what single settings change of it."""
+    """Return two tables, heads first: the spread of each peak, and what single settings change of it."""
     columns = [(key, peak) for key in _TITLES for peak in _PEAKS]
     spread = [["peak", "paper", "reproduce", "least", "median", "largest", "within 10 %"]]
     for key, peak in columns:
@@ -140,6 +140,6 @@ def tables(summary: dict[str, Any]) -> tuple[list[list[str]], list[list[str]]]:
 
 
 def _signed(percent: float) -> str:
-    """A change in per cent with its sign, 0.0 without one."""
+    """Return a change in per cent with its sign, 0.0 without one."""
     text = f"{percent:+.1f}"
     return "0.0" if float(text) == 0 else text.replace("-", "−")

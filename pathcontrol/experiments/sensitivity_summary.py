@@ -22,7 +22,7 @@ Peaks = dict[str, dict[str, Array]]
 
 
 def peaks_of(result: SweepResult) -> Peaks:
-    """The four peaks of each combination, in the window that it takes for the steady state."""
+    """Return the four peaks of each combination, in the window that it takes for the steady state."""
     table = result.table()
     return {name: _peaks(table.isel(sample=(table["experiment"] == name).to_numpy())) for name in PAPER}
 
@@ -34,23 +34,23 @@ def _peaks(table: xr.Dataset) -> dict[str, Array]:
 
 
 def _chosen(table: xr.Dataset, signal: str, windows: Array) -> Array:
-    """The peak of a signal in the window of each row."""
+    """Return the peak of a signal in the window of each row."""
     return np.select([windows == name for name in WINDOWS], [table[f"{signal} {name}"].to_numpy() for name in WINDOWS])
 
 
 def cloud_of(peaks: Peaks) -> Peaks:
-    """The peaks of the combinations in which several settings change, without the nominal one and single changes."""
+    """Return the peaks of the combinations in which several settings change."""
     return {name: {peak: values[_CLOUD:] for peak, values in own.items()} for name, own in peaks.items()}
 
 
 def furthest(peaks: Peaks) -> Array:
-    """The largest of the four differences from the paper's peaks, as a share of them, of each combination."""
+    """Return the largest of the four differences from the paper's peaks, as a share of them, of each combination."""
     shares = [abs(values / PAPER[name][peak] - 1) for name, own in peaks.items() for peak, values in own.items()]
     return np.max(shares, axis=0)
 
 
 def velocity_ratio(peaks: Peaks) -> Array:
-    """The peak of ‖e_v‖ with the projection over that with the extended motion plan, of each combination."""
+    """Return the peak of ‖e_v‖ of projection over that of the extended motion plan, of each combination."""
     return peaks["projection"]["e_v_peak_deg_s"] / peaks["extended_motion_plan"]["e_v_peak_deg_s"]
 
 
@@ -78,7 +78,7 @@ def summarise(peaks: Peaks) -> dict[str, Any]:
 
 
 def _of_each(peaks: Peaks, function: Any) -> dict[str, dict[str, Any]]:
-    """A function of the values of each peak and of what the paper says."""
+    """Return a function of the values of each peak and of what the paper says."""
     return {
         name: {peak: function(values, PAPER[name][peak]) for peak, values in own.items()} for name, own in peaks.items()
     }
@@ -93,5 +93,5 @@ def _within(values: Array, paper: float) -> dict[str, float]:
 
 
 def _changes(peaks: Peaks, row: int) -> dict[str, dict[str, float]]:
-    """What a combination changes of the nominal peaks, in per cent."""
+    """Return the changes of the nominal peaks by a combination, in per cent."""
     return _of_each(peaks, lambda values, paper: float(100 * (values[row] / values[0] - 1)))

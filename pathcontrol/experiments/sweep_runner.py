@@ -72,7 +72,7 @@ def run_sweep(
 
 
 def space_of(section: SweepSection) -> Space:
-    """The samples that a section ``[sweep]`` asks for.
+    """Return the samples that a section ``[sweep]`` asks for.
 
     Raises:
         ExperimentError: the parameters do not fit the method.
@@ -87,7 +87,7 @@ def space_of(section: SweepSection) -> Space:
 
 
 def values_of(key: str, given: dict[str, list[Any]]) -> Any:
-    """The values of a grid, or the frozen distribution; errors tell the ``key``."""
+    """Return the values of a grid, or the frozen distribution; errors tell the ``key``."""
     from scipy import stats
 
     [(kind, values)] = given.items()
@@ -110,5 +110,5 @@ def values_of(key: str, given: dict[str, list[Any]]) -> Any:
 
 
 def of_samples(data: dict[str, Any]) -> dict[str, Any]:
-    """What a file says of each sample."""
+    """Return the tables of a file that are about each sample."""
     return {name: value for name, value in data.items() if name not in ("sweep", "tune", "output")}

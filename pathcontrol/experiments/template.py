@@ -27,7 +27,7 @@ _KEY = re.compile(r"#?(?P<key>\w+) = (?P<value>[^#]*?) *(?P<comment>#.*)?")
 
 
 def example_text() -> str:
-    """The paper's first experiment as an experiment file, with every option explained."""
+    """Return the paper's first experiment as an experiment file, with every option explained."""
     text = resources.files("pathcontrol.experiments").joinpath("template.toml").read_text(encoding="utf-8")
     made: list[str] = []
     before = ""
@@ -41,7 +41,7 @@ def example_text() -> str:
 
 
 def _section(block: str) -> str:
-    """The table that a block of the file is."""
+    """Return the table that a block of the file is."""
     match = _HEAD.match(block)
     return match["section"] if match else ""
 

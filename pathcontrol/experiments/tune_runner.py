@@ -70,7 +70,7 @@ def _space(section: TuneSection) -> Space:
 
 
 def _check(build: SweptExperiment, space: Space, scenarios: Space | None) -> None:
-    """The least and the largest values, in every scenario, are valid experiments."""
+    """Check that the least and the largest values, in every scenario, are valid experiments."""
     design = {} if scenarios is None else scenarios.design()
     count = 1 if scenarios is None else scenarios.samples
     ends = space.at(np.repeat([[0.0], [1.0]], space.width, axis=1))

@@ -350,7 +350,7 @@ _LAWS = {law.__name__: law for law in (Viscous, Coulomb, Stribeck)}
 
 
 def rebuild_law(description: Mapping[str, Any]) -> FrictionLaw:
-    """The law that :meth:`FrictionLaw.describe` described, of the library or a class that the user has defined by now.
+    """Return the law that :meth:`FrictionLaw.describe` described, of the library or a class of the user.
 
     Raises:
         UnknownNameError: there is no such law, or it describes itself in its own way.

@@ -29,7 +29,7 @@ _KEY = "plant.friction"
 
 
 def build_arms(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, RobotModel]:
-    """The controller's model and the simulated arm.
+    """Return the controller's model and the simulated arm.
 
     Raises:
         ExperimentError: a robot, joint or frame does not exist, or a value is out of range.
@@ -39,7 +39,7 @@ def build_arms(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, Robo
 
 
 def build_models(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, RobotModel]:
-    """The arm without a payload, and the controller's model.
+    """Return the arm without a payload, and the controller's model.
 
     Raises:
         ExperimentError: a robot, joint or frame does not exist, or a value is out of range.
@@ -55,7 +55,7 @@ def build_models(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, Ro
 
 
 def build_plant(experiment: Experiment, bare: RobotModel, model: RobotModel, base_dir: Path) -> RobotModel:
-    """The simulated arm, of the arm without a payload and the controller's model.
+    """Return the simulated arm, made of the arm without a payload and the controller's model.
 
     Raises:
         ExperimentError: a frame does not exist, or a value is out of range.
@@ -104,7 +104,7 @@ def _with_tool(robot: RobotModel, experiment: Experiment) -> RobotModel:
 
 
 def _source(source: str, base_dir: Path) -> str | Path:
-    """A URDF as text or the name of a robot, as it is; else a path relative to the experiment file."""
+    """Return a URDF as text or the name of a robot as it is, and anything else as a path relative to the file."""
     if source.lstrip().startswith("<"):
         return source
     path = base_dir / source
@@ -134,7 +134,7 @@ def _carrying(key: str, robot: RobotModel, payload: Section | None) -> RobotMode
 
 
 def with_friction(robot: RobotModel, section: Any, place: Place) -> RobotModel:
-    """``robot`` with the friction of its URDF, with none, or with the laws of a section or of several.
+    """Return ``robot`` with the friction of its URDF, with none, or with the laws of a section or of several.
 
     Raises:
         ExperimentError: a coefficient is negative, or there is not one for each joint.

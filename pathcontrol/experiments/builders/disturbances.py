@@ -27,7 +27,7 @@ _NUMBERS = (Form.NUMBER, Form.NUMBERS, Form.POSITIVE)
 def build_disturbance(
     experiments: Sequence[Experiment], plant: RobotModel, q: Array, qd: Array, place: Place
 ) -> Disturbance | None:
-    """The sum of all that a file says, which has been tried once.
+    """Return the sum of all that a file says, which has been tried once.
 
     Args:
         experiments: one, or one for each rollout, that differ in arguments of which :func:`varies_together` is true.
@@ -53,7 +53,7 @@ def build_disturbance(
 
 
 def varies_together(key: str, experiment: Experiment) -> bool:
-    """Whether a dotted key sets numbers of a disturbance of the library, which may have some for each rollout."""
+    """Return whether a key sets numbers of a disturbance of the library, which may differ between rollouts."""
     match = _ARGUMENT.fullmatch(key)
     if match is None or isinstance(section := _listed(experiment)[int(match[1] or 0)], OwnSection):
         return False

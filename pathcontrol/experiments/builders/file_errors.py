@@ -17,7 +17,7 @@ _LISTS = str.maketrans("()", "[]")  # of Python and of TOML
 
 @contextlib.contextmanager
 def keyed(key: str, fields: Iterable[str] | Mapping[str, str] = ()) -> Iterator[None]:
-    """Errors inside the block become ExperimentErrors whose message begins with the key path.
+    """Turn errors inside the block into ExperimentErrors whose message begins with the key path.
 
     A message that begins with one of the ``fields`` of the section ``key``, as ``K_v = -1.0, expected …``, is
     told as ``controller.K_v = …``; advice to give one of them, as ``unit='mm'``, is told as a line of the file. Where a
@@ -36,7 +36,7 @@ def keyed(key: str, fields: Iterable[str] | Mapping[str, str] = ()) -> Iterator[
 
 
 def _line(name: str, value: str) -> str:
-    """How a key is given in a file."""
+    """Return how a key is given in a file."""
     return (
         f"{name} = {json.dumps(value)}"
         if re.fullmatch(r"[^\W\d]\w*", value)
@@ -46,7 +46,7 @@ def _line(name: str, value: str) -> str:
 
 @contextlib.contextmanager
 def users_code(key: str, doing: str, fields: Iterable[str] = ()) -> Iterator[None]:
-    """As :func:`keyed`, for code of the user: whatever it raises becomes an ExperimentError."""
+    """Turn whatever code of the user raises into an ExperimentError, as :func:`keyed` does with errors."""
     try:
         with keyed(key, fields):
             yield

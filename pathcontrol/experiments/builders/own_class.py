@@ -52,7 +52,7 @@ def _installed(name: str) -> ModuleType:
 
 @lru_cache(maxsize=16)
 def _run(file: Path, source: bytes) -> ModuleType:
-    """The module of a file with this ``source``, the same one as long as it has it: so its objects are of one class."""
+    """Return the module of a file with this ``source``, the same one as long as the file has it."""
     module_name = f"pathcontrol_file_{file.stem}"
     spec = importlib.util.spec_from_file_location(module_name, file)
     assert spec is not None
@@ -68,13 +68,13 @@ def _run(file: Path, source: bytes) -> ModuleType:
 
 
 def _line(error: BaseException, file: Path) -> str:
-    """`` at line N`` of the user's file, where the traceback passes through it."""
+    """Return `` at line N`` of the user's file, where the traceback passes through it."""
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if frame.filename == str(file)]
     return f" at line {lines[-1]}" if lines else ""
 
 
 def _defines(module: ModuleType, value: object, base: type) -> bool:
-    """Whether a value is a class that can be made, defined by the module and derived from ``base``."""
+    """Return whether a value is a class that can be made, defined by the module and derived from ``base``."""
     own = isinstance(value, type) and issubclass(value, base) and value.__module__ == module.__name__
     return own and not inspect.isabstract(value)

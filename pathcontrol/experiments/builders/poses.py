@@ -13,7 +13,7 @@ from pathcontrol.errors import ExperimentError
 
 
 def pose_of(key: str, arguments: Mapping[str, Any]) -> Array:
-    """The homogeneous transform (4, 4) of ``position`` [m] and ``rpy`` [rad], turned about fixed x, then y, then z.
+    """Return the transform (4, 4) of ``position`` [m] and ``rpy`` [rad], turned about fixed x, then y, then z.
 
     Raises:
         ExperimentError: one of them is not three numbers.

@@ -93,7 +93,7 @@ def build(experiment: Experiment, base_dir: str | Path = ".") -> Setup:
 
 
 def _controllers(experiment: Experiment, model: RobotModel, task: PathTask, place: Place) -> tuple[Controller, ...]:
-    """The law for the task, or one for each path of a sequence."""
+    """Return the law for the task, or one for each path of a sequence."""
     if not isinstance(task, PathSequence):
         return (law_of(experiment, model, task, place),)
     if experiment.until != "end":
@@ -110,7 +110,7 @@ def law_of(
     place: Place,
     gains: Mapping[str, Array] = MappingProxyType({}),
 ) -> Controller:
-    """The law of an experiment for one path, with other ``gains`` where some are given.
+    """Return the law of an experiment for one path, with other ``gains`` where some are given.
 
     Raises:
         ExperimentError: an argument is out of range.
@@ -120,7 +120,7 @@ def law_of(
 
 
 def _refuse_joints(output: Output, robot: RobotModel) -> None:
-    """What a figure shows has to be there: better refused now than after the simulation."""
+    """Check that the arm has the joints that a figure shows, now and not after the simulation."""
     if output.figure_joints is not None and max(output.figure_joints) >= robot.n:
         raise ExperimentError(
             f"output.figure_joints = {list(output.figure_joints)}, expected indices from 0 to {robot.n - 1}: "
@@ -129,7 +129,7 @@ def _refuse_joints(output: Output, robot: RobotModel) -> None:
 
 
 def _loop(experiment: Experiment, plant: RobotModel, duration: float, place: Place) -> SampledLoop | ContinuousTime:
-    """The loop, with encoders and torque limits that fit the simulated arm."""
+    """Return the loop, with encoders and torque limits that fit the simulated arm."""
     loop: SampledLoop | ContinuousTime = make("loop", experiment.loop, None, place)
     with keyed("loop", type(experiment.loop).model_fields):
         torque_limits(loop, plant)
@@ -155,7 +155,7 @@ def _refuse_too_long(duration: float, name: str, period: float, delay: float = 0
 
 
 def _state(experiment: Experiment, controller: Controller) -> tuple[Array, Array]:
-    """(q, q̇) at the start, for which the law has been tried once."""
+    """Return (q, q̇) at the start, for which the law has been tried once."""
     n, given = controller.robot.n, experiment.start.arguments(experiment.to_radians)
     with keyed("start", ("q", "qd")):
         begin = controller.task.q_d(np.array(controller.task.s0))

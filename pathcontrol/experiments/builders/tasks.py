@@ -25,7 +25,7 @@ _SAMPLES = 4001
 
 
 def build_task(section: Any, robot: RobotModel, place: Place) -> PathTask:
-    """The task for an arm, checked on samples of its domain.
+    """Return the task for an arm, checked on samples of its domain.
 
     Raises:
         ExperimentError: it cannot be made, or returns what a task must not.

@@ -45,7 +45,7 @@ def check_keys(keys: list[str], where: str) -> None:
 
 
 def section_of_key(key: str) -> str:
-    """The section of the file that a dotted key is in."""
+    """Return the section of the file that a dotted key is in."""
     return re.split(r"[.[]", key)[0]
 
 

@@ -13,7 +13,7 @@ _LONGEST = 1000
 
 
 def named_files(value: Any, folder: Path) -> Iterator[tuple[str, Path]]:
-    """The names and paths of the files that texts in a value are, relative to ``folder``; ``FILE.py:Name`` is one."""
+    """Yield names and paths of the files that texts in a value are, relative to ``folder``; ``FILE.py:Name`` is one."""
     if isinstance(value, dict | list):
         for item in value.values() if isinstance(value, dict) else value:
             yield from named_files(item, folder)
@@ -24,7 +24,7 @@ def named_files(value: Any, folder: Path) -> Iterator[tuple[str, Path]]:
 
 
 def _in_python(path: Path) -> Iterator[tuple[str, Path]]:
-    """Those that a text in a Python file is, beside it."""
+    """Yield the names and paths of files beside a Python file that are texts in it."""
     try:
         nodes = list(ast.walk(ast.parse(path.read_bytes())))
     except (SyntaxError, ValueError):
@@ -45,7 +45,7 @@ def _file(folder: Path, name: str) -> Path | None:
 
 
 def relative(value: Any, folder: Path) -> Any:
-    """The same value, with names relative to ``folder`` in the place of whole paths."""
+    """Return the same value, with names relative to ``folder`` in the place of whole paths."""
     if isinstance(value, Mapping):
         return {name: relative(item, folder) for name, item in value.items()}
     if isinstance(value, list):

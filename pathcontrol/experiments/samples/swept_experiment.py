@@ -71,12 +71,12 @@ class SweptExperiment:
         self._built: dict[str, tuple[Setup, RobotModel, RobotModel]] = {}
 
     def describe(self) -> dict[str, Any]:
-        """What the file says, and digests of the files that it names."""
+        """Return the content of the file, and digests of the files that it names."""
         files = {name: _digest(path) for name, path in self._files()}
         return {"experiment": self._data, "files_sha256": files}
 
     def pack(self) -> PackedBuilder:
-        """Itself and these files, for a machine that has neither."""
+        """Return this object packed together with the files, for a machine that has neither."""
         base, *paths = (Path(os.path.abspath(path)) for path in (self._base_dir, *dict(self._files()).values()))
         home = Path(os.path.commonpath([base, *paths]))
         files = {str(path.relative_to(home)): path.read_bytes() for path in paths}
@@ -101,7 +101,7 @@ class SweptExperiment:
     def __call__(
         self, parameters: Mapping[str, Array], samples: NDArray[np.int64]
     ) -> list[tuple[NDArray[np.intp], dict[str, Any]]]:
-        """The rows that fit in one batch, and the arguments of simulate() for them."""
+        """Return the rows that fit in one batch, and the arguments of simulate() for them."""
         experiments = [self._experiment(parameters, row, int(i)) for row, i in enumerate(samples)]
         gains = set.intersection(*(set(self._gains(experiment)) for experiment in experiments))
         apart = [name for name in parameters if not self._together(name, gains, experiments)]
@@ -120,7 +120,7 @@ class SweptExperiment:
     def _parts(
         self, key: str, rows: NDArray[np.intp], experiments: list[Experiment], varied: set[str]
     ) -> Iterator[tuple[NDArray[np.intp], dict[str, Any]]]:
-        """The batches of samples that differ in nothing but what may differ between rollouts."""
+        """Yield the batches of samples that differ in nothing but what may differ between rollouts."""
         setup, bare, model = self._of_group(key, experiments[0])
         found = [SweptTask(setup.task, float(setup.duration), setup.laps)] * len(rows)
         if "task" in varied:
@@ -137,13 +137,13 @@ class SweptExperiment:
             yield rows[some], {"controller": law, "plant": plant} | arguments
 
     def _together(self, name: str, gains: set[str], experiments: list[Experiment]) -> bool:
-        """Whether samples that differ in a key may be rollouts of one batch."""
+        """Return whether samples that differ in a key may be rollouts of one batch."""
         if section_of_key(name) == "disturbance":
             return all(varies_together(name, experiment) for experiment in experiments)
         return section_of_key(name) in _TOGETHER or _named(name) in gains
 
     def _law(self, model: RobotModel, experiments: list[Experiment], task: PathTask) -> Controller:
-        """The law of some samples, with a row for each of them of the gains that differ."""
+        """Return the law of some samples, with a row for each of them of the gains that differ."""
         first, arguments = experiments[0], [self._law_arguments(experiment) for experiment in experiments]
         names = self._gains(first).keys() & arguments[0].keys()
         gains = {name: _rows([each[name] for each in arguments]) for name in names}
@@ -154,7 +154,7 @@ class SweptExperiment:
         return arguments_of("controller", experiment.controller, LAWS, place)
 
     def _gains(self, experiment: Experiment) -> dict[str, bool]:
-        """The arguments of the law that are gains, of which a batch may have a row for each rollout; which may be 0."""
+        """Return the gains of the law, of which a batch may have a row for each rollout, and whether each may be 0."""
         place = Place(self._base_dir, experiment.to_radians)
         return _gains_of(target_of("controller", experiment.controller, LAWS, place))
 
@@ -196,26 +196,26 @@ def _unpacked(data: dict[str, Any], moved: Mapping[str, str], inside: Path, fold
 
 @lru_cache(maxsize=64)
 def _gains_of(law: Callable[..., Any]) -> dict[str, bool]:
-    """The gains among the arguments of a law, and which of them may be 0."""
+    """Return the gains among the arguments of a law, and which of them may be 0."""
     forms = {name: one.form for name, one in parameters_of(law).items()}
     return {name: _MAY_BE_ZERO[form] for name, form in forms.items() if form in _MAY_BE_ZERO}
 
 
 def _named(key: str) -> str:
-    """The argument of the law that a dotted key sets, or an empty text."""
+    """Return the argument of the law that a dotted key sets, or an empty text."""
     match = _GAIN.fullmatch(key)
     return match[1] if match else ""
 
 
 def _rows(values: list[Any]) -> Array:
-    """A gain of one number for all, (), or of all rollouts, (N, 1), (N, 1, n)."""
+    """Return a gain of one number for all, (), or of all rollouts, (N, 1), (N, 1, n)."""
     if all(value == values[0] for value in values):
         return np.asarray(values[0], dtype=np.float64)
     return np.asarray(values, dtype=np.float64)[:, None]
 
 
 def _arguments(setup: Setup, experiments: list[Experiment], tasks: list[SweptTask]) -> dict[str, Any]:
-    """Those of simulate() beside the law and the plant."""
+    """Return the arguments of simulate() beside the law and the plant."""
     q, qd = _states(setup, experiments, tasks)
     return {
         "q": q,
@@ -230,7 +230,7 @@ def _arguments(setup: Setup, experiments: list[Experiment], tasks: list[SweptTas
 
 
 def _states(setup: Setup, experiments: list[Experiment], tasks: list[SweptTask]) -> tuple[Array, Array]:
-    """q and q̇ at the start, (N, n) each; at rest where the path begins unless the file says otherwise."""
+    """Return q and q̇ at the start, (N, n) each; at rest where the path begins unless the file says otherwise."""
     begins = [one.task.q_d(np.array(one.task.s0)) for one in tasks]
     found = {"q": begins, "qd": [setup.qd] * len(experiments)}
     for i, experiment in enumerate(experiments):

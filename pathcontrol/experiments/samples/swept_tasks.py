@@ -29,7 +29,7 @@ class SweptTask(NamedTuple):
 
 
 def swept_tasks(experiments: Sequence[Experiment], model: RobotModel, base_dir: Path) -> list[SweptTask]:
-    """The task of each of some samples for one arm; samples that say the same have the same one.
+    """Return the task of each of some samples for one arm; samples that say the same have the same one.
 
     Raises:
         ExperimentError: a task cannot be made, is a sequence, or returns what a task must not.
@@ -48,13 +48,13 @@ def swept_tasks(experiments: Sequence[Experiment], model: RobotModel, base_dir: 
 
 
 def refuse_sequence(task: PathTask) -> None:
-    """A sweep is of single tasks."""
+    """Refuse a sequence of paths, as a sweep is of single tasks."""
     if isinstance(task, PathSequence):
         raise ExperimentError("task: a sequence of paths cannot be swept; sweep one of its paths")
 
 
 def rows_together(tasks: Sequence[SweptTask]) -> list[NDArray[np.intp]]:
-    """The rows that one batch takes: all closed or all open, and of one duration; an endless path is for itself."""
+    """Return the rows of each batch: all closed or all open, of one duration; an endless path is for itself."""
     groups: dict[Hashable, list[int]] = {}
     for row, (task, duration, _) in enumerate(tasks):
         kind = classify_end(task)
@@ -63,6 +63,6 @@ def rows_together(tasks: Sequence[SweptTask]) -> list[NDArray[np.intp]]:
 
 
 def joined(tasks: Sequence[SweptTask]) -> PathTask:
-    """The task of all rollouts, or a batch of them."""
+    """Return the task of all rollouts, or a batch of them."""
     first = tasks[0].task
     return first if all(one.task is first for one in tasks) else TaskBatch([one.task for one in tasks])

@@ -51,7 +51,7 @@ def _file(*suffixes: str) -> PlainValidator:
 
 
 def _pair(value: Any) -> list[int]:
-    """Two different joints, counted from 0."""
+    """Check that a value is two different joints, counted from 0; return them."""
     whole = isinstance(value, list | tuple) and all(type(index) is int and 0 <= index < 2**31 for index in value)
     if not whole or len(value) != 2 or value[0] == value[1]:
         raise expected("two different joints, counted from 0, as [0, 2]")

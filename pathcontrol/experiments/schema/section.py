@@ -114,7 +114,7 @@ def in_si(at: tuple[int | str, ...], value: Any, units: tuple[str, ...], wrong: 
 
 
 def _told(at: tuple[int | str, ...], wrong: _Wrong) -> bool:
-    """Whether something is wrong at a key that is ``at``, in it, or around it."""
+    """Return whether something is wrong at a key that is ``at``, in it, or around it."""
     return any(all(a == b for a, b in zip(at, other, strict=False)) for other in wrong)
 
 
@@ -124,7 +124,7 @@ def in_radians(value: Any, units: tuple[str, ...], to_radians: Callable[[float],
 
 
 def converted(value: Any, function: Callable[[float], float]) -> Any:
-    """``value`` with ``function`` applied to each number in it that was given without a unit."""
+    """Return ``value`` with ``function`` applied to each number in it that was given without a unit."""
     if isinstance(value, Quantity | bool):
         return value
     if isinstance(value, dict):
@@ -141,7 +141,7 @@ def _wrong_choice(key: str, kind: Any, names: list[str], also: str) -> Validatio
 
 
 def _detail(section: type[Section], error: Any) -> InitErrorDetails:
-    """A line of a validation error, as what follows the key path in the message."""
+    """Return a line of a validation error, as what follows the key path in the message."""
     return _explained(error["loc"], error["input"], _text(section, error))
 
 
@@ -164,7 +164,7 @@ def _text(section: type[Section], error: Any) -> str:
 
 
 def _or_with_unit(section: type[Section], error: Any) -> str:
-    """The units that a text might have had, where it stands for a quantity."""
+    """Return the units that a text might have had, where it stands for a quantity."""
     about_text = error["loc"] and isinstance(error["input"], str)
     units = section.units_of({}).get(error["loc"][0]) if about_text else None
     return "" if units is None else f", or one with a unit: {list_units(units)}"

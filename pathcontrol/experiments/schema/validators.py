@@ -18,12 +18,12 @@ _REPR.maxstring = _REPR.maxother = _REPR.maxlong = 80
 
 
 def expected(what: str) -> PydanticCustomError:
-    """The error of a value that is not ``what``."""
+    """Return the error of a value that is not ``what``."""
     return PydanticCustomError("expected", "{what}", {"what": what})
 
 
 def shown(value: Any) -> str:
-    """``value`` as an error message shows it: as TOML spells it, and not at length."""
+    """Return ``value`` as an error message shows it: as TOML spells it, and not at length."""
     return str(value).lower() if isinstance(value, bool) else _REPR.repr(value)
 
 
