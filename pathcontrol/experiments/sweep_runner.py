@@ -13,6 +13,7 @@ from pathcontrol.experiments.load import invalid, load_experiment, read_toml
 from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
 from pathcontrol.experiments.schema.sweep_sections import SweepSection
 from pathcontrol.simulation.engines import Engine
+from pathcontrol.sweeps.chunk import make_measure
 from pathcontrol.sweeps.cluster.connection import connect
 from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.result import SweepResult
@@ -61,7 +62,8 @@ def run_sweep(
             data = of_samples(read_toml(path)) | ({} if engine is None else {"engine": engine})
             build = SweptExperiment(data, Path(path).parent.absolute(), section.parameters)
             space = space_of(section)
-            with keyed("sweep"):
+            with keyed("sweep", ("metrics",)):
+                make_measure(section.metrics)
                 keep = Keep(**({} if section.keep is None else section.keep.arguments(float)))
                 design = space.design(section.seed)
             build.check(design)

@@ -13,6 +13,7 @@ from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
 from pathcontrol.experiments.schema.sweep_sections import TuneSection
 from pathcontrol.experiments.sweep_runner import of_samples, values_of
 from pathcontrol.simulation.engines import Engine
+from pathcontrol.sweeps.chunk import make_measure
 from pathcontrol.sweeps.space import Space
 from pathcontrol.tuning.tune import tune
 from pathcontrol.tuning.tuning_result import Tuning
@@ -50,6 +51,9 @@ def run_tune(
         data = of_samples(read_toml(path)) | ({} if engine is None else {"engine": engine})
         build = SweptExperiment(data, Path(path).parent.absolute(), varied, "tune")
         space = _space(section)
+        for key, names in (("objectives", section.objectives), ("limits", section.limits or ())):
+            with keyed(f"tune.{key}"):
+                make_measure([names] if isinstance(names, str) else list(names))
         with keyed("tune"):
             scenarios = None if section.scenarios is None else Space.given(section.scenarios)
         _check(build, space, scenarios)

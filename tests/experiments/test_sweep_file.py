@@ -256,6 +256,7 @@ def test_a_task_in_a_file_is_part_of_the_definition(experiment, tmp_path):
         ("", r"sweep: missing; add a section \[sweep\]"),
         ("[sweep]\n", "sweep.parameters: missing"),
         ("[sweep]\nparameters = {}\n", "sweep.parameters = {}, expected a table of keys of this file that vary"),
+        (GRID.replace("[sweep]", '[sweep]\nmetrics = ["e_p_peek"]'), "sweep.metrics = .*; did you mean 'e_p_peak'"),
         (GRID.replace("grid =", "list ="), "of 'start.q.list' a table of 'grid' or 'uniform'"),
         (GRID.replace("start.q", "start.p"), "in sample 0: start.p: unknown key; valid keys: q, qd"),
         (GRID.replace("start.q", "start.q[5]"), "no entry 5 on the way there|list of finite numbers"),

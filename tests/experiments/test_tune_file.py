@@ -94,6 +94,8 @@ def test_a_front_that_is_not_there_is_not_drawn(experiment, tmp_path):
         ),
         (TUNE.replace("uniform = [[30.0, 80.0]", "uniform = [[-30.0, 80.0]"), "expected gains greater than 0"),
         (TUNE.replace("= [0.0, 1.0]", "= []"), "expected a list of numbers"),
+        (TUNE.replace("e_p_rms", "e_p_rsm"), "tune.objectives: metrics = .*; did you mean 'e_p_rms'"),
+        (TUNE.replace("tau_noise", "tau_noize"), "tune.limits: .*; did you mean 'tau_noise'"),
     ],
 )
 def test_what_is_wrong_is_told_by_key(section, message, experiment, tmp_path):
