@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.schema.experiment import Experiment
-from pathcontrol.experiments.schema.validators import shown
+from pathcontrol.experiments.schema.validators import show_value
 
 _LONGEST = 2_000_000  # bytes
 _DEEPEST = 100  # parts of a key
@@ -33,10 +33,10 @@ def load_experiment(path: str | Path) -> Experiment:
     try:
         return Experiment.model_validate(data)
     except ValidationError as error:
-        raise invalid(path, map(finding, error.errors(include_url=False))) from None
+        raise make_file_error(path, map(describe_finding, error.errors(include_url=False))) from None
 
 
-def invalid(path: str | Path, findings: Iterable[str]) -> ExperimentError:
+def make_file_error(path: str | Path, findings: Iterable[str]) -> ExperimentError:
     """Return the error that lists what is wrong in the file ``path``."""
     told = list(findings)
     more = ["and more"] if len(told) > _MOST_TOLD else []
@@ -58,7 +58,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # integers of thousands of digits are a ValueError
-        raise invalid(path, [f"it cannot be read as TOML: {error}"]) from error
+        raise make_file_error(path, [f"it cannot be read as TOML: {error}"]) from error
 
 
 def read_text(path: str | Path) -> str:
@@ -77,18 +77,20 @@ def read_text(path: str | Path) -> str:
         ) from error
     except UnicodeDecodeError as error:
         line, byte = data[: error.start].count(b"\n") + 1, data[error.start]
-        raise invalid(path, [f"line {line} has the byte 0x{byte:02x}, expected text in UTF-8; save it so"]) from error
+        raise make_file_error(
+            path, [f"line {line} has the byte 0x{byte:02x}, expected text in UTF-8; save it so"]
+        ) from error
     except ExperimentError:
         raise
     except (OSError, ValueError) as error:  # a null character in the name is a ValueError
-        raise invalid(path, [f"it cannot be read: {error}"]) from error
+        raise make_file_error(path, [f"it cannot be read: {error}"]) from error
 
 
 def _refuse_deep_keys(path: str | Path, text: str) -> None:
     """Refuse keys of very many parts, ``a.a.a…``: the time to parse one grows with their square."""
     for number, line in enumerate(text.split("\n"), 1):
         if line.count(".") > _DEEPEST and max(part.count(".") for part in re.split(r"[=,\[\]{}]", line)) > _DEEPEST:
-            raise invalid(path, [f"line {number} has a key of more than {_DEEPEST} parts, expected a few"])
+            raise make_file_error(path, [f"line {number} has a key of more than {_DEEPEST} parts, expected a few"])
 
 
 def _read(path: Path) -> bytes:
@@ -96,18 +98,18 @@ def _read(path: Path) -> bytes:
     mode = path.stat().st_mode
     if not stat.S_ISREG(mode):
         kind = "a folder" if stat.S_ISDIR(mode) else "a pipe, a socket or a device"
-        raise invalid(path, [f"it is {kind}, expected a file"])
+        raise make_file_error(path, [f"it is {kind}, expected a file"])
     with path.open("rb") as file:
         data = file.read(_LONGEST + 1)
     if len(data) > _LONGEST:
-        raise invalid(path, [f"it is longer than {_LONGEST // 1_000_000} MB, expected an experiment file"])
+        raise make_file_error(path, [f"it is longer than {_LONGEST // 1_000_000} MB, expected an experiment file"])
     return data
 
 
-def finding(error: Any) -> str:
+def describe_finding(error: Any) -> str:
     """One line: the key path, and what is wrong with it."""
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error["loc"]).lstrip(".")
     key = key if len(key) <= _LONGEST_KEY else f"{key[:_LONGEST_KEY]}…"
     if error["type"] == "explained":
         return key + error["ctx"]["text"]
-    return f"{key} = {shown(error['input'])}, expected {error['msg']}"
+    return f"{key} = {show_value(error['input'])}, expected {error['msg']}"

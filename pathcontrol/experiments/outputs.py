@@ -38,7 +38,7 @@ def check_folder(out_dir: Path, output: Output) -> None:
             raise InputError(f"there is a folder where the file {str(target)!r} should go; remove or rename it")
 
 
-def measured(run: Run, setup: Setup) -> dict[str, Any]:
+def measure_run(run: Run, setup: Setup) -> dict[str, Any]:
     """Return the metrics of a run as JSON can hold them: those of a toolpath, or the usual ones."""
     if isinstance(setup.task, ToolpathTask):
         return _plain(toolpath_metrics(run, setup.plant, setup.task))

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.builders.setup import Setup, build
-from pathcontrol.experiments.load import invalid, load_experiment, read_text
-from pathcontrol.experiments.outputs import check_folder, measured, write_outputs
+from pathcontrol.experiments.load import load_experiment, make_file_error, read_text
+from pathcontrol.experiments.outputs import check_folder, measure_run, write_outputs
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.sequence import simulate_sequence
@@ -51,7 +51,7 @@ def run_experiment(
     check_folder(out_dir, setup.output)
     run = _simulated(setup if engine is None else setup._replace(engine=engine), progress)
     run.config["experiment"] = text
-    numbers = measured(run, setup)
+    numbers = measure_run(run, setup)
     return Outcome(run, numbers, write_outputs(run, numbers, setup, out_dir))
 
 
@@ -75,4 +75,4 @@ def load_setup(path: str | Path) -> Setup:
     try:
         return build(experiment, Path(path).parent)
     except ExperimentError as error:
-        raise invalid(path, [str(error)]) from error
+        raise make_file_error(path, [str(error)]) from error

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.builders.file_errors import keyed
-from pathcontrol.experiments.load import invalid, load_experiment, read_toml
+from pathcontrol.experiments.builders.file_errors import report_by_key
+from pathcontrol.experiments.load import load_experiment, make_file_error, read_toml
 from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
 from pathcontrol.experiments.schema.sweep_sections import SweepSection
 from pathcontrol.simulation.engines import Engine
@@ -62,13 +62,13 @@ def run_sweep(
             data = of_samples(read_toml(path)) | ({} if engine is None else {"engine": engine})
             build = SweptExperiment(data, Path(path).parent.absolute(), section.parameters)
             space = space_of(section)
-            with keyed("sweep", ("metrics",)):
+            with report_by_key("sweep", ("metrics",)):
                 make_measure(section.metrics)
                 keep = Keep(**({} if section.keep is None else section.keep.arguments(float)))
                 design = space.design(section.seed)
             build.check(design)
         except ExperimentError as error:
-            raise invalid(path, [str(error)]) from error
+            raise make_file_error(path, [str(error)]) from error
         options: dict[str, Any] = {"chunk": chunk, "resume": resume, "progress": progress, "cluster": client}
         return sweep(build, space, out, metrics=section.metrics, keep=keep, seed=section.seed, **options)
 
@@ -84,7 +84,7 @@ def space_of(section: SweepSection) -> Space:
         large = "is as large as its grids; leave samples out, or take method = 'random'"
         said = large if section.method == "grid" else "needs samples = …"
         raise ExperimentError(f"sweep.samples: method = {section.method!r} {said}")
-    with keyed("sweep", ("samples",)):
+    with report_by_key("sweep", ("samples",)):
         return Space(parameters, section.method, section.samples)
 
 
@@ -95,7 +95,7 @@ def values_of(key: str, given: dict[str, list[Any]]) -> Any:
     [(kind, values)] = given.items()
     if kind == "grid":
         return values
-    with keyed(key):
+    with report_by_key(key):
         try:
             a, b = (np.asarray(value, dtype=np.float64) for value in values)
             a, b = np.broadcast_arrays(a, b)

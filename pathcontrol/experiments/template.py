@@ -79,7 +79,7 @@ def _commented(line: str, target: Callable[..., Any]) -> str:
     match = _KEY.fullmatch(line)
     if match is None or match["comment"]:
         return line
-    comment = summary(target) if match["key"] in ("type", "mode") else meaning(target, match["key"])
+    comment = summarise_class(target) if match["key"] in ("type", "mode") else explain_argument(target, match["key"])
     return f"{line:<{_COLUMN}} # {comment}" if comment else line
 
 
@@ -94,12 +94,12 @@ def _value(parameter: Parameter) -> str:
     return _VALUES.get(parameter.form, "1.0") if parameter.form and parameter.required else ""
 
 
-def summary(target: Callable[..., Any]) -> str:
+def summarise_class(target: Callable[..., Any]) -> str:
     """Return the first sentence of a docstring, as far as a comment has room."""
     return _short((inspect.getdoc(target) or "").partition("\n")[0])
 
 
-def meaning(target: Callable[..., Any], argument: str) -> str:
+def explain_argument(target: Callable[..., Any], argument: str) -> str:
     """Return what the docstrings of a class and its bases say of an argument, as far as a comment has room."""
     for one in getattr(target, "__mro__", (target,)):
         found = re.search(rf"(?ms)^    {argument}: (.*?)(?=^ {{0,4}}\S|\Z)", inspect.cleandoc(one.__doc__ or ""))

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.builders.file_errors import keyed
-from pathcontrol.experiments.load import invalid, load_experiment, read_toml
+from pathcontrol.experiments.builders.file_errors import report_by_key
+from pathcontrol.experiments.load import load_experiment, make_file_error, read_toml
 from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
 from pathcontrol.experiments.schema.sweep_sections import TuneSection
 from pathcontrol.experiments.sweep_runner import of_samples, values_of
@@ -52,13 +52,13 @@ def run_tune(
         build = SweptExperiment(data, Path(path).parent.absolute(), varied, "tune")
         space = _space(section)
         for key, names in (("objectives", section.objectives), ("limits", section.limits or ())):
-            with keyed(f"tune.{key}"):
+            with report_by_key(f"tune.{key}"):
                 make_measure([names] if isinstance(names, str) else list(names))
-        with keyed("tune"):
+        with report_by_key("tune"):
             scenarios = None if section.scenarios is None else Space.given(section.scenarios)
         _check(build, space, scenarios)
     except ExperimentError as error:
-        raise invalid(path, [str(error)]) from error
+        raise make_file_error(path, [str(error)]) from error
     options = section.arguments(float) | {"scenarios": scenarios, "out": out}
     options = {name: value for name, value in options.items() if name != "parameters"}
     return tune(build, space, chunk=chunk, resume=resume, progress=progress, **options)
@@ -69,7 +69,7 @@ def _space(section: TuneSection) -> Space:
         if "normal" in given:
             raise ExperimentError(f"tune.parameters.{key}: normal has no ends to search between; give uniform = [a, b]")
     values = {key: values_of(f"tune.parameters.{key}", given) for key, given in section.parameters.items()}
-    with keyed("tune.parameters"):
+    with report_by_key("tune.parameters"):
         return Space.random(values, 1)
 
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import pathcontrol
 from pathcontrol.cli import main
 from pathcontrol.cli.group import in_options
-from pathcontrol.experiments.builders.file_errors import keyed
+from pathcontrol.experiments.builders.file_errors import report_by_key
 
 SOURCE = Path(pathcontrol.__file__).parent
 KEYWORD = re.compile(r"(?<![-\w.&?#/=$'])(?<!\w\()([a-z_]\w*)=(?![=\d])")
@@ -95,7 +95,7 @@ def test_advice_is_translated_or_left_out(command, message, said):
 def test_keyed_errors_speak_of_lines_of_the_file():
     from pathcontrol.errors import ExperimentError, ToolpathError
 
-    with pytest.raises(ExperimentError) as error, keyed("task.file", ("unit", "layers")):
+    with pytest.raises(ExperimentError) as error, report_by_key("task.file", ("unit", "layers")):
         raise ToolpathError("no unit; give unit='mm', or choose layers= of A; or read it with start=(x, y, z)")
     assert str(error.value) == 'task.file: no unit; give unit = "mm", or choose layers = of A'
 

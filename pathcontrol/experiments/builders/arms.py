@@ -11,12 +11,12 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ExperimentError, InputError
-from pathcontrol.experiments.builders.file_errors import keyed, refuse_unit
+from pathcontrol.experiments.builders.file_errors import refuse_unit, report_by_key
 from pathcontrol.experiments.builders.making import Place, make
 from pathcontrol.experiments.builders.poses import pose_of
 from pathcontrol.experiments.schema.arm_sections import Directions, FrictionTable
 from pathcontrol.experiments.schema.experiment import Experiment
-from pathcontrol.experiments.schema.section import Section, converted
+from pathcontrol.experiments.schema.section import Section, convert_numbers
 from pathcontrol.registry import FRICTION_LAWS
 from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.extent import question_offset
@@ -68,18 +68,18 @@ def build_plant(experiment: Experiment, bare: RobotModel, model: RobotModel, bas
 def _load(experiment: Experiment, base_dir: Path) -> RobotModel:
     section = experiment.robot
     package_dirs = [base_dir / folder for folder in section.package_dirs or ()]
-    with keyed("robot.source"):
+    with report_by_key("robot.source"):
         source = _source(section.source, base_dir)
         urdf = find_urdf(source, tuple(package_dirs))
         needed = section.lock or experiment.angle_unit == "deg"
         sliding = _sliding_joints(urdf.text) if needed else set()
     lock = {
-        joint: value if joint in sliding else converted(value, experiment.to_radians)
+        joint: value if joint in sliding else convert_numbers(value, experiment.to_radians)
         for joint, value in (section.lock or {}).items()
     }
     for joint, value in lock.items():
         refuse_unit(f"robot.lock.{joint}", value, "m" if joint in sliding else "rad")
-    with keyed("robot", ("lock", "keep", "tip", "estimated_inertia")):
+    with report_by_key("robot", ("lock", "keep", "tip", "estimated_inertia")):
         robot = load_robot(
             source,
             lock=lock,
@@ -99,7 +99,7 @@ def _with_tool(robot: RobotModel, experiment: Experiment) -> RobotModel:
         return robot
     pose = pose_of("robot.tool", tool.arguments(experiment.to_radians))
     question_offset("robot.tool.position", tool.position or (0.0,), robot)
-    with keyed("robot.tool", ("name", "frame")):
+    with report_by_key("robot.tool", ("name", "frame")):
         return robot.with_frame(tool.name, tool.frame, pose)
 
 
@@ -129,7 +129,7 @@ def _carrying(key: str, robot: RobotModel, payload: Section | None) -> RobotMode
         return robot
     given = payload.arguments(float)
     question_offset(f"{key}.com", given.get("com", (0.0,)), robot)
-    with keyed(key, ("mass", "com", "inertia")):
+    with report_by_key(key, ("mass", "com", "inertia")):
         return robot.with_payload(**given)
 
 
@@ -141,7 +141,7 @@ def with_friction(robot: RobotModel, section: Any, place: Place) -> RobotModel:
     """
     if isinstance(section, str):
         return robot if section == "urdf" else robot.with_friction(None)
-    with keyed(_KEY, FrictionTable.model_fields):
+    with report_by_key(_KEY, FrictionTable.model_fields):
         if isinstance(section, FrictionTable):
             laws = _laws(section, robot.n, place)
         elif isinstance(section, list):

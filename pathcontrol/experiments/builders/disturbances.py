@@ -12,7 +12,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, parameters_of
-from pathcontrol.experiments.builders.file_errors import users_code
+from pathcontrol.experiments.builders.file_errors import report_users_code
 from pathcontrol.experiments.builders.making import Place, arguments_of, make
 from pathcontrol.experiments.schema.derived import OwnSection
 from pathcontrol.experiments.schema.experiment import Experiment
@@ -46,7 +46,7 @@ def build_disturbance(
         differ = {name for one in values for name in one if one[name] != values[0].get(name)}
         rows = {name: np.array([one[name] for one in values]) for name in differ}
         one: Disturbance = make(key, sections[0], DISTURBANCES, place, {"robot": plant}, rows)
-        with users_code(key, f"{type(one).__name__} at the start"):
+        with report_users_code(key, f"{type(one).__name__} at the start"):
             check_disturbance(one, q, qd)
         made.append(one)
     return reduce(add, made) if made else None

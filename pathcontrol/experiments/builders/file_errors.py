@@ -16,7 +16,7 @@ _LISTS = str.maketrans("()", "[]")  # of Python and of TOML
 
 
 @contextlib.contextmanager
-def keyed(key: str, fields: Iterable[str] | Mapping[str, str] = ()) -> Iterator[None]:
+def report_by_key(key: str, fields: Iterable[str] | Mapping[str, str] = ()) -> Iterator[None]:
     """Turn errors inside the block into ExperimentErrors whose message begins with the key path.
 
     A message that begins with one of the ``fields`` of the section ``key``, as ``K_v = -1.0, expected …``, is
@@ -45,15 +45,15 @@ def _line(name: str, value: str) -> str:
 
 
 @contextlib.contextmanager
-def users_code(key: str, doing: str, fields: Iterable[str] = ()) -> Iterator[None]:
-    """Turn whatever code of the user raises into an ExperimentError, as :func:`keyed` does with errors."""
+def report_users_code(key: str, doing: str, fields: Iterable[str] = ()) -> Iterator[None]:
+    """Turn whatever code of the user raises into an ExperimentError, as :func:`report_by_key` does with errors."""
     try:
-        with keyed(key, fields):
+        with report_by_key(key, fields):
             yield
     except PathControlError:
         raise
     except Exception as error:
-        raise ExperimentError(f"{key}: {doing} raised {told(error)}") from error
+        raise ExperimentError(f"{key}: {doing} raised {describe_error(error)}") from error
 
 
 def refuse_unit(key: str, value: Any, unit: str) -> None:
@@ -66,6 +66,6 @@ def refuse_unit(key: str, value: Any, unit: str) -> None:
         raise ExperimentError(f"{key} was given in {value.unit}, expected {list_units([unit])}: so the joint moves")
 
 
-def told(error: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """Kind and message of an exception of the user's code."""
     return f"{type(error).__name__}: {error}"

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 from pathcontrol.arguments import parameters_of
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.builders.file_errors import keyed, users_code
-from pathcontrol.experiments.builders.own_class import own_class
+from pathcontrol.experiments.builders.file_errors import report_by_key, report_users_code
+from pathcontrol.experiments.builders.own_class import find_own_class
 from pathcontrol.experiments.schema.derived import OwnSection
-from pathcontrol.experiments.schema.section import Section, in_radians, in_si, units_of
+from pathcontrol.experiments.schema.section import Section, convert_angles, read_quantities, units_of
 from pathcontrol.registry import Kind
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -61,7 +61,7 @@ def make(
         inspect.signature(target).bind(**needed)
     except TypeError as error:
         raise ExperimentError(f"{where}: {error}; it is {target.__name__}{_plain_signature(target)}") from error
-    with users_code(where, target.__name__, arguments):
+    with report_users_code(where, target.__name__, arguments):
         return target(**needed)
 
 
@@ -80,8 +80,8 @@ def target_of(key: str, section: Any, kind: Kind | None, place: Place) -> Callab
     if not isinstance(section, OwnSection):
         return type(section).target
     assert kind is not None
-    with keyed(f"{key}.type"):
-        return own_class(place.folder, *section.place, kind)
+    with report_by_key(f"{key}.type"):
+        return find_own_class(place.folder, *section.place, kind)
 
 
 def arguments_of(
@@ -106,7 +106,7 @@ def _own_arguments(key: str, target: Callable[..., Any], parameters: Mapping[str
     quantities = {name: one.unit for name, one in parameters_of(target).items() if one.unit is not None}
     units = units_of(quantities, parameters)
     wrong: dict[Any, Any] = {}
-    values = {name: in_si((name,), value, units.get(name, ()), wrong) for name, value in parameters.items()}
+    values = {name: read_quantities((name,), value, units.get(name, ()), wrong) for name, value in parameters.items()}
     for (name, *_), error in wrong.items():
         raise ExperimentError(f"{key}.{name}{error['type'].message()}")
-    return {name: in_radians(value, units.get(name, ()), place.to_radians) for name, value in values.items()}
+    return {name: convert_angles(value, units.get(name, ()), place.to_radians) for name, value in values.items()}

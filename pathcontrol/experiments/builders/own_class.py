@@ -11,11 +11,11 @@ from pathlib import Path
 from types import ModuleType
 
 from pathcontrol.errors import InputError
-from pathcontrol.experiments.builders.file_errors import told
+from pathcontrol.experiments.builders.file_errors import describe_error
 from pathcontrol.registry import Kind, load
 
 
-def own_class(folder: Path, source: str, name: str, kind: Kind) -> type:
+def find_own_class(folder: Path, source: str, name: str, kind: Kind) -> type:
     """Return the class ``name``, of a ``kind``, of a Python file, which is run once to define it, or of a module.
 
     Raises:
@@ -46,7 +46,8 @@ def _installed(name: str) -> ModuleType:
         return importlib.import_module(name)
     except (Exception, SystemExit) as error:
         raise InputError(
-            f"the module {name!r} cannot be imported: {told(error)}; a file beside the TOML file is named with its .py"
+            f"the module {name!r} cannot be imported: {describe_error(error)}; a file beside the TOML file is named "
+            "with its .py"
         ) from error
 
 
@@ -63,7 +64,7 @@ def _run(file: Path, source: bytes) -> ModuleType:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[module_name]
-        raise InputError(f"{file.name} fails{_line(error, file)} with {told(error)}") from error
+        raise InputError(f"{file.name} fails{_line(error, file)} with {describe_error(error)}") from error
     return module
 
 

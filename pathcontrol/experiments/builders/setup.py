@@ -14,7 +14,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.builders.arms import build_arms
 from pathcontrol.experiments.builders.disturbances import build_disturbance
-from pathcontrol.experiments.builders.file_errors import keyed, refuse_unit, users_code
+from pathcontrol.experiments.builders.file_errors import refuse_unit, report_by_key, report_users_code
 from pathcontrol.experiments.builders.making import Place, make
 from pathcontrol.experiments.builders.tasks import build_duration, build_task
 from pathcontrol.experiments.schema.experiment import Experiment, Output
@@ -131,7 +131,7 @@ def _refuse_joints(output: Output, robot: RobotModel) -> None:
 def _loop(experiment: Experiment, plant: RobotModel, duration: float, place: Place) -> SampledLoop | ContinuousTime:
     """Return the loop, with encoders and torque limits that fit the simulated arm."""
     loop: SampledLoop | ContinuousTime = make("loop", experiment.loop, None, place)
-    with keyed("loop", type(experiment.loop).model_fields):
+    with report_by_key("loop", type(experiment.loop).model_fields):
         torque_limits(loop, plant)
         if isinstance(loop, ContinuousTime):
             _refuse_too_long(duration, "output_period", loop.output_period)
@@ -157,13 +157,13 @@ def _refuse_too_long(duration: float, name: str, period: float, delay: float = 0
 def _state(experiment: Experiment, controller: Controller) -> tuple[Array, Array]:
     """Return (q, q̇) at the start, for which the law has been tried once."""
     n, given = controller.robot.n, experiment.start.arguments(experiment.to_radians)
-    with keyed("start", ("q", "qd")):
+    with report_by_key("start", ("q", "qd")):
         begin = controller.task.q_d(np.array(controller.task.s0))
         q = check_finite("q", as_joint_array("q", given.get("q", begin), n))
         qd = check_finite("qd", as_joint_array("qd", given.get("qd", np.zeros(n)), n))
     for name, per in (("q", ""), ("qd", "/s")):
         for i, (value, unit) in enumerate(zip(given.get(name, ()), controller.robot.position_units, strict=False)):
             refuse_unit(f"start.{name}[{i}]", value, unit + per)
-    with users_code("controller", f"{type(controller).__name__} at the start"):
+    with report_users_code("controller", f"{type(controller).__name__} at the start"):
         controller.law(0.0, q, qd, controller.start(q, qd))
     return q, qd

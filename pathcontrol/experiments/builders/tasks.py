@@ -9,7 +9,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.builders.file_errors import keyed, users_code
+from pathcontrol.experiments.builders.file_errors import report_by_key, report_users_code
 from pathcontrol.experiments.builders.making import Place, arguments_of, make
 from pathcontrol.experiments.builders.poses import pose_of
 from pathcontrol.experiments.schema.experiment import Experiment
@@ -35,7 +35,7 @@ def build_task(section: Any, robot: RobotModel, place: Place) -> PathTask:
     task: PathTask = make("task", section, TASKS, place, {"robot": robot})
     if section.profile is not None:
         task = task.with_profile(make("task.profile", section.profile, PROFILES, place, {"robot": robot, "path": task}))
-    with users_code("task", f"checking {type(task).__name__}"):
+    with report_users_code("task", f"checking {type(task).__name__}"):
         check_task(task, robot.n)
     return task
 
@@ -48,10 +48,10 @@ def build_toolpath(section: ToolpathSection, robot: RobotModel, place: Place) ->
     """
     workpiece = pose_of("task.workpiece", section.workpiece.arguments(place.to_radians))
     keys = {name.removeprefix("tool_"): name for name in (*section.reader_options, "feed")}
-    with keyed("task.file", keys):
+    with report_by_key("task.file", keys):
         toolpath = read_toolpath(place.folder / section.file, **section.reading)
     arguments = arguments_of("task", section, None, place)
-    with keyed("task", type(section).model_fields):
+    with report_by_key("task", type(section).model_fields):
         return ToolpathTask(robot, arguments.pop("frame"), toolpath, workpiece, **arguments)
 
 

@@ -12,11 +12,11 @@ from typing import Any
 _LONGEST = 1000
 
 
-def named_files(value: Any, folder: Path) -> Iterator[tuple[str, Path]]:
+def find_files(value: Any, folder: Path) -> Iterator[tuple[str, Path]]:
     """Yield names and paths of the files that texts in a value are, relative to ``folder``; ``FILE.py:Name`` is one."""
     if isinstance(value, dict | list):
         for item in value.values() if isinstance(value, dict) else value:
-            yield from named_files(item, folder)
+            yield from find_files(item, folder)
     elif isinstance(value, str) and (path := _file(folder, re.sub(r"(\.py):\w+$", r"\1", value))):
         yield value, path
         if path.suffix == ".py":
@@ -44,11 +44,11 @@ def _file(folder: Path, name: str) -> Path | None:
         return None
 
 
-def relative(value: Any, folder: Path) -> Any:
+def make_relative(value: Any, folder: Path) -> Any:
     """Return the same value, with names relative to ``folder`` in the place of whole paths."""
     if isinstance(value, Mapping):
-        return {name: relative(item, folder) for name, item in value.items()}
+        return {name: make_relative(item, folder) for name, item in value.items()}
     if isinstance(value, list):
-        return [relative(item, folder) for item in value]
-    named = isinstance(value, str) and Path(value).is_absolute() and list(named_files(value, folder))
+        return [make_relative(item, folder) for item in value]
+    named = isinstance(value, str) and Path(value).is_absolute() and list(find_files(value, folder))
     return os.path.relpath(value, folder) if named else value

@@ -23,15 +23,15 @@ from pathcontrol.control.base import Controller
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.builders.arms import build_models, build_plant
 from pathcontrol.experiments.builders.disturbances import build_disturbance, varies_together
-from pathcontrol.experiments.builders.file_errors import keyed
+from pathcontrol.experiments.builders.file_errors import report_by_key
 from pathcontrol.experiments.builders.making import Place, arguments_of, target_of
 from pathcontrol.experiments.builders.setup import Setup, build, law_of
-from pathcontrol.experiments.load import finding
+from pathcontrol.experiments.load import describe_finding
 from pathcontrol.experiments.samples.dotted_keys import check_keys, put, section_of_key
-from pathcontrol.experiments.samples.named_files import named_files, relative
-from pathcontrol.experiments.samples.swept_tasks import SweptTask, joined, refuse_sequence, rows_together, swept_tasks
+from pathcontrol.experiments.samples.named_files import find_files, make_relative
+from pathcontrol.experiments.samples.swept_tasks import SweptTask, build_tasks, group_rows, join_tasks, refuse_sequence
 from pathcontrol.experiments.schema.experiment import Experiment
-from pathcontrol.experiments.schema.validators import shown
+from pathcontrol.experiments.schema.validators import show_value
 from pathcontrol.registry import LAWS
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.sweeps.cluster.user_code import PackedBuilder
@@ -80,11 +80,13 @@ class SweptExperiment:
         base, *paths = (Path(os.path.abspath(path)) for path in (self._base_dir, *dict(self._files()).values()))
         home = Path(os.path.commonpath([base, *paths]))
         files = {str(path.relative_to(home)): path.read_bytes() for path in paths}
-        moved = {name: relative(name, base) for name, _ in self._files() if os.path.isabs(name)}
-        return PackedBuilder(home, files, partial(_unpacked, relative(self._data, base), moved, base.relative_to(home)))
+        moved = {name: make_relative(name, base) for name, _ in self._files() if os.path.isabs(name)}
+        return PackedBuilder(
+            home, files, partial(_unpacked, make_relative(self._data, base), moved, base.relative_to(home))
+        )
 
     def _files(self) -> Iterator[tuple[str, Path]]:
-        return named_files([self._data, self._varied], self._base_dir)
+        return find_files([self._data, self._varied], self._base_dir)
 
     def check(self, design: Mapping[str, Array]) -> None:
         """No key is a part of another, every sample is valid with gains greater than 0, and the first can be built.
@@ -124,13 +126,13 @@ class SweptExperiment:
         setup, bare, model = self._of_group(key, experiments[0])
         found = [SweptTask(setup.task, float(setup.duration), setup.laps)] * len(rows)
         if "task" in varied:
-            found = swept_tasks(experiments, model, self._base_dir)
-        for some in rows_together(found):
+            found = build_tasks(experiments, model, self._base_dir)
+        for some in group_rows(found):
             chosen, own = [experiments[i] for i in some], [found[i] for i in some]
             plant: Any = setup.plant
             if "plant" in varied:
                 plant = [build_plant(experiment, bare, model, self._base_dir) for experiment in chosen]
-            law, arguments = self._law(model, chosen, joined(own)), _arguments(setup, chosen, own)
+            law, arguments = self._law(model, chosen, join_tasks(own)), _arguments(setup, chosen, own)
             if "disturbance" in varied:
                 place, state = Place(self._base_dir, chosen[0].to_radians), (arguments["q"], arguments["qd"])
                 arguments["disturbance"] = build_disturbance(chosen, setup.plant, *state, place)
@@ -165,8 +167,8 @@ class SweptExperiment:
             numbers = numbers.diagonal() if numbers.ndim > 1 else numbers
             if (numbers < 0).any() or (not zero[name] and (numbers == 0).any()):
                 raise ExperimentError(
-                    f"{self._where}: controller.{name} = {shown(arguments[name])} in sample {sample}, expected gains "
-                    "greater than 0; choose another distribution, such as log_uniform"
+                    f"{self._where}: controller.{name} = {show_value(arguments[name])} in sample {sample}, expected "
+                    "gains greater than 0; choose another distribution, such as log_uniform"
                 )
 
     def _experiment(self, parameters: Mapping[str, Array], row: int, sample: int) -> Experiment:
@@ -177,7 +179,7 @@ class SweptExperiment:
         try:
             return Experiment.model_validate(data)
         except ValidationError as error:
-            told = "; ".join(map(finding, error.errors(include_url=False)))
+            told = "; ".join(map(describe_finding, error.errors(include_url=False)))
             raise ExperimentError(f"{self._where}: in sample {sample}: {told}") from None
 
     def _of_group(self, key: str, experiment: Experiment) -> tuple[Setup, RobotModel, RobotModel]:
@@ -237,7 +239,7 @@ def _states(setup: Setup, experiments: list[Experiment], tasks: list[SweptTask])
         for name, value in experiment.start.arguments(experiment.to_radians).items():
             found[name][i] = np.asarray(value, dtype=np.float64)
     for name, states in found.items():
-        with keyed(f"start.{name}"):
+        with report_by_key(f"start.{name}"):
             wrong = [state.tolist() for state in states if state.shape != setup.q.shape]
             if wrong:
                 raise ExperimentError(f"start.{name} = {wrong[0]}, expected {len(setup.q)} values, one for each joint")

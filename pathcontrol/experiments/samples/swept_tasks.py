@@ -28,7 +28,7 @@ class SweptTask(NamedTuple):
     laps: int | None
 
 
-def swept_tasks(experiments: Sequence[Experiment], model: RobotModel, base_dir: Path) -> list[SweptTask]:
+def build_tasks(experiments: Sequence[Experiment], model: RobotModel, base_dir: Path) -> list[SweptTask]:
     """Return the task of each of some samples for one arm; samples that say the same have the same one.
 
     Raises:
@@ -53,7 +53,7 @@ def refuse_sequence(task: PathTask) -> None:
         raise ExperimentError("task: a sequence of paths cannot be swept; sweep one of its paths")
 
 
-def rows_together(tasks: Sequence[SweptTask]) -> list[NDArray[np.intp]]:
+def group_rows(tasks: Sequence[SweptTask]) -> list[NDArray[np.intp]]:
     """Return the rows of each batch: all closed or all open, of one duration; an endless path is for itself."""
     groups: dict[Hashable, list[int]] = {}
     for row, (task, duration, _) in enumerate(tasks):
@@ -62,7 +62,7 @@ def rows_together(tasks: Sequence[SweptTask]) -> list[NDArray[np.intp]]:
     return [np.array(rows) for rows in groups.values()]
 
 
-def joined(tasks: Sequence[SweptTask]) -> PathTask:
+def join_tasks(tasks: Sequence[SweptTask]) -> PathTask:
     """Return the task of all rollouts, or a batch of them."""
     first = tasks[0].task
     return first if all(one.task is first for one in tasks) else TaskBatch([one.task for one in tasks])

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self
 from pydantic import PlainValidator, model_validator
 
 from pathcontrol.arguments import Unit
-from pathcontrol.experiments.schema.derived import chooser, one_or_several, table_for
+from pathcontrol.experiments.schema.derived import accept_several, make_chooser, table_for
 from pathcontrol.experiments.schema.section import Section
 from pathcontrol.experiments.schema.validators import Number, Numbers, Text, expected
 from pathcontrol.registry import FRICTION_LAWS
@@ -76,7 +76,7 @@ class FrictionTable(Section):
         return self
 
 
-_LAWS = one_or_several(chooser(FRICTION_LAWS))
+_LAWS = accept_several(make_chooser(FRICTION_LAWS))
 
 
 def _friction(value: Any) -> Any:

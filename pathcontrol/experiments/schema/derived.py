@@ -54,7 +54,7 @@ class OwnSection(Section):
         return match["file"], match["name"]
 
 
-def chooser(
+def make_chooser(
     kind: Kind,
     base: type[Section] = Chosen,
     own: type[Section] | None = OwnSection,
@@ -85,7 +85,7 @@ def chooser(
     return partial(choose, key=key, find=find, choices=choices, default=default, also=also)
 
 
-def one_or_several(validate: Callable[[Any], Any]) -> Callable[[Any], Any]:
+def accept_several(validate: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Return a validator that takes what ``validate`` does, or a list of it."""
     several = TypeAdapter(list[Annotated[Any, PlainValidator(validate)]])
     return lambda value: several.validate_python(value) if isinstance(value, list) and value else validate(value)
@@ -134,7 +134,7 @@ def _annotation(parameter: Parameter) -> Any:
 def _table_of(kind: Any) -> Callable[[Any], Any] | None:
     """Return what makes a section of a table for an object that a parameter may be, if it may be one."""
     if (known := find_kind(kind)) is not None:
-        return chooser(known)
+        return make_chooser(known)
     return section_of(kind).model_validate if isinstance(kind, type) and is_dataclass(kind) else None
 
 

@@ -11,7 +11,7 @@ from pydantic import Field, PlainValidator
 
 from pathcontrol.arguments import Unit
 from pathcontrol.experiments.schema.arm_sections import Plant, Robot
-from pathcontrol.experiments.schema.derived import chooser, one_or_several
+from pathcontrol.experiments.schema.derived import accept_several, make_chooser
 from pathcontrol.experiments.schema.section import Section
 from pathcontrol.experiments.schema.sweep_sections import SweepSection, TuneSection
 from pathcontrol.experiments.schema.task_sections import Task
@@ -33,7 +33,7 @@ class LoopSection(Section):
     target: ClassVar[Callable[..., Any]]
 
 
-_LOOP = chooser(LOOPS, LoopSection, None, key="mode", default="sampled")
+_LOOP = make_chooser(LOOPS, LoopSection, None, key="mode", default="sampled")
 
 
 def _file(*suffixes: str) -> PlainValidator:
@@ -99,11 +99,11 @@ class Experiment(Section):
     engine: Literal["auto", "compiled", "pinocchio"] = "auto"
     robot: Robot
     task: Task
-    controller: Annotated[Any, PlainValidator(chooser(LAWS))]
+    controller: Annotated[Any, PlainValidator(make_chooser(LAWS))]
     start: Start = Start()
     plant: Plant = Plant()
     loop: Annotated[Any, PlainValidator(_LOOP)] = Field(default_factory=lambda: _LOOP({}))
-    disturbance: Annotated[Any, PlainValidator(one_or_several(chooser(DISTURBANCES)))] | None = None
+    disturbance: Annotated[Any, PlainValidator(accept_several(make_chooser(DISTURBANCES)))] | None = None
     output: Output = Output()
     sweep: SweepSection | None = None
     tune: TuneSection | None = None

@@ -14,7 +14,7 @@ from pathcontrol._expect import did_you_mean
 from pathcontrol._units import Quantity, is_quantity, list_units, parse_quantity
 from pathcontrol.arguments import Unit
 from pathcontrol.errors import InputError
-from pathcontrol.experiments.schema.validators import expected, shown
+from pathcontrol.experiments.schema.validators import expected, show_value
 
 #: the SI units of each field that is a quantity, one or several
 Units = Mapping[str, tuple[str, ...]]
@@ -41,7 +41,7 @@ class Section(BaseModel):
         names = [name for name in type(self).model_fields if name not in self.not_arguments]
         given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         units = self.units_of(given)
-        return {name: in_radians(value, units.get(name, ()), to_radians) for name, value in given.items()}
+        return {name: convert_angles(value, units.get(name, ()), to_radians) for name, value in given.items()}
 
     @model_validator(mode="wrap")
     @classmethod
@@ -50,7 +50,7 @@ class Section(BaseModel):
         wrong: _Wrong = {}
         if isinstance(value, dict):
             units = cls.units_of(value)
-            value = {key: in_si((key,), v, units.get(key, ()), wrong) for key, v in value.items()}
+            value = {key: read_quantities((key,), v, units.get(key, ()), wrong) for key, v in value.items()}
         try:
             made = handler(value)
         except ValidationError as error:
@@ -95,21 +95,21 @@ def choose(
     return section.model_validate(value)
 
 
-def in_si(at: tuple[int | str, ...], value: Any, units: tuple[str, ...], wrong: _Wrong) -> Any:
+def read_quantities(at: tuple[int | str, ...], value: Any, units: tuple[str, ...], wrong: _Wrong) -> Any:
     """Return ``value`` with each text in it read as a quantity; what is none goes to ``wrong``, by where it is."""
     if not units or isinstance(value, int | float):
         return value
     if isinstance(value, list):
-        return [in_si((*at, i), item, units, wrong) for i, item in enumerate(value)]
+        return [read_quantities((*at, i), item, units, wrong) for i, item in enumerate(value)]
     if isinstance(value, dict) and "type" not in value:  # one that has it is a section, which has its own units
-        return {key: in_si((*at, key), item, units, wrong) for key, item in value.items()}
+        return {key: read_quantities((*at, key), item, units, wrong) for key, item in value.items()}
     if isinstance(value, str) and is_quantity(value):
         try:
             if len(wrong) > _MOST_TOLD:
                 return value
             return parse_quantity(value, *units)
         except InputError as error:
-            wrong[at] = _explained(at, value, f" = {shown(value)}, {error}")
+            wrong[at] = _explained(at, value, f" = {show_value(value)}, {error}")
     return value
 
 
@@ -118,25 +118,25 @@ def _told(at: tuple[int | str, ...], wrong: _Wrong) -> bool:
     return any(all(a == b for a, b in zip(at, other, strict=False)) for other in wrong)
 
 
-def in_radians(value: Any, units: tuple[str, ...], to_radians: Callable[[float], float]) -> Any:
+def convert_angles(value: Any, units: tuple[str, ...], to_radians: Callable[[float], float]) -> Any:
     """Return an angle or an angular rate converted from the file's ``angle_unit``, and anything else as it is."""
-    return converted(value, to_radians) if units and units[0].startswith("rad") else value
+    return convert_numbers(value, to_radians) if units and units[0].startswith("rad") else value
 
 
-def converted(value: Any, function: Callable[[float], float]) -> Any:
+def convert_numbers(value: Any, function: Callable[[float], float]) -> Any:
     """Return ``value`` with ``function`` applied to each number in it that was given without a unit."""
     if isinstance(value, Quantity | bool):
         return value
     if isinstance(value, dict):
-        return {key: converted(item, function) for key, item in value.items()}
-    return [converted(item, function) for item in value] if isinstance(value, list) else function(value)
+        return {key: convert_numbers(item, function) for key, item in value.items()}
+    return [convert_numbers(item, function) for item in value] if isinstance(value, list) else function(value)
 
 
 def _wrong_choice(key: str, kind: Any, names: list[str], also: str) -> ValidationError:
     choices = ", ".join(map(repr, names)) + also
     text = f": missing; choose one of {choices}"
     if kind is not None:
-        text = f" = {shown(kind)}, expected one of {choices}{did_you_mean(kind, names)}"
+        text = f" = {show_value(kind)}, expected one of {choices}{did_you_mean(kind, names)}"
     return ValidationError.from_exception_data("choice", [_explained((key,), kind, text)])
 
 
@@ -160,7 +160,7 @@ def _text(section: type[Section], error: Any) -> str:
     if kind == "extra_forbidden":
         keys = sorted(section.model_fields, key=lambda name: name not in section.not_arguments)
         return f": unknown key{did_you_mean(error['loc'][-1], keys) or ';'} valid keys: {', '.join(keys)}"
-    return f" = {shown(value)}, expected {_wanted(error)}{_closest_literal(error)}{_or_with_unit(section, error)}"
+    return f" = {show_value(value)}, expected {_wanted(error)}{_closest_literal(error)}{_or_with_unit(section, error)}"
 
 
 def _or_with_unit(section: type[Section], error: Any) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import PlainValidator, create_model
 
 from pathcontrol.arguments import Unit
-from pathcontrol.experiments.schema.derived import Chosen, OwnSection, chooser, fields_of
+from pathcontrol.experiments.schema.derived import Chosen, OwnSection, fields_of, make_chooser
 from pathcontrol.experiments.schema.section import Section
 from pathcontrol.experiments.schema.validators import Numbers, Text
 from pathcontrol.registry import PROFILES, TASKS, load
@@ -18,7 +18,7 @@ class TaskSection(Section):
     """What every task but a toolpath takes: another velocity profile than its own."""
 
     not_arguments: ClassVar[tuple[str, ...]] = ("type", "profile")
-    profile: Annotated[Any, PlainValidator(chooser(PROFILES))] = None
+    profile: Annotated[Any, PlainValidator(make_chooser(PROFILES))] = None
 
 
 class PathSection(TaskSection, Chosen):
@@ -77,4 +77,4 @@ def toolpath_section() -> type[ToolpathSection]:
     return made
 
 
-Task = Annotated[Any, PlainValidator(chooser(TASKS, PathSection, OwnTask, {"toolpath": toolpath_section}))]
+Task = Annotated[Any, PlainValidator(make_chooser(TASKS, PathSection, OwnTask, {"toolpath": toolpath_section}))]

@@ -22,7 +22,7 @@ def expected(what: str) -> PydanticCustomError:
     return PydanticCustomError("expected", "{what}", {"what": what})
 
 
-def shown(value: Any) -> str:
+def show_value(value: Any) -> str:
     """Return ``value`` as an error message shows it: as TOML spells it, and not at length."""
     return str(value).lower() if isinstance(value, bool) else _REPR.repr(value)
 
