@@ -2,6 +2,7 @@ from . import analysis as analysis
 from . import figures as figures
 from .analysis.deviation import tool_deviation as tool_deviation
 from .analysis.deviation import toolpath_metrics as toolpath_metrics
+from .analysis.disturbance_estimate import momentum_observer as momentum_observer
 from .analysis.gamma import distance_to_gamma as distance_to_gamma
 from .analysis.lyapunov_functions import lyapunov as lyapunov
 from .analysis.pareto import non_dominated as non_dominated

@@ -161,11 +161,23 @@ class ArmDynamics:
         q, qd = self._array("q", q)[..., None, :], self._array("qd", qd)[..., None, :]
         return self.coriolis(q, qd, np.eye(self.n)).swapaxes(-1, -2)
 
+    def momentum(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """Return the generalized momentum p = M(q)q̇ [N m s], (*batch, n)."""
+        return self._weightless.inverse_dynamics(q, np.zeros(self.n), qd)
+
+    def momentum_rate(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
+        """Return ṗ = τ + C(q,q̇)ᵀq̇ − g(q) [N m], (*batch, n): the rate of the momentum p = M(q)q̇ under torques τ.
+
+        It needs no acceleration, as Ṁ = C + Cᵀ (Lagrange's equation: C(q,q̇)ᵀq̇ is the gradient of the kinetic energy).
+        """
+        qd = self._array("qd", qd)
+        gradient = (self.coriolis_matrix(q, qd) * qd[..., :, None]).sum(-2)
+        return self._array("tau", tau) + gradient - self.gravity(q)
+
     def kinetic_energy(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """Return the kinetic energy ½ q̇ᵀM(q)q̇ [J], (*batch,)."""
         qd = self._array("qd", qd)
-        momentum = self._weightless.inverse_dynamics(q, np.zeros(self.n), qd)
-        return 0.5 * np.asarray((momentum * qd).sum(-1))
+        return 0.5 * np.asarray((self.momentum(q, qd) * qd).sum(-1))
 
     def potential_energy(self, q: ArrayLike) -> Array:
         """Return the energy in the field of gravity [J], (*batch,), zero with all mass at the base frame's height."""

@@ -44,7 +44,7 @@ class Actuator:
         check_rows(limits, "torque_limits", shape[0])
         self.limits = None if limits is None else np.atleast_2d(limits)
         self._limits = None if self.limits is None else (-self.limits, self.limits)
-        whole, late = _split_delay(loop.delay, loop.period)
+        whole, late = split_delay(loop.delay, loop.period)
         self.waiting = whole + (late > 0)
         self._queue = deque([np.zeros(shape)] * self.waiting)
         self._parts = [late, loop.period - late] if late else [loop.period]
@@ -168,7 +168,7 @@ class SampledArm:
         return (self.q, self.qd) if self._noise is None else self._noise.add_noise(self.q, self.qd)
 
 
-def _split_delay(delay: float, period: float) -> tuple[int, float]:
+def split_delay(delay: float, period: float) -> tuple[int, float]:
     """Split ``delay`` into whole periods and a rest below one, ignoring rounding."""
     whole = round(delay / period)
     if abs(delay / period - whole) < 1e-9:

@@ -23,7 +23,7 @@ from pathcontrol import (
 )
 from pathcontrol.experiments.reproduce import paper_controllers
 from pathcontrol.simulation.arm.sensors import Sensors
-from pathcontrol.simulation.sampled import _split_delay
+from pathcontrol.simulation.sampled import split_delay
 
 START = np.deg2rad([40.0, 70.0])
 
@@ -143,8 +143,8 @@ def test_the_delay_moves_the_torque_in_time(arm, delay):
 @pytest.mark.parametrize("period", [2.5e-3, 1 / 3000, 0.007322015953741585, 0.001])
 def test_whole_periods_of_delay_leave_no_rest(arm, circle, period):
     for periods in range(1, 13):
-        assert _split_delay(periods * period, period) == (periods, 0.0)
-        whole, rest = _split_delay((periods + 0.25) * period, period)
+        assert split_delay(periods * period, period) == (periods, 0.0)
+        whole, rest = split_delay((periods + 0.25) * period, period)
         assert whole == periods
         assert rest == pytest.approx(0.25 * period)
 

@@ -1,0 +1,164 @@
+"""The disturbance torque of a run, estimated from its motion by the momentum observer."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_array
+from pathcontrol._expect import expect, expect_choice
+from pathcontrol.control.base import FrictionCompensation
+from pathcontrol.errors import InputError
+from pathcontrol.robot.friction import viscous_of
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.config import table
+from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.sampled import split_delay
+
+
+@np.errstate(over="ignore", invalid="ignore")  # numbers from a file may be huge
+def momentum_observer(
+    run: Run,
+    robot: RobotModel | None = None,
+    *,
+    cutoff_hz: ArrayLike = 20.0,
+    friction: FrictionCompensation = "none",
+    measured: bool = True,
+) -> Array:
+    """Estimate the torque that acts on the joints beside the motors [N m], (rollout, time, n).
+
+    With the momentum p = M(q)q̇ the observer
+
+        r(t) = K (p(t) − p(0) − ∫₀ᵗ (τ + C(q,q̇)ᵀq̇ − g(q) + r) dt'),  K = 2π · ``cutoff_hz``
+
+    is the disturbance torque d behind a first-order low-pass filter at each joint, ṙ = K (d − r) with r(0) = 0, and
+    needs neither an acceleration nor the inverse of M (A. De Luca and R. Mattone, Sensorless robot collision
+    detection and hybrid force/motion control, ICRA 2005; A. De Luca, A. Albu-Schäffer, S. Haddadin and G. Hirzinger,
+    Collision detection and safe reaction with the DLR-III lightweight manipulator arm, IROS 2006). What the model
+    leaves out is part of d: friction, with a minus, and errors of masses.
+
+    From one sample to the next the mean of d follows from the change of p, the mean torque, and the trapezoidal rule
+    for the rest; to this mean, held, the filter responds exactly. The error is of second order in the period.
+
+    Args:
+        run: a run of any law and loop, or a log with q, q̇ and τ.
+        robot: the arm's model; by default the one that the law computed with.
+        cutoff_hz: corner frequency of the filter [Hz], a number or (n,); inf for the mean of d over each period.
+        friction: what of the model's friction is known and so no part of d: ``"none"``, ``"viscous"``, or ``"full"``,
+            of which dry friction counts as 0 while a joint rests.
+        measured: take q and q̇ as the loop measured them, with noise and encoders; False for the true ones. Velocities
+            by difference are half a period old, and so is the estimate. A filter of the loop on the velocity is
+            not undone: what it holds back of p is missing in ṗ.
+
+    Returns:
+        r, NaN where the rollout has diverged.
+
+    Raises:
+        InputError: the run does not know its robot, it has other joints, or the frequency is not above 0.
+        UnknownNameError: the run has no torques, or there is no such ``friction``.
+    """
+    expect("run", run, Run)
+    arm = _find_arm(run, robot)
+    expect_choice("friction", friction, get_args(FrictionCompensation))
+    rate = 2 * np.pi * _check_cutoff(cutoff_hz, arm)
+    time, q, qd = _motion(run, measured)
+    known = zip(q, qd, _mean_torque(run, time), strict=True)
+    means = [_mean_disturbance(arm, friction, np.diff(time)[:, None], *rollout) for rollout in known]
+    return _low_pass(np.stack(means), np.diff(time), rate, np.where(np.isfinite(q[:, 0]), 0.0, np.nan))
+
+
+def _find_arm(run: Run, robot: RobotModel | None) -> RobotModel:
+    """Return the model to observe with, after checking that it has the joints of the run."""
+    arm = run.model if robot is None else robot
+    expect("robot", arm, RobotModel)
+    if arm.n != len(run.joints):
+        raise InputError(f"{arm.name} has {arm.n} joints, the run {len(run.joints)}; expected as many")
+    return arm
+
+
+def _check_cutoff(cutoff_hz: ArrayLike, arm: RobotModel) -> Array:
+    """Check the corner frequencies [Hz]; return them as (n,)."""
+    cutoff = as_array("cutoff_hz", cutoff_hz)
+    if cutoff.shape not in ((), (arm.n,)) or not (cutoff > 0).all():
+        raise InputError(
+            f"cutoff_hz = {cutoff.tolist()}, expected a frequency greater than 0 [Hz], or one for each of the "
+            f"{arm.n} joints",
+            argument="cutoff_hz",
+            value=cutoff_hz,
+        )
+    return np.broadcast_to(cutoff, (arm.n,))
+
+
+def _loop_number(run: Run, name: str) -> float:
+    """Return a number of the loop's settings that is not negative; 0 where there is none."""
+    try:
+        number = float(table(run.config, "loop").get(name, 0.0))
+    except (TypeError, ValueError):
+        return 0.0
+    return number if 0.0 <= number < np.inf else 0.0
+
+
+def _velocity_age(run: Run, measured: bool) -> float:
+    """Return how long ago [s] the arm had the velocity of a sample: half a period for a difference of positions."""
+    by_difference = table(run.config, "loop").get("velocity") == "difference"
+    return 0.5 * _loop_number(run, "period") if measured and by_difference else 0.0
+
+
+def _motion(run: Run, measured: bool) -> tuple[Array, Array, Array]:
+    """Return the times (time,) at which the arm had its velocities, and positions and velocities at these times."""
+    names = [f"{name}_measured" if measured and f"{name}_measured" in run else name for name in ("q", "qd")]
+    q, qd = map(run.array, names)
+    age = np.full(len(run.time), _velocity_age(run, measured))
+    age[0] = 0.0  # the first velocity is that of the start
+    return run.time - age, q - age[:, None] * qd, qd
+
+
+def _mean_torque(run: Run, time: Array) -> Array:
+    """Return the mean torques τ of a run between some times (k,), (rollout, k − 1, n): differences of its impulse."""
+    tau, begin = run.array("tau"), run.time - _torque_lead(run)
+    begin[0] = run.time[0]
+    impulse = np.zeros(tau.shape)
+    np.cumsum(tau[:, :-1] * np.diff(begin)[:, None], axis=1, out=impulse[:, 1:])
+    held = np.searchsorted(begin, time, side="right") - 1
+    until = impulse[:, held] + tau[:, held] * (time - begin[held])[:, None]
+    return np.diff(until, axis=1) / np.diff(time)[:, None]
+
+
+def _torque_lead(run: Run) -> float:
+    """Return how long before its sample [s] a torque began to act.
+
+    That is after the sample before by the part of the delay that is no whole period. In continuous time, where torques
+    change on the way, it is half a period: the trapezoidal rule.
+    """
+    if table(run.config, "loop").get("loop") == "continuous":
+        return 0.5 * _loop_number(run, "output_period")
+    period = _loop_number(run, "period")
+    late = split_delay(_loop_number(run, "delay"), period)[1] if period else 0.0
+    return period - late if late else 0.0
+
+
+def _mean_disturbance(
+    arm: RobotModel, friction: FrictionCompensation, dt: Array, q: Array, qd: Array, tau: Array
+) -> Array:
+    """Return the mean of d between the samples of one rollout, (time − 1, n): what τ does not explain of Δp."""
+    rate = arm.momentum_rate(q, qd, -_known_friction(arm, friction, qd))
+    return np.diff(arm.momentum(q, qd), axis=0) / dt - tau - 0.5 * (rate[1:] + rate[:-1])
+
+
+def _known_friction(arm: RobotModel, friction: FrictionCompensation, qd: Array) -> Array:
+    """Return the torque of the friction that is known [N m], (time, n)."""
+    if friction == "none":
+        return np.zeros_like(qd)
+    return arm.friction.torque(qd) if friction == "full" else viscous_of(arm.friction) * qd
+
+
+def _low_pass(means: Array, dt: Array, rate: Array, start: Array) -> Array:
+    """Return the response ṙ = K (d − r) from ``start`` (rollout, n) to means held for dt, (rollout, time, n)."""
+    r = np.empty((len(means), len(dt) + 1, len(rate)))
+    r[:, 0] = start
+    gains = -np.expm1(-rate * dt[:, None])
+    for k, gain in enumerate(gains):
+        r[:, k + 1] = r[:, k] + gain * (means[:, k] - r[:, k])
+    return r
