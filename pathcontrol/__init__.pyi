@@ -118,6 +118,7 @@ from .view.figures.deviation_figure import deviation_figure as deviation_figure
 from .view.figures.error_figures import error_bands_figure as error_bands_figure
 from .view.figures.error_figures import error_figure as error_figure
 from .view.figures.limits_figure import limits_figure as limits_figure
+from .view.figures.observer_figure import observer_figure as observer_figure
 from .view.figures.pareto_figure import pareto_figure as pareto_figure
 from .view.figures.path_figures import path_figure as path_figure
 from .view.figures.path_figures import phase_figure as phase_figure

@@ -5,6 +5,7 @@ from pathcontrol.view.figures.deviation_figure import deviation_figure as deviat
 from pathcontrol.view.figures.error_figures import error_bands_figure as error_bands_figure
 from pathcontrol.view.figures.error_figures import error_figure as error_figure
 from pathcontrol.view.figures.limits_figure import limits_figure as limits_figure
+from pathcontrol.view.figures.observer_figure import observer_figure as observer_figure
 from pathcontrol.view.figures.pareto_figure import pareto_figure as pareto_figure
 from pathcontrol.view.figures.path_figures import path_figure as path_figure
 from pathcontrol.view.figures.path_figures import phase_figure as phase_figure

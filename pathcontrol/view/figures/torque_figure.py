@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_joint_array
 from pathcontrol.analysis.torque_limits import torque_limits as clamped_limits
+from pathcontrol.view.figures.joint_panels import figure_of_joints, joint_panels
 from pathcontrol.view.figures.lettering import joint_label, legend
 from pathcontrol.view.figures.limits import extent, over_time, span
 from pathcontrol.view.figures.lines import drawable, series
 from pathcontrol.view.figures.shown import Runs, Shown, check_joints, own_robot, readable, shown
-from pathcontrol.view.figures.style import COLUMN, LIMIT_LOOK, PAGE, SMALL, apply_style, new_figure, style
+from pathcontrol.view.figures.style import LIMIT_LOOK, SMALL, style
 
 _BEYOND = "#ECECEC"  # the region beyond a limit
-_TALL_COLUMN = 3  # panels
 
 
 def torque_figure(run: Runs, limits: ArrayLike | None = None, rollout: int = 0) -> Figure:
@@ -38,18 +38,10 @@ def torque_figure(run: Runs, limits: ArrayLike | None = None, rollout: int = 0) 
     runs = shown(run, rollout=rollout)
     names = check_joints(runs)
     largest_torques = torque_limits(runs[0], limits)
-    columns = 1 if len(names) <= _TALL_COLUMN else 2
-    rows = -(-len(names) // columns)
     with style():
-        figure = new_figure(COLUMN if columns == 1 else PAGE, 0.6 + 1.35 * rows)
-        for k in range(len(names)):
-            # down the columns, so that neighbours on the page are neighbours on the arm
-            axes = apply_style(figure.add_subplot(rows, columns, 1 + columns * (k % rows) + k // rows))
+        figure = figure_of_joints(len(names))
+        for k, axes in enumerate(joint_panels(figure, len(names))):
             _draw_joint(axes, runs, k, float(largest_torques[k]))
-            last = k % rows == rows - 1 or k == len(names) - 1
-            axes.set_xlabel("time [s]" if last else "")
-            axes.tick_params(labelbottom=last)
-        figure.align_ylabels()
         entries = {one.label: Line2D([], [], **one.look) for one in runs if one.name}
         bounded = np.isfinite(largest_torques).any()
         legend(figure, entries | ({"limit": Line2D([], [], **LIMIT_LOOK)} if bounded else {}))

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
     from pathcontrol.view.figures.deviation_figure import deviation_figure
     from pathcontrol.view.figures.error_figures import error_bands_figure, error_figure
     from pathcontrol.view.figures.limits_figure import largest_shares, limits_figure
+    from pathcontrol.view.figures.observer_figure import observer_figure
     from pathcontrol.view.figures.path_figures import path_figure, phase_figure
     from pathcontrol.view.figures.speed_figure import speed_figure
     from pathcontrol.view.figures.tool_figure import tool_figure
@@ -68,6 +70,8 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
         yield "Speed along the path", speed_figure(shown)
     if "tau" in recorded:
         yield "Torques", torque_figure(shown)
+    if {"q", "qd", "tau"} <= recorded and _are_pushed(runs):
+        yield "Torques beside those of motors and friction", observer_figure(shown, friction="full")
     if any(largest_shares(run) for run in runs.values()):
         yield "Shares of limits", limits_figure(shown)
     if "qd" in recorded:
@@ -76,6 +80,12 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
         if isinstance(run.task, ToolpathTask) and "path_index" in run.data.coords:
             of = f" of {name}" if len(runs) > 1 else ""
             yield f"Distance of the tool from the drawing{of}", deviation_figure(run, run.robot, run.task)
+
+
+def _are_pushed(runs: Mapping[str, Run]) -> bool:
+    """Return whether a disturbance acts in one of the runs, and the models of all know their masses."""
+    pushed = any(table(run.config, "disturbance") for run in runs.values())
+    return pushed and all(run.model.has_mass for run in runs.values())
 
 
 def picture(figure: Figure, caption: str) -> Picture:
