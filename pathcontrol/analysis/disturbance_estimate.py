@@ -49,8 +49,7 @@ def momentum_observer(
         friction: what of the model's friction is known and so no part of d: ``"none"``, ``"viscous"``, or ``"full"``,
             of which dry friction counts as 0 while a joint rests.
         measured: take q and q̇ as the loop measured them, with noise and encoders; False for the true ones. Velocities
-            by difference are half a period old, and so is the estimate. A filter of the loop on the velocity is
-            not undone: what it holds back of p is missing in ṗ.
+            by difference are half a period old, and so is the estimate; a filter of the loop on them is undone.
 
     Returns:
         r, NaN where the rollout has diverged.
@@ -100,19 +99,29 @@ def _loop_number(run: Run, name: str) -> float:
     return number if 0.0 <= number < np.inf else 0.0
 
 
-def _velocity_age(run: Run, measured: bool) -> float:
+def _velocity_age(run: Run) -> float:
     """Return how long ago [s] the arm had the velocity of a sample: half a period for a difference of positions."""
     by_difference = table(run.config, "loop").get("velocity") == "difference"
-    return 0.5 * _loop_number(run, "period") if measured and by_difference else 0.0
+    return 0.5 * _loop_number(run, "period") if by_difference else 0.0
 
 
 def _motion(run: Run, measured: bool) -> tuple[Array, Array, Array]:
     """Return the times (time,) at which the arm had its velocities, and positions and velocities at these times."""
-    names = [f"{name}_measured" if measured and f"{name}_measured" in run else name for name in ("q", "qd")]
-    q, qd = map(run.array, names)
-    age = np.full(len(run.time), _velocity_age(run, measured))
+    if not (measured and "qd_measured" in run):
+        return run.time, run.array("q"), run.array("qd")
+    qd, position = _unfiltered(run), run.array("q_measured" if "q_measured" in run else "q")
+    age = np.full(len(run.time), _velocity_age(run))
     age[0] = 0.0  # the first velocity is that of the start
-    return run.time - age, q - age[:, None] * qd, qd
+    return run.time - age, position - age[:, None] * qd, qd
+
+
+def _unfiltered(run: Run) -> Array:
+    """Return the measured velocities before the low-pass filter of the loop, (rollout, time, n)."""
+    qd = run.array("qd_measured")
+    new = -np.expm1(-2 * np.pi * _loop_number(run, "filter_hz") * _loop_number(run, "period"))
+    if not new:
+        return qd
+    return np.concatenate([qd[:, :1], qd[:, :-1] + np.diff(qd, axis=1) / new], axis=1)
 
 
 def _mean_torque(run: Run, time: Array) -> Array:

@@ -170,9 +170,13 @@ class ArmDynamics:
 
         It needs no acceleration, as Ṁ = C + Cᵀ (Lagrange's equation: C(q,q̇)ᵀq̇ is the gradient of the kinetic energy).
         """
-        qd = self._array("qd", qd)
-        gradient = (self.coriolis_matrix(q, qd) * qd[..., :, None]).sum(-2)
-        return self._array("tau", tau) + gradient - self.gravity(q)
+        self._check_mass()
+        model, data, shape = self.pinocchio_model, self._data, (self.n, self.n)
+
+        def gradient(qi: Array, qdi: Array) -> Array:
+            return qdi @ pin.computeCoriolisMatrix(model, data, qi, qdi).reshape(shape)
+
+        return self._array("tau", tau) + self._each(q, (self.n,), gradient, qd=qd) - self.gravity(q)
 
     def kinetic_energy(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """Return the kinetic energy ½ q̇ᵀM(q)q̇ [J], (*batch,)."""
