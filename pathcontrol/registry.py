@@ -116,6 +116,7 @@ DISTURBANCES = Kind(
         "push": "simulation.arm.disturbance:Push",
         "harmonic": "simulation.arm.disturbance:Harmonic",
         "frame_force": "simulation.arm.disturbance:FrameForce",
+        "jammed_joint": "simulation.arm.jam:JammedJoint",
     },
     ("robot",),
 )

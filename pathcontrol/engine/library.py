@@ -73,7 +73,7 @@ def _declare(library: CDLL) -> None:
     library.pathcontrol_run.restype = c_longlong
     library.pathcontrol_run.argtypes = [c_void_p] * 3 + [array, c_void_p, c_longlong, c_longlong]
     for name, arguments in {
-        "advance": [c_void_p, c_double, array, array, array, c_longlong, c_longlong],
+        "advance": [c_void_p, c_double, array, array, array, array, c_longlong, c_longlong],
         "inverse_dynamics": [c_void_p, c_longlong, array, array, array, array],
         "mass_matrix": [c_void_p, c_longlong, array, array],
         "stick_slip": [c_int, c_longlong, array, array, array, array, array, array],

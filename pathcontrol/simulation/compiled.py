@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from ctypes import addressof
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
@@ -29,6 +30,7 @@ from pathcontrol.engine.structs import Disturbance as DisturbanceStruct
 from pathcontrol.errors import EngineError
 from pathcontrol.robot.constants import frame_carrier
 from pathcontrol.simulation.arm.disturbance import Disturbance, FrameForce, Harmonic, Push, list_terms
+from pathcontrol.simulation.arm.jam import JammedJoint
 from pathcontrol.simulation.arm.noise import NoiseSource
 from pathcontrol.simulation.arm.plant import has_strong_friction
 from pathcontrol.simulation.divergence import BEYOND, NO_NUMBERS, Divergence
@@ -39,6 +41,7 @@ from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sampled import Actuator
 
 _BLOCK = 1 << 16  # ticks of all rollouts together between checks of Ctrl-C and the progress bar
+_JAM = 3  # the engine's number of JammedJoint
 _REASONS = {1: BEYOND, 2: NO_NUMBERS}
 
 
@@ -58,11 +61,13 @@ class CompiledPlant:
         add_plant(self._setup, robot, has_strong_friction(robot), self._memory)
         self._advance = load_library().pathcontrol_advance
 
-    def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
-        """Return (q, q̇) one step later under the constant torque ``tau``; all (N, n)."""
+    def advance(self, q: Array, qd: Array, tau: Array, held: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
+        """Return (q, q̇) one step later under the constant torque ``tau``, with ``held`` joints; all (N, n)."""
         q, qd = np.array(q, order="C"), np.array(qd, order="C")
         torque = np.ascontiguousarray(tau)
-        self._advance(addressof(self._setup), self.step, q.ctypes.data, qd.ctypes.data, torque.ctypes.data, 0, len(q))
+        still = None if held is None or not held.any() else np.array(np.broadcast_to(held, q.shape), np.float64)
+        arrays = [q.ctypes.data, qd.ctypes.data, torque.ctypes.data, None if still is None else still.ctypes.data]
+        self._advance(addressof(self._setup), self.step, *arrays, 0, len(q))
         return q, qd
 
 
@@ -242,20 +247,20 @@ def _add_finish(setup: Setup, finish: Finish | None) -> None:
 
 
 def _add_disturbances(setup: Setup, disturbance: Disturbance | None, memory: Memory) -> None:
-    """Set pushes, sinusoids and forces on frames.
+    """Set pushes, sinusoids, forces on frames and joints that jam.
 
     Raises:
         EngineError: one of them is the user's own.
     """
     structs = [_disturbance_struct(term, setup.joints, memory) for term in list_terms(disturbance)]
-    setup.disturbances = len(structs)
+    setup.disturbances, setup.jams = len(structs), any(one.kind == _JAM for one in structs)
     if structs:
         setup.disturbance = addressof(memory.keep((DisturbanceStruct * len(structs))(*structs)))
 
 
 def _disturbance_struct(term: Disturbance, n: int, memory: Memory) -> DisturbanceStruct:
     """Return a disturbance as struct of the engine."""
-    kinds = (Push, Harmonic, FrameForce)
+    kinds = (Push, Harmonic, FrameForce, JammedJoint)
     if type(term) not in kinds:
         raise EngineError(f"the disturbance {type(term).__name__} is not one of the library")
     struct = DisturbanceStruct(kind=kinds.index(type(term)))
@@ -264,6 +269,9 @@ def _disturbance_struct(term: Disturbance, n: int, memory: Memory) -> Disturbanc
         struct.frequency, struct.phase = memory.numbers(term.frequency), memory.numbers(term.phase)
     elif isinstance(term, Push):
         struct.magnitude = memory.rows(term.magnitude, n)
+        struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)
+    elif isinstance(term, JammedJoint):
+        struct.magnitude = memory.rows(term.joints == np.arange(n), n)
         struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)
     elif isinstance(term, FrameForce):
         struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)

@@ -7,11 +7,13 @@ from typing import Any, NamedTuple
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
-from pathcontrol.simulation.arm.disturbance import check_disturbance
+from pathcontrol.errors import InputError
+from pathcontrol.robot.batch import RobotBatch
+from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
 from pathcontrol.simulation.checks.slips import warn_of_slips
 from pathcontrol.simulation.checks.too_long import warn_of_steps
 from pathcontrol.simulation.engines import Engine, choose_engine
-from pathcontrol.simulation.loops import Arm, Outside
+from pathcontrol.simulation.loops import Arm, Outside, SampledLoop
 from pathcontrol.simulation.run_arguments import Loop
 from pathcontrol.tasks.task import PathTask
 
@@ -57,11 +59,21 @@ def prepare(
 
     Raises:
         EngineError: the engine is to be the compiled one, and something of the simulation is beyond it.
-        InputError: the disturbance fails at the initial states.
+        InputError: the disturbance fails at the initial states, or holds joints in continuous time.
+        UnknownNameError: it names a joint that the arm does not have.
     """
     disturbance, first = outside
     slip = warn_of_slips(robot, task, q, first)
-    check_disturbance(disturbance, q, qd)
+    outside = Outside(_find_joints(disturbance, robot), first)
+    check_disturbance(outside.disturbance, q, qd)
+    if not isinstance(loop, SampledLoop) and outside.disturbance and outside.disturbance.held(0.0, q) is not None:
+        raise InputError("a joint that jams stops at once, which continuous time cannot do; give loop=SampledLoop(...)")
     arm, said = choose_engine(engine, controllers, loop, robot, q, qd, outside)
     slow = "" if first else warn_of_steps(controllers, loop, robot, q, qd, disturbance, duration)
     return Prepared(arm, said, slip or slow)
+
+
+def _find_joints(disturbance: Any, robot: Arm) -> Any:
+    """Return the disturbance with the joints that it names found in the arm; what is none is left to the check."""
+    arm = robot.robots[0] if isinstance(robot, RobotBatch) else robot
+    return disturbance.on(arm) if isinstance(disturbance, Disturbance) else disturbance

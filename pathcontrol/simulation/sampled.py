@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
@@ -27,8 +28,8 @@ class Stepper(Protocol):
 
     step: float
 
-    def advance(self, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
-        """Return (q, q̇) one step later under the constant torque ``tau``; all (N, n)."""
+    def advance(self, q: Array, qd: Array, tau: Array, held: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
+        """Return (q, q̇) one step later under the constant torque ``tau``, with ``held`` joints; all (N, n)."""
 
 
 class Actuator:
@@ -155,10 +156,11 @@ class SampledArm:
         t = self._ticks * self._period
         for plant, acting in zip(self._plants, torques, strict=True):
             for _ in range(self._substeps):
-                pushed = acting
+                pushed, held, middle = acting, None, t + 0.5 * plant.step
                 if self._disturbance is not None:
-                    pushed = acting + self._disturbance.torque(t + 0.5 * plant.step, self.q, self.qd)
-                self.q, self.qd = plant.advance(self.q, self.qd, pushed)
+                    pushed = acting + self._disturbance.torque(middle, self.q, self.qd)
+                    held = self._disturbance.held(middle, self.q)
+                self.q, self.qd = plant.advance(self.q, self.qd, pushed, held)
                 t += plant.step
         self._ticks += 1
         self._reading = self._sensors.read(*self._add_noise(), self._reading)

@@ -116,6 +116,15 @@ def test_pushes_sinusoids_and_forces_on_frames_are_those_of_the_reference():
     assert _apart(runs) < 1e-11
 
 
+@pytest.mark.parametrize(("name", "joints"), [("cicese_2dof", [1, 0]), ("ur5", [2, 4]), ("panda", [1, 6])])
+def test_joints_that_jam_are_those_of_the_reference(name, joints):
+    robot = _arm(name)
+    task = _task(name, True)
+    jams = pc.JammedJoint(joints[0], 0.2, 0.3) + pc.JammedJoint(robot.joint_names[joints[1]], 0.4013, 0.2)
+    runs = _pair(_law("ExtendedMotionPlan", robot, task), task.q_d(np.array(task.s0)), duration=1.0, disturbance=jams)
+    assert _apart(runs) < 1e-10
+
+
 def test_stribeck_friction_and_sums_are_those_of_the_reference():
     robot = pc.load_robot("cicese_2dof").with_friction(
         pc.Viscous([2.0, 0.2])

@@ -25,6 +25,7 @@ ALONE = {
 ROWS = {
     "pushes": pc.Push([[3.0, -1.0], [2.0, 0.5]], start=[0.02, 0.0], duration=[0.03, np.inf]),
     "waves": pc.Harmonic([0.1, 0.3], [7.0, 9.0], [0.0, 1.0]),
+    "jams": pc.JammedJoint(["joint_2", "joint_1"], [0.02, 0.0], 0.03),
     "forces": pc.FrameForce(ROBOT, "tool", [[0.1, 0.2, -5.0], [1.0, 0.0, 0.0]], duration=0.03),
 }
 
@@ -58,6 +59,12 @@ def test_a_disturbed_run_is_made_again_bit_for_bit(name, loop, tmp_path, monkeyp
     again = made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch)
     assert_the_very_run(run, again)
     assert again.config == run.config
+
+
+@pytest.mark.parametrize("joint", [1, "joint_2"])
+def test_a_run_with_a_jam_is_made_again(joint, tmp_path, monkeypatch):
+    run = simulated(PUSH + pc.JammedJoint(joint, 0.02, 0.03))
+    assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
 
 
 @pytest.mark.parametrize("name", ROWS)

@@ -25,10 +25,10 @@ EXPORT integer pathcontrol_run(const Setup *setup, const State *state, const Rec
 }
 
 // One step of the plant alone, of rollouts begin … end.
-EXPORT void pathcontrol_advance(const Setup *setup, double step, double *q, double *qd, const double *tau, integer begin, integer end) {
-  if (end - begin == 1) return advance_packs<0, double, double>(*setup, step, q, qd, tau, begin, end);
-  if (setup->plant_arms.index) return advance_packs<0, pack, pack>(*setup, step, q, qd, tau, begin, end);
-  return advance_packs<0, pack, double>(*setup, step, q, qd, tau, begin, end);
+EXPORT void pathcontrol_advance(const Setup *setup, double step, double *q, double *qd, const double *tau, const double *held, integer begin, integer end) {
+  if (end - begin == 1) return advance_packs<0, double, double>(*setup, step, q, qd, tau, held, begin, end);
+  if (setup->plant_arms.index) return advance_packs<0, pack, pack>(*setup, step, q, qd, tau, held, begin, end);
+  return advance_packs<0, pack, double>(*setup, step, q, qd, tau, held, begin, end);
 }
 
 // --- for tests and checks, one configuration after the other ----------------------------------------------------------

@@ -139,21 +139,42 @@ template <class V> static void read_sensors(const Setup &setup, const Senses<V> 
   }
 }
 
+// Whether a disturbance with a beginning and a duration acts at time t.
+template <class V> static Mask<V> acts(const Place<V> &place, const Disturbance &one, double t) {
+  V start, duration;
+  load(place, one.start, 1, &start), load(place, one.duration, 1, &duration);
+  const V since = t - start;
+  return less_equal(V{}, since) & less(since, duration);
+}
+// The joints that are held at time t; return whether there are any.
+template <class V> static NOINLINE bool find_held(const Setup &setup, const Place<V> &place, double t, Mask<V> *held) {
+  Mask<V> some{};
+  for (int i = 0; i < setup.joints; i++) held[i] = Mask<V>{};
+  for (int d = 0; d < setup.disturbances; d++) {
+    const Disturbance &one = setup.disturbance[d];
+    if (one.kind != JAMMED_JOINT) continue;
+    const Mask<V> now = acts(place, one, t);
+    V joint[MOST_JOINTS];
+    load(place, one.magnitude, setup.joints, joint);
+    for (int i = 0; i < setup.joints; i++) held[i] |= now & less(V{}, joint[i]), some |= held[i];
+  }
+  return any(some);
+}
+
 // Torques of the disturbances at time t, added to `tau`.
 template <int N, class V> static NOINLINE void add_disturbances(const Setup &setup, const Place<V> &place_, const V *q, double t, V *tau) {
   const int n = size<N>(setup.joints);
   for (int d = 0; d < setup.disturbances; d++) {
     const Disturbance &one = setup.disturbance[d];
-    V magnitude[MOST_JOINTS], start, duration, frequency, phase, share = number<V>(1.0);
+    if (one.kind == JAMMED_JOINT) continue;
+    V magnitude[MOST_JOINTS], frequency, phase, share = number<V>(1.0);
     load(place_, one.magnitude, one.kind == FRAME_FORCE ? 3 : n, magnitude);
     if (one.kind == HARMONIC) {
       V cosine;
       load(place_, one.frequency, 1, &frequency), load(place_, one.phase, 1, &phase);
       sine_cosine(V(2 * M_PI * frequency * t + phase), share, cosine);
     } else {
-      load(place_, one.start, 1, &start), load(place_, one.duration, 1, &duration);
-      const V since = t - start;
-      share = select(less_equal(V{}, since) & less(since, duration), share, V{});
+      share = select(acts(place_, one, t), share, V{});
     }
     if (one.kind != FRAME_FORCE) {
       for (int i = 0; i < n; i++) tau[i] += share * magnitude[i];
@@ -251,7 +272,9 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
         V pushed[room<N>()];
         for (int i = 0; i < n; i++) pushed[i] = acting[part][i];
         if (setup.disturbances) add_disturbances<N>(setup, place, r.q, now + 0.5 * step, pushed);
-        advance_plant<N>(plant_arm, plant_friction, damped, step, r.q, r.qd, pushed);
+        Mask<V> held[room<N>()];
+        const bool holds = setup.jams && find_held(setup, place, now + 0.5 * step, held);
+        advance_plant<N>(plant_arm, plant_friction, damped, step, r.q, r.qd, pushed, holds ? held : nullptr);
       }
     }
     if (setup.delayed) {
@@ -280,9 +303,10 @@ static integer run_packs(const Setup &setup, const State &state, const Record &r
   return samples;
 }
 
-// Take (q, q̇) of rollouts begin … end one step on under the torques `tau`, (rollouts, joints) each, for laws in Python.
+// Take (q, q̇) of rollouts begin … end one step on under the torques `tau`, (rollouts, joints) each, for laws in Python; joints
+// with `held` > 0 are held, none where it is null.
 template <int N, class V, class C>
-static void advance_packs(const Setup &setup, double step, double *q, double *qd, const double *tau, integer begin, integer end) {
+static void advance_packs(const Setup &setup, double step, double *q, double *qd, const double *tau, const double *held, integer begin, integer end) {
   const int n = size<N>(setup.joints);
   for (integer first = begin; first < end; first += Lanes<V>::count) {
     const Place<V> place = {first, end - first < Lanes<V>::count ? end - first : Lanes<V>::count};
@@ -291,7 +315,12 @@ static void advance_packs(const Setup &setup, double step, double *q, double *qd
     V own_q[room<N>()], own_qd[room<N>()], own_tau[room<N>()];
     load_friction(place, setup.plant_friction, n, friction);
     load(place, q, n, n, own_q), load(place, qd, n, n, own_qd), load(place, tau, n, n, own_tau);
-    advance_plant<N>(copy(place, setup.plant_arms), friction, load_mask<V>(place, setup.damped), step, own_q, own_qd, own_tau);
+    V flag[room<N>()];
+    Mask<V> own_held[room<N>()];
+    if (held) load(place, held, n, n, flag);
+    for (int i = 0; held && i < n; i++) own_held[i] = less(V{}, flag[i]);
+    const Arm<C> &arm = copy(place, setup.plant_arms);
+    advance_plant<N>(arm, friction, load_mask<V>(place, setup.damped), step, own_q, own_qd, own_tau, held ? own_held : nullptr);
     store(place, own_q, n, q), store(place, own_qd, n, qd);
   }
 }

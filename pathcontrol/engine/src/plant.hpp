@@ -92,6 +92,38 @@ static NOINLINE void hinder(int joints, V (*M)[room<N>()], const Dynamics<N, V> 
   for (int i = 0; i < n; i++) v[i] = select(some, stuck[i], v[i]);
 }
 
+// --- joints that are held still, see simulation/arm/jam.py: null where there are none -----------------------------------
+template <int N, class V> ALWAYS_INLINE void decouple(int n, const Mask<V> *held, V (*M)[room<N>()]) {
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++)
+      if (i != j) M[i][j] = select(held[i] | held[j], V{}, M[i][j]);
+}
+// Take away what moves held joints: their coupling to others, their load and their friction.
+template <int N, class V> static NOINLINE void hold(int n, const Mask<V> *held, Dynamics<N, V> &at) {
+  decouple<N>(n, held, at.M);
+  for (int i = 0; i < n; i++) {
+    at.load[i] = select(held[i], V{}, at.load[i]), at.dry[i] = select(held[i], V{}, at.dry[i]);
+    at.forward[i] = select(held[i], V{}, at.forward[i]), at.backward[i] = select(held[i], V{}, at.backward[i]);
+  }
+}
+// Stop held joints at once, which leaves (M v)_i of all others; return whether any moved.
+template <int N, class V> static NOINLINE bool stop(int n, const Mask<V> *held, V (*M)[room<N>()], V *v) {
+  Mask<V> moves{};
+  for (int i = 0; i < n; i++) moves |= held[i] & ~equal(v[i], V{});
+  if (!any(moves)) return false;
+  V momentum[room<N>()], still[room<N>()];
+  Factors<N, V> factors;
+  for (int i = 0; i < n; i++) {
+    V sum = M[i][0] * v[0];
+    for (int j = 1; j < n; j++) sum += M[i][j] * v[j];
+    momentum[i] = select(held[i], V{}, sum);
+  }
+  decouple<N>(n, held, M);
+  factorise<N>(n, M, factors), solve<N>(n, factors, momentum, still);
+  for (int i = 0; i < n; i++) v[i] = select(moves, still[i], v[i]);
+  return true;
+}
+
 // v = start + t M⁻¹(drive − dry friction − C u − g), with dry friction that holds; M is the inertia of the step.
 template <int N, class V>
 static void step_velocity(int joints, V (*M)[room<N>()], const Dynamics<N, V> &at, const V *u, const V *start, const V *drive, double t, V *v) {
@@ -104,21 +136,25 @@ static void step_velocity(int joints, V (*M)[room<N>()], const Dynamics<N, V> &a
   hinder<N>(n, M, at, u, t, v);
 }
 
-// (q, q̇) one step h later under the constant torque `tau`. `damped`: lanes whose viscous friction is condensed.
+// (q, q̇) one step h later under the constant torque `tau`. `damped`: lanes whose viscous friction is condensed; `held`: joints.
 template <int N, class V, class C>
-static NOINLINE void advance_plant(const Arm<C> &arm, const Friction<V> &law, Mask<V> damped, double h, V *q, V *qd, const V *tau) {
+static NOINLINE void advance_plant(const Arm<C> &arm, const Friction<V> &law, Mask<V> damped, double h, V *q, V *qd, const V *tau, const Mask<V> *held) {
   const int n = size<N>(arm.joints);
   V drive[room<N>()], middle_q[room<N>()], middle_qd[room<N>()], next[room<N>()], travel[room<N>()][room<N>()];
   V inertia[room<N>()][room<N>()];
   Dynamics<N, V> at;
   dynamics_at<N>(arm, law, q, qd, at);
+  if (held && stop<N>(n, held, at.M, qd)) dynamics_at<N>(arm, law, q, qd, at);
+  if (held) hold<N>(n, held, at);
   for (int i = 0; i < n; i++) {
     drive[i] = tau[i] - law.viscous[i] * qd[i];
+    if (held) drive[i] = select(held[i], V{}, drive[i]);
     at.M[i][i] += 0.5 * h * law.viscous[i];
   }
   step_velocity<N>(n, at.M, at, qd, qd, drive, 0.5 * h, middle_qd);
   for (int i = 0; i < n; i++) middle_q[i] = q[i] + 0.25 * h * (qd[i] + middle_qd[i]);
   dynamics_at<N>(arm, law, middle_q, middle_qd, at);
+  if (held) hold<N>(n, held, at);
   if (any(damped)) {
     Mask<V> moving[room<N>()];
     for (int i = 0; i < n; i++) moving[i] = ~equal(qd[i], V{}) | ~equal(middle_qd[i], V{}) | less_equal(at.forward[i], at.backward[i]);

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array, check_finite, freeze
 from pathcontrol._expect import expect
@@ -38,6 +38,18 @@ class Disturbance(ABC):
         """The times [s] at which it jumps, (k,); continuous time is integrated from one to the next."""
         return np.empty(0)
 
+    def held(self, t: float, q: Array) -> NDArray[np.bool_] | None:
+        """Return which joints are held still at t [s], broadcasts to the shape of q (N, n); ``None`` for none."""
+        return None
+
+    def on(self, robot: RobotModel) -> Disturbance:
+        """Return the disturbance with the joints that it names found in an arm.
+
+        Raises:
+            UnknownNameError: the arm has no such joint.
+        """
+        return self
+
     def __add__(self, other: Disturbance) -> Disturbance:
         return _Sum((self, other))
 
@@ -60,11 +72,18 @@ class _Sum(Disturbance):
     def jumps(self) -> Array:
         return np.concatenate([jump_times(term) for term in self.terms])
 
+    def held(self, t: float, q: Array) -> NDArray[np.bool_] | None:
+        masks = [mask for term in self.terms if (mask := term.held(t, q)) is not None]
+        return np.logical_or.reduce(np.broadcast_arrays(q != q, *masks)) if masks else None
+
+    def on(self, robot: RobotModel) -> Disturbance:
+        return _Sum(tuple(term.on(robot) for term in self.terms))
+
     def describe(self) -> dict[str, Any]:
         return {"disturbance": "sum", "terms": [term.describe() for term in self.terms]}
 
 
-class _Timed(Disturbance):
+class TimedDisturbance(Disturbance):
     """A disturbance from ``start`` for ``duration`` [s], each a number or one for each rollout, (N,)."""
 
     def __init__(self, start: ArrayLike, duration: ArrayLike) -> None:
@@ -85,7 +104,7 @@ class _Timed(Disturbance):
         return np.unique(ends[np.isfinite(ends)])
 
 
-class Push(_Timed):
+class Push(TimedDisturbance):
     """A constant torque on the joints for a while.
 
     Args:
@@ -120,7 +139,7 @@ class Harmonic(Disturbance):
         return (wave[..., None] if wave.ndim else wave) * self.amplitude
 
 
-class FrameForce(_Timed):
+class FrameForce(TimedDisturbance):
     """A constant force on the origin of a frame, in axes of the base: τ = J(q)ᵀ f, J the Jacobian of that point.
 
     In the sampled loop J is that at the beginning of the step.
@@ -200,6 +219,9 @@ def _check_term(disturbance: Disturbance, q: Array, qd: Array) -> None:
         ) from error
     if torque.shape not in ((), q.shape[1:], (1, q.shape[1]), q.shape):
         raise InputError(f"{name}.torque has shape {torque.shape}, expected {q.shape}: rollouts and joints")
+    held = disturbance.held(0.0, q)
+    if held is not None and np.shape(held) not in (q.shape[1:], (1, q.shape[1]), q.shape):
+        raise InputError(f"{name}.held has shape {np.shape(held)}, expected {q.shape}: rollouts and joints")
     if not np.isfinite(torque).all():
         raise InputError(f"{name}.torque gives {torque.tolist()} at the start, expected numbers", argument=name)
     jump_times(disturbance)
