@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol import Coulomb, ExtendedMotionPlan, Lissajous, PathTask, RobotModel, SampledLoop, Viscous, load_robot
-from pathcontrol.experiments.reproduce import K_P, K_V, START_DEG, K, paper_loop, paper_task
+from pathcontrol.comparison.paper import K_P, K_V, START_DEG, K, paper_loop, paper_task
 
 FINGERS = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}
 

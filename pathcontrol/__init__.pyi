@@ -19,6 +19,11 @@ from .cartesian.orientation import FixedOrientation as FixedOrientation
 from .cartesian.orientation import NormalOrientation as NormalOrientation
 from .cartesian.orientation import TangentOrientation as TangentOrientation
 from .cartesian.toolpath_task import ToolpathTask as ToolpathTask
+from .comparison.compare import Comparison as Comparison
+from .comparison.compare import compare as compare
+from .comparison.scenarios import Scenario as Scenario
+from .comparison.scenarios import known_scenarios as known_scenarios
+from .comparison.scenarios import make_scenario as make_scenario
 from .control.base import Controller as Controller
 from .control.base import ControlOutput as ControlOutput
 from .control.base import diagonal_gain as diagonal_gain
@@ -45,6 +50,7 @@ from .errors import ToolpathError as ToolpathError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import UrdfError as UrdfError
 from .experiments.runner import run_experiment as run_experiment
+from .experiments.scenario_file import load_scenario as load_scenario
 from .experiments.sweep_runner import run_sweep as run_sweep
 from .experiments.tune_runner import run_tune as run_tune
 from .profiles.jerk.start_stop import SmoothStartStop as SmoothStartStop

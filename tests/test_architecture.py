@@ -25,6 +25,7 @@ FLOORS = [
     "analysis",
     "sweeps",
     "tuning",
+    "comparison",
     "view",
     "experiments",
     "cli",

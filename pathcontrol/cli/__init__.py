@@ -6,6 +6,7 @@ import click
 
 from pathcontrol.cli import (
     check_command,
+    compare_command,
     report_command,
     reproduce_command,
     run_command,
@@ -28,6 +29,7 @@ for _part in (
     run_command,
     sweep_command,
     tune_command,
+    compare_command,
     view_command,
     report_command,
     check_command,

@@ -23,22 +23,14 @@ from pathcontrol._files import remove_own_parts, whole_file
 from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.analysis.run_metrics import peak, steady_state
+from pathcontrol.comparison.paper import DURATION, START_DEG, paper_controllers, paper_loop
 from pathcontrol.control.base import Controller
-from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
-from pathcontrol.control.projection import Projection
 from pathcontrol.errors import EngineError, SimulationError
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.engines import Engine
-from pathcontrol.simulation.loops import SampledLoop
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
-from pathcontrol.tasks.curves import Circle
-
-RADIUS_DEG, SPEED_DEG_S = 57.3, 114.59
-K_P, K_V, K = 800.0, (45.0, 100.0), 20.0
-START_DEG = (40.0, 70.0)
-PERIOD, DURATION = 2.5e-3, 10.0
 
 #: the paper's steady-state peaks and the numbers of its figures
 PAPER: dict[str, dict[str, float]] = {
@@ -64,25 +56,6 @@ class Experiment:
             "e_p_peak_deg": float(np.rad2deg(peak(late.norm("e_p"))[0])),
             "e_v_peak_deg_s": float(np.rad2deg(peak(late.norm("e_v"))[0])),
         }
-
-
-def paper_task() -> Circle:
-    """Return the circle of (9) and (10): r₀ = 57.3 deg, v₀ = 114.59 deg/s, about the origin of joint space."""
-    return Circle(np.deg2rad(RADIUS_DEG), np.deg2rad(SPEED_DEG_S))
-
-
-def paper_loop() -> SampledLoop:
-    """Return the control computer of the arm: 2.5 ms, encoders, velocity by differentiation, torque limits."""
-    return SampledLoop(period=PERIOD, encoders=True, velocity="difference", torque_limits=True)
-
-
-def paper_controllers(robot: RobotModel) -> dict[str, Controller]:
-    """Both path controllers with the published gains; viscous friction compensated, Coulomb friction not."""
-    task = paper_task()
-    return {
-        "extended_motion_plan": ExtendedMotionPlan(robot, task, K_P, K_V, K),
-        "projection": Projection(robot, task, K_P, K_V),
-    }
 
 
 def paper_experiment(name: str, robot: RobotModel, progress: bool = True, engine: Engine = "pinocchio") -> Experiment:

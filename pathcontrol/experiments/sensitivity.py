@@ -11,19 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
+from pathcontrol.comparison.paper import DURATION, K_P, K_V, PERIOD, START_DEG, K, paper_task
 from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.projection import Projection
-from pathcontrol.experiments.reproduce import (
-    DURATION,
-    K_P,
-    K_V,
-    PAPER,
-    PERIOD,
-    START_DEG,
-    K,
-    paper_task,
-)
+from pathcontrol.experiments.reproduce import PAPER
 from pathcontrol.robot.friction import Coulomb, Viscous, levels_of, viscous_of
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel

@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pathcontrol.cli import main
+from pathcontrol.comparison.paper import PERIOD, paper_task
 from pathcontrol.errors import InputError
 from pathcontrol.experiments import reproduce, sensitivity, sensitivity_page, sensitivity_summary
-from pathcontrol.experiments.reproduce import PAPER, PERIOD, paper_experiment, paper_task
+from pathcontrol.experiments.reproduce import PAPER, paper_experiment
 from pathcontrol.experiments.sensitivity import (
     NOMINAL,
     SINGLE,

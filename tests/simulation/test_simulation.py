@@ -21,7 +21,7 @@ from pathcontrol import (
     load_robot,
     simulate,
 )
-from pathcontrol.experiments.reproduce import paper_controllers
+from pathcontrol.comparison.paper import paper_controllers
 from pathcontrol.simulation.arm.sensors import Sensors
 from pathcontrol.simulation.sampled import split_delay
 

@@ -1,0 +1,105 @@
+"""The command ``pathcontrol compare``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from pathcontrol.cli.files import check_file
+from pathcontrol.cli.group import engine_option, import_all, json_option
+
+if TYPE_CHECKING:
+    from pathcontrol.comparison.compare import Comparison
+    from pathcontrol.comparison.scenarios import Scenario
+    from pathcontrol.simulation.engines import Engine
+
+
+@click.command("compare")
+@click.argument("file", type=click.Path(path_type=Path), required=False, metavar="[FILE.toml]")
+@click.option("--scenario", metavar="NAME", help="One of the scenarios that --list names, or a FILE.toml.")
+@click.option("--list", "listed", is_flag=True, help="List the scenarios and stop.")
+@click.option("--law", "laws", multiple=True, metavar="NAME", help="Compare this law; repeat for more. Default: all.")
+@click.option(
+    "--rollouts", type=click.IntRange(1), default=16, show_default=True, metavar="N", help="How many initial postures."
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Seed of the postures.")
+@engine_option
+@json_option
+def command(
+    file: Path | None,
+    scenario: str | None,
+    listed: bool,
+    laws: tuple[str, ...],
+    rollouts: int,
+    seed: int,
+    engine: Engine | None,
+    as_json: bool,
+) -> None:
+    """Compare motion control and path control in one situation.
+
+    The situation is a scenario of the library (--scenario NAME), or the experiment of a FILE.toml, whose [controller]
+    is replaced by each law with gains that mean the same. Numbers are means over the initial postures, with their
+    standard deviation.
+    """
+    if listed:
+        _list(as_json)
+        return
+    source = _choose(file, scenario)
+    if isinstance(source, Path):
+        check_file(source, "an experiment")
+    from pathcontrol.comparison.compare import compare
+
+    found = _load(source)
+    compared = compare(laws or None, found, rollouts=rollouts, seed=seed, engine=engine or "auto")
+    _tell(compared, as_json)
+
+
+def _choose(file: Path | None, scenario: str | None) -> Path | str:
+    """Return the file or the name of the scenario."""
+    if (file is None) == (scenario is None):
+        raise click.UsageError("give either --scenario NAME or an experiment file; --list shows the scenarios")
+    if scenario is None or Path(scenario).suffix == ".toml":
+        return Path(scenario or file or "")
+    return scenario
+
+
+def _load(source: Path | str) -> Scenario:
+    """Return the scenario of a file or of a name."""
+    if isinstance(source, Path):
+        import_all()
+        from pathcontrol.experiments.scenario_file import load_scenario
+
+        return load_scenario(source)
+    from pathcontrol.comparison.scenarios import make_scenario
+
+    return make_scenario(source)
+
+
+def _list(as_json: bool) -> None:
+    """Print the scenarios."""
+    from pathcontrol.comparison.scenarios import known_scenarios
+
+    known = known_scenarios()
+    if as_json:
+        click.echo(json.dumps({"scenarios": known}))
+        return
+    for name, sentence in known.items():
+        click.echo(f"{name:14} {sentence}")
+
+
+def _tell(compared: Comparison, as_json: bool) -> None:
+    """Print the results."""
+    if as_json:
+        click.echo(json.dumps(compared.to_dict(), allow_nan=False))
+        return
+    from rich.console import Console
+
+    from pathcontrol.cli.comparison_table import comparison_table, describe_comparison
+
+    console = Console()
+    console.print(comparison_table(compared))
+    for line in describe_comparison(compared):
+        click.echo(line)

@@ -1,0 +1,72 @@
+"""The table of a comparison: a row for each measure, a column for each law, the best of each row marked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.table import Table
+from rich.text import Text
+
+from pathcontrol.analysis.readable import reading
+from pathcontrol.comparison.measures import MEASURES, RECOVERED
+from pathcontrol.control.motion_control import MotionController
+
+if TYPE_CHECKING:
+    from pathcontrol.comparison.compare import Comparison
+
+_DIGITS = 3
+_NOTHING = 1e-9  # rad, m, N m, …: rounding of floats for an arm of usual size
+
+
+def comparison_table(compared: Comparison) -> Table:
+    """Return the table of a comparison, in degrees, with ``*`` at the least mean of each row."""
+    table = Table(title=Text(f"{compared.scenario.name}: {compared.scenario.sentence}"))
+    table.add_column("")
+    for law in compared.measures:
+        table.add_column(Text(law.replace("_", " ")), justify="right")
+    for name, unit in MEASURES.items():
+        factor, shown = reading(unit, np.zeros(0))
+        best = compared.best(name)
+        cells = [Text(_cell(compared, law, name, factor, law in best)) for law in compared.measures]
+        table.add_row(Text(f"{name.removesuffix('_s').removesuffix('_j').replace('_', ' ')} [{shown}]"), *cells)
+    return table
+
+
+def describe_comparison(compared: Comparison) -> list[str]:
+    """Return what the table is of, and in which measures motion control is the best, in sentences."""
+    begin, end = compared.scenario.window
+    count = len(next(iter(compared.runs.values())).status)
+    lines = [
+        f"Mean ± standard deviation of {count} initial postures, from {begin:g} to {end:g} s; * is the smallest of a row.",
+        f"Recovered is an arm whose contour error stays below {RECOVERED:g} times its own undisturbed peak.",
+    ]
+    wins = [name for name in MEASURES if _is_won_by_motion(compared, name)]
+    if wins:
+        lines.append(f"Motion control is the best in: {', '.join(wins)}.")
+    lines += [
+        f"{law}: {lost} of {count} diverged, whose numbers are left out with those of the law."
+        for law, run in compared.runs.items()
+        if (lost := int((run.status == "diverged").sum()))
+    ]
+    return lines
+
+
+def _is_won_by_motion(compared: Comparison, measure: str) -> bool:
+    """Return whether only laws of motion control have the least mean of a measure."""
+    best = compared.best(measure)
+    return bool(best) and all(isinstance(compared.laws[law], MotionController) for law in best)
+
+
+def _cell(compared: Comparison, law: str, measure: str, factor: float, best: bool) -> str:
+    """Return mean and spread of a measure as a text."""
+    mean, spread = compared.mean(law, measure), compared.spread(law, measure)
+    if np.isnan(mean):
+        return "–"
+    if np.isinf(mean):
+        values = compared.measures[law][measure]
+        return f"never in {int(np.isinf(values).sum())} of {len(values)}"
+    mean, spread = (0.0 if abs(value) < _NOTHING else factor * value for value in (mean, spread))
+    decimals = max(0, _DIGITS - 1 - int(np.floor(np.log10(abs(mean))))) if mean else 0
+    spread_text = f"{spread:.{decimals}f}"
+    return f"{mean:.{decimals}f}" + (f" ± {spread_text}" if float(spread_text) else "") + (" *" if best else "")

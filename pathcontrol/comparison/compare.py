@@ -1,0 +1,171 @@
+"""The comparison of laws in one scenario: same arm, same task, same starts, same seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array, check_whole
+from pathcontrol._expect import expect
+from pathcontrol.comparison.laws import Laws, make_laws
+from pathcontrol.comparison.measures import MEASURES, measure
+from pathcontrol.comparison.scenarios import Scenario, make_scenario
+from pathcontrol.control.base import Controller
+from pathcontrol.errors import SimulationError
+from pathcontrol.simulation.engines import Engine
+from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.simulate import simulate
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Laws in one scenario.
+
+    Attributes:
+        scenario: the scenario.
+        laws: the laws by name.
+        runs: the run of each law, with all rollouts.
+        undisturbed: the run of each law in the undisturbed scenario, with the same starts.
+        measures: for each law the measures by name, in SI units, (rollouts,) each.
+    """
+
+    scenario: Scenario
+    laws: Mapping[str, Controller]
+    runs: Mapping[str, Run]
+    undisturbed: Mapping[str, Run]
+    measures: Mapping[str, Mapping[str, Array]]
+
+    def mean(self, law: str, measure: str) -> float:
+        """Return the mean of a measure over the rollouts; inf if one of them never recovers, NaN where none is one."""
+        return _reduce(np.mean, self.measures[law][measure])
+
+    def spread(self, law: str, measure: str) -> float:
+        """Return the standard deviation of a measure over the rollouts; NaN where the mean is no number."""
+        return _reduce(np.std, self.measures[law][measure])
+
+    def best(self, measure: str) -> list[str]:
+        """Return the laws whose mean of a measure is the least, within a thousandth; none where no mean is finite."""
+        means = {law: self.mean(law, measure) for law in self.measures}
+        known = {law: abs(mean) for law, mean in means.items() if np.isfinite(mean)}
+        least = min(known.values(), default=0.0)
+        return [law for law, value in known.items() if value <= 1.001 * least + 1e-9]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what JSON can hold: means by law and measure, ``spread``, ``rollouts`` and units; null for no number.
+
+        The numbers are in SI units.
+        """
+        scenario = self.scenario
+        return {
+            "scenario": scenario.name,
+            "sentence": scenario.sentence,
+            "duration": scenario.duration,
+            "event": None if scenario.event is None else [_plain(t) for t in scenario.event],
+            "window": list(scenario.window),
+            "units": dict(MEASURES),
+            "controllers": {law: self._law_to_dict(law) for law in self.measures},
+        }
+
+    def _law_to_dict(self, law: str) -> dict[str, Any]:
+        """Return the numbers of one law."""
+        values = self.measures[law]
+        gains = {name: np.asarray(getattr(self.laws[law], name)).tolist() for name in self.laws[law].gains}
+        return {name: _plain(self.mean(law, name)) for name in values} | {
+            "spread": {name: _plain(self.spread(law, name)) for name in values},
+            "rollouts": {name: [_plain(one) for one in value.tolist()] for name, value in values.items()},
+            "diverged": int((self.runs[law].status == "diverged").sum()),
+            "gains": gains,
+        }
+
+
+def compare(
+    laws: Laws | None = None,
+    scenario: str | Scenario = "jammed-joint",
+    *,
+    rollouts: int = 16,
+    seed: int = 0,
+    engine: Engine = "auto",
+    progress: bool = True,
+) -> Comparison:
+    """Compare control laws in one scenario: same arm, task, plant, loop, starts and seeds, gains that mean the same.
+
+    The known laws are ``"computed_torque"``, ``"pd_plus"``, ``"slotine_li"``, ``"extended_motion_plan"`` and
+    ``"projection"``. Computed torque has K_p and K_v of the path laws. PD+ has diag M(q̄)K_p and diag M(q̄)K_v, the
+    same stiffness and damping at the mean posture q̄ of the path. Slotine and Li's law has ΛD = K_p and Λ + D = K_v with
+    K_d = diag M(q̄)D, or Λ = D = √K_p where K_v² < 4K_p, as it cannot damp less than critically. On a closed path all of
+    them begin at the point nearest to the arm. The same numbers come out for a rollout alone and among others.
+
+    The measures, of the event and the time after it (without one of the second half of a closed path, or of a whole
+    open one), in SI units:
+
+    ``contour_peak``, ``contour_rms``: distance to the nearest point of the path [rad].
+    ``lag_peak``: largest component along the path of q_d(s) − q [rad], s of the law. It is 0 for projection.
+    ``speed_peak``: largest ‖q̇‖ [rad/s].
+    ``torque_peak``: largest torque that acted, of all joints [N m].
+    ``recovery_s``: time after the end of the event until the contour error stays below 1.1 times its own undisturbed
+    peak [s]; inf where it does not, NaN where no event ends.
+    ``time_lost_s``: path parameter behind that of the undisturbed run at the end, over ϑ [s]. It is 0 for motion
+    control, whose s waits for nobody; what that costs are contour error and lag.
+    ``energy_j``: ∫|τ·q̇| dt [J].
+    ``saturated_s``: time with any torque at its limit [s].
+
+    Args:
+        laws: names of known laws, laws for ``scenario.robot`` and ``scenario.task``, or functions (robot, task) that
+            make one; one, several, or by names of your own. By default all known ones.
+        scenario: a name of :func:`known_scenarios`, or a :class:`Scenario`.
+        rollouts: how many starts: that of the scenario, and others near the path, see :meth:`Scenario.starts`.
+        seed: of these starts.
+        engine: as for :func:`simulate`.
+        progress: show a bar on standard error when a run takes longer than two seconds.
+
+    Raises:
+        InputError: a law does not fit the scenario, or an argument is something else.
+        UnknownNameError: there is no such law or scenario.
+    """
+    rollouts, seed = check_whole("rollouts", rollouts), check_whole("seed", seed, 0)
+    if isinstance(scenario, str):
+        scenario = make_scenario(scenario)
+    expect("scenario", scenario, Scenario)
+    made = make_laws(laws, scenario.robot, scenario.task, scenario.gains)
+    starts = scenario.starts(rollouts, seed)
+    calm = scenario if scenario.undisturbed is None else scenario.undisturbed
+    runs = {name: _run(law, scenario, starts, engine, progress) for name, law in made.items()}
+    others = runs if calm is scenario else {n: _run(law, calm, starts, engine, progress) for n, law in made.items()}
+    end = None if scenario.event is None or scenario.event[1] >= scenario.duration else scenario.event[1]
+    measures = {name: measure(runs[name], others[name], scenario.window, end) for name in made}
+    return Comparison(scenario, made, runs, others, measures)
+
+
+def _run(law: Controller, scenario: Scenario, starts: Array, engine: Engine, progress: bool) -> Run:
+    """Return the run of one law; where all rollouts diverged, what happened until then."""
+    try:
+        return simulate(
+            law,
+            starts,
+            duration=scenario.duration,
+            until="duration",
+            plant=scenario.plant,
+            loop=scenario.loop,
+            disturbance=scenario.disturbance,
+            engine=engine,
+            progress=progress,
+        )
+    except SimulationError as error:
+        if error.run is None:
+            raise
+        run: Run = error.run
+        return run
+
+
+def _reduce(function: Any, values: Array) -> float:
+    """Return a statistic of values; what is infinite makes the mean infinite, and the spread NaN."""
+    with np.errstate(invalid="ignore"):
+        return float(function(values))
+
+
+def _plain(value: float) -> float | None:
+    """Return a number as JSON can hold it: null where it is not finite."""
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,200 @@
+"""Control laws whose gains mean the same, for one arm and one task."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array
+from pathcontrol._expect import did_you_mean
+from pathcontrol.control.base import Controller, Start, diagonal_gain
+from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
+from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
+from pathcontrol.control.projection import Projection
+from pathcontrol.errors import InputError, TaskError, UnknownNameError
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.run_arguments import check_controller
+from pathcontrol.tasks.task import PathTask
+
+_RATE = 20.0  # 1/s, of the paper's plan towards the nearest point, k‖q_d'‖²
+_POINTS = 256  # along the path, of means
+_SAME = 1e-9  # share of the size of a path up to which two are the same
+
+Law = str | Controller | Callable[[RobotModel, PathTask], Controller]
+Laws = Law | Iterable[Law] | Mapping[str, Law]
+
+
+class Gains(NamedTuple):
+    """The gains that all laws of a comparison share.
+
+    Attributes:
+        K_p: position gain [1/s²], a number or (n,).
+        K_v: velocity gain [1/s], a number or (n,).
+        k: gain of the extended motion plan [1/(rad² s)]; ``None`` for k‖q_d'‖² = 20 1/s on average, as in the paper.
+    """
+
+    K_p: ArrayLike = 800.0
+    K_v: ArrayLike = 57.0
+    k: float | None = None
+
+
+def sample_task(task: PathTask) -> Array:
+    """Return path parameters s evenly over one traverse of a path, (k,)."""
+    try:
+        lower, upper = task.one_traverse
+    except TaskError:  # neither ends nor repeats
+        lower, upper = task.sampled_interval
+    return np.linspace(lower, upper, _POINTS, endpoint=not task.closed)
+
+
+def mean_inertia(robot: RobotModel, task: PathTask) -> Array:
+    """Return the diagonal of M(q̄) [kg m²], (n,), at the mean posture q̄ of a path."""
+    return np.array(robot.mass_matrix(task.q_d(sample_task(task)).mean(0)).diagonal())
+
+
+def split_damping(K_p: Array, K_v: Array) -> tuple[Array, Array]:
+    """Return Λ and D = K_d/m [1/s] of Slotine and Li's law on a mass m, with ΛD = K_p and Λ + D = K_v, (n,) each.
+
+    On that mass the law gives ë + (Λ + D)ė + ΛDe = 0. Λ is the smaller root. Where K_v² < 4K_p the roots are complex,
+    as the law cannot damp less than critically: there Λ = D = √K_p, with the same stiffness and the least damping.
+    """
+    root = np.sqrt(np.maximum(K_v**2 - 4 * K_p, 0.0))
+    fast = np.where(root > 0, 0.5 * (K_v + root), np.sqrt(K_p))
+    return K_p / fast, fast
+
+
+def _computed_torque(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+    """Return computed torque."""
+    return ComputedTorque(robot, task, gains.K_p, gains.K_v, start=start)
+
+
+def _pd_plus(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+    """Return PD+ with gains times the diagonal of M at the mean posture."""
+    mass = mean_inertia(robot, task)
+    return PDPlus(robot, task, mass * np.asarray(gains.K_p), mass * np.asarray(gains.K_v), start=start)
+
+
+def _slotine_li(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+    """Return Slotine and Li's law with the poles of the others at the mean posture, where it can have them."""
+    Lambda, damping = split_damping(*(np.broadcast_to(gain, robot.n) for gain in gains[:2]))
+    return SlotineLi(robot, task, Lambda, mean_inertia(robot, task) * damping, start=start)
+
+
+def _extended_motion_plan(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+    """Return the extended motion plan."""
+    k = mean_plan_gain(task) if gains.k is None else gains.k
+    return ExtendedMotionPlan(robot, task, gains.K_p, gains.K_v, k, start=start)
+
+
+def _projection(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+    """Return projection, whose position gain is one number: the mean of all joints."""
+    return Projection(robot, task, float(np.asarray(gains.K_p).mean()), gains.K_v, start=start)
+
+
+def mean_plan_gain(task: PathTask) -> float:
+    """Return k [1/(rad² s)] with k‖q_d'‖² = 20 1/s, the mean over a path."""
+    slopes = task.dq_d(sample_task(task))
+    return float(_RATE / np.vecdot(slopes, slopes).mean())
+
+
+_MAKERS = {
+    "computed_torque": _computed_torque,
+    "pd_plus": _pd_plus,
+    "slotine_li": _slotine_li,
+    "extended_motion_plan": _extended_motion_plan,
+    "projection": _projection,
+}
+KNOWN_LAWS = tuple(_MAKERS)
+
+
+def recover_gains(law: Controller) -> Gains:
+    """Return the gains of one of the known laws as those that all share.
+
+    Raises:
+        InputError: it is another law, or its gains differ between rollouts.
+    """
+    if isinstance(law, ExtendedMotionPlan):
+        gains = Gains(law.K_p, law.K_v, float(law.k) if law.k.size == 1 else None)
+    elif isinstance(law, Projection):
+        gains = Gains(law.k_p, law.K_v)
+    elif isinstance(law, ComputedTorque):
+        gains = Gains(law.K_p, law.K_v)
+    elif isinstance(law, PDPlus):
+        mass = mean_inertia(law.robot, law.task)
+        gains = Gains(law.K_p / mass, law.K_v / mass)
+    elif isinstance(law, SlotineLi):
+        damping = law.K_d / mean_inertia(law.robot, law.task)
+        gains = Gains(law.Lambda * damping, law.Lambda + damping)
+    else:
+        name = type(law).__name__
+        raise InputError(f"the gains of {name} mean nothing to other laws; expected one of {', '.join(KNOWN_LAWS)}")
+    if max(np.ndim(gains.K_p), np.ndim(gains.K_v)) > 1:
+        raise InputError(f"the gains of {type(law).__name__} differ between rollouts, expected one for all")
+    return gains
+
+
+def make_laws(laws: Laws | None, robot: RobotModel, task: PathTask, gains: Gains) -> dict[str, Controller]:
+    """Return control laws by name for one arm and one task, from names, laws, or functions of arm and task.
+
+    On a closed path the known laws begin at the point that is nearest to the arm, on an open one at its begin.
+
+    Raises:
+        UnknownNameError: there is no law of that name.
+        InputError: a law is for another arm or another task, or two have the same name.
+    """
+    for name in ("K_p", "K_v"):
+        diagonal_gain(name, getattr(gains, name), robot.n, robot.joint_names)
+    made: dict[str, Controller] = {}
+    for name, law in _list_laws(laws):
+        one = _make_law(law, robot, task, gains)
+        key = name or (law if isinstance(law, str) else type(one).__name__)
+        if key in made:
+            raise InputError(f"two laws are called {key!r}; give them names: {{'first': …, 'second': …}}")
+        made[key] = one
+    if not made:
+        raise InputError(f"there is no law to compare; expected some of {', '.join(KNOWN_LAWS)}, or laws of your own")
+    return made
+
+
+def _list_laws(laws: Laws | None) -> list[tuple[str, Law]]:
+    """Return laws with their names, empty where none is given."""
+    if laws is None:
+        return [("", name) for name in KNOWN_LAWS]
+    if isinstance(laws, Mapping):
+        return [(str(name), law) for name, law in laws.items()]
+    if isinstance(laws, str | Controller) or callable(laws):
+        return [("", laws)]
+    try:
+        return [("", law) for law in laws]
+    except TypeError as error:
+        raise InputError(f"laws = {laws!r:.80}, expected names, control laws, or a table of them by name") from error
+
+
+def _make_law(law: Law, robot: RobotModel, task: PathTask, gains: Gains) -> Controller:
+    """Return one law."""
+    if isinstance(law, str):
+        if law not in _MAKERS:
+            choices = ", ".join(KNOWN_LAWS)
+            raise UnknownNameError(f"there is no law {law!r}, expected one of {choices}{did_you_mean(law, _MAKERS)}")
+        return _MAKERS[law](robot, task, gains, "nearest" if task.closed else "s0")
+    made = law(robot, task) if callable(law) else law
+    check_controller("laws", made)
+    if made.robot.joint_names != robot.joint_names:
+        raise InputError(f"{type(made).__name__} is for the joints {made.robot.joint_names}, not {robot.joint_names}")
+    if not _is_same(made.task, task):
+        raise InputError(f"{type(made).__name__} is for another task than the scenario; make it with scenario.task")
+    return made
+
+
+def _is_same(one: PathTask, other: PathTask) -> bool:
+    """Return whether two tasks lead along the same path at the same speed."""
+    if one is other:
+        return True
+    if one.closed != other.closed or one.s0 != other.s0 or not np.array_equal(one.s_end, other.s_end):
+        return False
+    s = sample_task(other)
+    pairs = [(one.q_d(s), other.q_d(s)), (one.theta(s), other.theta(s))]
+    return all(np.allclose(a, b, rtol=0, atol=_SAME * np.abs(b).max()) for a, b in pairs)

@@ -1,0 +1,116 @@
+"""The measures of a comparison: contour and lag error told apart, and what an event costs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.analysis.limit_shares import stack_torque_limits
+from pathcontrol.analysis.run_metrics import contour_error, lag_error, settling_time
+from pathcontrol.simulation.run import Run
+from pathcontrol.tasks.task import PathTask
+
+#: the unit of each measure
+MEASURES = {
+    "contour_peak": "rad",
+    "contour_rms": "rad",
+    "lag_peak": "rad",
+    "speed_peak": "rad/s",
+    "torque_peak": "N m",
+    "recovery_s": "s",
+    "time_lost_s": "s",
+    "energy_j": "J",
+    "saturated_s": "s",
+}
+#: an arm has recovered when its contour error stays within this many times its own undisturbed peak
+RECOVERED = 1.1
+_LEAST_BAND = 1e-4  # rad, of an arm that follows its path exactly
+_QUADRATURE = 32  # points
+_SLACK = 1e-6  # share of a period, as times of samples are rounded
+_AT_LIMIT = 1 - 1e-9  # share of a limit
+
+
+def measure(run: Run, undisturbed: Run, window: tuple[float, float], event_end: float | None) -> dict[str, Array]:
+    """Return all :data:`MEASURES` of a run beside the undisturbed one with the same samples, (rollout,) each.
+
+    All but the time lost are of the ``window``; those of a rollout that diverged are NaN. ``event_end`` is when the
+    event is over [s], or ``None`` where it never is, and no arm recovers, NaN.
+    """
+    first, stop = find_samples(run.time, window)
+    time, task = run.time[first:stop], run.task
+    contour, normal = (contour_error(one)[:, first:stop] for one in (run, undisturbed))
+    torque, speed = run.array("tau")[:, first:stop], run.array("qd")[:, first:stop]
+    values = {
+        "contour_peak": contour.max(-1),
+        "contour_rms": np.sqrt((contour**2).mean(-1)),
+        "lag_peak": np.abs(lag_error(run)[:, first:stop]).max(-1),
+        "speed_peak": np.linalg.norm(speed, axis=-1).max(-1),
+        "torque_peak": np.abs(torque).max((-1, -2)),
+        "recovery_s": recovery_time(contour, normal.max(-1), time, event_end),
+        "time_lost_s": np.full(run.rollouts, np.nan) if task is None else time_lost(run, undisturbed, task),
+        "energy_j": energy(torque, speed, time),
+        "saturated_s": saturated_time(torque, stack_torque_limits(run), time),
+    }
+    return {name: np.where(run.status == "diverged", np.nan, value) for name, value in values.items()}
+
+
+def find_samples(time: Array, window: tuple[float, float]) -> tuple[int, int]:
+    """Return the first sample (of ``time`` [s], (k,)) within a window, and the one after the last."""
+    slack = _SLACK * (time[1] - time[0]) if len(time) > 1 else 0.0
+    begin, end = np.searchsorted(time, [window[0] - slack, window[1] + slack])
+    return int(begin), int(end)
+
+
+def recovery_time(contour: Array, normal: Array, time: Array, event_end: float | None) -> Array:
+    """Return the time [s] from the end of an event until the contour error stays within its band, (rollout,).
+
+    The band is :data:`RECOVERED` times the undisturbed peak ``normal`` [rad] (rollout,), 1e-4 rad at least. It is 0
+    where the error never leaves it, inf where it does not come back in time, NaN without an end of the event.
+    """
+    if event_end is None:
+        return np.full(len(contour), np.nan)
+    after = find_samples(time, (event_end, np.inf))[0]
+    if after == len(time):
+        return np.full(len(contour), np.nan)
+    band = np.maximum(RECOVERED * normal, _LEAST_BAND)[:, None]
+    return settling_time(contour[:, after:] / band, time[after:], 1.0) - time[after]
+
+
+def time_lost(run: Run, undisturbed: Run, task: PathTask) -> Array:
+    """Return the time [s] that a run is behind the undisturbed one at its end, (rollout,): ∫ds/ϑ(s) between both s.
+
+    Where both have finished an open path, it is the difference of their times. That of motion control is 0, as its
+    s waits for nobody.
+    """
+    ends = np.stack([one.array("s")[:, -1] for one in (run, undisturbed)])
+    lost = np.full(run.rollouts, np.nan)
+    known = np.isfinite(ends).all(0)
+    lost[known] = _planned_time(task, *ends[:, known])
+    finished = [one.finish_time for one in (run, undisturbed)]
+    both = np.isfinite(finished).all(0)
+    return np.where(both, finished[0] - finished[1], lost)
+
+
+def _planned_time(task: PathTask, begin: Array, end: Array) -> Array:
+    """Return ∫ds/ϑ(s) [s] from ``begin`` to ``end``, (k,) each, by Gauss–Legendre quadrature."""
+    nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE)
+    half = 0.5 * (end - begin)
+    s = (begin + half)[:, None] + half[:, None] * nodes
+    with np.errstate(divide="ignore", invalid="ignore"):  # ϑ is 0 at the end of some paths
+        slowness = 1 / np.broadcast_to(task.theta(s), s.shape)
+        return np.where(half == 0, 0.0, half * (weights * slowness).sum(-1))
+
+
+def energy(torque: Array, speed: Array, time: Array) -> Array:
+    """Return ∫|τ·q̇| dt [J], (rollout,), by the trapezoidal rule, of (rollout, time, n)."""
+    return np.trapezoid(np.abs(np.vecdot(torque, speed)), time, axis=-1)
+
+
+def saturated_time(torque: Array, limits: Array, time: Array) -> Array:
+    """Return the time [s] in which the torque of any joint is at its limit, (rollout,).
+
+    Torques are (rollout, time, n), each held for a period, and limits [N m], (rollout, n).
+    """
+    at_limit = (np.abs(torque) >= _AT_LIMIT * limits[:, None]).any(-1)
+    period = time[1] - time[0] if len(time) > 1 else 0.0
+    return period * at_limit.sum(-1)

@@ -1,0 +1,165 @@
+"""Situations in which laws are compared: a task, an arm that may differ from its model, and what happens to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol._expect import did_you_mean
+from pathcontrol.comparison.laws import Gains
+from pathcontrol.comparison.paper import DURATION, K_P, K_V, PERIOD, START_DEG, K, paper_task
+from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.robot.loading import load_robot
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.arm.jam import JammedJoint
+from pathcontrol.simulation.arm.noise import SensorNoise
+from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
+from pathcontrol.tasks.curves import Circle
+from pathcontrol.tasks.task import PathTask
+
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+_NEAR = 0.05  # rad, standard deviation of initial postures from the path
+_JAM = (4.0, 4.6)  # s
+_FAST = 11.0  # rad/s; a lap takes 0.571 s, of which the motors need 0.673 s at least
+_HEAVIER = 1.3
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A situation in which laws are compared, and the same one undisturbed.
+
+    Attributes:
+        name: its name.
+        sentence: what happens, in one sentence.
+        robot: the model of the arm that all laws know.
+        task: path and velocity profile.
+        q: initial posture [rad] of the first rollout, (n,), which begins at rest.
+        duration: simulated time [s].
+        loop: how the loop is closed.
+        plant: the simulated arm, by default ``robot``.
+        disturbance: what else acts on the arm, or ``None``.
+        event: from when to when something happens [s]; ``None`` where all of the run is as it is.
+        gains: what all laws share.
+        undisturbed: the scenario without what happens in it; ``None`` if nothing does.
+
+    Raises:
+        InputError: the event does not begin within the run.
+    """
+
+    name: str
+    sentence: str
+    robot: RobotModel
+    task: PathTask
+    q: Array
+    duration: float
+    loop: SampledLoop | ContinuousTime = field(default_factory=SampledLoop)
+    plant: RobotModel | None = None
+    disturbance: Disturbance | None = None
+    event: tuple[float, float] | None = None
+    gains: Gains = field(default_factory=Gains)
+    undisturbed: Scenario | None = None
+
+    def __post_init__(self) -> None:
+        if self.event is not None and not 0 <= self.event[0] < min(self.event[1], self.duration):
+            raise InputError(
+                f"event = {self.event}, expected begin and end [s] with a begin in the run of {self.duration:g} s"
+            )
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """The time that counts [s]: from the event on; without one the second half, on an open path all of the run."""
+        begin = 0.5 * self.duration if self.task.closed else 0.0
+        return (begin if self.event is None else self.event[0], self.duration)
+
+    def starts(self, rollouts: int, seed: int) -> Array:
+        """Return initial postures [rad], (rollouts, n): :attr:`q`, and others near the path.
+
+        Those are at points that cover a closed path evenly, whatever their number, or at the begin of an open one, plus
+        a normal deviate of 0.05 rad in each joint. Rollout i has the same posture alone and among others. The points
+        are the fractions of multiples of the golden ratio, moved along by a number that the seed draws.
+        """
+        moved = np.random.default_rng(seed).uniform()
+        others = [self._near(moved + i * _GOLDEN, np.random.default_rng([seed, i])) for i in range(1, rollouts)]
+        return np.stack([self.q, *others])
+
+    def _near(self, share: float, random: np.random.Generator) -> Array:
+        """Return a posture near the path, (n,), at a ``share`` of the length in s of a closed one."""
+        begin, end = self.task.one_traverse if self.task.closed else (self.task.s0, self.task.s0)
+        s = begin + (share % 1.0) * (end - begin)
+        return np.asarray(self.task.q_d(np.array(s)) + random.normal(0.0, _NEAR, self.robot.n))
+
+
+def known_scenarios() -> dict[str, str]:
+    """Return what happens in each scenario of the library, a sentence by its name."""
+    return {name: sentence for name, (sentence, _) in _SCENARIOS.items()}
+
+
+def make_scenario(name: str) -> Scenario:
+    """Return a scenario of the library by its name.
+
+    Raises:
+        UnknownNameError: there is none of this name.
+    """
+    if name not in _SCENARIOS:
+        choices = tuple(_SCENARIOS)
+        raise UnknownNameError(
+            f"there is no scenario {name!r}, expected one of {', '.join(choices)}{did_you_mean(name, choices)}",
+            argument="scenario",
+            value=name,
+            choices=choices,
+        )
+    sentence, change = _SCENARIOS[name]
+    return change(_paper(name, sentence))
+
+
+def _paper(name: str, sentence: str) -> Scenario:
+    """Return the paper's experiment with exact sensors."""
+    return Scenario(
+        name=name,
+        sentence=sentence,
+        robot=load_robot("cicese_2dof"),
+        task=paper_task(),
+        q=np.deg2rad(START_DEG),
+        duration=DURATION,
+        loop=SampledLoop(period=PERIOD, torque_limits=True),
+        gains=Gains(K_P, K_V, K),
+    )
+
+
+def _jam(calm: Scenario) -> Scenario:
+    """Return the scenario with joint 2 held for a while."""
+    jam = JammedJoint(1, _JAM[0], _JAM[1] - _JAM[0])
+    return replace(calm, disturbance=jam, event=_JAM, undisturbed=calm)
+
+
+def _weaken(calm: Scenario) -> Scenario:
+    """Return the scenario at a speed that the motors cannot keep, from a start on the path."""
+    task = Circle(1.0, _FAST)
+    fast = replace(calm, task=task, q=task.q_d(np.array(task.s0)))
+    return replace(fast, undisturbed=replace(fast, loop=SampledLoop(period=PERIOD)))
+
+
+def _load(calm: Scenario) -> Scenario:
+    """Return the scenario with a heavier link 2."""
+    heavier = calm.robot.with_masses({calm.robot.joint_names[1]: _HEAVIER})
+    return replace(calm, plant=heavier, undisturbed=calm)
+
+
+def _measure_badly(calm: Scenario) -> Scenario:
+    """Return the scenario with the sensors and the delay of a real loop."""
+    noise = SensorNoise(position=1e-4, seed=1)
+    loop = SampledLoop(PERIOD, encoders=True, velocity="difference", torque_limits=True, delay=PERIOD, noise=noise)
+    return replace(calm, loop=loop, undisturbed=calm)
+
+
+_SCENARIOS: dict[str, tuple[str, Callable[[Scenario], Scenario]]] = {
+    "undisturbed": ("The paper's circle at 2 rad/s with exact sensors; nothing happens.", lambda calm: calm),
+    "jammed-joint": ("Joint 2 is held still from 4.0 to 4.6 s and let go.", _jam),
+    "weak-motors": ("The circle is to be followed at 11 rad/s, which the motors cannot do.", _weaken),
+    "payload": ("Link 2 is 30 % heavier than the laws know.", _load),
+    "noisy-loop": ("Encoders, noise of 0.1 mrad, velocity by differences, and a delay of 2.5 ms.", _measure_badly),
+}

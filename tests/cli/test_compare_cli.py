@@ -1,0 +1,139 @@
+"""``pathcontrol compare``: scenarios by name and from files, JSON, and bad input."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import pathcontrol as pc
+from pathcontrol.cli import main
+
+JAM = """
+duration = 10.0
+angle_unit = "deg"
+[robot]
+source = "cicese_2dof"
+[task]
+type = "circle"
+radius = 57.3
+speed = 114.59
+[controller]
+type = "{law}"
+{gains}
+[start]
+q = [40.0, 70.0]
+[loop]
+torque_limits = true
+[disturbance]
+type = "jammed_joint"
+joint = "joint_2"
+start = 4.0
+duration = 0.6
+"""
+GAINS = {
+    "extended_motion_plan": "K_p = 800.0\nK_v = [45.0, 100.0]\nk = 20.0",
+    "projection": "k_p = 800.0\nK_v = [45.0, 100.0]",
+    "computed_torque": "K_p = 800.0\nK_v = [45.0, 100.0]",
+}
+
+
+def call(*arguments):
+    return CliRunner().invoke(main, ["compare", *map(str, arguments)])
+
+
+def done(*arguments):
+    result = call(*arguments, "--json")
+    assert result.exit_code == 0, result.stderr
+    return json.loads(result.stdout)
+
+
+def test_list_names_what_exists():
+    assert call("--list").stdout.splitlines()[1].startswith("jammed-joint ")
+    assert done("--list")["scenarios"] == pc.known_scenarios()
+
+
+def test_a_scenario_by_its_name():
+    said = done("--scenario", "jammed-joint", "--rollouts", 2)
+    assert said["event"] == [4.0, 4.6]
+    numbers = said["controllers"]
+    assert numbers["computed_torque"]["contour_peak"] > 2 * numbers["projection"]["contour_peak"]
+
+
+@pytest.mark.parametrize("law", GAINS)
+def test_a_file_that_says_the_same_gives_the_same(tmp_path, law):
+    path = tmp_path / "mine.toml"
+    path.write_text(JAM.format(law=law, gains=GAINS[law]), encoding="utf-8")
+    of_name = done("--scenario", "jammed-joint", "--rollouts", 2)
+    for arguments in ([path], ["--scenario", path]):
+        of_file = done(*arguments, "--rollouts", 2)
+        assert of_file["scenario"] == "mine"
+        assert of_file["event"] == pytest.approx([4.0, 4.6])
+        for name, numbers in of_name["controllers"].items():
+            for key in ("contour_peak", "lag_peak", "speed_peak", "recovery_s", "time_lost_s"):
+                assert of_file["controllers"][name][key] == pytest.approx(numbers[key], rel=1e-3, abs=1e-6)
+
+
+def test_the_table_says_what_it_is_of_and_where_motion_control_wins():
+    said = call("--scenario", "jammed-joint", "--rollouts", 2).stdout
+    assert "from 4 to 10 s" in said
+    assert "Motion control is the best in: " in said
+    assert "time_lost_s" in said.rpartition("best in: ")[2]
+
+
+def test_chosen_laws_and_seed():
+    said = done("--scenario", "undisturbed", "--law", "projection", "--law", "pd_plus", "--rollouts", 1, "--seed", 3)
+    assert list(said["controllers"]) == ["projection", "pd_plus"]
+    assert np.isfinite(said["controllers"]["pd_plus"]["energy_j"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "--list"),
+        (["--scenario", "jammed-joint", "mine.toml"], "either"),
+        (["--scenario", "jammed"], "jammed-joint"),
+        (["--scenario", "undisturbed", "--law", "pid"], "computed_torque"),
+        (["missing.toml"], "there is no file"),
+        (["--scenario", "missing.toml"], "there is no file"),
+        (["--scenario", "undisturbed", "--rollouts", "0"], "rollouts"),
+        (["--scenario", "undisturbed", "--engine", "fast"], "engine"),
+    ],
+)
+def test_bad_input_is_one_message(arguments, said):
+    result = call(*arguments)
+    assert result.exit_code == 2
+    assert said in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("start = 4.0", "start = 40.0", "event"),
+        ('type = "circle"', 'type = "circel"', "circle"),
+        ('"joint_2"', '"joint_9"', "joint_9"),
+    ],
+)
+def test_a_file_that_is_no_scenario(tmp_path, old, new, said):
+    path = tmp_path / "mine.toml"
+    path.write_text(JAM.format(law="projection", gains=GAINS["projection"]).replace(old, new, 1), encoding="utf-8")
+    result = call(path)
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_a_law_of_ones_own_in_a_file_has_no_gains_for_others(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "import pathcontrol as pc\nclass Still(pc.MotionController):\n"
+        "    def torque(self, q, qd, ref):\n        return self.robot.gravity(q)\n",
+        encoding="utf-8",
+    )
+    path = tmp_path / "mine.toml"
+    path.write_text(JAM.format(law="own.py:Still", gains=""), encoding="utf-8")
+    result = call(path)
+    assert result.exit_code == 2
+    assert "Still" in result.stderr
+    assert "computed_torque" in result.stderr

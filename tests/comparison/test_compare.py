@@ -1,0 +1,190 @@
+"""Laws in one scenario: gains that mean the same, the same starts and seeds, and what is known of jams."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+import pathcontrol as pc
+from pathcontrol.comparison.laws import KNOWN_LAWS, Gains, make_laws, recover_gains, split_damping
+from pathcontrol.comparison.measures import MEASURES
+
+MOTION, PATH = KNOWN_LAWS[:3], KNOWN_LAWS[3:]
+
+
+class Mine(pc.ComputedTorque):
+    """Computed torque under another name."""
+
+
+@pytest.fixture(scope="module")
+def jam():
+    return pc.compare(None, "jammed-joint", progress=False)
+
+
+def compared(*names, scenario="jammed-joint", **options):
+    return pc.compare(list(names), scenario, progress=False, **options)
+
+
+# --- gains that mean the same -----------------------------------------------------------------------------------
+
+
+@given(st.floats(1.0, 1e4), st.floats(1.0, 1e3))
+def test_slotine_and_li_have_the_same_stiffness_and_the_same_damping_where_they_can(K_p, K_v):
+    Lambda, D = split_damping(np.array([K_p]), np.array([K_v]))
+    assert_allclose(Lambda * D, K_p, rtol=1e-9)
+    assert_allclose(Lambda + D, max(K_v, 2 * np.sqrt(K_p)), rtol=1e-7)
+
+
+def test_tracking_laws_are_one_law_on_an_arm_of_one_joint(arm):
+    """Its M is constant and its C is zero, so that equal gains must give equal motions."""
+    one = arm.reduced({arm.joint_names[1]: 0.3})
+    task = pc.Line([0.2], [1.2], 1.0)
+    start = task.q_d(np.array(0.0)) + 0.1
+    laws = make_laws(MOTION, one, task, Gains(100.0, 25.0))
+    runs = [pc.simulate(law, start, duration=1.0, progress=False).array("q") for law in laws.values()]
+    assert np.abs(runs[0] - task.q_d(runs[0][..., 0])).max() > 0.01
+    for other in runs[1:]:
+        assert_allclose(other, runs[0], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", KNOWN_LAWS)
+def test_gains_come_back_from_a_law(arm, circle, name):
+    law = make_laws(name, arm, circle, Gains(300.0, [45.0, 100.0], 7.0))[name]
+    gains = recover_gains(law)
+    assert_allclose(np.broadcast_to(gains.K_p, 2), 300.0)
+    assert_allclose(np.broadcast_to(gains.K_v, 2), [45.0, 100.0])
+
+
+def test_the_plan_has_the_rate_of_the_papers_on_any_path(arm):
+    for radius in (0.1, 1.0):
+        task = pc.Circle(radius, 0.5)
+        law = make_laws("extended_motion_plan", arm, task, Gains())["extended_motion_plan"]
+        assert_allclose(law.k * radius**2, 20.0)
+
+
+# --- the same for all -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scenario", ["jammed-joint", "noisy-loop"])
+def test_a_rollout_has_the_same_numbers_alone_and_among_others(scenario):
+    few, many = (compared("projection", "pd_plus", scenario=scenario, rollouts=n) for n in (2, 5))
+    for law in few.measures:
+        for name in MEASURES:
+            assert_array_equal(few.measures[law][name], many.measures[law][name][:2])
+
+
+def test_the_same_seed_gives_the_same_numbers_and_another_one_others():
+    one, again, other = (compared("projection", rollouts=3, seed=seed) for seed in (4, 4, 5))
+    peaks = [run.measures["projection"]["contour_peak"] for run in (one, again, other)]
+    assert_array_equal(peaks[0], peaks[1])
+    assert peaks[0][0] == peaks[2][0]  # the start of the scenario
+    assert (peaks[0][1:] != peaks[2][1:]).all()
+
+
+def test_all_laws_begin_at_the_same_postures_near_the_path(jam):
+    starts = [run.array("q")[:, 0] for run in jam.runs.values()]
+    for other in starts[1:]:
+        assert_array_equal(starts[0], other)
+    distance = np.abs(np.linalg.norm(starts[0][1:], axis=-1) - 1.0)
+    assert distance.max() < 0.25
+    around = np.sort(np.arctan2(starts[0][1:, 1], starts[0][1:, 0]))
+    assert np.diff(around, append=around[0] + 2 * np.pi).max() < 1.0  # all around
+
+
+# --- what is known ----------------------------------------------------------------------------------------------
+
+
+def test_in_a_jam_motion_control_cuts_the_corner_and_path_control_loses_time(jam):
+    mean = {law: {name: jam.mean(law, name) for name in MEASURES} for law in jam.measures}
+    for path in PATH:
+        assert mean["computed_torque"]["contour_peak"] > 2.5 * mean[path]["contour_peak"]
+        assert mean["computed_torque"]["speed_peak"] > 2.2 * mean[path]["speed_peak"]
+        assert mean["computed_torque"]["recovery_s"] > 2.5 * mean[path]["recovery_s"]
+        assert 0.2 < mean[path]["time_lost_s"] < 0.7  # of the 0.6 s in which the joint was held
+    for motion in MOTION:
+        assert mean[motion]["time_lost_s"] == pytest.approx(0.0, abs=1e-9)
+    assert mean["projection"]["lag_peak"] < 1e-12
+
+
+def test_without_a_disturbance_motion_control_is_as_good(arm):
+    calm = compared("pd_plus", "extended_motion_plan", scenario="undisturbed", rollouts=2)
+    assert calm.best("contour_peak") == ["pd_plus"]
+    assert calm.runs == calm.undisturbed
+    assert np.isnan(calm.mean("pd_plus", "recovery_s"))
+
+
+def test_motors_that_are_too_weak_saturate_and_the_same_ones_without_limits_do_not(arm):
+    weak = compared("computed_torque", "projection", scenario="weak-motors", rollouts=1)
+    assert weak.mean("computed_torque", "torque_peak") == pytest.approx(arm.limits.effort.max())
+    assert weak.mean("projection", "time_lost_s") > 1.0
+    assert weak.mean("computed_torque", "contour_peak") > 3 * weak.mean("projection", "contour_peak")
+
+
+# --- laws and scenarios of one's own ------------------------------------------------------------------------------
+
+
+def test_laws_of_ones_own_are_objects_or_functions():
+    scenario = pc.make_scenario("jammed-joint")
+    law = Mine(scenario.robot, scenario.task, 800.0, [45.0, 100.0], start="nearest")
+    both = pc.compare({"a": law, "b": lambda arm, task: Mine(arm, task, 800.0, 50.0)}, scenario, rollouts=1)
+    theirs = compared("computed_torque", rollouts=1)
+    assert both.mean("a", "contour_peak") == pytest.approx(theirs.mean("computed_torque", "contour_peak"))
+    assert list(pc.compare(law, scenario, rollouts=1).measures) == ["Mine"]
+    assert both.mean("b", "contour_peak") != both.mean("a", "contour_peak")
+
+
+def test_an_open_path_in_a_scenario_of_ones_own(arm):
+    line = pc.Line([0.2, 0.1], [1.0, 1.2], 0.8)
+    push = pc.Push([0.0, 10.0], start=0.5, duration=0.3)
+    calm = pc.Scenario("line", "A line.", arm, line, line.q_d(np.array(0.0)), 4.0)
+    pushed = pc.Scenario(
+        "line", "A push.", arm, line, calm.q, 4.0, disturbance=push, event=(0.5, 0.8), undisturbed=calm
+    )
+    result = pc.compare(None, pushed, rollouts=3, progress=False)
+    assert (result.runs["projection"].status == "finished").all()
+    for law in result.measures:
+        assert np.isfinite(result.measures[law]["time_lost_s"]).all()
+    assert calm.window == (0.0, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("laws", "said"),
+    [
+        (["projection", "projection"], "two laws are called 'projection'"),
+        ([], "no law to compare"),
+        ("projektion", "did you mean 'projection'"),
+        (3, "laws = 3"),
+        ([None], "expected a Controller"),
+    ],
+)
+def test_laws_that_are_none(laws, said):
+    with pytest.raises((pc.InputError, pc.UnknownNameError), match=said):
+        pc.compare(laws, "undisturbed")
+
+
+def test_what_does_not_fit_is_refused(arm, circle):
+    with pytest.raises(pc.UnknownNameError, match="jammed-joint"):
+        pc.compare(None, "jammed")
+    with pytest.raises(pc.InputError, match="another task"):
+        pc.compare(pc.Projection(arm, pc.Circle(1.0, 1.0), 800.0, 45.0), "undisturbed")
+    with pytest.raises(pc.InputError, match="rollouts"):
+        pc.compare(None, "undisturbed", rollouts=0)
+    with pytest.raises(pc.InputError, match="event"):
+        pc.Scenario("late", "Too late.", arm, circle, np.zeros(2), 1.0, event=(2.0, 3.0))
+    with pytest.raises(pc.InputError, match="expected a Scenario"):
+        pc.compare(None, 7)
+
+
+def test_json_has_the_keys_in_si_units_for_every_scenario():
+    for name in pc.known_scenarios():
+        said = json.loads(json.dumps(compared(*KNOWN_LAWS, scenario=name, rollouts=1).to_dict(), allow_nan=False))
+        assert list(said["controllers"]) == list(KNOWN_LAWS)
+        for numbers in said["controllers"].values():
+            assert set(MEASURES) <= set(numbers)
+            assert all(numbers[key] is None or isinstance(numbers[key], float) for key in MEASURES)
+            assert set(numbers["spread"]) == set(numbers["rollouts"]) == set(MEASURES)

@@ -1,0 +1,110 @@
+"""The measures of a comparison have closed forms on motions that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+import pathcontrol as pc
+from pathcontrol.comparison.measures import MEASURES, RECOVERED, measure, recovery_time
+from pathcontrol.simulation.variables import VARIABLES
+
+TIME = np.linspace(0.0, 4.0, 4001)
+TASK = pc.Circle(1.0, 2.0)
+
+
+class Uneven(pc.PathTask):
+    """A circle with ϑ = 1/(1 + cos(s)/2), along which ∫ds/ϑ = s + sin(s)/2."""
+
+    period = 2 * np.pi
+
+    def q_d(self, s):
+        return np.stack([np.cos(s), np.sin(s)], axis=-1)
+
+    def theta(self, s):
+        return 1 / (1 + 0.5 * np.cos(s))
+
+
+def made(arm, task=TASK, *, s=None, behind=0.0, away=0.0, tau=(0.0, 0.0), outcome=None):
+    """A run of one rollout whose arm is ``away`` from the circle and ``behind`` s."""
+    s = 2.0 * TIME if s is None else np.broadcast_to(s, TIME.shape)
+    arrays = {
+        name: np.zeros((1, len(TIME), 2) if "joint" in dims else (1, len(TIME)))
+        for name, (dims, *_) in VARIABLES.items()
+    }
+    angle = s - behind
+    arrays["s"] = s[None]
+    arrays["q"] = ((1 + away) * np.stack([np.cos(angle), np.sin(angle)]))[None].swapaxes(1, 2)
+    arrays["qd"] = np.gradient(arrays["q"], TIME, axis=1)
+    arrays["tau"] = np.broadcast_to(tau, (1, len(TIME), 2)).copy()
+    joints = dict.fromkeys(arm.joint_names, "rad")
+    return pc.Run.from_arrays(TIME, joints, arrays, {}, outcome or {}, robot=arm, task=task)
+
+
+def test_contour_and_lag_are_told_apart(arm):
+    away = 0.2 * np.sin(TIME)
+    values = measure(made(arm, away=away, behind=0.3), made(arm), (1.0, 4.0), None)
+    assert set(values) == set(MEASURES)
+    late = TIME >= 1.0
+    assert_allclose(values["contour_peak"], np.abs(away[late]).max(), rtol=1e-9)
+    assert_allclose(values["contour_rms"], np.sqrt((away[late] ** 2).mean()), rtol=1e-9)
+    # the arm at radius ρ and angle s − α is ρ sin α behind along the tangent
+    assert_allclose(values["lag_peak"], (1 + away[late]).max() * np.sin(0.3), rtol=1e-9)
+
+
+def test_peaks_are_of_the_event_and_after(arm):
+    early = np.where(TIME < 1.0, 0.5, 0.1)
+    values = measure(made(arm, away=early), made(arm), (1.0, 4.0), None)
+    assert_allclose(values["contour_peak"], 0.1)
+    assert_allclose(measure(made(arm, away=early), made(arm), (0.0, 4.0), None)["contour_peak"], 0.5)
+
+
+def test_energy_and_torque_of_a_constant_power(arm):
+    turning = made(arm, tau=(3.0, -4.0))
+    turning.array("qd")[...] = (2.0, 1.0)
+    values = measure(turning, made(arm), (1.0, 4.0), None)
+    assert_allclose(values["energy_j"], abs(3.0 * 2.0 - 4.0) * 3.0, rtol=1e-12)
+    assert_allclose(values["torque_peak"], 4.0)
+    assert_allclose(values["speed_peak"], np.hypot(2.0, 1.0))
+    turning.array("tau")[...] = (0.0, -4.0)  # power that flows back counts as well
+    assert_allclose(measure(turning, made(arm), (0.0, 4.0), None)["energy_j"], 16.0, rtol=1e-12)
+
+
+def test_saturated_is_the_time_at_the_limit_of_any_joint(arm):
+    limits = arm.limits.effort
+    torque = np.zeros((len(TIME), 2))
+    torque[(TIME >= 1.0) & (TIME < 1.5), 0] = limits[0]
+    torque[(TIME >= 1.25) & (TIME < 2.0), 1] = -limits[1]
+    torque[TIME >= 3.0, 1] = 0.99 * limits[1]
+    assert_allclose(measure(made(arm, tau=torque), made(arm), (0.0, 4.0), None)["saturated_s"], 1.0, atol=2e-3)
+
+
+@given(st.floats(1e-3, 0.1), st.floats(0.5, 5.0))
+def test_recovery_of_an_error_that_decays(normal, rate):
+    contour = np.exp(-rate * (TIME - 1.0))[None]
+    found = recovery_time(contour, np.array([normal]), TIME, 1.0)[0]
+    exact = -np.log(RECOVERED * normal) / rate
+    assert found == pytest.approx(exact, abs=1.1e-3) if exact < 2.999 else (found == np.inf or found > 2.99)
+
+
+def test_recovery_of_what_never_leaves_comes_back_or_ends():
+    contour = np.array([np.full(len(TIME), 0.1), np.full(len(TIME), 0.2), np.where(TIME < 3.0, 0.1, 0.2)])
+    found = recovery_time(contour, np.full(3, 0.1), TIME, 2.0)
+    assert found.tolist() == [0.0, np.inf, np.inf]
+    assert np.isnan(recovery_time(contour, np.full(3, 0.1), TIME, None)).all()
+
+
+@given(st.floats(-3.0, 3.0), st.floats(0.0, 20.0))
+def test_time_lost_is_the_planned_time_between_both(lost, end):
+    arm, task = pc.load_robot("cicese_2dof"), Uneven()
+    here, there = made(arm, task, s=end - lost), made(arm, task, s=end)
+    exact = lost + 0.5 * (np.sin(end) - np.sin(end - lost))
+    assert_allclose(measure(here, there, (0.0, 4.0), None)["time_lost_s"], exact, atol=1e-9)
+
+
+def test_a_rollout_that_diverged_has_no_numbers(arm):
+    lost = made(arm, outcome={"diverged_time": np.array([2.0]), "reason": np.array(["too fast"])})
+    assert all(np.isnan(value).all() for value in measure(lost, made(arm), (1.0, 4.0), 2.0).values())
