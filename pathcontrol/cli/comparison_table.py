@@ -38,7 +38,7 @@ def describe_comparison(compared: Comparison) -> list[str]:
     begin, end = compared.scenario.window
     count = len(next(iter(compared.runs.values())).status)
     lines = [
-        f"Mean ± standard deviation of {count} initial postures, from {begin:g} to {end:g} s; * is the smallest in size.",
+        f"Mean ± standard deviation of {count} starts, from {begin:g} to {end:g} s; * is the smallest in size.",
         f"Recovered is an arm whose contour error stays below {RECOVERED:g} times its own undisturbed peak.",
     ]
     wins = [name for name in MEASURES if _is_won_by_motion(compared, name)]
