@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,7 +24,7 @@ from pathcontrol.view.figures.lines import drawable, series
 from pathcontrol.view.figures.shown import Shown, shown
 from pathcontrol.view.figures.style import COLUMN, apply_style, new_figure, style
 
-_EVENT = {"color": "#D9D9D9", "alpha": 0.6, "linewidth": 0}
+_EVENT: dict[str, Any] = {"color": "#D9D9D9", "alpha": 0.6, "linewidth": 0}
 _BEFORE, _AFTER = 0.5, 3.0  # lengths of the event that are shown around it
 
 
