@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array, as_array
 from pathcontrol._expect import expect, expect_choice
 from pathcontrol.control.base import FrictionCompensation
 from pathcontrol.errors import InputError
-from pathcontrol.robot.friction import viscous_of
+from pathcontrol.robot.friction import FrictionLaw, levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
@@ -46,8 +46,8 @@ def momentum_observer(
         run: a run of any law and loop, or a log with q, q̇ and τ.
         robot: the arm's model; by default the one that the law computed with.
         cutoff_hz: corner frequency of the filter [Hz], a number or (n,); inf for the mean of d over each period.
-        friction: what of the model's friction is known and so no part of d: ``"none"``, ``"viscous"``, or ``"full"``,
-            of which dry friction counts as 0 while a joint rests.
+        friction: what of the model's friction is known and so no part of d: ``"none"``, ``"viscous"``, or ``"full"``;
+            of a joint that rests or turns round, dry friction explains what it can.
         measured: take q and q̇ as the loop measured them, with noise and encoders; False for the true ones. Velocities
             by difference are half a period old, and so is the estimate; a filter of the loop on them is undone.
 
@@ -152,15 +152,29 @@ def _mean_disturbance(
     arm: RobotModel, friction: FrictionCompensation, dt: Array, q: Array, qd: Array, tau: Array
 ) -> Array:
     """Return the mean of d between the samples of one rollout, (time − 1, n): what τ does not explain of Δp."""
-    rate = arm.momentum_rate(q, qd, -_known_friction(arm, friction, qd))
-    return np.diff(arm.momentum(q, qd), axis=0) / dt - tau - 0.5 * (rate[1:] + rate[:-1])
+    rate = arm.momentum_rate(q, qd, np.zeros(arm.n))
+    unexplained = np.diff(arm.momentum(q, qd), axis=0) / dt - tau - _between(rate)
+    if friction != "none":
+        unexplained += viscous_of(arm.friction) * _between(qd)
+    return unexplained + _dry_friction(arm.friction, qd, -unexplained) if friction == "full" else unexplained
 
 
-def _known_friction(arm: RobotModel, friction: FrictionCompensation, qd: Array) -> Array:
-    """Return the torque of the friction that is known [N m], (time, n)."""
-    if friction == "none":
-        return np.zeros_like(qd)
-    return arm.friction.torque(qd) if friction == "full" else viscous_of(arm.friction) * qd
+def _dry_friction(law: FrictionLaw, qd: Array, wanted: Array) -> Array:
+    """Return the mean dry friction between samples [N m], (time − 1, n).
+
+    Of a joint that rests, or turns round, it is what explains the motion best within its levels: that nearest to
+    ``wanted``.
+    """
+    plus, minus = (np.broadcast_to(level, qd.shape) for level in levels_of(law, qd))
+    dry = np.where(qd > 0, plus, 0.0) - np.where(qd < 0, minus, 0.0)
+    most, least = np.maximum(plus[1:], plus[:-1]), -np.maximum(minus[1:], minus[:-1])
+    turns = np.sign(qd[1:]) * np.sign(qd[:-1]) <= 0
+    return np.where(turns, np.clip(wanted, least, most), _between(dry))
+
+
+def _between(values: Array) -> Array:
+    """Return the means of neighbouring samples, (time − 1, n) from (time, n)."""
+    return 0.5 * (values[1:] + values[:-1])
 
 
 def _low_pass(means: Array, dt: Array, rate: Array, start: Array) -> Array:
