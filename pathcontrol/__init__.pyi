@@ -137,5 +137,6 @@ from .view.figures.sweep_figures import robustness_figure as robustness_figure
 from .view.figures.tool_figure import tool_figure as tool_figure
 from .view.figures.toolpath_figure import toolpath_figure as toolpath_figure
 from .view.figures.torque_figure import torque_figure as torque_figure
+from .view.report.comparison_page import save_comparison as save_comparison
 from .view.report.report import report as report
 from .view.video import save_video as save_video

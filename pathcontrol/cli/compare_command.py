@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.cli.files import check_file
-from pathcontrol.cli.group import engine_option, import_all, json_option
+from pathcontrol.cli.group import engine_option, import_all, json_option, open_option, open_page
 
 if TYPE_CHECKING:
     from pathcontrol.comparison.compare import Comparison
@@ -26,7 +27,14 @@ if TYPE_CHECKING:
     "--rollouts", type=click.IntRange(1), default=16, show_default=True, metavar="N", help="How many initial postures."
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Seed of the postures.")
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="FOLDER",
+    help="Write comparison.html, the figure and summary.json to this folder.",
+)
 @engine_option
+@open_option
 @json_option
 def command(
     file: Path | None,
@@ -35,7 +43,9 @@ def command(
     laws: tuple[str, ...],
     rollouts: int,
     seed: int,
+    out: Path | None,
     engine: Engine | None,
+    opened: bool,
     as_json: bool,
 ) -> None:
     """Compare motion control and path control in one situation.
@@ -52,9 +62,17 @@ def command(
         check_file(source, "an experiment")
     from pathcontrol.comparison.compare import compare
 
+    if opened and out is None:
+        out = Path("results") / Path(source).stem
+    if out is not None:
+        out = refuse_suffix(out, "a folder")
+        import_all()
     found = _load(source)
     compared = compare(laws or None, found, rollouts=rollouts, seed=seed, engine=engine or "auto")
-    _tell(compared, as_json)
+    written = {} if out is None else _write(compared, out)
+    _tell(compared, written, as_json)
+    if opened and out is not None:
+        open_page(Path(written["html"]))
 
 
 def _choose(file: Path | None, scenario: str | None) -> Path | str:
@@ -90,16 +108,33 @@ def _list(as_json: bool) -> None:
         click.echo(f"{name:14} {sentence}")
 
 
-def _tell(compared: Comparison, as_json: bool) -> None:
+def _write(compared: Comparison, out: Path) -> dict[str, str]:
+    """Write page, figure and numbers; return the files by what they are."""
+    from pathcontrol._files import write_whole
+    from pathcontrol.view.figures.scenario_figure import scenario_figure
+    from pathcontrol.view.figures.style import save_figure
+    from pathcontrol.view.report.comparison_page import save_comparison
+
+    page = save_comparison(compared, out / "comparison.html")
+    svg, png = save_figure(scenario_figure(compared), out / "comparison")
+    text = json.dumps(compared.to_dict(), indent=2, allow_nan=False) + "\n"
+    write_whole(out / "summary.json", text.encode())
+    files = {"html": page, "figure-svg": svg, "figure-png": png, "summary": out / "summary.json"}
+    return {name: str(path) for name, path in files.items()}
+
+
+def _tell(compared: Comparison, written: dict[str, str], as_json: bool) -> None:
     """Print the results."""
     if as_json:
-        click.echo(json.dumps(compared.to_dict(), allow_nan=False))
+        click.echo(json.dumps(compared.to_dict() | {"written": written}, allow_nan=False))
         return
     from rich.console import Console
 
-    from pathcontrol.cli.comparison_table import comparison_table, describe_comparison
+    from pathcontrol.cli.tables import comparison_table
+    from pathcontrol.comparison.summary import describe_comparison
 
-    console = Console()
-    console.print(comparison_table(compared))
+    Console().print(comparison_table(compared))
     for line in describe_comparison(compared):
         click.echo(line)
+    for name, path in written.items():
+        click.echo(f"  {name}: {path}")

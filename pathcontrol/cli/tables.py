@@ -12,6 +12,7 @@ from rich.text import Text
 from pathcontrol.cli.group import printable
 
 if TYPE_CHECKING:
+    from pathcontrol.comparison.compare import Comparison
     from pathcontrol.simulation.run import Run
 
 _MOST_ROWS = 50
@@ -56,6 +57,19 @@ def remark_lines(run: Run) -> list[str]:
     from pathcontrol.analysis.run_remarks import remarks
 
     return [red(printable(sentence)) for sentence in remarks(run)]
+
+
+def comparison_table(compared: Comparison) -> Table:
+    """Return the table of a comparison: a row for each measure, a column for each law."""
+    from pathcontrol.comparison.summary import tabulate
+
+    heads, *rows = tabulate(compared)
+    table = Table(title=Text(printable(f"{compared.scenario.name}: {compared.scenario.sentence}")))
+    for i, head in enumerate(heads):
+        table.add_column(Text(printable(head)), justify="right" if i else "left")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    return table
 
 
 def red(text: str) -> str:

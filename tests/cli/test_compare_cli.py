@@ -137,3 +137,16 @@ def test_a_law_of_ones_own_in_a_file_has_no_gains_for_others(tmp_path):
     assert result.exit_code == 2
     assert "Still" in result.stderr
     assert "computed_torque" in result.stderr
+
+
+def test_out_writes_page_figure_and_numbers(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    said = done("--scenario", "jammed-joint", "--law", "projection", "--rollouts", 1, "--out", "deep/here")
+    assert set(said["written"]) == {"html", "figure-svg", "figure-png", "summary"}
+    assert all((tmp_path / path).stat().st_size > 0 for path in said["written"].values())
+    kept = json.loads((tmp_path / said["written"]["summary"]).read_text(encoding="utf-8"))
+    assert kept["controllers"] == said["controllers"]
+    assert done("--scenario", "jammed-joint", "--law", "projection", "--rollouts", 1)["written"] == {}
+    refused = call("--scenario", "jammed-joint", "--out", "page.html")
+    assert refused.exit_code == 2
+    assert "page.html" in refused.stderr

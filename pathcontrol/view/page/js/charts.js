@@ -5,13 +5,14 @@ const VALUES_EVERY = 100; // ms: numbers that change faster cannot be read
 
 class Chart {
   constructor(film, clock, chart) {
-    Object.assign(this, { clock, chart, last: 0, time: 0, times: film.block(chart.times) });
+    Object.assign(this, { film, clock, chart, last: 0, time: 0, times: film.block(chart.times) });
     const shades = new Set(chart.lines.filter((line) => line.role === "value").map((line) => line.shade || 0)).size;
     this.styles = chart.lines.map((line) => lineStyle(film, line, shades));
     this.caption = new Caption(chart, this.styles, () => this.rescale());
     this.build();
     const values = chart.lines.map((line) => withGaps(film.block(line.values)));
     this.uplot = new uPlot(this.options(), [this.times, ...values], this.plot);
+    this.addEvents();
     this.addPlayhead();
     scrubbable(this.uplot.over, clock, (event) => this.uplot.posToVal(event.clientX - this.left(), "x"));
     new ResizeObserver(() => this.resize()).observe(this.plot);
@@ -59,6 +60,16 @@ class Chart {
     return padded(clipped && !caption.pressed ? widened(late) : whole, extent(lines("limit"), first, last));
   }
 
+  // what happens during the film, from when to when
+  addEvents() {
+    this.events = (this.film.header.events || []).map(([from, to]) => {
+      const element = document.createElement("div");
+      element.className = "event";
+      this.uplot.over.append(element);
+      return { element, from, to };
+    });
+  }
+
   addPlayhead() {
     this.playhead = document.createElement("div");
     this.playhead.className = "playhead";
@@ -83,6 +94,10 @@ class Chart {
     const { min, max } = this.uplot.scales.x;
     this.playhead.hidden = this.time < min || this.time > max;
     this.playhead.style.transform = `translateX(${this.uplot.valToPos(this.time, "x").toFixed(2)}px)`;
+    for (const { element, from, to } of this.events) {
+      const [begin, end] = [from, to].map((time) => this.uplot.valToPos(Math.min(Math.max(time, min), max), "x"));
+      Object.assign(element.style, { left: `${begin.toFixed(2)}px`, width: `${(end - begin).toFixed(2)}px` });
+    }
   }
 
   // under the pointer, or else of the moment of the film

@@ -1,36 +1,27 @@
-"""The table of a comparison: a row for each measure, a column for each law, the best of each row marked."""
+"""A comparison in words and numbers: a table in degrees with the best of each row marked, and sentences."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
-from rich.table import Table
-from rich.text import Text
 
 from pathcontrol.analysis.readable import reading
+from pathcontrol.comparison.compare import Comparison
 from pathcontrol.comparison.measures import MEASURES, RECOVERED
 from pathcontrol.control.motion_control import MotionController
-
-if TYPE_CHECKING:
-    from pathcontrol.comparison.compare import Comparison
 
 _DIGITS = 3
 _NOTHING = 1e-9  # rad, m, N m, …: rounding of floats for an arm of usual size
 
 
-def comparison_table(compared: Comparison) -> Table:
-    """Return the table of a comparison, in degrees, with ``*`` at the least mean of each row."""
-    table = Table(title=Text(f"{compared.scenario.name}: {compared.scenario.sentence}"))
-    table.add_column("")
-    for law in compared.measures:
-        table.add_column(Text(law.replace("_", " ")), justify="right")
+def tabulate(compared: Comparison) -> list[list[str]]:
+    """Return the table of a comparison, heads first: a row for each measure, with ``*`` at its smallest mean."""
+    rows = [["", *(law.replace("_", " ") for law in compared.measures)]]
     for name, unit in MEASURES.items():
         factor, shown = reading(unit, np.zeros(0))
+        label = f"{name.removesuffix('_s').removesuffix('_j').replace('_', ' ')} [{shown}]"
         best = compared.best(name)
-        cells = [Text(_cell(compared, law, name, factor, law in best)) for law in compared.measures]
-        table.add_row(Text(f"{name.removesuffix('_s').removesuffix('_j').replace('_', ' ')} [{shown}]"), *cells)
-    return table
+        rows.append([label, *(_cell(compared, law, name, factor, law in best) for law in compared.measures)])
+    return rows
 
 
 def describe_comparison(compared: Comparison) -> list[str]:
@@ -45,7 +36,7 @@ def describe_comparison(compared: Comparison) -> list[str]:
     if wins:
         lines.append(f"Motion control is the best in: {', '.join(wins)}.")
     lines += [
-        f"{law}: {lost} of {count} diverged, whose numbers are left out with those of the law."
+        f"{law}: {lost} of {count} diverged, so that it has no numbers here."
         for law, run in compared.runs.items()
         if (lost := int((run.status == "diverged").sum()))
     ]
