@@ -131,7 +131,7 @@ def _tell(compared: Comparison, written: dict[str, str], as_json: bool) -> None:
     from rich.console import Console
 
     from pathcontrol.cli.tables import comparison_table
-    from pathcontrol.comparison.summary import describe_comparison
+    from pathcontrol.comparison.comparison_table import describe_comparison
 
     Console().print(comparison_table(compared))
     for line in describe_comparison(compared):

@@ -61,7 +61,7 @@ def remark_lines(run: Run) -> list[str]:
 
 def comparison_table(compared: Comparison) -> Table:
     """Return the table of a comparison: a row for each measure, a column for each law."""
-    from pathcontrol.comparison.summary import tabulate
+    from pathcontrol.comparison.comparison_table import tabulate
 
     heads, *rows = tabulate(compared)
     table = Table(title=Text(printable(f"{compared.scenario.name}: {compared.scenario.sentence}")))

@@ -107,13 +107,20 @@ def make_scenario(name: str) -> Scenario:
     if name not in _SCENARIOS:
         choices = tuple(_SCENARIOS)
         raise UnknownNameError(
-            f"there is no scenario {name!r}, expected one of {', '.join(choices)}{did_you_mean(name, choices)}",
+            f"there is no scenario {name!r}, expected one of {', '.join(choices)}{_advise(name)}",
             argument="scenario",
             value=name,
             choices=choices,
         )
     sentence, change = _SCENARIOS[name]
     return change(_paper(name, sentence))
+
+
+def _advise(name: str) -> str:
+    """Return what to try in place of an unknown name."""
+    if name.endswith(".toml"):
+        return f"; load_scenario({name!r}) makes one of an experiment file"
+    return did_you_mean(name, _SCENARIOS)
 
 
 def _paper(name: str, sentence: str) -> Scenario:

@@ -170,6 +170,8 @@ def test_laws_that_are_none(laws, said):
 def test_what_does_not_fit_is_refused(arm, circle):
     with pytest.raises(pc.UnknownNameError, match="jammed-joint"):
         pc.compare(None, "jammed")
+    with pytest.raises(pc.UnknownNameError, match="load_scenario"):
+        pc.compare(None, "mine.toml")
     with pytest.raises(pc.InputError, match="another task"):
         pc.compare(pc.Projection(arm, pc.Circle(1.0, 1.0), 800.0, 45.0), "undisturbed")
     with pytest.raises(pc.InputError, match="rollouts"):

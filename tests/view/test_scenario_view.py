@@ -10,7 +10,7 @@ from browser import opened
 from lxml import html
 
 import pathcontrol as pc
-from pathcontrol.comparison.summary import describe_comparison, tabulate
+from pathcontrol.comparison.comparison_table import describe_comparison, tabulate
 
 LAWS = ["computed_torque", "projection"]
 

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from pathcontrol._files import whole_file
 from pathcontrol._suffixes import check_suffix
 from pathcontrol.comparison.compare import Comparison
-from pathcontrol.comparison.summary import describe_comparison, tabulate
+from pathcontrol.comparison.comparison_table import describe_comparison, tabulate
 from pathcontrol.view.animation.record import record
 from pathcontrol.view.figures.scenario_figure import scenario_figure
 from pathcontrol.view.page.html import Section, page
