@@ -84,7 +84,8 @@ class Setup(Structure):
     _fields_ = [
         *((name, c_int) for name in ("joints", "law", "compensation", "branch", "finish", "ends_run", "laps")),
         *((name, c_int) for name in ("substeps", "parts", "delayed")),
-        *((name, c_int) for name in ("encoders", "differentiates", "filters", "limited", "disturbances", "jams")),
+        *((name, c_int) for name in ("encoders", "differentiates", "filters", "limited")),
+        *((name, c_int) for name in ("disturbances", "jams", "drops")),
         ("period", c_double),
         ("part", c_double * 2),
         ("keep", c_double),

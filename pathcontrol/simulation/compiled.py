@@ -29,7 +29,7 @@ from pathcontrol.engine.structs import (
 from pathcontrol.engine.structs import Disturbance as DisturbanceStruct
 from pathcontrol.errors import EngineError
 from pathcontrol.robot.constants import frame_carrier
-from pathcontrol.simulation.arm.disturbance import Disturbance, FrameForce, Harmonic, Push, list_terms
+from pathcontrol.simulation.arm.disturbance import Disturbance, FrameForce, Harmonic, Push, TorqueLimitDrop, list_terms
 from pathcontrol.simulation.arm.jam import JammedJoint
 from pathcontrol.simulation.arm.noise import NoiseSource
 from pathcontrol.simulation.arm.plant import has_strong_friction
@@ -41,7 +41,7 @@ from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sampled import Actuator
 
 _BLOCK = 1 << 16  # ticks of all rollouts together between checks of Ctrl-C and the progress bar
-_JAM = 3  # the engine's number of JammedJoint
+_JAM, _DROP = 3, 4  # the engine's numbers of JammedJoint and TorqueLimitDrop
 _REASONS = {1: BEYOND, 2: NO_NUMBERS}
 
 
@@ -247,20 +247,21 @@ def _add_finish(setup: Setup, finish: Finish | None) -> None:
 
 
 def _add_disturbances(setup: Setup, disturbance: Disturbance | None, memory: Memory) -> None:
-    """Set pushes, sinusoids, forces on frames and joints that jam.
+    """Set pushes, sinusoids, forces on frames, joints that jam and motors that are weak.
 
     Raises:
         EngineError: one of them is the user's own.
     """
     structs = [_disturbance_struct(term, setup.joints, memory) for term in list_terms(disturbance)]
-    setup.disturbances, setup.jams = len(structs), any(one.kind == _JAM for one in structs)
+    kinds = {one.kind for one in structs}
+    setup.disturbances, setup.jams, setup.drops = len(structs), _JAM in kinds, _DROP in kinds
     if structs:
         setup.disturbance = addressof(memory.keep((DisturbanceStruct * len(structs))(*structs)))
 
 
 def _disturbance_struct(term: Disturbance, n: int, memory: Memory) -> DisturbanceStruct:
     """Return a disturbance as struct of the engine."""
-    kinds = (Push, Harmonic, FrameForce, JammedJoint)
+    kinds = (Push, Harmonic, FrameForce, JammedJoint, TorqueLimitDrop)
     if type(term) not in kinds:
         raise EngineError(f"the disturbance {type(term).__name__} is not one of the library")
     struct = DisturbanceStruct(kind=kinds.index(type(term)))
@@ -269,6 +270,9 @@ def _disturbance_struct(term: Disturbance, n: int, memory: Memory) -> Disturbanc
         struct.frequency, struct.phase = memory.numbers(term.frequency), memory.numbers(term.phase)
     elif isinstance(term, Push):
         struct.magnitude = memory.rows(term.magnitude, n)
+        struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)
+    elif isinstance(term, TorqueLimitDrop):
+        struct.magnitude = memory.rows(term.factor, n)
         struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)
     elif isinstance(term, JammedJoint):
         struct.magnitude = memory.rows(term.joints == np.arange(n), n)

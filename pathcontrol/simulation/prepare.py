@@ -59,15 +59,14 @@ def prepare(
 
     Raises:
         EngineError: the engine is to be the compiled one, and something of the simulation is beyond it.
-        InputError: the disturbance fails at the initial states, or holds joints in continuous time.
+        InputError: the disturbance fails at the initial states, or does what the loop cannot do.
         UnknownNameError: it names a joint that the arm does not have.
     """
     disturbance, first = outside
     slip = warn_of_slips(robot, task, q, first)
     outside = Outside(_find_joints(disturbance, robot), first)
     check_disturbance(outside.disturbance, q, qd)
-    if not isinstance(loop, SampledLoop) and outside.disturbance and outside.disturbance.held(0.0, q) is not None:
-        raise InputError("a joint that jams stops at once, which continuous time cannot do; give loop=SampledLoop(...)")
+    _check_loop(outside.disturbance, loop, q)
     arm, said = choose_engine(engine, controllers, loop, robot, q, qd, outside)
     slow = "" if first else warn_of_steps(controllers, loop, robot, q, qd, disturbance, duration)
     return Prepared(arm, said, slip or slow)
@@ -77,3 +76,17 @@ def _find_joints(disturbance: Any, robot: Arm) -> Any:
     """Return the disturbance with the joints that it names found in the arm; what is none is left to the check."""
     arm = robot.robots[0] if isinstance(robot, RobotBatch) else robot
     return disturbance.on(arm) if isinstance(disturbance, Disturbance) else disturbance
+
+
+def _check_loop(disturbance: Disturbance | None, loop: Loop, q: Array) -> None:
+    """Check that the loop can do what a disturbance does beside pushing."""
+    if disturbance is None:
+        return
+    holds, weakens = disturbance.held(0.0, q) is not None, disturbance.torque_factor(0.0) is not None
+    if isinstance(loop, SampledLoop):
+        if weakens and loop.torque_limits is False:
+            raise InputError("TorqueLimitDrop lowers torque limits, and the loop has none: give torque_limits=True")
+        return
+    if holds or weakens:
+        what = "a joint that jams stops at once" if holds else "torque limits drop at once"
+        raise InputError(f"{what}, which continuous time cannot do; give loop=SampledLoop(...)")

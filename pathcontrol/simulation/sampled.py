@@ -131,7 +131,7 @@ class SampledArm:
                 tau = self._actuator.clip(out.tau)
                 if lost.any:
                     tau = lost.replace_lost(tau, 0.0)
-                torques = self._actuator.torques(tau)
+                torques = [self._weaken(one) for one in self._actuator.torques(tau)]
                 recorder.write(self.q, self.qd, reading, out, torques[0])
                 if tick % _UPDATE_EVERY == 0:
                     update(tick)
@@ -164,6 +164,15 @@ class SampledArm:
                 t += plant.step
         self._ticks += 1
         self._reading = self._sensors.read(*self._add_noise(), self._reading)
+
+    def _weaken(self, tau: Array) -> Array:
+        """Return torques (N, n) within what a disturbance leaves of the limits in this period."""
+        middle = (self._ticks + 0.5) * self._period
+        share = None if self._disturbance is None else self._disturbance.torque_factor(middle)
+        if share is None or self._actuator.limits is None:
+            return tau
+        limits = self._actuator.limits * share
+        return np.minimum(np.maximum(tau, -limits), limits)
 
     def _add_noise(self) -> tuple[Array, Array]:
         """Return positions and velocities (N, n) with noise, as the sensors get them."""

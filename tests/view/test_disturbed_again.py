@@ -25,6 +25,7 @@ ALONE = {
 ROWS = {
     "pushes": pc.Push([[3.0, -1.0], [2.0, 0.5]], start=[0.02, 0.0], duration=[0.03, np.inf]),
     "waves": pc.Harmonic([0.1, 0.3], [7.0, 9.0], [0.0, 1.0]),
+    "drops": pc.TorqueLimitDrop([[0.1, 0.2], [0.0, 1.0]], [0.02, 0.0], 0.03),
     "jams": pc.JammedJoint(["joint_2", "joint_1"], [0.02, 0.0], 0.03),
     "forces": pc.FrameForce(ROBOT, "tool", [[0.1, 0.2, -5.0], [1.0, 0.0, 0.0]], duration=0.03),
 }
@@ -47,7 +48,7 @@ def assert_the_very_run(run, again):
 
 def simulated(disturbance, rows=1, loop=None, plant=ROBOT):
     law = pc.ExtendedMotionPlan(ROBOT, pc.Circle(0.5, 2.0), 800.0, K_v=[45.0, 100.0], k=20.0)
-    loop = pc.SampledLoop() if loop is None else loop
+    loop = pc.SampledLoop(torque_limits=True) if loop is None else loop
     q = [[0.7, 1.2]] * rows
     return pc.simulate(law, q, duration=0.08, disturbance=disturbance, loop=loop, plant=plant, progress=False)
 
@@ -64,6 +65,11 @@ def test_a_disturbed_run_is_made_again_bit_for_bit(name, loop, tmp_path, monkeyp
 @pytest.mark.parametrize("joint", [1, "joint_2"])
 def test_a_run_with_a_jam_is_made_again(joint, tmp_path, monkeypatch):
     run = simulated(PUSH + pc.JammedJoint(joint, 0.02, 0.03))
+    assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
+
+
+def test_a_run_with_weak_motors_is_made_again(tmp_path, monkeypatch):
+    run = simulated(PUSH + pc.TorqueLimitDrop([0.01, 0.5], 0.02, 0.03), loop=pc.SampledLoop(torque_limits=True))
     assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
 
 

@@ -161,12 +161,24 @@ template <class V> static NOINLINE bool find_held(const Setup &setup, const Plac
   return any(some);
 }
 
+// What disturbances leave of the torque limits at time t.
+template <class V> static NOINLINE void weaken(const Setup &setup, const Place<V> &place, double t, V *limit) {
+  for (int d = 0; d < setup.disturbances; d++) {
+    const Disturbance &one = setup.disturbance[d];
+    if (one.kind != TORQUE_LIMIT_DROP) continue;
+    const Mask<V> now = acts(place, one, t);
+    V share[MOST_JOINTS];
+    load(place, one.magnitude, setup.joints, share);
+    for (int i = 0; i < setup.joints; i++) limit[i] = select(now, limit[i] * share[i], limit[i]);
+  }
+}
+
 // Torques of the disturbances at time t, added to `tau`.
 template <int N, class V> static NOINLINE void add_disturbances(const Setup &setup, const Place<V> &place_, const V *q, double t, V *tau) {
   const int n = size<N>(setup.joints);
   for (int d = 0; d < setup.disturbances; d++) {
     const Disturbance &one = setup.disturbance[d];
-    if (one.kind == JAMMED_JOINT) continue;
+    if (one.kind > FRAME_FORCE) continue;  // it adds no torque
     V magnitude[MOST_JOINTS], frequency, phase, share = number<V>(1.0);
     load(place_, one.magnitude, one.kind == FRAME_FORCE ? 3 : n, magnitude);
     if (one.kind == HARMONIC) {
@@ -259,6 +271,13 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
       held[i] = setup.limited ? clamped(out.tau[i], V(-senses.limit[i]), senses.limit[i]) : out.tau[i];
       held[i] = select(lost, V{}, held[i]);
       for (int part = 0; part < setup.parts; part++) acting[part][i] = part < setup.delayed ? queue[(head + part) % setup.delayed * n + i] : held[i];
+    }
+    if (setup.drops && setup.limited) {
+      V limit[MOST_JOINTS];
+      for (int i = 0; i < n; i++) limit[i] = senses.limit[i];
+      weaken(setup, place, (span.arm_tick + sample + 0.5) * setup.period, limit);
+      for (int part = 0; part < setup.parts; part++)
+        for (int i = 0; i < n; i++) acting[part][i] = clamped(acting[part][i], V(-limit[i]), limit[i]);
     }
     write_sample<N>(record, sample * record.stride, place, n, r, out, acting[0]);
     look_at_finish(setup, paths, r, out.s, t);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import reduce
 from typing import Annotated, Any
 
 import numpy as np
@@ -42,6 +43,10 @@ class Disturbance(ABC):
         """Return which joints are held still at t [s], broadcasts to the shape of q (N, n); ``None`` for none."""
         return None
 
+    def torque_factor(self, t: float) -> Array | None:
+        """Return the share of its torque limit that each motor has at t [s], broadcasts to (N, n); ``None`` for all."""
+        return None
+
     def on(self, robot: RobotModel) -> Disturbance:
         """Return the disturbance with the joints that it names found in an arm.
 
@@ -75,6 +80,10 @@ class _Sum(Disturbance):
     def held(self, t: float, q: Array) -> NDArray[np.bool_] | None:
         masks = [mask for term in self.terms if (mask := term.held(t, q)) is not None]
         return np.logical_or.reduce(np.broadcast_arrays(q != q, *masks)) if masks else None
+
+    def torque_factor(self, t: float) -> Array | None:
+        shares = [share for term in self.terms if (share := term.torque_factor(t)) is not None]
+        return reduce(np.multiply, shares) if shares else None
 
     def on(self, robot: RobotModel) -> Disturbance:
         return _Sum(tuple(term.on(robot) for term in self.terms))
@@ -119,6 +128,35 @@ class Push(TimedDisturbance):
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
         return self.share(t) * self.magnitude
+
+
+class TorqueLimitDrop(TimedDisturbance):
+    """Motors that have only a share of their torque limits for a while: hot, or at a sagging supply.
+
+    What acts is limited anew in the periods of the loop whose middle the time covers, whenever it was asked for. It needs
+    torque limits, ``SampledLoop(torque_limits=…)``; the law knows nothing of it.
+
+    Args:
+        factor: what each motor still has of its limit, from 0 to 1: one number, (n,), or for each rollout, (N, n).
+        start: when it begins [s], or for each rollout, (N,).
+        duration: how long it lasts [s], or for each rollout, (N,).
+
+    Raises:
+        InputError: a factor is not from 0 to 1, or a time is no number.
+    """
+
+    def __init__(self, factor: Annotated[ArrayLike, Form.NUMBERS], start: Begin = 0.0, duration: Span = np.inf) -> None:
+        super().__init__(start, duration)
+        self.factor = freeze(check_finite("factor", as_array("factor", factor)))
+        if not ((self.factor >= 0) & (self.factor <= 1)).all():
+            raise InputError(f"factor = {self.factor.tolist()}, expected numbers from 0 to 1", argument="factor")
+
+    def torque(self, t: float, q: Array, qd: Array) -> Array:
+        """Return zeros: it takes torque away and adds none."""
+        return np.zeros(np.broadcast_shapes(np.shape(self.share(t)), np.shape(self.factor), (q.shape[-1],)))
+
+    def torque_factor(self, t: float) -> Array:
+        return np.where(self.share(t) > 0, self.factor, 1.0)
 
 
 class Harmonic(Disturbance):

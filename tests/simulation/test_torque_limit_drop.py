@@ -1,0 +1,79 @@
+"""Motors with a share of their torque limits: what acts is the demand within what is left, for as long as it lasts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import pathcontrol as pc
+
+ARM = pc.load_robot("cicese_2dof")
+LIMITS = ARM.limits.effort
+LAW = pc.ExtendedMotionPlan(ARM, pc.Circle(1.0, 3.0), 800.0, [45.0, 100.0], 20.0)
+
+
+def simulated(drop, law=LAW, q=(0.7, 1.2), **options):
+    loop = options.pop("loop", pc.SampledLoop(torque_limits=True))
+    return pc.simulate(law, q, duration=0.5, loop=loop, disturbance=drop, progress=False, **options)
+
+
+@pytest.mark.parametrize("engine", ["compiled", "pinocchio"])
+def test_what_acts_is_the_demand_within_the_limits_that_are_left(engine):
+    factor = np.array([0.1, 0.4])
+    run = simulated(pc.TorqueLimitDrop(factor, 0.1, 0.2), engine=engine)
+    during = (run.time >= 0.1 - 1e-9) & (run.time < 0.3 - 1e-9)
+    left = np.where(during[:, None], factor, 1.0) * LIMITS
+    assert_array_equal(run.array("tau")[0], np.clip(run.array("tau_demand")[0], -left, left))
+    assert (np.abs(run.array("tau")[0, during]).max(0) == factor * LIMITS).any()
+
+
+def test_torques_that_are_on_their_way_are_limited_when_they_act():
+    loop = pc.SampledLoop(torque_limits=True, delay=0.02)  # eight periods
+    run = simulated(pc.TorqueLimitDrop(0.05, 0.1, 0.2), loop=loop)
+    during = (run.time >= 0.1 - 1e-9) & (run.time < 0.3 - 1e-9)
+    asked = np.clip(run.array("tau_demand")[0], -LIMITS, LIMITS)
+    acts = np.concatenate([np.zeros((8, 2)), asked[:-8]])
+    left = np.where(during[:, None], 0.05, 1.0) * LIMITS
+    assert_array_equal(run.array("tau")[0], np.clip(acts, -left, left))
+
+
+@pytest.mark.parametrize("engine", ["compiled", "pinocchio"])
+def test_motors_without_torque_let_the_arm_fall_as_one_without_motors(engine):
+    falling = simulated(pc.TorqueLimitDrop(0.0), engine=engine)
+    q, qd, plant = np.array([[0.7, 1.2]]), np.zeros((1, 2)), pc.Plant(ARM, 2.5e-3)
+    for _ in range(200):
+        q, qd = plant.advance(q, qd, np.zeros((1, 2)))
+    assert_allclose(falling.array("q")[0, -1], q[0], rtol=0, atol=1e-11)
+
+
+def test_drops_compose_and_each_rollout_has_its_own():
+    factor, start = np.array([[0.5, 0.1], [0.2, 1.0]]), np.array([0.0, 0.2])
+    drops = pc.TorqueLimitDrop(factor, start, 0.3) + pc.TorqueLimitDrop(0.5, 0.1, 0.3)
+    together = simulated(drops)
+    for i in range(2):
+        alone = simulated(pc.TorqueLimitDrop(factor[i], start[i], 0.3) + pc.TorqueLimitDrop(0.5, 0.1, 0.3))
+        assert_array_equal(together.array("q")[i], alone.array("q")[0])
+    reference = simulated(drops, engine="pinocchio")
+    assert_allclose(reference.array("q"), together.array("q"), rtol=0, atol=1e-11)
+    both = (together.time >= 0.2 - 1e-9) & (together.time < 0.3 - 1e-9)
+    assert (np.abs(together.array("tau")[:, both]) <= 0.5 * factor[:, None] * LIMITS).all()
+
+
+def test_nothing_is_taken_from_motors_that_have_all():
+    assert_array_equal(simulated(pc.TorqueLimitDrop(1.0)).array("q"), simulated(None).array("q"))
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: pc.TorqueLimitDrop(1.5), "factor = 1.5, expected numbers from 0 to 1"),
+        (lambda: pc.TorqueLimitDrop([0.5, -0.1]), "expected numbers from 0 to 1"),
+        (lambda: simulated(pc.TorqueLimitDrop(0.5), loop=pc.SampledLoop()), "give torque_limits=True"),
+        (lambda: simulated(pc.TorqueLimitDrop(0.5), loop=pc.ContinuousTime()), "continuous time cannot"),
+        (lambda: simulated(pc.TorqueLimitDrop([0.5, 0.5, 0.5])), "TorqueLimitDrop"),
+    ],
+)
+def test_what_cannot_be(make, said):
+    with pytest.raises(pc.InputError, match=said):
+        make()
