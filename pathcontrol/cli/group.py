@@ -18,6 +18,7 @@ from typing import Any
 import click
 
 from pathcontrol._advice import reword_advice, reword_setting
+from pathcontrol._interrupts import delay_interrupt
 from pathcontrol.cli.quantity import QuantityType
 from pathcontrol.errors import PathControlError, PathControlWarning
 
@@ -141,22 +142,9 @@ def interrupts_kept() -> Iterator[None]:
         signal.signal(signal.SIGALRM, handler)
 
 
-@contextlib.contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Hold Ctrl-C back until the block is over: compiled modules do not survive it while they are imported."""
-    pressed: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if pressed:
-        raise KeyboardInterrupt
-
-
 def import_all() -> None:
     """Import everything that a command which simulates or draws will need."""
-    with uninterrupted():
+    with delay_interrupt():
         import pathcontrol.experiments.reproduce
         import pathcontrol.experiments.runner
         import pathcontrol.view.animation.record  # noqa: F401

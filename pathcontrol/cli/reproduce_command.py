@@ -8,7 +8,8 @@ from typing import Any
 
 import click
 
-from pathcontrol.cli.group import json_option, open_option, open_page, uninterrupted
+from pathcontrol._interrupts import delay_interrupt
+from pathcontrol.cli.group import json_option, open_option, open_page
 
 
 @click.command("reproduce")
@@ -43,7 +44,7 @@ def command(out: Path, sensitivity: bool, samples: int | None, opened: bool, as_
 
 def _import_all(sensitivity: bool) -> None:
     """Import what the runs, their files, and a sweep will need; a missing extra is reported before any simulation."""
-    with uninterrupted():
+    with delay_interrupt():
         import pathcontrol.experiments.reproduce
         import pathcontrol.simulation.storage.netcdf
         import pathcontrol.view.animation.record

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pathcontrol._interrupts import delay_interrupt
 from pathcontrol.cli.files import check_file
-from pathcontrol.cli.group import engine_option, json_option, uninterrupted
+from pathcontrol.cli.group import engine_option, json_option
 
 if TYPE_CHECKING:
     from pathcontrol.simulation.engines import Engine
@@ -54,7 +55,7 @@ def command(
     crash, finished chunks stay, and --resume computes the rest.
     """
     check_file(file, "an experiment")
-    with uninterrupted():
+    with delay_interrupt():
         from pathcontrol.experiments.sweep_runner import run_sweep
         from pathcontrol.sweeps.cluster.connection import load_security
         from pathcontrol.sweeps.parquet import load_parquet

@@ -8,9 +8,10 @@ from typing import Any
 
 import click
 
+from pathcontrol._interrupts import delay_interrupt
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.cli.files import check_file
-from pathcontrol.cli.group import json_option, uninterrupted
+from pathcontrol.cli.group import json_option
 from pathcontrol.cli.quantity import QuantityType, check_feed
 
 
@@ -76,7 +77,7 @@ def command(file: Path, plot: Path | None, as_json: bool, **options: Any) -> Non
     read = read_toolpath(file, **given)
     content = summary(read)
     if plot is not None:
-        with uninterrupted():
+        with delay_interrupt():
             from pathcontrol.view.figures.style import save_figure
             from pathcontrol.view.figures.toolpath_figure import toolpath_figure
         content["figures"] = [str(path) for path in save_figure(toolpath_figure(read), plot)]

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pathcontrol._interrupts import delay_interrupt
 from pathcontrol.cli.files import check_file
-from pathcontrol.cli.group import engine_option, json_option, uninterrupted
+from pathcontrol.cli.group import engine_option, json_option
 from pathcontrol.cli.sweep_command import chunk_option, out_option, resume_option
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def command(file: Path, out: Path | None, resume: bool, chunk: int, engine: Engi
     where every rollout is noted. After Ctrl-C it tells what was found, and --resume goes on.
     """
     check_file(file, "an experiment")
-    with uninterrupted():
+    with delay_interrupt():
         from pathcontrol.experiments.tune_runner import run_tune
         from pathcontrol.view.figures.pareto_figure import pareto_figure
         from pathcontrol.view.figures.style import save_figure

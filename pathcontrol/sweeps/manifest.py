@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from pathcontrol._files import append_line, write_whole
+from pathcontrol._interrupts import delay_interrupt
 from pathcontrol.errors import InputError
 from pathcontrol.sweeps.space import MOST_SAMPLES
 
@@ -73,8 +74,10 @@ class Manifest:
     def note(self, files: Mapping[str, str | None]) -> None:
         """Note files by their SHA-256, or by ``None`` for those to be removed, all of them or none."""
         content = {"files": dict(files)}
-        append_line(self.folder / LOG, json.dumps(content | {"sha256": _digest(content)}, sort_keys=True))
-        self._take(files)
+        line = json.dumps(content | {"sha256": _digest(content)}, sort_keys=True)
+        with delay_interrupt():
+            append_line(self.folder / LOG, line)
+            self._take(files)
 
     def settle(self) -> None:
         """Write the manifest with all files noted since."""

@@ -193,7 +193,7 @@ class Store:
                 notes |= {_run_place(other): None for other in self.kept() if other not in chosen}
             self.manifest.note(notes)
         except BaseException:
-            self._remove(place for place, digest in notes.items() if digest is not None)
+            self._remove(place for place in notes if place not in self.manifest.files)  # they have not been noted
             raise
         self._remove(place for place, digest in notes.items() if digest is None)
 

@@ -133,8 +133,8 @@ class Push(TimedDisturbance):
 class TorqueLimitDrop(TimedDisturbance):
     """Motors that have only a share of their torque limits for a while: hot, or at a sagging supply.
 
-    What acts is limited anew in the periods of the loop whose middle the time covers, whenever it was asked for. It needs
-    torque limits, ``SampledLoop(torque_limits=…)``; the law knows nothing of it.
+    What acts is limited anew in the periods of the loop whose middle the time covers, whenever it was asked for. It
+    needs torque limits, ``SampledLoop(torque_limits=…)``; the law knows nothing of it.
 
     Args:
         factor: what each motor still has of its limit, from 0 to 1: one number, (n,), or for each rollout, (N, n).
