@@ -68,7 +68,7 @@ def command(
         out = refuse_suffix(out, "a folder")
         import_all()
     found = _load(source)
-    compared = compare(laws or None, found, rollouts=rollouts, seed=seed, engine=engine or "auto")
+    compared = compare(laws or None, found, rollouts=rollouts, seed=seed, engine=engine)
     written = {} if out is None else _write(compared, out)
     _tell(compared, written, as_json)
     if opened and out is not None:

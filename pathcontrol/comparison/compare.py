@@ -15,7 +15,7 @@ from pathcontrol.comparison.measures import MEASURES, measure
 from pathcontrol.comparison.scenarios import Scenario, make_scenario
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import SimulationError
-from pathcontrol.simulation.engines import Engine
+from pathcontrol.simulation.engines import Engine, check_engine
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
 
@@ -87,7 +87,7 @@ def compare(
     *,
     rollouts: int = 16,
     seed: int = 0,
-    engine: Engine = "auto",
+    engine: Engine | None = None,
     progress: bool = True,
 ) -> Comparison:
     """Compare control laws in one scenario: same arm, task, plant, loop, starts and seeds, gains that mean the same.
@@ -118,7 +118,7 @@ def compare(
         scenario: a name of :func:`known_scenarios`, or a :class:`Scenario`.
         rollouts: how many starts: that of the scenario, and others near the path, see :meth:`Scenario.starts`.
         seed: of these starts.
-        engine: as for :func:`simulate`.
+        engine: as for :func:`simulate`, by default the scenario's.
         progress: show a bar on standard error when a run takes longer than two seconds.
 
     Raises:
@@ -130,6 +130,8 @@ def compare(
         scenario = make_scenario(scenario)
     expect("scenario", scenario, Scenario)
     made = make_laws(laws, scenario.robot, scenario.task, scenario.gains)
+    if engine is not None:
+        check_engine(engine)
     starts = scenario.starts(rollouts, seed)
     calm = scenario if scenario.undisturbed is None else scenario.undisturbed
     runs = {name: _run(law, scenario, starts, engine, progress) for name, law in made.items()}
@@ -139,7 +141,7 @@ def compare(
     return Comparison(scenario, made, runs, others, measures)
 
 
-def _run(law: Controller, scenario: Scenario, starts: Array, engine: Engine, progress: bool) -> Run:
+def _run(law: Controller, scenario: Scenario, starts: Array, engine: Engine | None, progress: bool) -> Run:
     """Return the run of one law; where all rollouts diverged, what happened until then."""
     try:
         return simulate(
@@ -150,7 +152,7 @@ def _run(law: Controller, scenario: Scenario, starts: Array, engine: Engine, pro
             plant=scenario.plant,
             loop=scenario.loop,
             disturbance=scenario.disturbance,
-            engine=engine,
+            engine=scenario.engine if engine is None else engine,
             progress=progress,
         )
     except SimulationError as error:

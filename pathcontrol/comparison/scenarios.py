@@ -17,6 +17,7 @@ from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.arm.jam import JammedJoint
 from pathcontrol.simulation.arm.noise import SensorNoise
+from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
 from pathcontrol.tasks.curves import Circle
 from pathcontrol.tasks.task import PathTask
@@ -44,6 +45,7 @@ class Scenario:
         disturbance: what else acts on the arm, or ``None``.
         event: from when to when something happens [s]; ``None`` where all of the run is as it is.
         gains: what all laws share.
+        engine: which engine runs it, see :func:`simulate`.
         undisturbed: the scenario without what happens in it; ``None`` if nothing does.
 
     Raises:
@@ -61,6 +63,7 @@ class Scenario:
     disturbance: Disturbance | None = None
     event: tuple[float, float] | None = None
     gains: Gains = field(default_factory=Gains)
+    engine: Engine = "auto"
     undisturbed: Scenario | None = None
 
     def __post_init__(self) -> None:

@@ -42,6 +42,7 @@ def load_scenario(path: str | Path) -> Scenario:
             disturbance=setup.disturbance,
             event=find_event(setup.disturbance, float(setup.duration)),
             gains=gains,
+            engine=setup.engine,
         )
     except InputError as error:
         raise ExperimentError(f"{str(path)!r} is no scenario for a comparison: {error}") from error

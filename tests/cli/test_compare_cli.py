@@ -83,6 +83,15 @@ def test_the_table_says_what_it_is_of_and_where_motion_control_wins():
     assert "time_lost_s" in said.rpartition("best in: ")[2]
 
 
+def test_the_engine_is_that_of_the_file_unless_told(tmp_path):
+    path = tmp_path / "mine.toml"
+    text = JAM.format(law="projection", gains=GAINS["projection"])
+    path.write_text('engine = "pinocchio"\n' + text.replace("10.0", "4.8", 1), encoding="utf-8")
+    scenario = pc.load_scenario(path)
+    used = [pc.compare("projection", scenario, rollouts=1, engine=engine) for engine in (None, "compiled")]
+    assert [one.runs["projection"].config["engine"] for one in used] == ["pinocchio", "compiled"]
+
+
 def test_chosen_laws_and_seed():
     said = done("--scenario", "undisturbed", "--law", "projection", "--law", "pd_plus", "--rollouts", 1, "--seed", 3)
     assert list(said["controllers"]) == ["projection", "pd_plus"]
