@@ -176,4 +176,5 @@ def test_ctrl_c_leaves_no_half_written_file(tmp_path):
 
 def test_the_console_script_is_the_same_command():
     assert main.name == "main"
-    assert set(main.commands) == {"reproduce", "run", "sweep", "tune", "view", "report", "check", "toolpath"}
+    known = {"reproduce", "run", "sweep", "tune", "compare", "view", "report", "check", "toolpath"}
+    assert set(main.commands) == known
