@@ -101,16 +101,16 @@ def compare(
     The measures, of the event and the time after it (without one of the second half of a closed path, or of a whole
     open one), in SI units:
 
-    ``contour_peak``, ``contour_rms``: distance to the nearest point of the path [rad].
-    ``lag_peak``: largest component along the path of q_d(s) − q [rad], s of the law. It is 0 for projection.
-    ``speed_peak``: largest ‖q̇‖ [rad/s].
-    ``torque_peak``: largest torque that acted, of all joints [N m].
-    ``recovery_s``: time after the end of the event until the contour error stays below 1.1 times its own undisturbed
-    peak [s]; inf where it does not, NaN where no event ends.
-    ``time_lost_s``: path parameter behind that of the undisturbed run at the end, over ϑ [s]. It is 0 for motion
-    control, whose s waits for nobody; what that costs are contour error and lag.
-    ``energy_j``: ∫|τ·q̇| dt [J].
-    ``saturated_s``: time with any torque at its limit [s].
+    - ``contour_peak``, ``contour_rms``: distance to the nearest point of the path [rad].
+    - ``lag_peak``: largest component along the path of q_d(s) − q [rad], s of the law. It is 0 for projection.
+    - ``speed_peak``: largest ‖q̇‖ [rad/s].
+    - ``torque_peak``: largest torque that acted, of all joints [N m].
+    - ``recovery_s``: time after the end of the event until the contour error stays below 1.1 times its own undisturbed
+      peak [s]; inf where it does not, NaN where no event ends.
+    - ``time_lost_s``: path parameter behind that of the undisturbed run at the end, over ϑ [s]. It is 0 for motion
+      control, whose s waits for nobody; what that costs are contour error and lag.
+    - ``energy_j``: ∫|τ·q̇| dt [J].
+    - ``saturated_s``: time with any torque at its limit [s].
 
     Args:
         laws: names of known laws, laws for ``scenario.robot`` and ``scenario.task``, or functions (robot, task) that
