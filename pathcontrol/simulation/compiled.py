@@ -40,7 +40,7 @@ from pathcontrol.simulation.loops import Outside, SampledLoop, check_rows
 from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sampled import Actuator
 
-_BLOCK = 1 << 16  # ticks of all rollouts together between checks of Ctrl-C and the progress bar
+_BLOCK = 1 << 17  # ticks of all rollouts together between checks of Ctrl-C and the progress bar
 _JAM, _DROP = 3, 4  # the engine's numbers of JammedJoint and TorqueLimitDrop
 _REASONS = {1: BEYOND, 2: NO_NUMBERS}
 
@@ -126,11 +126,11 @@ class CompiledArm:
         recorder = Recorder(rollouts, self._shape[1], ticks + 1)
         block = max(1, _BLOCK // rollouts)
         done, over = 0, False
-        with progress_bar("simulating", ticks, progress) as update:
+        with progress_bar("simulating", ticks, progress) as update, ThreadPoolExecutor(self._threads) as pool:
             while not over:
                 count = min(block, ticks - done)
                 last = done + count == ticks
-                samples = self._run_block(setup, recorder, done, count, last)
+                samples = self._run_block(setup, recorder, done, count, last, pool)
                 done += count
                 update(min(done, ticks))
                 over = last or samples < count or self._is_over(finish, setup)
@@ -153,8 +153,10 @@ class CompiledArm:
             state[name] = np.full(rollouts, np.nan)
         self.divergence = Divergence(state["home_q"], state["home_qd"])
 
-    def _run_block(self, setup: Setup, recorder: Recorder, done: int, count: int, last: bool) -> int:
-        """Run ``count`` ticks and return the number of samples recorded."""
+    def _run_block(
+        self, setup: Setup, recorder: Recorder, done: int, count: int, last: bool, pool: ThreadPoolExecutor
+    ) -> int:
+        """Run ``count`` ticks and return the number of samples recorded; this thread takes part."""
         rollouts = self._shape[0]
         width = lanes(self._library)
         noise = None if self._noise is None else self._noise.samples(count)
@@ -168,13 +170,10 @@ class CompiledArm:
         def work(begin: int, end: int) -> int:
             return int(self._library.pathcontrol_run(*pointers, *tail, begin, end))
 
-        if self._threads == 1:
-            samples = work(0, rollouts)
-        else:
-            packs = -(-rollouts // width)
-            cuts = [min(rollouts, width * round(packs * i / self._threads)) for i in range(self._threads + 1)]
-            with ThreadPoolExecutor(self._threads) as pool:
-                samples = max(pool.map(work, cuts[:-1], cuts[1:]))
+        packs = -(-rollouts // width)
+        cuts = [min(rollouts, width * round(packs * i / self._threads)) for i in range(self._threads + 1)]
+        others = pool.map(work, cuts[1:-1], cuts[2:])
+        samples = max([work(cuts[0], cuts[1]), *others])
         self._ticks += min(samples, count)
         recorder.add(samples)
         return samples
