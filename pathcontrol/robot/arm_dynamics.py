@@ -64,12 +64,12 @@ class ArmDynamics:
         """The robot's name in its URDF."""
         return self.pinocchio_model.name
 
-    @property
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, in the order of every ``(*batch, n)`` array."""
         return tuple(self.pinocchio_model.names)[1:]
 
-    @property
+    @cached_property
     def position_units(self) -> tuple[str, ...]:
         """The unit of each joint's position: ``"rad"`` for those that turn, ``"m"`` for those that slide."""
         joints = list(self.pinocchio_model.joints)[1:]

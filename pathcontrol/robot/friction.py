@@ -292,7 +292,11 @@ def levels_of(law: FrictionLaw, qd: Array) -> tuple[Array, Array]:
 
 
 def levels_vary(law: FrictionLaw) -> bool:
-    """Return whether the levels change with velocity, as tested at a few velocities."""
+    """Return whether the levels change with velocity, as tested at a few velocities where the law is not known."""
+    if isinstance(law, FrictionSum):
+        return any(map(levels_vary, law.terms))
+    if type(law) in (Viscous, Coulomb):
+        return False
     rest = law.levels(np.zeros((1, law.n)))
     tried = [law.levels(np.full((1, law.n), qd)) for qd in (-3.0, -0.1, -1e-3, 1e-3, 0.1, 3.0)]
     return any(not np.array_equal(a, b) for pair in tried for a, b in zip(pair, rest, strict=True))
