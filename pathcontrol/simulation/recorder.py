@@ -61,7 +61,7 @@ class Recorder:
     def arrays(self) -> dict[str, Array]:
         """Return all samples, rollouts first, and release the room that was not needed."""
         self._block.resize(self._samples, refcheck=False)
-        return {name: np.moveaxis(self._block[name], 0, 1) for name in VARIABLES}
+        return {name: self._block[name].swapaxes(0, 1) for name in VARIABLES}
 
     def _reserve_block(self, samples: int) -> Array:
         """Return the room for the next ``samples``; it doubles, as a run may end long before its duration."""
