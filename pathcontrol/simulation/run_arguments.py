@@ -151,22 +151,30 @@ def start_law(
         InputError: the law fails there, or does not give what :class:`ControlOutput` says.
     """
     z = _call_law(controller, q, controller.start, q, qd)
+    out = _call_law(controller, q, controller.law, 0.0, q, qd, z)
     if len(q) == 1:
-        asked = [lambda: controller.law(0.0, q, qd, z).tau]
-        if isinstance(disturbance, Disturbance):
-            asked.append(lambda: disturbance.torque(0.0, q, qd))
-        rows = max(map(_count_rows, asked))
+        pushed = None if disturbance is None else _first_torque(disturbance, q, qd)
+        rows = max(_count_rows(getattr(out, "tau", None)), _count_rows(pushed))
         q, qd = q.repeat(rows, axis=0), qd.repeat(rows, axis=0)
         z = z if len(z) == rows else np.repeat(z, rows, axis=0)
-    check_law(controller, q, qd, z)
+        out = out if rows == 1 else _call_law(controller, q, controller.law, 0.0, q, qd, z)
+    _check_output(controller, out, q, z)
     return q, qd, z
 
 
-def _count_rows(torque: Callable[[], Any]) -> int:
-    """Return the number of rows of a torque (N, n), or 1 where it fails; later checks report the failure."""
+def _first_torque(disturbance: Any, q: Array, qd: Array) -> Any:
+    """Return the torque of a disturbance at the start, or None where it fails; a later check reports the failure."""
     try:
-        shape = np.shape(torque())
+        return disturbance.torque(0.0, q, qd)
     except Exception:  # code of the user
+        return None
+
+
+def _count_rows(torque: Any) -> int:
+    """Return the number of rows of a torque (N, n), or 1 where it is something else, which later checks report."""
+    try:
+        shape = np.shape(torque)
+    except ValueError:  # lists of different lengths
         return 1
     return max(1, shape[0]) if len(shape) == 2 else 1
 
@@ -186,8 +194,17 @@ def check_controller(name: str, controller: Any) -> None:
 
 
 def check_law(controller: Controller, q: Array, qd: Array, z: Array) -> None:
-    """Check that the law returns a :class:`ControlOutput` whose shapes fit the initial states, with finite numbers."""
-    name, out = type(controller).__name__, _call_law(controller, q, controller.law, 0.0, q, qd, z)
+    """Check what the law returns at the initial states.
+
+    Raises:
+        InputError: the law fails there, or does not give what :class:`ControlOutput` says.
+    """
+    _check_output(controller, _call_law(controller, q, controller.law, 0.0, q, qd, z), q, z)
+
+
+def _check_output(controller: Controller, out: Any, q: Array, z: Array) -> None:
+    """Check that a law returned a :class:`ControlOutput` whose shapes fit the initial states, with finite numbers."""
+    name = type(controller).__name__
     if not isinstance(out, ControlOutput):
         raise InputError(f"{name}.law returns {type(out).__name__}, expected a ControlOutput")
     wanted = {"tau": q.shape, "e_p": q.shape, "e_v": q.shape, "zdot": np.shape(z)}
