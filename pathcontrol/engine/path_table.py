@@ -44,6 +44,7 @@ class PathTable(NamedTuple):
         closed: whether the path repeats.
         ending: how the plan of an open path comes to rest, else ``None``.
         arrival: the s from which on an arm has arrived at the end of an open path; ∞ for a closed one.
+        width: the median width of a piece.
     """
 
     knots: Array
@@ -51,6 +52,7 @@ class PathTable(NamedTuple):
     closed: bool
     ending: Ending | None
     arrival: float
+    width: float
 
     def struct(self, memory: Memory) -> Path:
         """Return the table for the engine; its arrays live as long as ``memory``."""
@@ -120,7 +122,8 @@ def make_table(task: PathTask) -> PathTable:
     coefficients = np.concatenate([hermite.coefficients(knots, jets), rate[..., None]], axis=-1)
     ending = Ending.of(task)
     arrival = np.inf if task.closed else arrival_parameter(task)
-    table = PathTable(knots, np.moveaxis(coefficients, 0, 1), task.closed, ending, arrival)
+    width = float(np.median(np.diff(knots)))
+    table = PathTable(knots, np.moveaxis(coefficients, 0, 1), task.closed, ending, arrival, width)
     if not _agrees(table, task):
         raise EngineError(
             f"{name} is not smooth enough for a table of quintics: q_d must have two derivatives that fit"
@@ -226,7 +229,7 @@ def _agrees(table: PathTable, task: PathTask) -> bool:
     steepest[-1] = max(steepest[-1], extent[-1] / (domain[1] - domain[0]))  # smaller ϑ' do not count
     rounding = _ROUNDING * np.abs(expected[0]).max()
     close = np.abs(found[0] - expected[0]) <= 2 * _VALUE * extent + rounding
-    along = np.abs(found[1] - expected[1]) <= 4 * _SLOPE * steepest + rounding / np.median(np.diff(table.knots)) + 1e-12
+    along = np.abs(found[1] - expected[1]) <= 4 * _SLOPE * steepest + rounding / table.width + 1e-12
     return bool(close.all() and along.all())
 
 

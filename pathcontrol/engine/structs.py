@@ -170,8 +170,9 @@ class Memory:
         """Return values (), (columns,), (N, 1) or (N, columns) as rows of ``columns`` numbers."""
         array = np.asarray(values, dtype=np.float64)
         several = array.ndim > 1 and len(array) > 1
-        wide = np.broadcast_to(array, (len(array) if several else 1, columns))
-        return Rows(self.address(wide), columns if several else 0)
+        if array.shape[-1:] != (columns,):
+            array = np.broadcast_to(array, (len(array) if several else 1, columns))
+        return Rows(self.address(array), columns if several else 0)
 
     def numbers(self, values: Any) -> Rows:
         """Return values () or (N,) as rows of one number."""
