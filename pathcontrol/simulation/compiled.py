@@ -29,7 +29,15 @@ from pathcontrol.engine.structs import (
 from pathcontrol.engine.structs import Disturbance as DisturbanceStruct
 from pathcontrol.errors import EngineError
 from pathcontrol.robot.constants import frame_carrier
-from pathcontrol.simulation.arm.disturbance import Disturbance, FrameForce, Harmonic, Push, TorqueLimitDrop, list_terms
+from pathcontrol.simulation.arm.disturbance import (
+    Disturbance,
+    FrameForce,
+    Harmonic,
+    Push,
+    TimedDisturbance,
+    TorqueLimitDrop,
+    list_terms,
+)
 from pathcontrol.simulation.arm.jam import JammedJoint
 from pathcontrol.simulation.arm.noise import NoiseSource
 from pathcontrol.simulation.arm.plant import has_strong_friction
@@ -41,7 +49,7 @@ from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sampled import Actuator
 
 _BLOCK = 1 << 17  # ticks of all rollouts together between checks of Ctrl-C and the progress bar
-_JAM, _DROP = 3, 4  # the engine's numbers of JammedJoint and TorqueLimitDrop
+_DISTURBANCES = (Push, Harmonic, FrameForce, JammedJoint, TorqueLimitDrop)  # in the order of the engine's numbers
 _REASONS = {1: BEYOND, 2: NO_NUMBERS}
 
 
@@ -252,32 +260,29 @@ def _add_disturbances(setup: Setup, disturbance: Disturbance | None, memory: Mem
         EngineError: one of them is the user's own.
     """
     structs = [_disturbance_struct(term, setup.joints, memory) for term in list_terms(disturbance)]
-    kinds = {one.kind for one in structs}
-    setup.disturbances, setup.jams, setup.drops = len(structs), _JAM in kinds, _DROP in kinds
+    kinds = {_DISTURBANCES[one.kind] for one in structs}
+    setup.disturbances, setup.jams, setup.drops = len(structs), JammedJoint in kinds, TorqueLimitDrop in kinds
     if structs:
         setup.disturbance = addressof(memory.keep((DisturbanceStruct * len(structs))(*structs)))
 
 
 def _disturbance_struct(term: Disturbance, n: int, memory: Memory) -> DisturbanceStruct:
     """Return a disturbance as struct of the engine."""
-    kinds = (Push, Harmonic, FrameForce, JammedJoint, TorqueLimitDrop)
-    if type(term) not in kinds:
+    if type(term) not in _DISTURBANCES:
         raise EngineError(f"the disturbance {type(term).__name__} is not one of the library")
-    struct = DisturbanceStruct(kind=kinds.index(type(term)))
+    struct = DisturbanceStruct(kind=_DISTURBANCES.index(type(term)))
+    if isinstance(term, TimedDisturbance):
+        struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)
     if isinstance(term, Harmonic):
         struct.magnitude = memory.rows(term.amplitude, n)
         struct.frequency, struct.phase = memory.numbers(term.frequency), memory.numbers(term.phase)
     elif isinstance(term, Push):
         struct.magnitude = memory.rows(term.magnitude, n)
-        struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)
     elif isinstance(term, TorqueLimitDrop):
         struct.magnitude = memory.rows(term.factor, n)
-        struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)
     elif isinstance(term, JammedJoint):
         struct.magnitude = memory.rows(term.joints == np.arange(n), n)
-        struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)
     elif isinstance(term, FrameForce):
-        struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)
         _set_frame(struct, term, memory)
     return struct
 

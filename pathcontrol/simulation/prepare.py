@@ -62,12 +62,11 @@ def prepare(
         InputError: the disturbance fails at the initial states, or does what the loop cannot do.
         UnknownNameError: it names a joint that the arm does not have.
     """
-    disturbance, first = outside
+    disturbance, first = _find_joints(outside.disturbance, robot), outside.first
     slip = warn_of_slips(robot, task, q, first)
-    outside = Outside(_find_joints(disturbance, robot), first)
-    check_disturbance(outside.disturbance, q, qd)
-    _check_loop(outside.disturbance, loop, q)
-    arm, said = choose_engine(engine, controllers, loop, robot, q, qd, outside)
+    check_disturbance(disturbance, q, qd)
+    _check_loop(disturbance, loop, q)
+    arm, said = choose_engine(engine, controllers, loop, robot, q, qd, Outside(disturbance, first))
     slow = "" if first else warn_of_steps(controllers, loop, robot, q, qd, disturbance, duration)
     return Prepared(arm, said, slip or slow)
 
@@ -75,14 +74,14 @@ def prepare(
 def _find_joints(disturbance: Any, robot: Arm) -> Any:
     """Return the disturbance with the joints that it names found in the arm; what is none is left to the check."""
     arm = robot.robots[0] if isinstance(robot, RobotBatch) else robot
-    return disturbance.on(arm) if isinstance(disturbance, Disturbance) else disturbance
+    return disturbance.find_joints(arm) if isinstance(disturbance, Disturbance) else disturbance
 
 
 def _check_loop(disturbance: Disturbance | None, loop: Loop, q: Array) -> None:
     """Check that the loop can do what a disturbance does beside pushing."""
     if disturbance is None:
         return
-    holds, weakens = disturbance.held(0.0, q) is not None, disturbance.torque_factor(0.0) is not None
+    holds, weakens = disturbance.held_joints(0.0, q) is not None, disturbance.torque_factor(0.0) is not None
     if isinstance(loop, SampledLoop):
         if weakens and loop.torque_limits is False:
             raise InputError("TorqueLimitDrop lowers torque limits, and the loop has none: give torque_limits=True")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from math import prod
+
 import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import ControlOutput
+from pathcontrol.errors import InputError
 from pathcontrol.simulation.arm.sensors import Reading
 from pathcontrol.simulation.variables import VARIABLES
 
+_LARGEST = 2**31 - 1  # bytes of a sample, which NumPy's types of records allow
 _ROOM = 1 << 30  # bytes reserved at first; pages that are not written take no memory
 
 
@@ -22,6 +26,9 @@ class Recorder:
         rollouts: number of rollouts.
         joints: number of joints.
         samples: largest number of samples.
+
+    Raises:
+        InputError: a sample takes 2 GiB or more.
     """
 
     def __init__(self, rollouts: int, joints: int, samples: int) -> None:
@@ -29,6 +36,11 @@ class Recorder:
         whole = {"rollout": rollouts, "joint": joints}
         shapes = {name: tuple(whole[dim] for dim in dims if dim in whole) for name, (dims, _, _) in VARIABLES.items()}
         fields = [(name, bool if name == "regular" else np.float64, shape) for name, shape in shapes.items()]
+        if sum(8 * prod(shape) for shape in shapes.values()) > _LARGEST:
+            raise InputError(
+                f"{rollouts} rollouts of {joints} joints at once, expected less than 2 GiB a sample; simulate them in "
+                "parts with first_rollout, or by sweep"
+            )
         sample = np.dtype(fields, align=True)
         self._block = np.empty(min(samples, max(1, _ROOM // max(1, sample.itemsize))), dtype=sample)
 

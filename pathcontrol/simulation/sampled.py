@@ -159,7 +159,7 @@ class SampledArm:
                 pushed, held, middle = acting, None, t + 0.5 * plant.step
                 if self._disturbance is not None:
                     pushed = acting + self._disturbance.torque(middle, self.q, self.qd)
-                    held = self._disturbance.held(middle, self.q)
+                    held = self._disturbance.held_joints(middle, self.q)
                 self.q, self.qd = plant.advance(self.q, self.qd, pushed, held)
                 t += plant.step
         self._ticks += 1

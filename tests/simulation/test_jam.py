@@ -122,6 +122,18 @@ def test_a_motor_goes_on_pushing_and_friction_of_a_held_joint_does_nothing():
     assert np.ptp(runs[0].array("tau_demand")[0, :, 1]) > 0.1
 
 
+def test_attributes_of_a_disturbance_of_ones_own_may_be_called_anything():
+    class Kick(pc.Disturbance):
+        def __init__(self):
+            self.on, self.held = 1.0, True
+
+        def torque(self, t, q, qd):
+            return self.on * np.ones_like(q)
+
+    run = run_with(Kick() + pc.JammedJoint("joint_2"))
+    assert np.ptp(run.array("q")[0, :, 1]) == 0
+
+
 def test_a_file_says_it(tmp_path):
     file = tmp_path / "jam.toml"
     file.write_text(

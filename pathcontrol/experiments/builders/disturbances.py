@@ -47,7 +47,7 @@ def build_disturbance(
         rows = {name: np.array([one[name] for one in values]) for name in differ}
         one: Disturbance = make(key, sections[0], DISTURBANCES, place, {"robot": plant}, rows)
         with report_users_code(key, f"{type(one).__name__} at the start"):
-            check_disturbance(one.on(plant), q, qd)
+            check_disturbance(one.find_joints(plant), q, qd)
         made.append(one)
     return reduce(add, made) if made else None
 

@@ -39,7 +39,7 @@ class Disturbance(ABC):
         """The times [s] at which it jumps, (k,); continuous time is integrated from one to the next."""
         return np.empty(0)
 
-    def held(self, t: float, q: Array) -> NDArray[np.bool_] | None:
+    def held_joints(self, t: float, q: Array) -> NDArray[np.bool_] | None:
         """Return which joints are held still at t [s], broadcasts to the shape of q (N, n); ``None`` for none."""
         return None
 
@@ -47,7 +47,7 @@ class Disturbance(ABC):
         """Return the share of its torque limit that each motor has at t [s], broadcasts to (N, n); ``None`` for all."""
         return None
 
-    def on(self, robot: RobotModel) -> Disturbance:
+    def find_joints(self, robot: RobotModel) -> Disturbance:
         """Return the disturbance with the joints that it names found in an arm.
 
         Raises:
@@ -77,16 +77,16 @@ class _Sum(Disturbance):
     def jumps(self) -> Array:
         return np.concatenate([jump_times(term) for term in self.terms])
 
-    def held(self, t: float, q: Array) -> NDArray[np.bool_] | None:
-        masks = [mask for term in self.terms if (mask := term.held(t, q)) is not None]
-        return np.logical_or.reduce(np.broadcast_arrays(q != q, *masks)) if masks else None
+    def held_joints(self, t: float, q: Array) -> NDArray[np.bool_] | None:
+        masks = [mask for term in self.terms if (mask := term.held_joints(t, q)) is not None]
+        return np.logical_or.reduce(np.broadcast_arrays(np.zeros(q.shape, dtype=bool), *masks)) if masks else None
 
     def torque_factor(self, t: float) -> Array | None:
         shares = [share for term in self.terms if (share := term.torque_factor(t)) is not None]
         return reduce(np.multiply, shares) if shares else None
 
-    def on(self, robot: RobotModel) -> Disturbance:
-        return _Sum(tuple(term.on(robot) for term in self.terms))
+    def find_joints(self, robot: RobotModel) -> Disturbance:
+        return _Sum(tuple(term.find_joints(robot) for term in self.terms))
 
     def describe(self) -> dict[str, Any]:
         return {"disturbance": "sum", "terms": [term.describe() for term in self.terms]}
@@ -257,9 +257,9 @@ def _check_term(disturbance: Disturbance, q: Array, qd: Array) -> None:
         ) from error
     if torque.shape not in ((), q.shape[1:], (1, q.shape[1]), q.shape):
         raise InputError(f"{name}.torque has shape {torque.shape}, expected {q.shape}: rollouts and joints")
-    held = disturbance.held(0.0, q)
+    held = disturbance.held_joints(0.0, q)
     if held is not None and np.shape(held) not in (q.shape[1:], (1, q.shape[1]), q.shape):
-        raise InputError(f"{name}.held has shape {np.shape(held)}, expected {q.shape}: rollouts and joints")
+        raise InputError(f"{name}.held_joints has shape {np.shape(held)}, expected {q.shape}: rollouts and joints")
     if not np.isfinite(torque).all():
         raise InputError(f"{name}.torque gives {torque.tolist()} at the start, expected numbers", argument=name)
     jump_times(disturbance)

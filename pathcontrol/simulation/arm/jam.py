@@ -47,7 +47,7 @@ class JammedJoint(TimedDisturbance):
         rows = np.shape(self.share(t))[:1] or np.shape(self.joint)
         return np.zeros((*rows, q.shape[-1]))
 
-    def held(self, t: float, q: Array) -> NDArray[np.bool_]:
+    def held_joints(self, t: float, q: Array) -> NDArray[np.bool_]:
         """Return the joint while it is jammed, (n,), or for each rollout, (N, n)."""
         return (self.joints == np.arange(q.shape[-1])) & (self.share(t) > 0)
 
@@ -59,10 +59,12 @@ class JammedJoint(TimedDisturbance):
             InputError: the joint has a name, and no arm has been asked for its number.
         """
         if self._index is None:
-            raise InputError(f"joint = {self.joint!r} is a name: use JammedJoint(...).on(robot), as simulate does")
+            raise InputError(
+                f"joint = {self.joint!r} is a name: use JammedJoint(...).find_joints(robot), as simulate does"
+            )
         return self._index[..., None]
 
-    def on(self, robot: RobotModel) -> JammedJoint:
+    def find_joints(self, robot: RobotModel) -> JammedJoint:
         if self._index is not None:
             self._check(robot.n)
             return self
