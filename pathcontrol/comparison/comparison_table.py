@@ -18,7 +18,7 @@ def tabulate(compared: Comparison) -> list[list[str]]:
     rows = [["", *(law.replace("_", " ") for law in compared.measures)]]
     for name, unit in MEASURES.items():
         factor, shown = reading(unit, np.zeros(0))
-        label = f"{name.removesuffix('_s').removesuffix('_j').replace('_', ' ')} [{shown}]"
+        label = f"{_in_words(name)} [{shown}]"
         best = compared.best(name)
         rows.append([label, *(_cell(compared, law, name, factor, law in best) for law in compared.measures)])
     return rows
@@ -32,7 +32,7 @@ def describe_comparison(compared: Comparison) -> list[str]:
         f"Mean ± standard deviation of {count} starts, from {begin:g} to {end:g} s; * is the smallest in size.",
         f"Recovered is an arm whose contour error stays below {RECOVERED:g} times its own undisturbed peak.",
     ]
-    wins = [name for name in MEASURES if _is_won_by_motion(compared, name)]
+    wins = [_in_words(name) for name in MEASURES if _is_won_by_motion(compared, name)]
     if wins:
         lines.append(f"Motion control is the best in: {', '.join(wins)}.")
     lines += [
@@ -41,6 +41,11 @@ def describe_comparison(compared: Comparison) -> list[str]:
         if (lost := int((run.status == "diverged").sum()))
     ]
     return lines
+
+
+def _in_words(measure: str) -> str:
+    """Return the name of a measure as a reader has it, without its unit."""
+    return measure.removesuffix("_s").removesuffix("_j").replace("_", " ")
 
 
 def _is_won_by_motion(compared: Comparison, measure: str) -> bool:

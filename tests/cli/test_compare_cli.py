@@ -80,7 +80,7 @@ def test_the_table_says_what_it_is_of_and_where_motion_control_wins():
     said = call("--scenario", "jammed-joint", "--rollouts", 2).stdout
     assert "from 4 to 10 s" in said
     assert "Motion control is the best in: " in said
-    assert "time_lost_s" in said.rpartition("best in: ")[2]
+    assert "time lost" in said.rpartition("best in: ")[2]
 
 
 def test_the_engine_is_that_of_the_file_unless_told(tmp_path):
