@@ -10,6 +10,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.engine.structs import MOST_STRIBECK, FrictionRows, Memory
 from pathcontrol.errors import EngineError
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, FrictionOfGroups, FrictionSum, Stribeck, Viscous
+from pathcontrol.robot.scaled_friction import ScaledFriction
 
 
 class Coefficients(NamedTuple):
@@ -54,6 +55,8 @@ def coefficients_of(law: FrictionLaw) -> Coefficients:
         return _add([coefficients_of(term) for term in law.terms])
     if type(law) is FrictionOfGroups:
         return _gather_groups(law)
+    if type(law) is ScaledFriction:
+        return _scale(coefficients_of(law.law), law.factor)
     raise EngineError(f"the friction law {type(law).__name__} is not one of the library")
 
 
@@ -68,6 +71,12 @@ def _add(terms: list[Coefficients]) -> Coefficients:
         sum((t.backward for t in terms[1:]), terms[0].backward),
         falling,
     )
+
+
+def _scale(law: Coefficients, factor: Array) -> Coefficients:
+    """Multiply the coefficients of a law."""
+    falling = tuple((factor * fall, velocity) for fall, velocity in law.falling)
+    return Coefficients(factor * law.viscous, factor * law.forward, factor * law.backward, falling)
 
 
 def _gather_groups(law: FrictionOfGroups) -> Coefficients:

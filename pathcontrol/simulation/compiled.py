@@ -29,6 +29,7 @@ from pathcontrol.engine.structs import (
 from pathcontrol.engine.structs import Disturbance as DisturbanceStruct
 from pathcontrol.errors import EngineError
 from pathcontrol.robot.constants import frame_carrier
+from pathcontrol.simulation.arm.changing_arm import ChangingArm
 from pathcontrol.simulation.arm.disturbance import (
     Disturbance,
     FrameForce,
@@ -38,6 +39,7 @@ from pathcontrol.simulation.arm.disturbance import (
     TorqueLimitDrop,
     list_terms,
 )
+from pathcontrol.simulation.arm.friction_change import FrictionChange
 from pathcontrol.simulation.arm.jam import JammedJoint
 from pathcontrol.simulation.arm.noise import NoiseSource
 from pathcontrol.simulation.arm.plant import has_strong_friction
@@ -50,6 +52,7 @@ from pathcontrol.simulation.sampled import Actuator
 
 _BLOCK = 1 << 17  # ticks of all rollouts together between checks of Ctrl-C and the progress bar
 _DISTURBANCES = (Push, Harmonic, FrameForce, JammedJoint, TorqueLimitDrop)  # in the order of the engine's numbers
+_CHANGES = (FrictionChange,)  # what only changes the arm, from block to block
 _REASONS = {1: BEYOND, 2: NO_NUMBERS}
 
 
@@ -104,12 +107,14 @@ class CompiledArm:
         controllers: Sequence[Controller],
     ) -> None:
         self._library, self._memory, self._setup = load_library(), Memory(), Setup(joints=robot.n)
+        self._arm_memory = Memory()
         self._loop, self._shape, self._ticks = loop, q.shape, 0
         self._threads = max(1, min(_threads(robot), -(-len(q) // lanes(self._library))))
         self._noise = None if loop.noise is None else NoiseSource(loop.noise, q.shape, outside.first)
         sensors, actuator = loop.sensors(robot), Actuator(loop, robot, q.shape)
         check_rows(sensors.resolution, "encoders", len(q))
         self._add_loop(sensors.resolution, actuator)
+        self._changing = ChangingArm(robot, outside.disturbance, loop.period)
         add_plant(self._setup, robot, has_strong_friction(robot), self._memory)
         _add_disturbances(self._setup, outside.disturbance, self._memory)
         self._laws = {controller: self._add_law(controller) for controller in controllers}
@@ -136,7 +141,7 @@ class CompiledArm:
         done, over = 0, False
         with progress_bar("simulating", ticks, progress) as update, ThreadPoolExecutor(self._threads) as pool:
             while not over:
-                count = min(block, ticks - done)
+                count = self._begin_block(setup, min(block, ticks - done))
                 last = done + count == ticks
                 samples = self._run_block(setup, recorder, done, count, last, pool)
                 done += count
@@ -160,6 +165,14 @@ class CompiledArm:
         for name in ("lap_start", "finish_time", "diverged_time"):
             state[name] = np.full(rollouts, np.nan)
         self.divergence = Divergence(state["home_q"], state["home_qd"])
+
+    def _begin_block(self, setup: Setup, most: int) -> int:
+        """Set the arm as it is now, and return the number of ticks, ``most`` at most, until it changes."""
+        if not self._changing.changes:
+            return most
+        arm, self._arm_memory = self._changing.at(self._ticks), Memory()
+        add_plant(setup, arm, has_strong_friction(arm), self._arm_memory)
+        return int(min(most, self._changing.next_change(self._ticks) - self._ticks))
 
     def _run_block(
         self, setup: Setup, recorder: Recorder, done: int, count: int, last: bool, pool: ThreadPoolExecutor
@@ -259,7 +272,8 @@ def _add_disturbances(setup: Setup, disturbance: Disturbance | None, memory: Mem
     Raises:
         EngineError: one of them is the user's own.
     """
-    structs = [_disturbance_struct(term, setup.joints, memory) for term in list_terms(disturbance)]
+    terms = [term for term in list_terms(disturbance) if type(term) not in _CHANGES]
+    structs = [_disturbance_struct(term, setup.joints, memory) for term in terms]
     kinds = {_DISTURBANCES[one.kind] for one in structs}
     setup.disturbances, setup.jams, setup.drops = len(structs), JammedJoint in kinds, TorqueLimitDrop in kinds
     if structs:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
+from pathcontrol.simulation.arm.changing_arm import ChangingArm
 from pathcontrol.simulation.arm.noise import NoiseSource
 from pathcontrol.simulation.arm.plant import Plant
 from pathcontrol.simulation.arm.sensors import Reading
@@ -99,7 +100,9 @@ class SampledArm:
         self.q, self.qd, self._period, self._substeps = q, qd, loop.period, loop.substeps
         self._sensors, self._actuator = loop.sensors(robot), Actuator(loop, robot, q.shape)
         check_rows(self._sensors.resolution, "encoders", len(q))
-        self._plants = [plant(robot, part / loop.substeps) for part in self._actuator.parts]
+        self._make_plant, self._robot = plant, robot
+        self._plants = self._make_plants(robot)
+        self._changing = ChangingArm(robot, outside.disturbance, loop.period)
         self._noise = None if loop.noise is None else NoiseSource(loop.noise, q.shape, outside.first)
         self._reading = self._sensors.start(*self._add_noise())
         self._reading = self._sensors.read(*self._add_noise(), self._reading)
@@ -153,7 +156,9 @@ class SampledArm:
 
     def _advance(self, torques: Sequence[Array]) -> None:
         """Advance by one period, with the torque of each part of it."""
-        t = self._ticks * self._period
+        t, arm = self._ticks * self._period, self._changing.at(self._ticks)
+        if arm is not self._robot:
+            self._robot, self._plants = arm, self._make_plants(arm)
         for plant, acting in zip(self._plants, torques, strict=True):
             for _ in range(self._substeps):
                 pushed, held, middle = acting, None, t + 0.5 * plant.step
@@ -164,6 +169,10 @@ class SampledArm:
                 t += plant.step
         self._ticks += 1
         self._reading = self._sensors.read(*self._add_noise(), self._reading)
+
+    def _make_plants(self, robot: Arm) -> list[Stepper]:
+        """Return the steppers of an arm for the parts of a period."""
+        return [self._make_plant(robot, part / self._substeps) for part in self._actuator.parts]
 
     def _weaken(self, tau: Array) -> Array:
         """Return torques (N, n) within what a disturbance leaves of the limits in this period."""

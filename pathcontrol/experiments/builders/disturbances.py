@@ -21,7 +21,7 @@ from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
 
 _ARGUMENT = re.compile(r"disturbance(?:\[(\d+)\])?\.(\w+)(?:\[\d+\])*")
-_NUMBERS = (Form.NUMBER, Form.NUMBERS, Form.POSITIVE)
+_NUMBERS = (Form.NUMBER, Form.NUMBERS, Form.POSITIVE, Form.GAIN)
 
 
 def build_disturbance(
@@ -44,12 +44,19 @@ def build_disturbance(
         key = f"disturbance[{i}]" if isinstance(experiments[0].disturbance, list) else "disturbance"
         values = [arguments_of(key, section, DISTURBANCES, place) for section in sections]
         differ = {name for one in values for name in one if one[name] != values[0].get(name)}
-        rows = {name: np.array([one[name] for one in values]) for name in differ}
+        rows = {name: _stack(type(sections[0]), name, [one[name] for one in values]) for name in differ}
         one: Disturbance = make(key, sections[0], DISTURBANCES, place, {"robot": plant}, rows)
         with report_users_code(key, f"{type(one).__name__} at the start"):
-            check_disturbance(one.find_joints(plant), q, qd)
+            check_disturbance(one.find_names(plant), q, qd)
         made.append(one)
     return reduce(add, made) if made else None
+
+
+def _stack(section: Any, name: str, values: list[Any]) -> Array:
+    """Return values with a row for each rollout; a number in the place of one for each joint is a row too."""
+    rows = np.array(values)
+    per_joint = not issubclass(section, OwnSection) and parameters_of(section.target)[name].form is Form.GAIN
+    return rows[:, None] if per_joint and rows.ndim == 1 else rows
 
 
 def varies_together(key: str, experiment: Experiment) -> bool:

@@ -13,6 +13,7 @@ from pathcontrol._arrays import Array, as_array, check_finite, freeze
 from pathcontrol._expect import expect
 from pathcontrol.arguments import Form, Torques, Unit
 from pathcontrol.errors import InputError
+from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.profile import plain_attributes
 
@@ -47,11 +48,20 @@ class Disturbance(ABC):
         """Return the share of its torque limit that each motor has at t [s], broadcasts to (N, n); ``None`` for all."""
         return None
 
-    def find_joints(self, robot: RobotModel) -> Disturbance:
-        """Return the disturbance with the joints that it names found in an arm.
+    @property
+    def arm_change_times(self) -> Array:
+        """The times [s] at which it changes the arm itself, (k,), in any order; none by default."""
+        return np.empty(0)
+
+    def change_arm(self, t: float, arm: RobotModel | RobotBatch) -> RobotModel | RobotBatch:
+        """Return what it makes of the arm, or of the arms of all rollouts, at t [s]; the arm itself by default."""
+        return arm
+
+    def find_names(self, robot: RobotModel) -> Disturbance:
+        """Return the disturbance with the joints and frames that it names found in an arm.
 
         Raises:
-            UnknownNameError: the arm has no such joint.
+            UnknownNameError: the arm has no such joint or frame.
         """
         return self
 
@@ -85,8 +95,15 @@ class _Sum(Disturbance):
         shares = [share for term in self.terms if (share := term.torque_factor(t)) is not None]
         return reduce(np.multiply, shares) if shares else None
 
-    def find_joints(self, robot: RobotModel) -> Disturbance:
-        return _Sum(tuple(term.find_joints(robot) for term in self.terms))
+    @property
+    def arm_change_times(self) -> Array:
+        return np.concatenate([term.arm_change_times for term in self.terms])
+
+    def change_arm(self, t: float, arm: RobotModel | RobotBatch) -> RobotModel | RobotBatch:
+        return reduce(lambda changed, term: term.change_arm(t, changed), self.terms, arm)
+
+    def find_names(self, robot: RobotModel) -> Disturbance:
+        return _Sum(tuple(term.find_names(robot) for term in self.terms))
 
     def describe(self) -> dict[str, Any]:
         return {"disturbance": "sum", "terms": [term.describe() for term in self.terms]}
@@ -137,7 +154,8 @@ class TorqueLimitDrop(TimedDisturbance):
     needs torque limits, ``SampledLoop(torque_limits=…)``; the law knows nothing of it.
 
     Args:
-        factor: what each motor still has of its limit, from 0 to 1: one number, (n,), or for each rollout, (N, n).
+        factor: what each motor still has of its limit, from 0 to 1: one number, (n,), or for each rollout, (N, n) or
+            (N, 1).
         start: when it begins [s], or for each rollout, (N,).
         duration: how long it lasts [s], or for each rollout, (N,).
 
@@ -145,7 +163,7 @@ class TorqueLimitDrop(TimedDisturbance):
         InputError: a factor is not from 0 to 1, or a time is no number.
     """
 
-    def __init__(self, factor: Annotated[ArrayLike, Form.NUMBERS], start: Begin = 0.0, duration: Span = np.inf) -> None:
+    def __init__(self, factor: Annotated[ArrayLike, Form.GAIN], start: Begin = 0.0, duration: Span = np.inf) -> None:
         super().__init__(start, duration)
         self.factor = freeze(check_finite("factor", as_array("factor", factor)))
         if not ((self.factor >= 0) & (self.factor <= 1)).all():

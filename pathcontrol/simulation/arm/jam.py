@@ -60,11 +60,11 @@ class JammedJoint(TimedDisturbance):
         """
         if self._index is None:
             raise InputError(
-                f"joint = {self.joint!r} is a name: use JammedJoint(...).find_joints(robot), as simulate does"
+                f"joint = {self.joint!r} is a name: use JammedJoint(...).find_names(robot), as simulate does"
             )
         return self._index[..., None]
 
-    def find_joints(self, robot: RobotModel) -> JammedJoint:
+    def find_names(self, robot: RobotModel) -> JammedJoint:
         if self._index is not None:
             self._check(robot.n)
             return self

@@ -8,6 +8,8 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import warn
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import levels_of
+from pathcontrol.simulation.arm.disturbance import Disturbance, list_terms
+from pathcontrol.simulation.arm.friction_change import FrictionChange
 from pathcontrol.simulation.checks.weight import PathPostures, check_weight
 from pathcontrol.simulation.loops import Arm
 from pathcontrol.simulation.run import Run
@@ -50,6 +52,13 @@ def warn_if_still(run: Run, robot: Arm, friction: str) -> None:
             f"the arm did not move in {run.time[-1]:g} s: its dry friction holds it, which the law does not "
             'compensate; give the controller friction="full"'
         )
+
+
+def warn_of_idle_changes(robot: Arm, disturbance: Disturbance | None) -> None:
+    """Warn of a multiple of friction that the arm does not have."""
+    for term in list_terms(disturbance):
+        if isinstance(term, FrictionChange) and term.is_idle(robot.friction):
+            warn(f"{robot.name} has no friction, so FrictionChange(factor=…) changes nothing; add some by coulomb=…")
 
 
 def _check_start(robot: Arm, q: Array) -> str:

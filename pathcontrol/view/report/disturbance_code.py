@@ -11,7 +11,7 @@ from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.summaries import is_whole
 from pathcontrol.view.report.code import call, class_code
 
-_AXES = {Form.NUMBERS: 1, Form.NUMBER: 0, Form.POSITIVE: 0}  # axes of a value for a single rollout
+_AXES = {Form.NUMBERS: 1, Form.GAIN: 1, Form.NUMBER: 0, Form.POSITIVE: 0}  # axes of a value for a single rollout
 _DEEPEST = 20  # sums in one another
 
 
@@ -62,6 +62,8 @@ def _is_argument(parameter: Parameter, value: Any, run: Run) -> bool:
         return all(isinstance(one, str | int) for one in names) and (names is not value or len(value) == run.rollouts)
     if parameter.form is None:
         return str not in parameter.types or isinstance(value, str)
+    if parameter.form is Form.GAIN and not isinstance(value, list):  # one number for all joints
+        return isinstance(value, int | float)
     return _fits(value, _AXES[parameter.form], run.rollouts)
 
 
