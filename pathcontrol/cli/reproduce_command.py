@@ -26,9 +26,14 @@ def command(out: Path, sensitivity: bool, samples: int | None, opened: bool, as_
     """Run the paper's two experiments on the bundled arm."""
     if samples is not None and not sensitivity:
         raise click.UsageError("--samples counts the combinations of --sensitivity; give that, too")
-    _import_all(sensitivity)
-    from pathcontrol.experiments.reproduce import PAPER
-    from pathcontrol.experiments.reproduce import reproduce as run_both
+    with delay_interrupt():
+        from pathcontrol.experiments.reproduce import PAPER
+        from pathcontrol.experiments.reproduce import reproduce as run_both
+
+        if sensitivity:  # a missing extra is reported before any simulation
+            from pathcontrol.sweeps.parquet import load_parquet
+
+            load_parquet()
 
     summary = run_both(out)
     if not as_json:
@@ -40,22 +45,6 @@ def command(out: Path, sensitivity: bool, samples: int | None, opened: bool, as_
     if opened:
         for name in (*PAPER, *(["sensitivity"] if sensitivity else [])):
             open_page(out / f"{name}.html")
-
-
-def _import_all(sensitivity: bool) -> None:
-    """Import what the runs, their files, and a sweep will need; a missing extra is reported before any simulation."""
-    with delay_interrupt():
-        import pathcontrol.experiments.reproduce
-        import pathcontrol.simulation.storage.netcdf
-        import pathcontrol.view.animation.record
-        import pathcontrol.view.figures.error_figures
-        import pathcontrol.view.figures.path_figures
-        import pathcontrol.view.page.html  # noqa: F401
-
-        if sensitivity:
-            from pathcontrol.sweeps.parquet import load_parquet
-
-            load_parquet()
 
 
 def _vary(out: Path, samples: int | None, as_json: bool) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import signal
@@ -15,11 +16,12 @@ from dataclasses import dataclass
 from itertools import repeat
 from multiprocessing import active_children, get_context
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from pathcontrol._files import remove_own_parts, whole_file
+from pathcontrol._interrupts import delay_interrupt
 from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.analysis.run_metrics import peak, steady_state
@@ -31,6 +33,8 @@ from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
+
+T = TypeVar("T")
 
 #: the paper's steady-state peaks and the numbers of its figures
 PAPER: dict[str, dict[str, float]] = {
@@ -83,29 +87,53 @@ class Part(NamedTuple):
 def reproduce(out: str | Path) -> dict[str, Any]:
     """Run both experiments and write data, figures, animations and ``summary.json`` to the folder ``out``.
 
-    Each has a process of its own where there are two cores and no other threads, which a fork would lose.
+    Each has a process of its own where there are two cores and no other threads, which a fork would lose; what draws
+    is loaded while they simulate.
 
     Returns:
         What ``summary.json`` holds.
     """
     out, began = refuse_suffix(out, "a folder"), time.perf_counter()
-    parts = {}
-    with _mapped() as apply, progress_bar("reproducing", len(PAPER)) as update:
-        for name, part in zip(PAPER, apply(_reproduce_one, PAPER, repeat(out)), strict=True):
-            parts[name] = part
-            update(len(parts))
+    with progress_bar("reproducing", 2 * len(PAPER)) as update:
+        with _mapped() as apply:
+            simulated = apply(_simulate_one, PAPER)
+            load_writers()
+            runs = _collect(simulated, update)
+        with _mapped() as apply:
+            parts = _collect(apply(_write_one, runs.items(), repeat(out)), lambda done: update(len(PAPER) + done))
     summary = summarise(parts) | {"seconds": round(time.perf_counter() - began, 2)}
     with whole_file(out / "summary.json") as temporary:
         temporary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary
 
 
+def load_writers() -> None:
+    """Import what writes the files."""
+    with delay_interrupt():
+        import pathcontrol.simulation.storage.netcdf
+        import pathcontrol.simulation.storage.task_recipes
+        import pathcontrol.view.animation.record
+        import pathcontrol.view.figures.error_figures
+        import pathcontrol.view.figures.path_figures
+        import pathcontrol.view.page.html  # noqa: F401
+
+
+def _collect(results: Iterable[T], update: Callable[[int], None]) -> dict[str, T]:
+    """Return the results by the names of the experiments, as they come."""
+    found = {}
+    for name, result in zip(PAPER, results, strict=True):
+        found[name] = result
+        update(len(found))
+    return found
+
+
 @contextmanager
-def _mapped() -> Iterator[Callable[..., Iterable[Part]]]:
+def _mapped() -> Iterator[Callable[..., Iterable[Any]]]:
     """Give ``map``, or one that computes in processes, which know all that has been loaded here."""
     if threading.active_count() > 1 or len(os.sched_getaffinity(0)) < len(PAPER):
         yield map
         return
+    gc.freeze()  # or its next round would copy all pages into each process
     with ProcessPoolExecutor(len(PAPER), get_context("fork"), _leave_at_signals) as pool:
         try:
             yield pool.map
@@ -135,12 +163,17 @@ def _leave(number: int, frame: object) -> None:
     os._exit(128 + number)
 
 
-def _reproduce_one(name: str, out: Path) -> Part:
-    """Run one of the experiments and write its files."""
-    robot = load_robot("cicese_2dof")
-    experiment = paper_experiment(name, robot, progress=False)
+def _simulate_one(name: str) -> Run:
+    """Simulate one of the experiments."""
+    return paper_experiment(name, load_robot("cicese_2dof"), progress=False).run
+
+
+def _write_one(simulated: tuple[str, Run], out: Path) -> Part:
+    """Write the files of one of the experiments."""
+    (name, run), robot = simulated, load_robot("cicese_2dof")
+    experiment = Experiment(name, paper_controllers(robot)[name], run)
     _write(experiment, robot, out)
-    return Part(experiment.peaks, dict(experiment.run.config), compare_engines(experiment, robot))
+    return Part(experiment.peaks, dict(run.config), compare_engines(experiment, robot))
 
 
 def compare_engines(reference: Experiment, robot: RobotModel) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -193,9 +194,13 @@ class FrictionSum(FrictionLaw):
         return sum((viscous_of(term) for term in self.terms), np.zeros(self.n))
 
     def levels(self, qd: Array) -> tuple[Array, Array]:
-        levels = [levels_of(term, qd) for term in self.terms]
-        zero = np.zeros(self.n)
-        return sum((p for p, _ in levels), zero), sum((m for _, m in levels), zero)
+        plus, minus = zip(*(levels_of(term, qd) for term in self._dry_terms), strict=True)
+        return sum(plus[1:], plus[0]), sum(minus[1:], minus[0])
+
+    @cached_property
+    def _dry_terms(self) -> tuple[FrictionLaw, ...]:
+        """The terms that may have dry friction, or one that has none: others are not asked in every step."""
+        return tuple(term for term in self.terms if type(term) is not Viscous) or self.terms[:1]
 
     def select(self, joints: Sequence[int]) -> Self:
         return type(self)(tuple(term.select(joints) for term in self.terms))

@@ -42,14 +42,15 @@ class Recorder:
                 "parts with first_rollout, or by sweep"
             )
         sample = np.dtype(fields, align=True)
-        self._block = np.empty(min(samples, max(1, _ROOM // max(1, sample.itemsize))), dtype=sample)
+        self._use_block(np.empty(min(samples, max(1, _ROOM // max(1, sample.itemsize))), dtype=sample))
 
     def write(self, q: Array, qd: Array, reading: Reading, out: ControlOutput, tau: Array) -> None:
         """Store one more sample: true state, measurement, output of the law and the torque that acts."""
-        (room,) = self._reserve_block(1)
+        if self._samples >= len(self._block):
+            self._reserve_block(1)
         values = (q, qd, *reading, out.tau, tau, out.s, out.sdot, out.e_p, out.e_v, out.regular)  # as in VARIABLES
-        for name, value in zip(VARIABLES, values, strict=True):
-            room[name][...] = value
+        for column, value in zip(self._columns, values, strict=True):
+            column[self._samples] = value
         self._samples += 1
 
     @property
@@ -72,6 +73,7 @@ class Recorder:
 
     def arrays(self) -> dict[str, Array]:
         """Return all samples, rollouts first, and release the room that was not needed."""
+        self._columns.clear()  # the block may move
         self._block.resize(self._samples, refcheck=False)
         return {name: self._block[name].swapaxes(0, 1) for name in VARIABLES}
 
@@ -83,5 +85,10 @@ class Recorder:
         if room > len(self._block):
             larger = np.empty(room, dtype=self._block.dtype)
             larger[: self._samples] = self._block[: self._samples]
-            self._block = larger
+            self._use_block(larger)
         return self._block[self._samples : self._samples + samples]
+
+    def _use_block(self, block: Array) -> None:
+        """Store samples in ``block``, a variable in each of its columns."""
+        self._block = block
+        self._columns = [block[name] for name in VARIABLES]

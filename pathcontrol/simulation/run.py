@@ -332,7 +332,10 @@ class Run:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # a task may hold functions that cannot be pickled; its recipe for a file always can
-        return _unpickle, (self.data, self.config, self._stored())
+        held = self._held
+        if isinstance(held, Samples):  # arrays of an excerpt are parts of larger ones until they are asked for
+            held = held._replace(arrays=dict(held.arrays))
+        return _unpickle, (held, self.config, self._stored())
 
 
 def norms(vectors: Array) -> Array:
@@ -341,6 +344,6 @@ def norms(vectors: Array) -> Array:
         return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
 
 
-def _unpickle(data: xr.Dataset, config: Mapping[str, Any], stored: StoredContext) -> Run:
+def _unpickle(data: xr.Dataset | Samples, config: Mapping[str, Any], stored: StoredContext) -> Run:
     """Return a run from its pickled parts."""
     return Run(data, config, RunContext.load(stored))
