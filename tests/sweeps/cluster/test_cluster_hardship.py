@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from cluster_sweeps import QUIET, free_port, when_chunks_are_there
 from patience import PATIENCE, wait_until
 from scipy import stats
 
@@ -30,8 +31,8 @@ pytest.importorskip("pyarrow")
 ROBOT = pc.load_robot("cicese_2dof")
 CIRCLE = pc.Circle(1.0, 2.0)
 SPACE = pc.Space.random({"K_p": stats.loguniform(100.0, 1e4)}, 24)
-QUIET = {"dashboard_address": "127.0.0.1:0", "silence_logs": 50, "n_workers": 2, "threads_per_worker": 1}
-PAGE = Path(__file__).parents[2] / "docs" / "cluster.md"
+TWO = QUIET | {"n_workers": 2, "threads_per_worker": 1}
+PAGE = Path(__file__).parents[3] / "docs" / "cluster.md"
 
 
 def slowly(p, samples):
@@ -53,20 +54,11 @@ def pids(cluster):
     return [nanny.process.process.pid for nanny in cluster.workers.values()]
 
 
-def when_chunks_are_there(folder, count, action):
-    def watch():
-        while len(list(folder.glob("chunks/0*"))) < count:
-            time.sleep(0.01)
-        action()
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
 def test_others_take_over_from_a_frozen_worker(here, tmp_path, monkeypatch):
     monkeypatch.setattr(dispatch, "_SILENCE", 3.0)
     monkeypatch.setattr(dispatch, "_LOOK", 0.5)
     monkeypatch.setattr(dispatch, "_RESTART", 15.0)  # what computes chunks may go to the frozen one
-    with distributed.LocalCluster(**QUIET) as cluster:
+    with distributed.LocalCluster(**TWO) as cluster:
         frozen = pids(cluster)[0]
         when_chunks_are_there(tmp_path / "out", 2, lambda: os.kill(frozen, signal.SIGSTOP))
         try:
@@ -79,7 +71,7 @@ def test_others_take_over_from_a_frozen_worker(here, tmp_path, monkeypatch):
 @pytest.mark.parametrize("mortal", [1, 2], ids=["one of two", "both"])
 def test_workers_that_die_every_second_do_not_end_a_sweep(mortal, here, tmp_path):
     over, deaths = threading.Event(), []
-    with distributed.LocalCluster(**QUIET) as cluster:
+    with distributed.LocalCluster(**TWO) as cluster:
 
         def kill():
             while not over.wait(1.0):
@@ -136,14 +128,9 @@ def family(pid):
     return found
 
 
-def free_port():
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        return str(taken.getsockname()[1])
-
-
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="looks into /proc")
 def test_what_the_page_starts_listens_on_this_machine_only(here, tmp_path):
-    port, started = free_port(), []
+    port, started = str(free_port()), []
     try:
         for line in commands():
             _, *words = shlex.split(line.replace("8786", port).replace("--nworkers=-1", "--nworkers=1"))
@@ -187,7 +174,7 @@ def test_a_sweep_over_tls(certificate, here, tmp_path):
         f"tls_{role}_{kind}": file for role in ("scheduler", "worker") for kind, file in (("cert", cert), ("key", key))
     }
     security = distributed.Security(require_encryption=True, **files)
-    quiet = QUIET | {"n_workers": 1}
+    quiet = TWO | {"n_workers": 1}
     with distributed.LocalCluster(**quiet, protocol="tls://", security=security, host="127.0.0.1") as cluster:
         address = cluster.scheduler_address
         assert address.startswith("tls://")
