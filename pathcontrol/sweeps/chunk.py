@@ -216,7 +216,6 @@ def _simulate_alone(job: Job, parameters: Mapping[str, Array], samples: NDArray[
 
 def _history(alone: Run, parameters: Mapping[str, Any]) -> Run:
     """Return the run of one sample up to its end, with its ``parameters``."""
-    end, sample = int(count_samples_alone(alone)[0]), int(alone.data["rollout"][0])
-    kept = alone.with_data(alone.data.isel(time=slice(0, end)).copy(deep=True))
-    kept.config["sweep"] = {"sample": sample, **parameters}
+    kept = alone.excerpt(np.array([0]), int(count_samples_alone(alone)[0]))
+    kept.config["sweep"] = {"sample": int(alone.array("rollout")[0]), **parameters}
     return kept

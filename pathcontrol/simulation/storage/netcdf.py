@@ -102,17 +102,15 @@ def _remedy(path: Path) -> str:
 
 def _read_origin(path: Path) -> StoredContext | None:
     """Read robot and path, or ``None`` from a file without them."""
-    import xarray as xr
-
-    try:
-        origin = xr.load_dataset(path, engine="h5netcdf", group=_GROUP)
-    except OSError:  # there is no such group: the file is older than runs that know their robot
-        return None
-    recipe, numbers = origin["recipe"].to_numpy(), origin["numbers"].to_numpy()
+    with h5py.File(path, "r") as file:
+        if _GROUP not in file:  # the file is older than runs that know their robot
+            return None
+        origin = file[_GROUP]
+        recipe, numbers, digest = origin["recipe"][...], origin["numbers"][...], origin.attrs.get(_DIGEST)
     if recipe.dtype != np.uint8 or numbers.dtype != np.float64 or recipe.ndim != 1 or numbers.ndim != 1:
         raise InputError("what it says of its robot and path is no text with numbers")
     stored = StoredContext(recipe.tobytes().decode(), numbers)
-    _check_digest(origin.attrs.get(_DIGEST), lambda: _digest_of_origin(stored))
+    _check_digest(digest, lambda: _digest_of_origin(stored))
     return stored
 
 
