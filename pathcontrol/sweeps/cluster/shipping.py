@@ -24,6 +24,7 @@ from pathcontrol.sweeps.chunk import Chunk, Job, Piece
 from pathcontrol.sweeps.cluster.user_code import PackedBuilder
 
 _OURS = __name__.partition(".")[0]
+_STDLIB = sysconfig.get_path("stdlib")
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # glibc's names for what mallopt sets
 _KEPT, _LARGE = 256 << 20, 32 << 20  # bytes
 
@@ -125,8 +126,7 @@ def _is_own(module: ModuleType) -> bool:
     if type(module) is not ModuleType or sys.modules.get(module.__name__) is not module:  # as lazy ones, and __main__
         return False
     file = Path(vars(module).get("__file__") or "")
-    stdlib, others = sysconfig.get_path("stdlib"), {"site-packages", "dist-packages"}
-    installed = file.is_relative_to(stdlib) or others.intersection(file.parts)
+    installed = file.is_relative_to(_STDLIB) or {"site-packages", "dist-packages"}.intersection(file.parts)
     return file.suffix == ".py" and not installed and module.__name__.partition(".")[0] not in (_OURS, "__main__")
 
 
