@@ -77,6 +77,7 @@ from .simulation.arm.disturbance import FrameForce as FrameForce
 from .simulation.arm.disturbance import Harmonic as Harmonic
 from .simulation.arm.disturbance import Push as Push
 from .simulation.arm.disturbance import TorqueLimitDrop as TorqueLimitDrop
+from .simulation.arm.dropout import Dropout as Dropout
 from .simulation.arm.friction_change import FrictionChange as FrictionChange
 from .simulation.arm.jam import JammedJoint as JammedJoint
 from .simulation.arm.noise import SensorNoise as SensorNoise

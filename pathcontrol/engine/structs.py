@@ -104,12 +104,14 @@ class Setup(Structure):
 
 STATE = ("q", "qd", "q_read", "qd_read", "home_q", "home_qd", "queue")
 STATE_NUMBERS = ("s", "first_s", "rest_since", "lap_start", "finish_time", "diverged_time", "reason")
+SEEN_AND_SAID = ("q_seen", "qd_seen", "tau_said", "e_p_said", "e_v_said")
+SAID_NUMBERS = ("s_said", "sdot_said")
 
 
 class State(Structure):
     """Addresses of the arrays that hold the state of all rollouts."""
 
-    _fields_ = [(name, _Doubles) for name in STATE + STATE_NUMBERS]
+    _fields_ = [(name, _Doubles) for name in STATE + STATE_NUMBERS + SEEN_AND_SAID + SAID_NUMBERS]
 
 
 RECORDED = ("q", "qd", "q_measured", "qd_measured", "tau_demand", "tau", "s", "sdot", "e_p", "e_v", "regular")
@@ -128,6 +130,8 @@ class Span(Structure):
         *((name, c_longlong) for name in ("law_tick", "arm_tick", "ticks", "rollouts")),
         ("last", c_int),
         ("stops", c_int),
+        ("missed", c_void_p),
+        ("stale", c_void_p),
     ]
 
 

@@ -17,8 +17,8 @@ from pathcontrol.engine.library import lanes, load_library
 from pathcontrol.engine.run_settings import add_law, add_plant, rows_or_none
 from pathcontrol.engine.structs import (
     RECORDED,
-    STATE,
-    STATE_NUMBERS,
+    SAID_NUMBERS,
+    SEEN_AND_SAID,
     Arm,
     Memory,
     Record,
@@ -39,6 +39,7 @@ from pathcontrol.simulation.arm.disturbance import (
     TorqueLimitDrop,
     list_terms,
 )
+from pathcontrol.simulation.arm.dropout import Dropout, Dropouts
 from pathcontrol.simulation.arm.friction_change import FrictionChange
 from pathcontrol.simulation.arm.jam import JammedJoint
 from pathcontrol.simulation.arm.noise import NoiseSource
@@ -52,7 +53,7 @@ from pathcontrol.simulation.sampled import Actuator
 
 _BLOCK = 1 << 17  # ticks of all rollouts together between checks of Ctrl-C and the progress bar
 _DISTURBANCES = (Push, Harmonic, FrameForce, JammedJoint, TorqueLimitDrop)  # in the order of the engine's numbers
-_CHANGES = (FrictionChange,)  # what only changes the arm, from block to block
+_BETWEEN = (FrictionChange, Dropout)  # what is set for each block of ticks
 _REASONS = {1: BEYOND, 2: NO_NUMBERS}
 
 
@@ -123,6 +124,11 @@ class CompiledArm:
         self._state = {"q": q, "qd": qd, "q_read": reading.q, "qd_read": reading.qd}
         self._state = {name: np.array(value, dtype=np.float64, order="C") for name, value in self._state.items()}
         self._state["queue"] = np.zeros((actuator.waiting, *q.shape))
+        self._dropouts = Dropouts(outside.disturbance, loop.period, outside.first, len(q))
+        if self._dropouts.any:
+            self._state |= {name: np.zeros(q.shape) for name in SEEN_AND_SAID}
+            self._state |= {name: np.zeros(len(q)) for name in SAID_NUMBERS}
+            self._state["q_seen"][...], self._state["qd_seen"][...] = reading
         self.divergence = Divergence(q, qd)
 
     def run(
@@ -183,8 +189,11 @@ class CompiledArm:
         noise = None if self._noise is None else self._noise.samples(count)
         arrays = recorder.reserve(count + last)
         record = Record(**{name: arrays[name].ctypes.data for name in RECORDED}, stride=arrays["q"].strides[0])
-        state = State(**{name: self._state[name].ctypes.data for name in STATE + STATE_NUMBERS})
+        state = State(**{name: array.ctypes.data for name, array in self._state.items()})
         span = Span(done, self._ticks, count, rollouts, last, rollouts <= width)
+        losses = self._lose(count + last)
+        if losses is not None:
+            span.missed, span.stale = losses[0].ctypes.data, losses[1].ctypes.data
         pointers = [addressof(setup), addressof(state), addressof(record)]
         tail = [None if noise is None else noise.ctypes.data, addressof(span)]
 
@@ -198,6 +207,14 @@ class CompiledArm:
         self._ticks += min(samples, count)
         recorder.add(samples)
         return samples
+
+    def _lose(self, count: int) -> NDArray[np.uint8] | None:
+        """Return what is lost at the next ``count`` ticks, missed ticks and measurements, (2, count, N)."""
+        if not self._dropouts.any:
+            return None
+        ticks, lost = self._ticks + np.arange(count), self._dropouts
+        missed = lost.missed(ticks).astype(np.uint8) + lost.silent(ticks)
+        return np.stack([missed, lost.stale(ticks)]).astype(np.uint8)
 
     def _is_over(self, finish: Finish | None, setup: Setup) -> bool:
         """Return whether all rollouts are finished or lost."""
@@ -272,7 +289,7 @@ def _add_disturbances(setup: Setup, disturbance: Disturbance | None, memory: Mem
     Raises:
         EngineError: one of them is the user's own.
     """
-    terms = [term for term in list_terms(disturbance) if type(term) not in _CHANGES]
+    terms = [term for term in list_terms(disturbance) if type(term) not in _BETWEEN]
     structs = [_disturbance_struct(term, setup.joints, memory) for term in terms]
     kinds = {_DISTURBANCES[one.kind] for one in structs}
     setup.disturbances, setup.jams, setup.drops = len(structs), JammedJoint in kinds, TorqueLimitDrop in kinds

@@ -10,6 +10,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance, list_terms
+from pathcontrol.simulation.arm.dropout import Dropout
 from pathcontrol.simulation.checks.slips import warn_of_idle_changes, warn_of_slips
 from pathcontrol.simulation.checks.too_long import warn_of_steps
 from pathcontrol.simulation.engines import Engine, choose_engine
@@ -97,4 +98,6 @@ def _do_at_once(term: Disturbance, q: Array) -> str:
         return "a joint that jams stops at once"
     if term.torque_factor(0.0) is not None:
         return "torque limits drop at once"
+    if isinstance(term, Dropout):
+        return "a Dropout loses ticks or measurements"
     return f"{type(term).__name__} changes the arm at once" if term.arm_change_times.size else ""

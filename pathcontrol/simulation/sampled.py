@@ -13,12 +13,14 @@ from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
 from pathcontrol.simulation.arm.changing_arm import ChangingArm
+from pathcontrol.simulation.arm.dropout import Dropouts
 from pathcontrol.simulation.arm.noise import NoiseSource
 from pathcontrol.simulation.arm.plant import Plant
 from pathcontrol.simulation.arm.sensors import Reading
 from pathcontrol.simulation.divergence import Divergence
 from pathcontrol.simulation.finish import Finish
 from pathcontrol.simulation.loops import Arm, Outside, SampledLoop, check_rows, torque_limits
+from pathcontrol.simulation.lossy_line import LossyLine
 from pathcontrol.simulation.recorder import Recorder
 
 _UPDATE_EVERY = 64  # ticks between updates of the progress bar
@@ -107,6 +109,7 @@ class SampledArm:
         self._reading = self._sensors.start(*self._add_noise())
         self._reading = self._sensors.read(*self._add_noise(), self._reading)
         self._disturbance, self._ticks = outside.disturbance, 0
+        self._line = LossyLine(Dropouts(outside.disturbance, loop.period, outside.first, len(q)), self._reading)
         self.divergence = Divergence(q, qd)
 
     def run(
@@ -128,8 +131,8 @@ class SampledArm:
                 if lost.any:
                     self._hold_lost(lost)
                     z = lost.replace_lost(z, first)
-                reading = self._reading
-                out = controller.law(t, reading.q, reading.qd, z)
+                reading = self._line.see(self._ticks, self._reading)
+                out = self._line.say(controller.law(t, reading.q, reading.qd, z), begins=tick == 0)
                 lost.check_torque(t, out.tau)
                 tau = self._actuator.clip(out.tau)
                 if lost.any:
@@ -142,7 +145,7 @@ class SampledArm:
                     break
                 if finish is not None and finish(t, out.s, self.qd, lost.lost):
                     break
-                z = controller.advance(z, out, self._period)
+                z = self._line.keep(z, controller.advance(z, out, self._period))
                 self._advance(torques)
                 self._actuator.hold(tau)
         arrays = recorder.arrays()
@@ -153,6 +156,7 @@ class SampledArm:
         """Put lost rollouts, and their readings, back to their initial states."""
         self.q, self.qd = lost.reset_lost(self.q, self.qd)
         self._reading = Reading(*lost.reset_lost(*self._reading))
+        self._line.reset(lost)
 
     def _advance(self, torques: Sequence[Array]) -> None:
         """Advance by one period, with the torque of each part of it."""

@@ -18,7 +18,11 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
         "rad/s",
         "velocity error q_d'(s) theta(s) - qd as the controller sees it",
     ),
-    "regular": (("rollout", "time"), "1", "0 where the path parameter was undefined and the last one kept"),
+    "regular": (
+        ("rollout", "time"),
+        "1",
+        "0 where the path parameter was undefined, or the law missed its tick, and the last one kept",
+    ),
 }
 
 

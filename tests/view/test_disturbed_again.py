@@ -27,6 +27,7 @@ ROWS = {
     "waves": pc.Harmonic([0.1, 0.3], [7.0, 9.0], [0.0, 1.0]),
     "drops": pc.TorqueLimitDrop([[0.1, 0.2], [0.0, 1.0]], [0.02, 0.0], 0.03),
     "changes of friction": pc.FrictionChange([[2.0], [0.5]], [0.02, 0.0], 0.03, coulomb=[0.1, 0.2]),
+    "dropouts": pc.Dropout([0.02, 0.0], 0.03, probability=[0.5, 0.9]),
     "jams": pc.JammedJoint(["joint_2", "joint_1"], [0.02, 0.0], 0.03),
     "forces": pc.FrameForce(ROBOT, "tool", [[0.1, 0.2, -5.0], [1.0, 0.0, 0.0]], duration=0.03),
 }
@@ -71,6 +72,12 @@ def test_a_run_with_a_jam_is_made_again(joint, tmp_path, monkeypatch):
 
 def test_a_run_with_weak_motors_is_made_again(tmp_path, monkeypatch):
     run = simulated(PUSH + pc.TorqueLimitDrop([0.01, 0.5], 0.02, 0.03), loop=pc.SampledLoop(torque_limits=True))
+    assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
+
+
+@pytest.mark.parametrize("what", ["ticks", "measurements"])
+def test_a_run_with_a_dropout_is_made_again(what, tmp_path, monkeypatch):
+    run = simulated(PUSH + pc.Dropout(0.02, 0.03, what, "zero", 0.5, seed=3))
     assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
 
 

@@ -221,10 +221,10 @@ ALWAYS_INLINE void record_vector(double *to, integer at, const Place<V> &place, 
   }
 }
 template <int N, class V>
-static NOINLINE void write_sample(const Record &record, integer at, const Place<V> &place, int n, const Rollouts<V> &r, const Output<V> &out, const V *acting) {
+static NOINLINE void write_sample(const Record &record, integer at, const Place<V> &place, int n, const Rollouts<V> &r, const V *q_seen, const V *qd_seen, const Output<V> &out, const V *acting) {
   const Mask<V> lost = lost_lanes(r);
   record_vector<N>(record.q, at, place, n, r.q, lost), record_vector<N>(record.qd, at, place, n, r.qd, lost);
-  record_vector<N>(record.q_measured, at, place, n, r.q_read, lost), record_vector<N>(record.qd_measured, at, place, n, r.qd_read, lost);
+  record_vector<N>(record.q_measured, at, place, n, q_seen, lost), record_vector<N>(record.qd_measured, at, place, n, qd_seen, lost);
   record_vector<N>(record.tau_demand, at, place, n, out.tau, lost), record_vector<N>(record.tau, at, place, n, acting, lost);
   record_vector<N>(record.e_p, at, place, n, out.e_p, lost), record_vector<N>(record.e_v, at, place, n, out.e_v, lost);
   record_vector<1>(record.s, at, place, 1, &out.s, lost), record_vector<1>(record.sdot, at, place, 1, &out.sdot, lost);
@@ -232,9 +232,50 @@ static NOINLINE void write_sample(const Record &record, integer at, const Place<
     for (int lane = 0; lane < place.live; lane++) record.regular[at + place.first + lane] = !lane_of(lost, lane) && lane_of(out.regular, lane);
 }
 
+// --- ticks and measurements that are lost, see simulation/lossy_line.py ------------------------------------------------
+// What a law saw and said last, and what is lost at this tick.
+template <class V> struct Line {
+  V q[MOST_JOINTS], qd[MOST_JOINTS], tau[MOST_JOINTS], e_p[MOST_JOINTS], e_v[MOST_JOINTS], s, sdot;
+  Mask<V> missed, silent;
+};
+template <class V> static void load_line(const Place<V> &place, const State &state, int n, Line<V> &line) {
+  const double *vectors[] = {state.q_seen, state.qd_seen, state.tau_said, state.e_p_said, state.e_v_said};
+  V *lanes[] = {line.q, line.qd, line.tau, line.e_p, line.e_v};
+  for (int k = 0; k < 5; k++) load(place, vectors[k], n, n, lanes[k]);
+  load(place, state.s_said, 1, 1, &line.s), load(place, state.sdot_said, 1, 1, &line.sdot);
+}
+template <class V> static void store_line(const Place<V> &place, const Line<V> &line, int n, const State &state) {
+  store(place, line.q, n, state.q_seen), store(place, line.qd, n, state.qd_seen), store(place, line.tau, n, state.tau_said);
+  store(place, line.e_p, n, state.e_p_said), store(place, line.e_v, n, state.e_v_said);
+  store(place, &line.s, 1, state.s_said), store(place, &line.sdot, 1, state.sdot_said);
+}
+// What the law sees at this tick: the reading, or the last one that came; lost rollouts have their initial states.
+template <class V>
+static NOINLINE void see(const Place<V> &place, int n, const Rollouts<V> &r, const unsigned char *missed, const unsigned char *stale, Line<V> &line) {
+  Mask<V> away;
+  for (int lane = 0; lane < Lanes<V>::count; lane++) {
+    const integer row = rollout_of(place, lane);
+    set_lane(line.missed, lane, missed[row] > 0), set_lane(line.silent, lane, missed[row] > 1), set_lane(away, lane, missed[row] || stale[row]);
+  }
+  away &= ~lost_lanes(r);
+  for (int i = 0; i < n; i++) line.q[i] = select(away, line.q[i], r.q_read[i]), line.qd[i] = select(away, line.qd[i], r.qd_read[i]);
+}
+// The output in use: that of the law, or what was said last where it misses the tick; one that begins has said nothing before.
+template <class V> static NOINLINE void say(int n, bool begins, Line<V> &line, Output<V> &out) {
+  const Mask<V> kept = begins ? Mask<V>{} : line.missed;
+  for (int i = 0; i < n; i++) {
+    line.tau[i] = out.tau[i] = select(line.silent, V{}, select(line.missed, line.tau[i], out.tau[i]));
+    line.e_p[i] = out.e_p[i] = select(kept, line.e_p[i], out.e_p[i]), line.e_v[i] = out.e_v[i] = select(kept, line.e_v[i], out.e_v[i]);
+  }
+  line.s = out.s = select(kept, line.s, out.s), line.sdot = out.sdot = select(kept, line.sdot, out.sdot);
+  out.regular &= ~line.missed;
+}
+
 // --- the loop ---------------------------------------------------------------------------------------------------------
 // The ticks that a call takes: `ticks` of them with a period after each and, at the end of the run, one `last` without.
-struct Span { integer law_tick, arm_tick, ticks, rollouts; int last, stops; };
+// `missed`: (time, rollouts), 1 where the law misses its tick and its torque stays, 2 where none acts then; `stale`: 1 where no
+// measurement comes. Both are null where nothing is lost.
+struct Span { integer law_tick, arm_tick, ticks, rollouts; int last, stops; const unsigned char *missed, *stale; };
 
 // Run the rollouts of a pack; return the number of samples recorded.
 template <int N, class V, class C>
@@ -252,6 +293,9 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
   load_friction(place, setup.law_friction, n, law_friction), load_friction(place, setup.plant_friction, n, plant_friction);
   const Mask<V> damped = load_mask<V>(place, setup.damped);
   load_state(place, state, n, r);
+  Line<V> line;
+  const V *q_seen = span.missed ? line.q : r.q_read, *qd_seen = span.missed ? line.qd : r.qd_read;
+  if (span.missed) load_line(place, state, n, line);
   for (int lane = 0; lane < Lanes<V>::count; lane++) paths[lane] = setup.paths + (setup.path_index ? setup.path_index[rollout_of(place, lane)] : 0);
   const integer waiting = setup.delayed * n;
   Buffer<V> queue(waiting);  // a ring of torques that wait, the oldest at `head`
@@ -264,7 +308,9 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
     look_at_state(setup, r, t);
     Output<V> out;
     V held[room<N>()], acting[2][room<N>()];
-    control<N>(setup, law_arm, law_friction, gains, paths, r.q_read, r.qd_read, r.s, out);
+    if (span.missed) see(place, n, r, span.missed + sample * span.rollouts, span.stale + sample * span.rollouts, line);
+    control<N>(setup, law_arm, law_friction, gains, paths, q_seen, qd_seen, r.s, out);
+    if (span.missed) say(n, span.law_tick + sample == 0, line, out);
     look_at_torque(setup, r, out.tau, t);
     const Mask<V> lost = lost_lanes(r);
     for (int i = 0; i < n; i++) {
@@ -279,11 +325,12 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
       for (int part = 0; part < setup.parts; part++)
         for (int i = 0; i < n; i++) acting[part][i] = clamped(acting[part][i], V(-limit[i]), limit[i]);
     }
-    write_sample<N>(record, sample * record.stride, place, n, r, out, acting[0]);
+    write_sample<N>(record, sample * record.stride, place, n, r, q_seen, qd_seen, out, acting[0]);
     look_at_finish(setup, paths, r, out.s, t);
     const Mask<V> going = ~lost & (setup.ends_run && setup.finish != NEVER ? ~equal(r.finish_time, r.finish_time) : ~Mask<V>{});
     if (final || (span.stops && !any(going))) { sample++; break; }
-    r.s = select(lost, r.first_s, advance_parameter(setup, paths, out));
+    const V next_s = advance_parameter(setup, paths, out);
+    r.s = select(lost, r.first_s, span.missed ? select(line.missed, r.s, next_s) : next_s);
     double now = (span.arm_tick + sample) * setup.period;
     for (int part = 0; part < setup.parts; part++) {
       const double step = setup.part[part] / setup.substeps;
@@ -307,6 +354,7 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
     read_sensors(setup, senses, r, noise ? q_noise : nullptr, noise ? qd_noise : nullptr);
   }
   store_state(place, r, n, state);
+  if (span.missed) store_line(place, line, n, state);
   for (int k = 0; k < setup.delayed; k++) store(place, &queue[(head + k) % setup.delayed * n], n, state.queue + k * span.rollouts * n);
   return sample;
 }

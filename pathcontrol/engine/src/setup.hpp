@@ -43,10 +43,12 @@ struct Setup {
   const Disturbance *disturbance;
 };
 
-// (rollouts, joints) or (rollouts,) each; `queue` is (delayed, rollouts, joints).
+// (rollouts, joints) or (rollouts,) each; `queue` is (delayed, rollouts, joints). What was seen and said last is kept where
+// ticks or measurements are lost, and null elsewhere.
 struct State {
   double *q, *qd, *q_read, *qd_read, *home_q, *home_qd, *queue;
   double *s, *first_s, *rest_since, *lap_start, *finish_time, *diverged_time, *reason;
+  double *q_seen, *qd_seen, *tau_said, *e_p_said, *e_v_said, *s_said, *sdot_said;
 };
 
 // (time, rollouts, joints) or (time, rollouts) each, from the first sample of this call on, `stride` bytes from one to the next.
