@@ -14,6 +14,7 @@ from .analysis.run_metrics import peak as peak
 from .analysis.run_metrics import rms as rms
 from .analysis.run_metrics import settling_time as settling_time
 from .analysis.run_metrics import steady_state as steady_state
+from .analysis.speed_factor import speed_factor as speed_factor
 from .cartesian.cartesian_path import CartesianPath as CartesianPath
 from .cartesian.orientation import FixedOrientation as FixedOrientation
 from .cartesian.orientation import NormalOrientation as NormalOrientation
@@ -35,6 +36,9 @@ from .control.motion_control import PDPlus as PDPlus
 from .control.motion_control import SlotineLi as SlotineLi
 from .control.motion_control import Tracking as Tracking
 from .control.projection import Projection as Projection
+from .control.speed_override import SpeedOverride as SpeedOverride
+from .control.speed_rule import SpeedRule as SpeedRule
+from .control.wrapper import LawWrapper as LawWrapper
 from .engine.control_tick import ControlTick as ControlTick
 from .errors import ClusterError as ClusterError
 from .errors import EngineError as EngineError

@@ -12,3 +12,4 @@ from .run_metrics import peak as peak
 from .run_metrics import rms as rms
 from .run_metrics import settling_time as settling_time
 from .run_metrics import steady_state as steady_state
+from .speed_factor import speed_factor as speed_factor

@@ -2,6 +2,9 @@
 
 V̇ ≤ 0 holds for exact compensation, q̈ = u: without uncompensated friction, saturation or sampling. In a run with these
 V follows from its errors, and rises at many ticks once the errors are small.
+
+Of a law that is wrapped, for its speed to be overridden or paced, they are those of the law inside, with the velocity
+error e_v = wr − q̇: no factor w(t) that is differentiable changes V̇.
 """
 
 from __future__ import annotations
@@ -13,9 +16,11 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.analysis.metric_helpers import resolve_task
+from pathcontrol.analysis.speed_factor import speed_factor
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.projection import Projection
+from pathcontrol.control.wrapper import LawWrapper
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
 
@@ -63,6 +68,8 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     expect("controller", controller, Controller)
     resolve_task(run, controller.task)
     e_p, e_v = run.array("e_p"), run.array("e_v")
+    if isinstance(controller, LawWrapper):  # whose plan waits for nothing where it is held
+        controller = controller.inner.at_speed(speed_factor(run, controller.task).T)
     if isinstance(controller, ExtendedMotionPlan):
         s, K_p, K_v = run.array("s").T, _add_time_axis(controller.K_p), _add_time_axis(controller.K_v)
         # the errors of a diverged rollout are NaN, so that any s will do there; laws take the rollouts last in s

@@ -8,6 +8,7 @@ from pathcontrol.analysis.readable import reading
 from pathcontrol.comparison.compare import Comparison
 from pathcontrol.comparison.measures import MEASURES, RECOVERED
 from pathcontrol.control.motion_control import MotionController
+from pathcontrol.control.wrapper import unwrap
 
 _DIGITS = 3
 _NOTHING = 1e-9  # rad, m, N m, …: rounding of floats for an arm of usual size
@@ -51,7 +52,7 @@ def _in_words(measure: str) -> str:
 def _is_won_by_motion(compared: Comparison, measure: str) -> bool:
     """Return whether only laws of motion control have the least mean of a measure."""
     best = compared.best(measure)
-    return bool(best) and all(isinstance(compared.laws[law], MotionController) for law in best)
+    return bool(best) and all(isinstance(unwrap(compared.laws[law]), MotionController) for law in best)
 
 
 def _cell(compared: Comparison, law: str, measure: str, factor: float, best: bool) -> str:

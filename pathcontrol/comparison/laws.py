@@ -14,6 +14,7 @@ from pathcontrol.control.base import Controller, Start, diagonal_gain
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
+from pathcontrol.control.wrapper import unwrap
 from pathcontrol.errors import InputError, TaskError, UnknownNameError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run_arguments import check_controller
@@ -116,6 +117,7 @@ def recover_gains(law: Controller) -> Gains:
     Raises:
         InputError: it is another law, or its gains differ between rollouts.
     """
+    law = unwrap(law)
     if isinstance(law, ExtendedMotionPlan):
         gains = Gains(law.K_p, law.K_v, float(law.k) if law.k.size == 1 else None)
     elif isinstance(law, Projection):

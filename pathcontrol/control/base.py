@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple, get_args
+from copy import copy
+from typing import Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +22,8 @@ from pathcontrol.tasks.task_check import check_task
 
 FrictionCompensation = Literal["none", "viscous", "full"]
 Start = Literal["s0", "nearest"]
+
+_HELD = 1e-6  # factor of the speed below which a plan stands still
 
 
 class ControlOutput(NamedTuple):
@@ -123,6 +126,19 @@ class Controller(ABC):
 
     # --- for laws -------------------------------------------------------------------------------------------
 
+    #: the factor w of ϑ that the plan goes at, (*batch,), set by :meth:`at_speed`; ``None`` for 1
+    speed: Array | None = None
+
+    def at_speed(self, factor: Array) -> Self:
+        """Return this law with the profile wϑ in place of ϑ, for a ``factor`` w (*batch,) that is constant.
+
+        :meth:`point` and :meth:`timed` know it, and with them every law that asks them. Where w changes, the law's
+        acceleration lacks ẇ q_d'ϑ, which :class:`LawWrapper` adds.
+        """
+        law = copy(self)
+        law.speed = np.where(np.abs(factor) < _HELD, 0.0, factor)
+        return law
+
     def point(self, s: Array) -> PathPoint:
         """Return the task at s; on an open path with ϑ and ϑ' of the plan that comes to rest, :meth:`Ending.brake`.
 
@@ -131,12 +147,42 @@ class Controller(ABC):
         if not s.ndim:  # tasks take arrays
             return PathPoint(*(value[0] for value in self.point(s[None])))
         if self.ending is None:
-            return self.task.at(s if self.task.closed else np.maximum(s, self.task.s0))
-        return self.ending.brake(self.task.at(np.minimum(np.maximum(s, self.task.s0), self.task.s_end)), s)
+            return self.task.at(s) if self.speed is None else self.task.at(s).at_speed(self.speed)
+        point = self.task.at(np.minimum(np.maximum(s, self.task.s0), self.task.s_end))
+        return self.ending.brake(point, s, 1.0 if self.speed is None else self.speed)
 
     def timed(self, s: Array) -> NDArray[np.bool_]:
-        """Return where the plan follows σ̇ = ϑ(σ) without feedback, at the end of an open path, (*batch,)."""
-        return np.zeros(s.shape, dtype=bool) if self.ending is None else s >= self.ending.begin
+        """Return where the plan follows σ̇ = ϑ(σ) without feedback: at the end of an open path, and held, (*batch,).
+
+        A plan that is held at the factor 0 stays where it is, and what pushes the arm does not move it.
+        """
+        timed = np.zeros(s.shape, dtype=bool)
+        if self.ending is not None:
+            timed = self.ending.timed(s, 1.0 if self.speed is None else self.speed)
+        return timed if self.speed is None else timed | (self.speed == 0.0)
+
+    def full_speed(self, s: Array) -> tuple[Array, Array]:
+        """Return q_d'ϑ [rad/s], (*batch, n), and ϑ [1/s] at s (*batch,), where the plan goes at its factor; else 0.
+
+        With the factor w they are the rates ∂(wr)/∂w and ∂(wϑ)/∂w: braked at an end of an open path the plan does not
+        depend on w.
+        """
+        if not s.ndim:
+            velocity, theta = self.full_speed(s[None])
+            return velocity[0], theta[0]
+        if self.ending is None:
+            point = self.task.at(s)
+            return point.velocity, point.theta
+        point = self.task.at(np.minimum(np.maximum(s, self.task.s0), self.task.s_end))
+        point = point.at_speed(self.ending.follows(s, np.ones(()) if self.speed is None else self.speed))
+        return point.velocity, point.theta
+
+    def speed_response(self, s: Array, theta: Array) -> Array:
+        """Return ∂ṡ/∂w [1/s], (*batch,), at the state s, where the plan's own rate is wϑ, ``theta`` (*batch,).
+
+        It is ϑ for a law whose plan is ṡ = wϑ(s) and what feedback adds.
+        """
+        return theta
 
     def inside(self, s: Array, sdot: Array) -> Array:
         """Return ṡ without the part that would leave an open path."""

@@ -1,10 +1,11 @@
-"""The end of the motion plan of an open path: braking, timing and arrival."""
+"""The ends of the motion plan of an open path: braking, timing and arrival."""
 
 from __future__ import annotations
 
 from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.tasks.base import PathPoint
@@ -20,6 +21,8 @@ _REMAINING = 1e-4  # rad (or m) of joint path that a plan at the end may have le
 class Ending(NamedTuple):
     """The last stretch of an open path, where the plan no longer waits for the arm and comes to rest.
 
+    A plan that goes back, at a negative factor of its speed, comes to rest on s0 in the same way.
+
     The plan comes to rest at s_end exponentially, with the time constant T = 0.1 s: over the last s_end − s < Tϑ(s_end)
     its rate is ϑ(s)(s_end − s)/(Tϑ(s_end)). A profile that is slow at its end has little left to brake.
 
@@ -28,34 +31,64 @@ class Ending(NamedTuple):
     or to the braking if that is longer. The arm is drawn to the end by its position gain and held there.
 
     Attributes:
-        s_end: last path parameter, as all of these a number, or (N,) for a batch of tasks in which it differs.
+        s_end: last path parameter, as all of these a number, or (N,) for a batch of tasks in which it differs; ∞ for a
+            path that does not end.
         braking: Tϑ(s_end), the length of parameter over which ϑ is brought to 0.
         begin: path parameter from which on the plan is timed.
+        s0: first path parameter.
+        braking_back: Tϑ(s0), the same length for a plan that goes back.
+        begin_back: path parameter below which a plan that goes back is timed.
     """
 
     s_end: float | Array
     braking: float | Array
     begin: float | Array
+    s0: float | Array
+    braking_back: float | Array
+    begin_back: float | Array
 
     @classmethod
     def of(cls, task: PathTask) -> Self | None:
-        """Return the ending of ``task``, ``None`` where it has none."""
-        if isinstance(task, TaskBatch):
-            return None if task.closed else cls(*map_tasks(task, cls.of).T)
-        if not np.isfinite(task.s_end):
+        """Return the ending of ``task``, ``None`` for a closed path."""
+        if task.closed:
             return None
+        if isinstance(task, TaskBatch):
+            return cls(*map_tasks(task, cls.of).T)
+        if not np.isfinite(task.s_end):
+            back = max(END_TIME * float(np.asarray(task.theta(np.asarray(task.s0)))), _SHORTEST)
+            return cls(np.inf, 1.0, np.inf, task.s0, back, task.s0 + back)
         s = np.linspace(task.s0, task.s_end, _SAMPLES)
         theta, length = task.theta(s) + np.zeros_like(s), np.linalg.norm(task.dq_d(s), axis=-1)
-        with np.errstate(over="ignore"):  # a plan may take for ever
+        with np.errstate(over="ignore", divide="ignore"):  # a plan may take for ever, and a path begin at rest
             speed = np.trapezoid(length, s) / np.trapezoid(1 / theta, s)
-        braking = max(END_TIME * float(theta[-1]), _SHORTEST)
-        return cls(task.s_end, braking, task.s_end - max(braking, END_TIME * float(speed / length[-1])))
+            braking = np.maximum(END_TIME * theta[[-1, 0]], _SHORTEST)
+            stretch = np.maximum(braking, END_TIME * speed / length[[-1, 0]])
+        return cls(
+            task.s_end, float(braking[0]), task.s_end - stretch[0], task.s0, float(braking[1]), task.s0 + stretch[1]
+        )
 
-    def brake(self, point: PathPoint, s: Array) -> PathPoint:
-        """Return ``point``, the task at s, with ϑ and ϑ' of the plan that comes to rest."""
-        left = (self.s_end - s) / self.braking
-        share, slope = np.minimum(np.maximum(left, 0.0), 1.0), np.where(left < 1.0, -1.0 / self.braking, 0.0)
+    def brake(self, point: PathPoint, s: Array, factor: Array | float = 1.0) -> PathPoint:
+        """Return ``point``, the task at s, with ϑ and ϑ' of the plan that goes at a ``factor`` and comes to rest."""
+        left, back = self._left(s), self._back(s)
+        share = np.minimum(np.maximum(factor, -np.maximum(back, 0.0)), np.maximum(left, 0.0))
+        slope = np.where(left < factor, -1.0 / self.braking, np.where(-back > factor, -1.0 / self.braking_back, 0.0))
         return point._replace(theta=point.theta * share, dtheta=point.dtheta * share + point.theta * slope)
+
+    def follows(self, s: Array, factor: Array) -> NDArray[np.bool_]:
+        """Return where a plan goes at its ``factor``, and is not braked at an end, (*batch,)."""
+        return (self._left(s) >= factor) & (-self._back(s) <= factor)
+
+    def timed(self, s: Array, factor: Array | float = 1.0) -> NDArray[np.bool_]:
+        """Return where a plan with a ``factor`` is timed at the end that it goes to, (*batch,)."""
+        return (s >= self.begin) | (s <= self.begin_back) & (np.asarray(factor) < 0)
+
+    def _left(self, s: Array) -> Array:
+        """Return the largest factor at s with which the plan comes to rest on s_end, negative beyond it."""
+        return np.asarray((self.s_end - s) / self.braking)
+
+    def _back(self, s: Array) -> Array:
+        """Return the largest factor at s with which the plan comes to rest on s0, negative before it."""
+        return np.asarray((s - self.s0) / self.braking_back)
 
 
 def arrival_parameter(task: PathTask) -> float:

@@ -79,4 +79,4 @@ class ExtendedMotionPlan(Controller):
 
     def plan_gain(self, s: Array) -> Array:
         """Return k(σ) [1/(rad² s)], (*batch,): ``k``, and 0 where the plan is timed."""
-        return self.k if self.ending is None else np.where(self.timed(s), 0.0, self.k)
+        return self.k if self.ending is None and self.speed is None else np.where(self.timed(s), 0.0, self.k)

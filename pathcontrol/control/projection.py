@@ -81,7 +81,7 @@ class Projection(Controller):
         last, none = z[..., 0], np.zeros(z.shape[:-1])
         s, point, sdot, regular = self._project(q, qd, last)
         slope = none
-        if self.ending is not None and (timed := self.timed(last)).any():
+        if (self.ending is not None or self.speed is not None) and (timed := self.timed(last)).any():
             s = np.where(timed, last, s)
             point = self.point(s)
             sdot, slope = np.where(timed, point.theta, sdot), np.where(timed, point.dtheta, 0.0)
@@ -92,6 +92,9 @@ class Projection(Controller):
         # in continuous time the state integrates dσ̄/dt; its offset, as after a change of branch, decays exponentially
         zdot = sdot + np.where(regular, (s - last) / _CATCH_UP, 0.0)
         return ControlOutput(tau, zdot[..., None], s, sdot, slope, none, e_p, e_v, regular)
+
+    def speed_response(self, s: Array, theta: Array) -> Array:
+        return np.where(self.timed(s), theta, 0.0)
 
     def describe(self) -> dict[str, Any]:
         return super().describe() | {"branch": self.branches.branch, "capture": self.branches.capture}

@@ -1,7 +1,8 @@
-"""A control law for one arm as one compiled call per period, as a control loop on hardware needs it."""
+"""A control law for one arm as one call per period, as a control loop on hardware needs it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from ctypes import addressof
 
 import numpy as np
@@ -9,6 +10,8 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_joint_array, as_scalar
 from pathcontrol.control.base import Controller
+from pathcontrol.control.override_rule import Override
+from pathcontrol.control.wrapper import LawWrapper
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.run_settings import add_law
 from pathcontrol.engine.structs import Memory, Setup
@@ -26,8 +29,11 @@ class ControlTick:
     It computes what ``law.law`` and ``law.advance`` do, without torque limits. The next call writes the returned array
     anew; copy it to keep it.
 
+    A law that is wrapped, by :class:`SpeedOverride` or another :class:`LawWrapper`, is run in Python, and has the
+    methods of its speed input: :meth:`hold`, :meth:`resume`, :meth:`override` and :meth:`reverse` act at the next call.
+
     Args:
-        law: one of the five laws of the library, with one task and gains for one arm.
+        law: one of the five laws of the library, with one task and gains for one arm, or any law that is wrapped.
         period: control period [s].
 
     Attributes:
@@ -41,30 +47,101 @@ class ControlTick:
     def __init__(self, law: Controller, period: float) -> None:
         if isinstance(law.task, TaskBatch) or any(np.ndim(getattr(law, gain)) > 1 for gain in law.gains):
             raise InputError("the law is for several rollouts, expected one task and one set of gains")
-        self.law, self._memory, self._setup = law, Memory(), Setup()
-        self._setup.period = as_scalar("period", period, positive=True)
-        add_law(self._setup, law, self._memory)
-        n = law.robot.n
-        self._io = np.zeros(3 * n + 1)
-        self._q, self._qd, self._tau = self._io[:n], self._io[n : 2 * n], self._io[2 * n + 1 :]
-        self._function = load_library().pathcontrol_control_tick
-        self._arguments = addressof(self._setup), self._io.ctypes.data
-        self.start(np.zeros(n) if law.start_at == "s0" else law.task.q_d(np.array(law.task.s0)))
+        self.law, self._period = law, as_scalar("period", period, positive=True)
+        make = _PythonTick if isinstance(law, LawWrapper) else _CompiledTick
+        self._tick: _PythonTick | _CompiledTick = make(law, self._period)
+        self.start(np.zeros(law.robot.n) if law.start_at == "s0" else law.task.q_d(np.array(law.task.s0)))
 
     @property
     def s(self) -> float:
         """The path parameter of the plan at the next call."""
-        return float(self._io[len(self._q) * 2])
+        return self._tick.s
 
     def start(self, q: ArrayLike, qd: ArrayLike | None = None) -> None:
         """Start again with an arm at q [rad] and q̇ [rad/s], each (n,); at rest by default."""
         n = self.law.robot.n
         position = as_joint_array("q", q, n)
         velocity = np.zeros(n) if qd is None else as_joint_array("qd", qd, n)
-        self._io[2 * n] = self.law.start(position, velocity)[..., 0]
+        self._tick.start(self.law.start(position, velocity))
 
     def __call__(self, q: Array, qd: Array) -> Array:
         """Return the torques [N m], (n,), for measured q [rad] and q̇ [rad/s]; advance the plan by a period."""
+        return self._tick(q, qd)
+
+    def hold(self) -> None:
+        """Let the plan come to rest on its path and stay there; see :meth:`LawWrapper.hold`."""
+        self._wrapper().hold()
+
+    def resume(self) -> None:
+        """Let the plan go forward again; see :meth:`LawWrapper.resume`."""
+        self._wrapper().resume()
+
+    def override(self, value: Override) -> None:
+        """Set how fast the plan goes when it is not held, as a factor from 0 to 2; see :meth:`LawWrapper.override`."""
+        self._wrapper().override(value)
+
+    def reverse(self) -> None:
+        """Let the plan go back along its path; see :meth:`LawWrapper.reverse`."""
+        self._wrapper().reverse()
+
+    def _wrapper(self) -> LawWrapper:
+        """Return the law, which must have a speed input."""
+        if not isinstance(self.law, LawWrapper):
+            name = type(self.law).__name__
+            raise InputError(f"{name} has no speed input; wrap it: ControlTick(SpeedOverride(law), {self._period:g})")
+        return self.law
+
+
+class _CompiledTick:
+    """A tick in the compiled engine."""
+
+    def __init__(self, law: Controller, period: float) -> None:
+        self._memory, self._setup = Memory(), Setup()
+        self._setup.period = period
+        add_law(self._setup, law, self._memory)
+        n = law.robot.n
+        self._io = np.zeros(3 * n + 1)
+        self._q, self._qd, self._tau = self._io[:n], self._io[n : 2 * n], self._io[2 * n + 1 :]
+        self._function: Callable[..., object] = load_library().pathcontrol_control_tick
+        self._arguments = addressof(self._setup), self._io.ctypes.data
+
+    @property
+    def s(self) -> float:
+        """The path parameter of the plan at the next call."""
+        return float(self._io[len(self._q) * 2])
+
+    def start(self, z: Array) -> None:
+        """Start with the state z (1,)."""
+        self._io[len(self._q) * 2] = z[..., 0]
+
+    def __call__(self, q: Array, qd: Array) -> Array:
+        """Return the torques, and advance."""
         self._q[:], self._qd[:] = q, qd
         self._function(*self._arguments)
+        return self._tau
+
+
+class _PythonTick:
+    """A tick of a law in Python."""
+
+    def __init__(self, law: Controller, period: float) -> None:
+        self._law, self._period, self._ticks = law, period, 0
+        self._z = np.zeros((1, 1))
+        self._tau = np.zeros(law.robot.n)
+
+    @property
+    def s(self) -> float:
+        """The path parameter of the plan at the next call."""
+        return float(self._z[0, 0])
+
+    def start(self, z: Array) -> None:
+        """Start with the state z (m,)."""
+        self._z, self._ticks = np.atleast_2d(z), 0
+
+    def __call__(self, q: Array, qd: Array) -> Array:
+        """Return the torques, and advance."""
+        position, velocity = np.array(q, dtype=np.float64)[None], np.array(qd, dtype=np.float64)[None]
+        out = self._law.law(self._ticks * self._period, position, velocity, self._z)
+        self._z, self._ticks = self._law.advance(self._z, out, self._period), self._ticks + 1
+        self._tau[:] = out.tau[0]
         return self._tau

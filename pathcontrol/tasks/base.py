@@ -37,6 +37,10 @@ class PathPoint(NamedTuple):
         """Slope r' = dr/ds = q_d''ϑ + q_d'ϑ', (*batch, n); the desired acceleration is r'ṡ."""
         return self.ddq_d * self.theta[..., None] + self.dq_d * self.dtheta[..., None]
 
+    def at_speed(self, factor: Array) -> PathPoint:
+        """Return the point with ϑ and ϑ' times a ``factor`` (*batch,)."""
+        return self._replace(theta=self.theta * factor, dtheta=self.dtheta * factor)
+
 
 class Task(ABC):
     """The interface of tasks that control laws and simulations use; users subclass :class:`PathTask`.

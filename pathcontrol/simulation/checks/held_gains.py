@@ -13,6 +13,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
+from pathcontrol.control.wrapper import unwrap
 from pathcontrol.robot.friction import viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.damping import Damping
@@ -33,8 +34,9 @@ class Feedback(NamedTuple):
 def linearize_law(controller: Controller, q: Array, rollouts: Sequence[int] = ()) -> list[Feedback]:
     """Return the feedback of a law of the library at q (k, n), for the extreme gains of a batch and some ``rollouts``.
 
-    For a law of the user's own none is returned.
+    For a law of the user's own none is returned. A wrapped law has the feedback of the one inside.
     """
+    controller = unwrap(controller)
     M = controller.robot.mass_matrix(q)
     if isinstance(controller, SlotineLi):
         pairs = _select_extremes(controller.Lambda, controller.K_d, controller.robot.n, rollouts)

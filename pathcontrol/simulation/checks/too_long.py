@@ -12,6 +12,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import PDPlus, SlotineLi
+from pathcontrol.control.wrapper import unwrap
 from pathcontrol.errors import PathControlWarning, warn
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import viscous_of
@@ -98,7 +99,7 @@ def _find_warnings(
     """Yield the warnings of all laws, of the arm and of the disturbance."""
     rows = find_extreme_arms(robot, q[:1])
     felt = {row: add_damping(arm_of(robot, row), loop.period / loop.substeps) for row in rows}
-    for law in controllers:
+    for law in map(unwrap, controllers):
         postures, speeds = _sample_states(law.task, q, qd)
         yield from _check_gains(law, loop.period, robot, rows, postures)
         yield from _check_plan(law, loop.period)

@@ -1,0 +1,148 @@
+"""The operator's input: how fast the plan is to go along its path, and which way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_array, as_scalar, check_finite, freeze
+from pathcontrol.control.base import Controller
+from pathcontrol.control.speed_rule import Moment, Speed, SpeedRule
+from pathcontrol.errors import InputError
+
+#: u of the speed: a number, one for each rollout (N,), steps [[t, u], …], or a function of time [s]
+Override = ArrayLike | Callable[[float], ArrayLike]
+
+MOST = 2.0  # largest |u|
+_SMOOTHING = 0.02  # s, time constant T of the rate of w
+
+
+class SpeedSteps:
+    """A speed that changes in steps: u(t) is that of the last step, and 1 before the first.
+
+    Args:
+        steps: times [s], increasing, and factors u, (m, 2).
+    """
+
+    def __init__(self, steps: ArrayLike) -> None:
+        table = freeze(check_finite("override", as_array("override", steps)))
+        if table.ndim != 2 or table.shape[1] != 2 or not len(table):
+            raise InputError(f"override has shape {table.shape}, expected a number, (N,), or steps [[t, u], …], (m, 2)")
+        if (np.diff(table[:, 0]) <= 0).any():
+            raise InputError(f"override has steps at {table[:, 0].tolist()} s, expected increasing times")
+        self.times, self.factors = table.T
+
+    def __call__(self, t: float) -> Array:
+        i = int(np.searchsorted(self.times, t, side="right"))
+        return np.asarray(self.factors[i - 1] if i else 1.0)
+
+
+class OverrideRule(SpeedRule):
+    """The factor w follows u(t) within a bound of its rate, which has no jumps either.
+
+    ẇ = v and Tv̇ = clip((u − w)/4T, ±a) − v with T = 20 ms: v changes with the time constant T between the bounds ±a,
+    and w comes to u with both poles at −1/2T. The state is (w, v).
+
+    Args:
+        override: u, from −2 to 2.
+        acceleration: largest |ẇ| [1/s].
+    """
+
+    size = 2
+
+    def __init__(self, override: Override = 1.0, acceleration: float = 2.0) -> None:
+        self.acceleration = as_scalar("acceleration", acceleration, positive=True)
+        self._value = _make_function(override)
+        self._given: Any = override if callable(override) else np.asarray(override).tolist()
+        self._held, self._back = False, False
+
+    def hold(self) -> None:
+        """Let the plan come to rest, whatever :meth:`override` says."""
+        self._held = True
+
+    def resume(self) -> None:
+        """Let the plan go forward at the override."""
+        self._held, self._back = False, False
+
+    def reverse(self) -> None:
+        """Let the plan go back at the override."""
+        self._held, self._back = False, True
+
+    def override(self, value: Override) -> None:
+        """Set how fast the plan goes when it is not held."""
+        self._value = _make_function(value)
+        self._given = value if callable(value) else np.asarray(value).tolist()
+
+    def value(self, t: float) -> Array:
+        """Return u at time t [s], a number or (N,)."""
+        if self._held:
+            return np.zeros(())
+        u = _check_range(f"override at t = {t:g} s", self._value(t))
+        return -u if self._back else u
+
+    def start(self, law: Controller, q: Array, qd: Array, s: Array) -> Array:
+        u = self.value(0.0)
+        u = np.broadcast_to(u, np.broadcast_shapes(s.shape, u.shape))
+        return np.stack([u, np.zeros_like(u)], axis=-1)
+
+    def rate(self, moment: Moment, asked: Speed, x: Array) -> Array:
+        return x[..., 1]
+
+    def memory_rate(self, moment: Moment, asked: Speed, tau: Array, x: Array) -> Array:
+        wanted = (asked.factor * self.value(moment.t) - x[..., 0]) / (4 * _SMOOTHING)
+        wanted = np.minimum(np.maximum(wanted, -self.acceleration), self.acceleration)
+        return ((wanted - x[..., 1]) / _SMOOTHING)[..., None]
+
+    def advance(self, x: Array, xdot: Array, period: float) -> Array:
+        """Return the state one ``period`` [s] after x: exact where u stays, and never beyond u for long periods."""
+        v = x[..., 1]
+        wanted = v + _SMOOTHING * xdot[..., 1]
+        bounded = np.abs(wanted) >= self.acceleration * (1 - 1e-12)
+        ramp, approach = _advance_ramp(v, wanted, period), _advance_approach(v, wanted, period)
+        step, v = (np.where(bounded, one, other) for one, other in zip(ramp, approach, strict=True))
+        return np.stack([x[..., 0] + step, v], axis=-1)
+
+    def describe(self) -> dict[str, Any]:
+        given = getattr(self._given, "__name__", repr(self._given)) if callable(self._given) else self._given
+        return {"override": given, "acceleration": self.acceleration}
+
+
+def _advance_ramp(v: Array, wanted: Array, period: float) -> tuple[Array, Array]:
+    """Return the change of w and the new v where v comes to the bound ``wanted`` with the time constant T."""
+    decay, time = np.exp(-period / _SMOOTHING), min(period, 4 * _SMOOTHING)
+    return wanted * time + (v - wanted) * _SMOOTHING * (1 - decay), wanted + (v - wanted) * decay
+
+
+def _advance_approach(v: Array, wanted: Array, period: float) -> tuple[Array, Array]:
+    """Return the change of w and the new v where w comes to u = w + 4T ``wanted``: (A + Bt)exp(−t/2T) from u."""
+    pole = 0.5 / _SMOOTHING
+    decay, gap = np.exp(-pole * period), -4 * _SMOOTHING * wanted
+    slope = v + pole * gap
+    return decay * (gap + slope * period) - gap, decay * (v - pole * period * slope)
+
+
+def _make_function(override: Override) -> Callable[[float], ArrayLike]:
+    """Return u as a function of time."""
+    if callable(override):
+        return override
+    array = check_finite("override", as_array("override", override))
+    if array.ndim > 1:
+        steps = SpeedSteps(array)
+        _check_range("override", steps.factors)
+        return steps
+    fixed = freeze(_check_range("override", array))
+    return lambda t: fixed
+
+
+def _check_range(name: str, u: ArrayLike) -> Array:
+    """Return u as an array, (), or (N,); check its range."""
+    array = as_array(name, u)
+    if array.ndim > 1 or not (np.abs(array) <= MOST).all():  # NaN is refused too
+        raise InputError(
+            f"{name} = {array.tolist()}, expected factors of the speed from {-MOST:g} to {MOST:g}, one for all "
+            "rollouts or one for each: 1 is the profile itself, 0 holds, and less goes back"
+        )
+    return array

@@ -1,0 +1,41 @@
+"""Hold, slow down, go back: the speed of any law along its path as an input."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pathcontrol.arguments import Form, Unit
+from pathcontrol.control.base import Controller
+from pathcontrol.control.override_rule import Override, OverrideRule
+from pathcontrol.control.wrapper import LawWrapper
+
+
+class SpeedOverride(LawWrapper):
+    """A law that goes along its path at an input u(t) times its speed: hold, slow down, hurry, go back.
+
+    The factor w in use follows u within ``acceleration``, |ẇ| ≤ a, and ẇ has no jumps: it changes with a time constant
+    of 20 ms. Nothing else changes, and the arm is asked to leave its path nowhere: :class:`LawWrapper` says why the
+    theorems hold for any w.
+
+    u = 1 is the law itself. At 0 the plan rests, and is not moved by what pushes the arm. Below 0 it goes back; an open
+    path is braked at its begin as it is at its end. :meth:`hold`, :meth:`resume`, :meth:`override` and :meth:`reverse`
+    set u from outside while the law runs, as in a control loop.
+
+    Args:
+        law: any law that is to be overridden.
+        override: u from −2 to 2: a number, one for each rollout (N,), a function of time [s] that returns either, or
+            steps [[t, u], …], (m, 2), with u = 1 before the first.
+        acceleration: largest |ẇ| [1/s]: at 2 the full speed is left, or reached from rest, in half a second. The
+            acceleration along the path is ẇ‖q_d'ϑ‖ [rad/s²].
+
+    Raises:
+        InputError: u is not from −2 to 2, also while the law runs, or an argument has the wrong shape.
+    """
+
+    def __init__(
+        self,
+        law: Controller,
+        override: Annotated[Override, Form.ARRAY] = 1.0,
+        acceleration: Annotated[float, Form.POSITIVE, Unit("1/s")] = 2.0,
+    ) -> None:
+        super().__init__(law, OverrideRule(override, acceleration))

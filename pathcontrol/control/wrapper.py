@@ -1,0 +1,149 @@
+"""Laws around another law, which choose the speed along its path."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
+from pathcontrol.control.base import Controller, ControlOutput
+from pathcontrol.control.override_rule import Override, OverrideRule
+from pathcontrol.control.speed_rule import Moment, Speed, SpeedRule
+
+
+class LawWrapper(Controller):
+    """A law that goes along its path at a factor w(t) of the speed, chosen by rules.
+
+    The law inside is asked with the profile wϑ in place of ϑ, by :meth:`Controller.at_speed`, and M(q)q_d'ϑẇ is added
+    to its torque. With r = q_d'ϑ its velocity error is then e_v = wr − q̇, its acceleration d(wr)/dt = wr'σ̇ + ẇr,
+    and the plan of the extended motion plan σ̇ = wϑ(σ) − k e_pᵀq_d'. Both theorems hold as they are for any w(t)
+    that is differentiable, of any sign: that of the extended motion plan asks for k(σ) ≥ 0, that of the projection for
+    e_p ⊥ r, and neither asks for more of w.
+
+    Each rule makes of the speed that is asked for (first that of the profile, w = 1) the speed that is taken. A wrapper
+    around a wrapper adds its rule to those inside, after them or, where they are ``last``, before them. The state z is
+    that of the law inside, then those of the rules in their order.
+
+    Any :class:`Controller` can be wrapped that asks :meth:`Controller.point` for its task and that is to accelerate the
+    arm as its plan does.
+
+    Args:
+        law: the law inside.
+        rule: the rule that is added.
+
+    Attributes:
+        wrapped: the law, as given.
+        rule: the rule, as given.
+        inner: the innermost law.
+        rules: all rules, in the order in which they are asked.
+    """
+
+    def __init__(self, law: Controller, rule: SpeedRule) -> None:
+        expect("law", law, Controller)
+        self.wrapped, self.rule = law, rule
+        known = law.rules if isinstance(law, LawWrapper) else ()
+        rules = sorted((*known, rule), key=lambda one: one.last)
+        has_operator = any(isinstance(one, OverrideRule) for one in rules)
+        self.rules: tuple[SpeedRule, ...] = tuple(rules if has_operator else [OverrideRule(), *rules])
+        self.inner: Controller = law.inner if isinstance(law, LawWrapper) else law
+        inner = self.inner
+        self.robot, self.task, self.friction, self.start_at = inner.robot, inner.task, inner.friction, inner.start_at
+        self.ending, self._viscous, self.gains = inner.ending, inner._viscous, inner.gains
+        for name in inner.gains:
+            setattr(self, name, getattr(inner, name))
+
+    # --- the operator ---------------------------------------------------------------------------------------
+
+    def hold(self) -> None:
+        """Let the plan come to rest on its path and stay there, within the acceleration bound."""
+        self._operator.hold()
+
+    def resume(self) -> None:
+        """Let the plan go forward again, after :meth:`hold` or :meth:`reverse`, at the override."""
+        self._operator.resume()
+
+    def override(self, value: Override) -> None:
+        """Set the override u, 0 to 2: how fast the plan goes when it is not held, as a factor of its profile.
+
+        Held, it stays held. A function of time t [s], or steps [[t, u], …], may go back by u < 0.
+
+        Raises:
+            InputError: u is not from −2 to 2.
+        """
+        self._operator.override(value)
+
+    def reverse(self) -> None:
+        """Let the plan go back along its path at the override; an open path ends at its begin."""
+        self._operator.reverse()
+
+    @property
+    def _operator(self) -> OverrideRule:
+        """The outermost speed input."""
+        return next(rule for rule in reversed(self.rules) if isinstance(rule, OverrideRule))
+
+    # --- the law --------------------------------------------------------------------------------------------
+
+    def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """Return the state z of the law inside and of all rules, (*batch, m), for an arm that starts at (q, q̇)."""
+        own = self.inner.start(q, qd)
+        position, velocity = np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64)
+        velocity = np.broadcast_to(velocity, position.shape)
+        parts = [own, *(rule.start(self.inner, position, velocity, own[..., 0]) for rule in self.rules)]
+        batch = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
+        return np.concatenate([np.broadcast_to(part, (*batch, part.shape[-1])) for part in parts], axis=-1)
+
+    def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
+        if q.shape[:-1] != z.shape[:-1]:  # one arm, and rules with a row for each rollout
+            q, qd = (np.broadcast_to(part, (*z.shape[:-1], self.robot.n)) for part in (q, qd))
+        own, *states = self.split(z)
+        moment = self._ask(t, q, qd, own, states[-1][..., 0])
+        asked = [Speed(np.ones(q.shape[:-1]), np.zeros(q.shape[:-1]))]
+        for rule, x in zip(self.rules, states, strict=True):
+            asked.append(Speed(x[..., 0], rule.rate(moment, asked[-1], x)))
+        out, taken = moment.out, asked[-1].rate
+        tau = out.tau + taken[..., None] * moment.gradient
+        zdot = [out.zdot]
+        for rule, x, before, after in zip(self.rules, states, asked[:-1], asked[1:], strict=True):
+            zdot += [after.rate[..., None], rule.memory_rate(moment, before, tau, x)]
+        drift = out.drift + taken * moment.law.speed_response(own[..., 0], moment.theta)
+        return out._replace(tau=tau, zdot=np.concatenate(zdot, axis=-1), drift=drift)
+
+    def advance(self, z: Array, out: ControlOutput, period: float) -> Array:
+        own, *states = self.split(z)
+        own_rate, *rates = self.split(out.zdot)
+        law = self.inner.at_speed(states[-1][..., 0])
+        parts = [law.advance(own, out._replace(zdot=own_rate), period)]
+        parts += [rule.advance(x, xdot, period) for rule, x, xdot in zip(self.rules, states, rates, strict=True)]
+        return np.concatenate(parts, axis=-1)
+
+    def split(self, z: Array) -> list[Array]:
+        """Return the state of the law inside, (*batch, m), and those of the rules, (*batch, size)."""
+        sizes = [rule.size for rule in self.rules]
+        return np.split(z, z.shape[-1] - np.cumsum(sizes[::-1])[::-1], axis=-1)
+
+    def _ask(self, t: float, q: Array, qd: Array, own: Array, factor: Array) -> Moment:
+        """Return what the law inside says at a ``factor`` of its speed (*batch,)."""
+        law = self.inner.at_speed(factor)
+        out = law.law(t, q, qd, own)
+        velocity, theta = law.full_speed(out.s)
+        gradient = self.robot.inverse_dynamics(q, np.zeros_like(qd), velocity) - self.robot.gravity(q)
+        return Moment(t, q, qd, law, out, theta, gradient)
+
+    # --- for the record -------------------------------------------------------------------------------------
+
+    def __repr__(self) -> str:
+        settings = ", ".join(f"{name}={value}" for name, value in self.rule.describe().items())
+        return f"{type(self).__name__}({self.wrapped!r}, {settings})"
+
+    def describe(self) -> dict[str, Any]:
+        """Return the description of the law inside, with the names of all wrappers and the settings of their rules."""
+        inner = self.wrapped.describe()
+        return inner | {"controller": f"{type(self).__name__}({inner['controller']})"} | self.rule.describe()
+
+
+def unwrap(law: Controller) -> Controller:
+    """Return the innermost law of wrappers, or the law itself."""
+    return law.inner if isinstance(law, LawWrapper) else law
