@@ -10,6 +10,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.control.base import ControlOutput
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.arm.sensors import Reading
+from pathcontrol.simulation.record_memory import new_block
 from pathcontrol.simulation.variables import VARIABLES
 
 _LARGEST = 2**31 - 1  # bytes of a sample, which NumPy's types of records allow
@@ -42,7 +43,7 @@ class Recorder:
                 "parts with first_rollout, or by sweep"
             )
         sample = np.dtype(fields, align=True)
-        self._use_block(np.empty(min(samples, max(1, _ROOM // max(1, sample.itemsize))), dtype=sample))
+        self._use_block(new_block(min(samples, max(1, _ROOM // max(1, sample.itemsize))), sample))
 
     def write(self, q: Array, qd: Array, reading: Reading, out: ControlOutput, tau: Array) -> None:
         """Store one more sample: true state, measurement, output of the law and the torque that acts."""
@@ -73,9 +74,7 @@ class Recorder:
 
     def arrays(self) -> dict[str, Array]:
         """Return all samples, rollouts first, and release the room that was not needed."""
-        self._columns.clear()  # the block may move
-        self._block.resize(self._samples, refcheck=False)
-        return {name: self._block[name].swapaxes(0, 1) for name in VARIABLES}
+        return {name: self._block[name][: self._samples].swapaxes(0, 1) for name in VARIABLES}
 
     def _reserve_block(self, samples: int) -> Array:
         """Return the room for the next ``samples``; it doubles, as a run may end long before its duration."""
@@ -83,7 +82,7 @@ class Recorder:
         while self._samples + samples > room:
             room = min(2 * room, self._most)
         if room > len(self._block):
-            larger = np.empty(room, dtype=self._block.dtype)
+            larger = new_block(room, self._block.dtype)
             larger[: self._samples] = self._block[: self._samples]
             self._use_block(larger)
         return self._block[self._samples : self._samples + samples]
