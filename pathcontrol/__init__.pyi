@@ -57,6 +57,8 @@ from .experiments.runner import run_experiment as run_experiment
 from .experiments.scenario_file import load_scenario as load_scenario
 from .experiments.sweep_runner import run_sweep as run_sweep
 from .experiments.tune_runner import run_tune as run_tune
+from .export.export import export_trajectory as export_trajectory
+from .export.plan import plan_trajectory as plan_trajectory
 from .profiles.jerk.start_stop import SmoothStartStop as SmoothStartStop
 from .profiles.limited.limited import limited as limited
 from .profiles.limited.motion_limit import MotionLimit as MotionLimit
@@ -91,6 +93,7 @@ from .simulation.loops import SampledLoop as SampledLoop
 from .simulation.run import Run as Run
 from .simulation.sequence import simulate_sequence as simulate_sequence
 from .simulation.simulate import simulate as simulate
+from .simulation.trajectory import Trajectory as Trajectory
 from .sweeps.histories import Keep as Keep
 from .sweeps.result import SweepResult as SweepResult
 from .sweeps.space import Space as Space

@@ -26,6 +26,7 @@ FLOORS = [
     "sweeps",
     "tuning",
     "comparison",
+    "export",
     "view",
     "experiments",
     "cli",

@@ -70,7 +70,7 @@ def _find_nearest(task: PathTask, q: Array, qd: Array, weight: float, braking: b
     except EngineError:
         pass  # the search below is for any task, and needs no compiled library
     ending = Ending.of(task) if braking else None
-    state, gamma = np.concatenate([q, weight * qd], axis=-1), _curve(_plan_task(task, ending), weight)
+    state, gamma = np.concatenate([q, weight * qd], axis=-1), _curve(plan_of(task, ending), weight)
     lower, upper = task.one_traverse
     s = ClosestPoint(gamma, lower, upper, task.closed, task.knots, _kinks(task, ending))(state)
     return np.linalg.norm(gamma.p(s) - state, axis=-1), s
@@ -93,10 +93,10 @@ def planned_rate(task: PathTask, s: Array) -> Array:
     ending = Ending.of(task)
     if ending is None:
         return np.broadcast_to(task.theta(s), np.shape(s))  # it may be a plain number
-    return _plan_task(task, ending)(s).theta
+    return plan_of(task, ending)(s).theta
 
 
-def _plan_task(task: PathTask, ending: Ending | None) -> Callable[[Array], PathPoint]:
+def plan_of(task: PathTask, ending: Ending | None) -> Callable[[Array], PathPoint]:
     """Return the task as a function of s, with the ending of the controllers' plan where there is one."""
     if ending is None:
         return task.at

@@ -7,6 +7,7 @@ import click
 from pathcontrol.cli import (
     check_command,
     compare_command,
+    export_command,
     report_command,
     reproduce_command,
     run_command,
@@ -34,5 +35,6 @@ for _part in (
     report_command,
     check_command,
     toolpath_command,
+    export_command,
 ):
     main.add_command(_part.command)

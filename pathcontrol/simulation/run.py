@@ -17,6 +17,7 @@ from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.config import laws, table
 from pathcontrol.simulation.context import RunContext, StoredContext, check_sequence
 from pathcontrol.simulation.samples import Samples, complete_outcome, label_outcome
+from pathcontrol.simulation.trajectory import Trajectory, interpolate_motion
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 from pathcontrol.tasks.task import PathTask
 
@@ -291,6 +292,32 @@ class Run:
     def with_robot(self, robot: RobotModel) -> Run:
         """Return the same run with the given ``robot``, for runs that do not know their own."""
         return Run(self._held, self.config, self._origin.with_robot(robot))
+
+    def to_trajectory(self, rate: float, rollout: int = 0) -> Trajectory:
+        """Return the motion of the arm as positions, velocities and accelerations at equal times, from 0 s on.
+
+        Between samples positions are cubics through q and q̇; accelerations are the slopes of such cubics through q̇ and
+        its central differences. A rollout that was finished ends there. :func:`pathcontrol.export_trajectory` writes it
+        for the controllers of arms.
+
+        Args:
+            rate: samples per second [Hz].
+            rollout: which of the rollouts, counted from 0.
+
+        Raises:
+            InputError: the rollout diverged or there is no such one, or the rate gives less than two samples.
+        """
+        if not 0 <= rollout < self.rollouts:
+            raise InputError(f"rollout = {rollout}, expected one of the {self.rollouts} of the run, counted from 0")
+        if self.status[rollout] == "diverged":
+            raise InputError(
+                f"rollout {rollout} diverged at {self.diverged_time[rollout]:g} s and is no motion to follow"
+            )
+        end = self.finish_time[rollout]
+        stop = None if np.isnan(end) else int(np.searchsorted(self.time, end, side="right"))
+        q, qd = (self.array(name)[rollout, :stop] for name in ("q", "qd"))
+        units = [self.unit("q")] * q.shape[-1] if self._origin.robot is None else self.robot.position_units
+        return Trajectory(*interpolate_motion(self.time[:stop], q, qd, rate), self.joints, units)
 
     def save(self, path: str | Path) -> Path:
         """Write netCDF, whole or not at all; :meth:`load` reads it back, :attr:`robot` and :attr:`task` included.
