@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -52,13 +53,11 @@ def imported(node: ast.AST) -> Iterator[str]:
             yield inner if inner in MODULES else str(node.module)
 
 
+@cache
 def imports_of(name: str) -> set[str]:
     """What a module imports of the package: at its top, in functions, and for its types."""
     tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
     return {target for node in ast.walk(tree) for target in imported(node)} - {name}
-
-
-GRAPH = {name: imports_of(name) for name in MODULES}
 
 
 def floor(name: str) -> int | None:
@@ -72,7 +71,9 @@ def test_every_package_has_a_floor():
 
 
 def test_no_module_imports_itself_around_a_corner():
-    list(TopologicalSorter(GRAPH).static_order())  # raises CycleError, which names the circle
+    list(
+        TopologicalSorter({name: imports_of(name) for name in MODULES}).static_order()
+    )  # raises CycleError, which names the circle
 
 
 @pytest.mark.parametrize("name", sorted(MODULES))
@@ -80,7 +81,7 @@ def test_imports_run_down(name):
     mine = floor(name)
     if name in {"pathcontrol", "pathcontrol.__main__", "pathcontrol.figures"}:
         return  # they stand before the house
-    for target in GRAPH[name]:
+    for target in imports_of(name):
         theirs = floor(target)
         if mine is None:
             assert theirs is None, f"{name} stands below all floors and imports {target}"
@@ -95,7 +96,7 @@ def test_a_module_is_found_by_its_name():
 
 def test_saved_runs_find_classes_by_the_registry():
     storage = [name for name in MODULES if name.startswith("pathcontrol.simulation.storage")]
-    used = {".".join(target.split(".")[:2]) for name in storage for target in GRAPH[name]}
+    used = {".".join(target.split(".")[:2]) for name in storage for target in imports_of(name)}
     assert storage
     assert used & {f"pathcontrol.{package}" for package in ("cartesian", "profiles", "toolpaths")} == set()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import re
 from pathlib import Path
 
@@ -19,7 +20,7 @@ KEYWORD = re.compile(r"(?<![-\w.&?#/=$'])(?<!\w\()([a-z_]\w*)=(?![=\d])")
 
 
 def messages():
-    """Every text of the package that an error or a warning may say and that names an argument by ``name=``."""
+    """Every text of the package that an error or a warning may say and that names an argument by ``name=``, by its place."""
     for file in sorted(SOURCE.rglob("*.py")):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if not (
@@ -30,7 +31,7 @@ def messages():
             for text in node.args:
                 said = _text(text)
                 if said and KEYWORD.search(_without_quoted(said)):
-                    yield pytest.param(said, id=f"{file.stem}-{node.lineno}")
+                    yield f"{file.stem}:{node.lineno}", said
 
 
 def _text(node):
@@ -47,19 +48,16 @@ def _without_quoted(text):
     return re.sub(r"`[^`]*`|<[^>]*>|(?<![=\w])'[^']*'", "", text)
 
 
-@pytest.mark.parametrize("message", list(messages()))
-def test_no_command_speaks_of_arguments_of_python(message):
-    for name, command in main.commands.items():
+def test_no_command_speaks_of_arguments_of_python():
+    found = list(messages())
+    for (where, message), (name, command) in itertools.product(found, main.commands.items()):
         said = in_options(message, command)
         left = KEYWORD.findall(_without_quoted(said))
-        assert not left or message.startswith(left[0]), (name, said)
+        assert not left or message.startswith(left[0]), (where, name, said)
         for option in re.findall(r"(?<![-\w])--[a-z][-a-z0-9]*", _without_quoted(said)):
             known = {word for param in command.params for word in param.opts}
-            assert option in known or option in message, (name, said)
-
-
-def test_there_are_such_messages():
-    assert len(list(messages())) > 10
+            assert option in known or option in message, (where, name, said)
+    assert len(found) > 10
 
 
 @pytest.mark.parametrize(

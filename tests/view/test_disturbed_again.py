@@ -55,8 +55,9 @@ def simulated(disturbance, rows=1, loop=None, plant=ROBOT):
     return pc.simulate(law, q, duration=0.08, disturbance=disturbance, loop=loop, plant=plant, progress=False)
 
 
-@pytest.mark.parametrize("loop", [pc.SampledLoop(), pc.ContinuousTime()], ids=["sampled", "continuous"])
-@pytest.mark.parametrize("name", ALONE)
+@pytest.mark.parametrize(
+    ("name", "loop"), [*((name, pc.SampledLoop()) for name in ALONE), ("sum", pc.ContinuousTime())]
+)
 def test_a_disturbed_run_is_made_again_bit_for_bit(name, loop, tmp_path, monkeypatch):
     run = simulated(ALONE[name], loop=loop)
     again = made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch)

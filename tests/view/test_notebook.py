@@ -22,9 +22,7 @@ def run():
     return pc.simulate(law, [1.0, 0.0], duration=1.0)
 
 
-@pytest.mark.parametrize(
-    "draw", [pc.path_figure, pc.phase_figure, pc.error_figure, pc.torque_figure, pc.speed_figure, pc.tool_figure]
-)
+@pytest.mark.parametrize("draw", [pc.path_figure, pc.error_figure, pc.tool_figure])
 def test_a_figure_shows_itself_and_is_saved_as_before(run, draw, tmp_path):
     before = pc.save_figure(draw(run), tmp_path / "before")
     figure = draw(run)

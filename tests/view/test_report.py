@@ -22,7 +22,7 @@ from pathcontrol import Circle, InputError, RobotModel, Run, metrics
 from pathcontrol.analysis.readable import reading
 from pathcontrol.analysis.run_metrics import LABELS, UNITS
 from pathcontrol.simulation.context import RunContext
-from pathcontrol.view.report.pictures import pictures
+from pathcontrol.view.report.pictures import picture
 from pathcontrol.view.report.report import report
 from pathcontrol.view.report.run_summary import Row, measure, rows
 from pathcontrol.view.report.sections import _section
@@ -63,6 +63,12 @@ def parsed(file: Path) -> html.HtmlElement:
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """For reports whose figures do not matter: they take most of the time."""
     monkeypatch.setattr("pathcontrol.view.report.sections.pictures", lambda runs: [])
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For reports in which the figures are made, and stand with their captions, but are empty images."""
+    monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure, kind: b"")
 
 
 def words(element: html.HtmlElement) -> str:
@@ -199,22 +205,22 @@ def test_long_runs_are_thinned_evenly(arm, circle, tmp_path):
 def test_figures_are_images_that_parse(page):
     pictures = page.xpath("//figure/img")
     assert len(pictures) >= 5
-    for picture in pictures:
-        kind, _, data = picture.get("src").partition(";base64,")
+    for shown in pictures:
+        kind, _, data = shown.get("src").partition(";base64,")
         assert kind == "data:image/svg+xml"
         root = etree.fromstring(base64.b64decode(data))
         assert root.tag.endswith("svg")
-        assert picture.get("alt")
-        assert float(root.get("width").removesuffix("pt")) / 72 * 96 == pytest.approx(int(picture.get("width")), abs=1)
+        assert shown.get("alt")
+        assert float(root.get("width").removesuffix("pt")) / 72 * 96 == pytest.approx(int(shown.get("width")), abs=1)
 
 
 def test_a_figure_too_large_as_svg_is_a_png(runs, monkeypatch):
     monkeypatch.setattr("pathcontrol.view.report.pictures._LARGEST", 0)
-    for picture in pictures({"one": runs["plan"]}):
-        kind, _, data = picture.href.partition(";base64,")
-        assert kind == "data:image/png"
-        image = Image.open(io.BytesIO(base64.b64decode(data)))
-        assert image.width == pytest.approx(picture.width / 96 * 200, abs=2)  # as wide on the page, 200 dots an inch
+    large = picture(pc.error_figure(runs["plan"]), "errors")
+    kind, _, data = large.href.partition(";base64,")
+    assert kind == "data:image/png"
+    image = Image.open(io.BytesIO(base64.b64decode(data)))
+    assert image.width == pytest.approx(large.width / 96 * 200, abs=2)  # as wide on the page, 200 dots an inch
 
 
 # --- settings ----------------------------------------------------------------------------------------------
@@ -274,6 +280,7 @@ def skeleton(file: Path) -> list[tuple[str, tuple[str, ...]]]:
     return [(e.tag, tuple(sorted(e.attrib))) for e in parsed(file).iter() if isinstance(e.tag, str)]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_hostile_names_are_text(runs, arm, tmp_path):
     pages = []
     for name in ("plain", HOSTILE):
@@ -328,6 +335,7 @@ def test_a_run_without_a_path_has_the_metrics_that_need_none(runs, arm):
     assert found.keys() >= {"e_p_peak", "e_v_rms", "tau_demand_peak"}
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_arms_of_different_joints_stand_side_by_side(runs, tmp_path):
     one = pc.load_robot("cicese_2dof", lock={"joint_2": 0.0})
     line = pc.Line([0.0], [1.0], 1.0)
