@@ -20,7 +20,7 @@ KEYWORD = re.compile(r"(?<![-\w.&?#/=$'])(?<!\w\()([a-z_]\w*)=(?![=\d])")
 
 
 def messages():
-    """Every text of the package that errors and warnings may say and that names an argument by ``name=``, by its place."""
+    """Texts of the package that errors and warnings may say and that name an argument by ``name=``, and where."""
     for file in sorted(SOURCE.rglob("*.py")):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if not (

@@ -1,4 +1,4 @@
-"""Both experiments at once, in a process each, write what they write one after the other."""
+"""The paper's experiments come out as published; both at once, in a process each, write the same files."""
 
 from __future__ import annotations
 
@@ -20,27 +20,64 @@ TWO_CORES = pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="there i
 COMMAND = [sys.executable, "-m", "pathcontrol", "reproduce", "--out"]
 
 
-def run(out, cores):
+def run(out, cores, *options):
     """Run the command on some cores only."""
     return subprocess.run(
-        [*COMMAND, str(out)],
+        [*COMMAND, str(out), *options],
         capture_output=True,
         text=True,
         preexec_fn=lambda: os.sched_setaffinity(0, cores),
     )
 
 
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """The folder that both experiments write on one core, and what the command says of them."""
+    out = tmp_path_factory.mktemp("reproduce")
+    done = run(out, sorted(os.sched_getaffinity(0))[:1], "--json")
+    assert done.returncode == 0, done.stderr
+    return out, json.loads(done.stdout)
+
+
+def test_reproduce_writes_everything(results):
+    out, summary = results
+    figures = {f"figure_{number}.{suffix}" for number in ("07", "08", "09", "10") for suffix in ("svg", "png")}
+    pages = {f"{name}{suffix}" for name in ("extended_motion_plan", "projection") for suffix in (".html", ".nc")}
+    assert {p.name for p in out.iterdir()} == figures | pages | {"summary.json"}
+    assert json.loads((out / "summary.json").read_text()) == summary
+    assert set(summary["versions"]) >= {"pathcontrol", "pin", "numpy", "python"}
+    assert summary["settings"]["projection"]["controller"]["k_p"] == 800.0
+    assert summary["seconds"] > 0
+
+
+@pytest.mark.parametrize("name", ["extended_motion_plan", "projection"])
+def test_the_papers_peaks_come_out_within_ten_percent(results, name):
+    measured = results[1][name]
+    for key, paper in measured["paper"].items():
+        assert measured[key] == pytest.approx(paper, rel=0.10)
+        assert measured[key] != paper  # a measurement, not a copy
+
+
+def test_reproduce_prints_a_table(monkeypatch, capsys, results):
+    from rich.console import Console
+
+    from pathcontrol.cli.tables import peaks_table
+
+    console = Console(width=120, record=True)
+    console.print(peaks_table(results[1]))
+    text = console.export_text()
+    assert "extended motion plan" in text
+    assert "14.5" in text
+
+
 @TWO_CORES
-def test_files_are_the_same_to_the_last_bit_on_one_core_and_on_two(tmp_path):
-    cores = sorted(os.sched_getaffinity(0))[:2]
-    for name, some in (("one", cores[:1]), ("two", cores)):
-        done = run(tmp_path / name, some)
-        assert done.returncode == 0, done.stderr
-    files = sorted(path.name for path in (tmp_path / "one").iterdir())
-    assert files == sorted(path.name for path in (tmp_path / "two").iterdir())
-    assert len(files) == 2 * 2 + 2 * 2 * 2 + 1
+def test_files_are_the_same_to_the_last_bit_on_one_core_and_on_two(results, tmp_path):
+    done = run(tmp_path, sorted(os.sched_getaffinity(0))[:2])
+    assert done.returncode == 0, done.stderr
+    files = sorted(path.name for path in results[0].iterdir())
+    assert files == sorted(path.name for path in tmp_path.iterdir())
     for name in files:
-        one, two = ((tmp_path / folder / name).read_bytes() for folder in ("one", "two"))
+        one, two = ((folder / name).read_bytes() for folder in (results[0], tmp_path))
         if name == "summary.json":
             one, two = (json.loads(text) | {"seconds": 0.0} for text in (one, two))
         assert one == two, name
