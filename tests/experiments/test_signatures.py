@@ -5,10 +5,14 @@ from __future__ import annotations
 import inspect
 import re
 
+import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from pathcontrol._units import parse_quantity
 from pathcontrol.arguments import Form, Unit, parameters_of
+from pathcontrol.experiments.runner import run_experiment
+from pathcontrol.experiments.schema.derived import section_of
 from pathcontrol.experiments.template import example_text
 from pathcontrol.registry import KINDS, LOOPS, Kind
 
@@ -47,3 +51,37 @@ def test_the_example_shows_every_argument():
         for argument, parameter in parameters_of(kind.find(name)).items():
             if parameter.required and argument not in kind.given:
                 assert re.search(rf"\b{argument} = ", text), f"{name}.{argument}"
+
+
+def several(one: str | int, other: float | bool | None = None, third: int | float = 0) -> None:
+    """Arguments that may be of more than one type."""
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"one": "a"}, None),
+        ({"one": 1, "other": 0.5, "third": 2}, None),
+        ({"one": 1, "other": False, "third": 0.5}, None),
+        ({"one": 1.5}, "one = 1.5, expected a text in quotes, or a whole number"),
+        ({"one": True}, "one = true, expected a text in quotes, or a whole number"),
+        ({"one": 1, "other": "x"}, "other = 'x', expected a finite number, or true or false"),
+        ({"one": 1, "third": "x"}, "third = 'x', expected a whole number, or a finite number"),
+    ],
+)
+def test_an_argument_of_several_types_takes_each_of_them(given, said):
+    if said is None:
+        assert section_of(several).model_validate(given).arguments(float) == given
+        return
+    with pytest.raises(ValidationError) as error:
+        section_of(several).model_validate(given)
+    [detail] = error.value.errors()
+    assert detail["loc"][-1] + detail["msg"] == said
+
+
+@pytest.mark.parametrize("joint", [1, "joint_2"])
+def test_a_joint_is_named_or_numbered(write_experiment, joint, tmp_path):
+    jam = {"type": "jammed_joint", "joint": joint, "start": 0.01, "duration": 0.02}
+    run = run_experiment(write_experiment({"disturbance": jam}), tmp_path, progress=False).run
+    held = run.array("q")[0, (run.time > 0.011) & (run.time < 0.029)]
+    assert np.ptp(held[:, 1]) == 0.0 < np.ptp(held[:, 0])

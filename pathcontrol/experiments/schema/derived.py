@@ -16,7 +16,7 @@ from pydantic_core import PydanticCustomError
 from pathcontrol._expect import did_you_mean
 from pathcontrol.arguments import Form, Parameter, parameters_of
 from pathcontrol.experiments.schema.section import Section, choose
-from pathcontrol.experiments.schema.validators import Text, check, expected
+from pathcontrol.experiments.schema.validators import Text, check_forms, expected
 from pathcontrol.registry import Kind, find_kind, load
 
 _OWN = re.compile(r"(?P<file>.+\.py|[^\W\d]\w*(\.[^\W\d]\w*)*):(?P<name>[^\W\d]\w*)")
@@ -116,14 +116,14 @@ def table_for(place: str, given: tuple[str, ...] = ()) -> PlainValidator:
 def _annotation(parameter: Parameter) -> Any:
     """Return the annotation of a field for a parameter."""
     literals = [value for kind in parameter.types if get_origin(kind) is Literal for value in get_args(kind)]
-    form = parameter.form or next((_FORMS[kind] for kind in parameter.types if kind in _FORMS), None)
+    forms = [parameter.form] if parameter.form else [_FORMS[kind] for kind in parameter.types if kind in _FORMS]
     table = next(filter(None, map(_table_of, parameter.types)), None)
-    if form is Form.TEXTS:
+    if forms == [Form.TEXTS]:
         return list[Text]  # its errors name the entry
-    if literals and form is None and table is None:
+    if literals and not forms and table is None:
         return Literal[tuple(literals)]
-    validate = partial(check, form) if form else _anything
-    words = [form.value] if form else []
+    validate = check_forms(*forms) if forms else _anything
+    words = [form.value for form in forms]
     if table is not None:
         validate, words = partial(_table_or, table, validate), [*words, "a table with the key 'type'"]
     if literals:

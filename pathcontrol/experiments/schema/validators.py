@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import reprlib
 from collections.abc import Callable
-from functools import partial
 from typing import Annotated, Any
 
 from pydantic import PlainValidator
@@ -104,15 +103,19 @@ _TESTS: dict[Form, Callable[[Any], bool]] = {
 }
 
 
-def check(form: Form, value: Any) -> Any:
-    """Return a value that has the ``form``, integers as they are; others are told what was expected."""
-    if not _TESTS[form](value):
-        raise expected(form.value)
-    return list(value) if isinstance(value, tuple) else value
+def check_forms(*forms: Form) -> Callable[[Any], Any]:
+    """Return a function that gives values of one of the ``forms`` back, and tells what else was expected."""
+
+    def check(value: Any) -> Any:
+        if not any(_TESTS[form](value) for form in forms):
+            raise expected(", or ".join(form.value for form in forms))
+        return list(value) if isinstance(value, tuple) else value
+
+    return check
 
 
 def _of(form: Form) -> PlainValidator:
-    return PlainValidator(partial(check, form))
+    return PlainValidator(check_forms(form))
 
 
 Text = Annotated[str, _of(Form.TEXT)]
