@@ -21,6 +21,7 @@ class Form(Enum):
 
     TEXT = "a text in quotes"
     TEXTS = "a list of texts in quotes"
+    JOINT = "the name of a joint, or its number from 0"
     FLAG = "true or false"
     WHOLE = "a whole number"
     WHOLES = "a list of whole numbers"

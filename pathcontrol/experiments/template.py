@@ -16,6 +16,7 @@ _COLUMN, _LONGEST = 34, 84  # where comments begin, and how long they are
 #: what may stand for an argument of which neither the file nor the signature has a value
 _VALUES = {
     Form.TEXT: '"tool"',
+    Form.JOINT: "0",
     Form.NUMBERS: "[0.0, 0.0]",
     Form.WHOLES: "[0, 1]",
     Form.GAIN: "[10.0, 10.0]",

@@ -11,6 +11,8 @@ from pydantic import ValidationError
 
 from pathcontrol._units import parse_quantity
 from pathcontrol.arguments import Form, Unit, parameters_of
+from pathcontrol.errors import ExperimentError
+from pathcontrol.experiments.load import load_experiment
 from pathcontrol.experiments.runner import run_experiment
 from pathcontrol.experiments.schema.derived import section_of
 from pathcontrol.experiments.template import example_text
@@ -77,6 +79,14 @@ def test_an_argument_of_several_types_takes_each_of_them(given, said):
         section_of(several).model_validate(given)
     [detail] = error.value.errors()
     assert detail["loc"][-1] + detail["msg"] == said
+
+
+@pytest.mark.parametrize("joint", [-1, 0.5, True, [0]])
+def test_what_names_no_joint_is_told(write_experiment, joint):
+    with pytest.raises(
+        ExperimentError, match=r"disturbance.joint = .*, expected the name of a joint, or its number from 0"
+    ):
+        load_experiment(write_experiment({"disturbance": {"type": "jammed_joint", "joint": joint}}))
 
 
 @pytest.mark.parametrize("joint", [1, "joint_2"])

@@ -75,14 +75,19 @@ def _is_array(value: Any) -> bool:
     return _is_number(value) or _list_of(_is_array)(value)
 
 
+def _is_name_or_number(value: Any) -> bool:
+    return _is_text(value) or (_is_whole(value) and value >= 0)
+
+
 def _is_columns(value: Any) -> bool:
     if isinstance(value, dict):
-        return all(_is_text(at) or (_is_whole(at) and at >= 0) for at in value.values())
+        return all(map(_is_name_or_number, value.values()))
     return _is_text(value) or (isinstance(value, list) and all(map(_is_text, value)))
 
 
 _TESTS: dict[Form, Callable[[Any], bool]] = {
     Form.TEXT: _is_text,
+    Form.JOINT: _is_name_or_number,
     Form.FLAG: _is_flag,
     Form.WHOLE: _is_whole,
     Form.WHOLES: _list_of(_is_whole),

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
+from pathcontrol.arguments import Form
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance
+
+Joint = Annotated[str | int | Sequence[str | int], Form.JOINT]
 
 
 class JammedJoint(TimedDisturbance):
@@ -29,7 +33,7 @@ class JammedJoint(TimedDisturbance):
         InputError: ``joint`` is neither, or a time is no number.
     """
 
-    def __init__(self, joint: str | int | Sequence[str | int], start: Begin = 0.0, duration: Span = np.inf) -> None:
+    def __init__(self, joint: Joint, start: Begin = 0.0, duration: Span = np.inf) -> None:
         super().__init__(start, duration)
         names = np.asarray(joint)
         whole = names.dtype.kind in "iu" and bool((names >= 0).all())

@@ -57,7 +57,7 @@ def _term(kind: Any, described: Mapping[str, Any], run: Run) -> Code | None:
 
 def _is_argument(parameter: Parameter, value: Any, run: Run) -> bool:
     """Return whether a value has the axes that a parameter states, or any where it states none."""
-    if parameter.form is Form.TEXT:  # one name or number, or one for each rollout
+    if parameter.form is Form.JOINT:  # one, or one for each rollout
         names = value if isinstance(value, list) else [value]
         return all(isinstance(one, str | int) for one in names) and (names is not value or len(value) == run.rollouts)
     if parameter.form is None:
