@@ -3,6 +3,8 @@ from . import figures as figures
 from .analysis.deviation import tool_deviation as tool_deviation
 from .analysis.deviation import toolpath_metrics as toolpath_metrics
 from .analysis.disturbance_estimate import momentum_observer as momentum_observer
+from .analysis.friction_identification import FrictionEstimate as FrictionEstimate
+from .analysis.friction_identification import identify_friction as identify_friction
 from .analysis.gamma import distance_to_gamma as distance_to_gamma
 from .analysis.lyapunov_functions import lyapunov as lyapunov
 from .analysis.pareto import non_dominated as non_dominated
@@ -134,6 +136,7 @@ from .view.figures.comparison_figure import comparison_figure as comparison_figu
 from .view.figures.deviation_figure import deviation_figure as deviation_figure
 from .view.figures.error_figures import error_bands_figure as error_bands_figure
 from .view.figures.error_figures import error_figure as error_figure
+from .view.figures.friction_figure import friction_figure as friction_figure
 from .view.figures.limits_figure import limits_figure as limits_figure
 from .view.figures.observer_figure import observer_figure as observer_figure
 from .view.figures.pareto_figure import pareto_figure as pareto_figure

@@ -4,6 +4,7 @@ from pathcontrol.view.figures.comparison_figure import comparison_figure as comp
 from pathcontrol.view.figures.deviation_figure import deviation_figure as deviation_figure
 from pathcontrol.view.figures.error_figures import error_bands_figure as error_bands_figure
 from pathcontrol.view.figures.error_figures import error_figure as error_figure
+from pathcontrol.view.figures.friction_figure import friction_figure as friction_figure
 from pathcontrol.view.figures.limits_figure import limits_figure as limits_figure
 from pathcontrol.view.figures.observer_figure import observer_figure as observer_figure
 from pathcontrol.view.figures.pareto_figure import pareto_figure as pareto_figure

@@ -1,6 +1,8 @@
 from .deviation import tool_deviation as tool_deviation
 from .deviation import toolpath_metrics as toolpath_metrics
 from .disturbance_estimate import momentum_observer as momentum_observer
+from .friction_identification import FrictionEstimate as FrictionEstimate
+from .friction_identification import identify_friction as identify_friction
 from .gamma import distance_to_gamma as distance_to_gamma
 from .lyapunov_functions import lyapunov as lyapunov
 from .pareto import non_dominated as non_dominated

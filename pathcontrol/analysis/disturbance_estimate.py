@@ -62,7 +62,7 @@ def momentum_observer(
     arm = _find_arm(run, robot)
     expect_choice("friction", friction, get_args(FrictionCompensation))
     rate = 2 * np.pi * _check_cutoff(cutoff_hz, arm)
-    time, q, qd = _motion(run, measured)
+    time, q, qd = motion_of(run, measured)
     known = zip(q, qd, _mean_torque(run, time), strict=True)
     means = [_mean_disturbance(arm, friction, np.diff(time)[:, None], *rollout) for rollout in known]
     return _low_pass(np.stack(means), np.diff(time), rate, np.where(np.isfinite(q[:, 0]), 0.0, np.nan))
@@ -105,7 +105,7 @@ def _velocity_age(run: Run) -> float:
     return 0.5 * _loop_number(run, "period") if by_difference else 0.0
 
 
-def _motion(run: Run, measured: bool) -> tuple[Array, Array, Array]:
+def motion_of(run: Run, measured: bool) -> tuple[Array, Array, Array]:
     """Return the times (time,) at which the arm had its velocities, and positions and velocities at these times."""
     if not (measured and "qd_measured" in run):
         return run.time, run.array("q"), run.array("qd")

@@ -8,6 +8,7 @@ from pathcontrol.cli import (
     check_command,
     compare_command,
     export_command,
+    identify_command,
     report_command,
     reproduce_command,
     run_command,
@@ -36,5 +37,6 @@ for _part in (
     check_command,
     toolpath_command,
     export_command,
+    identify_command,
 ):
     main.add_command(_part.command)

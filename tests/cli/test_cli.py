@@ -136,5 +136,17 @@ def test_ctrl_c_leaves_no_half_written_file(tmp_path):
 
 def test_the_console_script_is_the_same_command():
     assert main.name == "main"
-    known = {"reproduce", "run", "sweep", "tune", "compare", "view", "report", "check", "toolpath", "export"}
+    known = {
+        "reproduce",
+        "run",
+        "sweep",
+        "tune",
+        "compare",
+        "view",
+        "report",
+        "check",
+        "toolpath",
+        "export",
+        "identify",
+    }
     assert set(main.commands) == known
