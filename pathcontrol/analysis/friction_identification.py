@@ -123,9 +123,10 @@ def identify_friction(
         ∫φ f dt = ∫φ (τ + C(q,q̇)ᵀq̇ − g(q)) dt + ∫φ̇ p dt,
 
     so no acceleration is needed (modulating functions: M. Shinbrot, Trans. ASME 79, 1957); φ = (1 − x²)² falls to 0
-    smoothly, which averages the noise of encoders and the chatter of a motor. Of each joint count the windows in which it moves one
-    way all the time, faster than ``min_speed``. To their mean friction torques the coefficients are fitted by linear least squares, none below 0;
-    the Stribeck velocity by a search around that. Standard errors are those of independent residuals.
+    smoothly, which averages the noise of encoders and the chatter of a motor. Of each joint count the windows in which
+    it moves one way all the time, faster than ``min_speed``. To their mean friction torques the coefficients are fitted
+    by linear least squares, none below 0; the Stribeck velocity by a search around that. Standard errors are those of
+    independent residuals.
 
     What else the model of the arm gets wrong, masses above all, is taken for friction as far as it looks like it.
 
@@ -187,7 +188,7 @@ def _select_windows(time: Array, torque: Array, qd: Array, count: int, slowest: 
 
 
 def _bump(count: int) -> Array:
-    """Return the weights (1 − x²)² of the periods of a window, (count,), which fall to 0 at its ends, slope included."""
+    """Return the weights (1 − x²)² of the periods of a window, (count,), 0 at its ends with their slope."""
     x = (2 * np.arange(count) + 1) / count - 1
     return (1 - x**2) ** 2
 
