@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array
 from pathcontrol._expect import expect, expect_choice
-from pathcontrol.control.base import FrictionCompensation
+from pathcontrol.control.base import KnownFriction
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import FrictionLaw, levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
@@ -24,7 +24,7 @@ def momentum_observer(
     robot: RobotModel | None = None,
     *,
     cutoff_hz: ArrayLike = 20.0,
-    friction: FrictionCompensation = "none",
+    friction: KnownFriction = "none",
     measured: bool = True,
 ) -> Array:
     """Estimate the torque that acts on the joints beside the motors [N m], (rollout, time, n).
@@ -60,7 +60,7 @@ def momentum_observer(
     """
     expect("run", run, Run)
     arm = _find_arm(run, robot)
-    expect_choice("friction", friction, get_args(FrictionCompensation))
+    expect_choice("friction", friction, get_args(KnownFriction))
     rate = 2 * np.pi * _check_cutoff(cutoff_hz, arm)
     time, q, qd = motion_of(run, measured)
     known = zip(q, qd, _mean_torque(run, time), strict=True)
@@ -148,9 +148,7 @@ def _torque_lead(run: Run) -> float:
     return period - late if late else 0.0
 
 
-def _mean_disturbance(
-    arm: RobotModel, friction: FrictionCompensation, dt: Array, q: Array, qd: Array, tau: Array
-) -> Array:
+def _mean_disturbance(arm: RobotModel, friction: KnownFriction, dt: Array, q: Array, qd: Array, tau: Array) -> Array:
     """Return the mean of d between the samples of one rollout, (time − 1, n): what τ does not explain of Δp."""
     rate = arm.momentum_rate(q, qd, np.zeros(arm.n))
     unexplained = np.diff(arm.momentum(q, qd), axis=0) / dt - tau - _between(rate)

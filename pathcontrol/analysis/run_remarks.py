@@ -40,7 +40,7 @@ def stands_still(run: Run) -> bool:
 
 def remedy(run: Run) -> str:
     """Return advice for an arm that stands still."""
-    if _has_dry_friction(run) and not any(law.get("friction") == "full" for law in laws(run.config)):
+    if _has_dry_friction(run) and not any(law.get("friction") in ("full", "observed") for law in laws(run.config)):
         return 'dry friction that the law does not compensate holds it; give the controller friction="full"'
     return "give the controller larger gains, or torque limits that hold and move the arm"
 

@@ -5,24 +5,29 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from copy import copy
-from typing import Any, Literal, NamedTuple, Self, get_args
+from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array, as_joint_array, check_finite, freeze, strip_labels
 from pathcontrol._expect import expect, expect_choice
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.ending import Ending
-from pathcontrol.errors import InputError, warn_of_single
+from pathcontrol.control.observer import CUTOFF, MomentumObserver, Observation
+from pathcontrol.errors import InputError, warn, warn_of_single
 from pathcontrol.robot.friction import levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.tasks.task_check import check_task
 
-FrictionCompensation = Literal["none", "viscous", "full"]
+#: what may be known of the friction of a model
+KnownFriction = Literal["none", "viscous", "full"]
+FrictionCompensation = Literal["none", "viscous", "full", "observed"]
 Start = Literal["s0", "nearest"]
 
+_RESTING = 1e-6  # rad/s or m/s, the desired velocity below which a joint is to rest
 _HELD = 1e-6  # factor of the speed below which a plan stands still
 
 
@@ -39,6 +44,7 @@ class ControlOutput(NamedTuple):
         e_p: position error q_d(s) − q [rad], (*batch, n).
         e_v: velocity error q_d'(s)ϑ(s) − q̇ [rad/s], (*batch, n).
         regular: False where the path parameter is not defined by the law and the last one was kept, (*batch,).
+        observation: the values of the law's momentum observer, or None where it has none.
     """
 
     tau: Array
@@ -50,20 +56,29 @@ class ControlOutput(NamedTuple):
     e_p: Array
     e_v: Array
     regular: Array
+    observation: Observation | None = None
 
 
 class Controller(ABC):
     """A control law for any arm and any task.
 
     :meth:`start` gives the state z, (*batch, m); :meth:`law` maps (t, q, q̇, z) to torques and ż and keeps nothing;
-    :meth:`advance` takes z over one control period. The state of the controllers here is the path parameter, m = 1.
+    :meth:`advance` takes z over one control period. The state of the controllers here is the path parameter, m = 1, and
+    after it the memory of the momentum observer, where there is one.
 
     Args:
         robot: the model the law uses, which need not be the simulated arm.
         task: path and velocity profile, for as many joints; one of each rollout is a :class:`TaskBatch`.
         friction: what the torque compensates of ``robot.friction``: ``"none"``, ``"viscous"`` (as in the paper) or
             ``"full"``, which adds the Coulomb level in the direction of motion; of the desired one where a joint rests.
+            ``"observed"`` takes nothing from it, but compensates what a :class:`MomentumObserver` estimates: the torque
+            d that acts beside the motors, from all friction, loads and contacts.
         start: the first path parameter: ``"s0"`` of the task, or that of the ``"nearest"`` point of the path.
+        observer_hz: corner frequency of both low passes of the observer [Hz], a number or (n,); (N, n) has a row for
+            each rollout. By default 35 Hz. Of ``friction="observed"`` only.
+
+    Where the torque compensates an estimate d̂, the terms of a law's theorem stay, and the rest d − d̂ acts on the arm as
+    uncompensated friction does: V̇ has a term of e_v and M⁻¹(d − d̂) more, which falls with the corner frequency.
     """
 
     def __init__(
@@ -72,6 +87,7 @@ class Controller(ABC):
         task: PathTask,
         friction: FrictionCompensation = "viscous",
         start: Start = "s0",
+        observer_hz: Annotated[ArrayLike, Form.GAIN, Unit("Hz")] | None = None,
     ) -> None:
         expect_choice("friction", friction, get_args(FrictionCompensation))
         expect_choice("start", start, get_args(Start))
@@ -80,25 +96,47 @@ class Controller(ABC):
         self.robot, self.task, self.friction, self.start_at = robot, task, friction, start
         self.ending = Ending.of(task)
         self._viscous = viscous_of(robot.friction)
+        if (cutoff := self._check_cutoff(observer_hz)) is not None:
+            self.observer_hz, self.observer = cutoff, MomentumObserver(robot, cutoff)
 
     def __init_subclass__(cls, single: bool | None = None, **options: Any) -> None:
         super().__init_subclass__(**options)
         if single is not None:
             warn_of_single(cls.__name__)
 
+    def _check_cutoff(self, observer_hz: ArrayLike | None) -> Array | None:
+        """Check the corner frequency of the observer [Hz]; return it, or None for a law without one."""
+        if self.friction == "observed":
+            given = CUTOFF if observer_hz is None else observer_hz
+            return diagonal_gain("observer_hz", given, self.robot.n, self.robot.joint_names)
+        if observer_hz is not None:
+            warn(f"observer_hz = {observer_hz}, but friction = {self.friction!r} has no observer; give 'observed'")
+        return None
+
     @abstractmethod
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         """Return the torques and rates for q [rad] and q̇ [rad/s], (*batch, n), at time t [s] and state z."""
 
     def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
-        """Return the state z, (*batch, 1), for an arm that starts at (q, q̇)."""
+        """Return the state z, (*batch, m), for an arm that starts at (q, q̇)."""
         q = as_joint_array("q", q, self.robot.n, self.robot.joint_names)
-        as_joint_array("qd", qd, self.robot.n)
-        s = np.full(q.shape[:-1], self.task.s0) if self.start_at == "s0" else self.task.sigma_bar(q)
-        return np.asarray(s)[..., None]
+        qd = np.broadcast_to(as_joint_array("qd", qd, self.robot.n), q.shape)
+        s = np.asarray(self.first_parameter(q, qd))[..., None]
+        return s if self.observer is None else np.concatenate([s, self.observer.start(q, qd)], axis=-1)
+
+    def first_parameter(self, q: Array, qd: Array) -> Array:
+        """Return the path parameter, (*batch,), of an arm that starts at (q, q̇), (*batch, n) each."""
+        return np.full(q.shape[:-1], self.task.s0) if self.start_at == "s0" else self.task.sigma_bar(q)
+
+    def rate(self, out: ControlOutput) -> Array:
+        """Return ż in continuous time, (*batch, m), where the torque that acts is ``out.tau``."""
+        if self.observer is None or out.observation is None:
+            return out.zdot
+        memory, own = self.observer.rate(out.observation, out.tau), out.zdot[..., 1 + self.observer.size :]
+        return np.concatenate([out.zdot[..., :1], memory, own], axis=-1)
 
     def advance(self, z: Array, out: ControlOutput, period: float) -> Array:
-        """Return the state one control ``period`` [s] after z.
+        """Return the state one control ``period`` [s] after z; ``out.tau`` is the mean of the torque that acts in it.
 
         ṡ = f(s, t), where t stands for the motion of the arm at its present velocity, is integrated by the exponential
         Rosenbrock–Euler step s + h φ₁(hf_s) f + h² φ₂(hf_s) f_t, φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x: second
@@ -109,7 +147,10 @@ class Controller(ABC):
         x = np.minimum(period * out.slope, 1.0)
         phi_1, phi_2 = _phi(x)
         s = out.s + period * (phi_1 * out.sdot + period * phi_2 * out.drift)
-        return (s if self.task.closed else np.minimum(np.maximum(s, self.task.s0), self.task.s_end))[..., None]
+        s = (s if self.task.closed else np.minimum(np.maximum(s, self.task.s0), self.task.s_end))[..., None]
+        if self.observer is None or out.observation is None:
+            return s
+        return np.concatenate([s, self.observer.advance(out.observation, out.tau)], axis=-1)
 
     def __repr__(self) -> str:
         gains = ", ".join(f"{name}={np.asarray(getattr(self, name)).tolist()}" for name in self.gains)
@@ -119,10 +160,15 @@ class Controller(ABC):
         """Return name, gains and choices, for the configuration of a run."""
         gains = {name: np.asarray(getattr(self, name)).tolist() for name in self.gains}
         name = {"controller": type(self).__name__, "friction": self.friction, "start": self.start_at}
+        if self.observer_hz is not None:
+            name["observer_hz"] = self.observer_hz.tolist()
         return name | gains | {"robot": self.robot.name, "task": self.task.describe()}
 
     #: names of the attributes that hold gains
     gains: tuple[str, ...] = ()
+    #: the momentum observer whose estimate the torque compensates, and its corner frequency [Hz]
+    observer: MomentumObserver | None = None
+    observer_hz: Array | None = None
 
     # --- for laws -------------------------------------------------------------------------------------------
 
@@ -194,7 +240,7 @@ class Controller(ABC):
     @property
     def compensated(self) -> Array:
         """The viscous friction b̂ [N m s/rad] that the law compensates, (n,) or (N, n)."""
-        return np.zeros(self.robot.n) if self.friction == "none" else self._viscous
+        return self._viscous if self.friction in ("viscous", "full") else np.zeros(self.robot.n)
 
     def friction_torque(self, qd: Array, desired: Array | None = None) -> Array | float:
         """Return f̂(q̇) [N m], the friction that the law compensates, (*batch, n).
@@ -204,11 +250,24 @@ class Controller(ABC):
         """
         if self.friction == "viscous":
             return self._viscous * qd
-        if self.friction == "none":
+        if self.friction in ("none", "observed"):
             return 0.0
         direction = qd if desired is None else np.where(qd == 0, desired, qd)
         plus, minus = levels_of(self.robot.friction, qd)
         return self._viscous * qd + np.where(direction > 0, plus, 0.0) - np.where(direction < 0, minus, 0.0)
+
+    def compensate(self, t: float, q: Array, qd: Array, z: Array, out: ControlOutput) -> ControlOutput:
+        """Return ``out`` with the torque that the observer estimates compensated; the same for a law without one.
+
+        The estimate of a joint that rests, and is to rest, stays what it was: friction would hold the arm whatever the
+        torque, and the smallest error be summed up until the arm broke loose, for ever.
+        """
+        if self.observer is None:
+            return out
+        memory = z[..., 1 : 1 + self.observer.size]
+        seen = self.observer.observe(t, q, qd, memory, kept=(qd == 0) & (np.abs(out.e_v) < _RESTING))
+        out = out._replace(tau=out.tau - seen.torque, observation=seen)
+        return out._replace(zdot=self.rate(out))
 
 
 def _phi(x: Array) -> tuple[Array, Array]:

@@ -75,7 +75,8 @@ class ExtendedMotionPlan(Controller):
         slope = np.where(held, 0.0, point.dtheta - k * curvature)
         drift = np.where(held, 0.0, k * np.vecdot(qd, point.dq_d))
         regular = np.isfinite(s)
-        return ControlOutput(tau, sdot[..., None], s, sdot, slope, drift, e_p, e_v, regular)
+        out = ControlOutput(tau, sdot[..., None], s, sdot, slope, drift, e_p, e_v, regular)
+        return self.compensate(t, q, qd, z, out)
 
     def plan_gain(self, s: Array) -> Array:
         """Return k(σ) [1/(rad² s)], (*batch,): ``k``, and 0 where the plan is timed."""

@@ -39,7 +39,8 @@ class MotionController(Controller):
         tracking = Tracking(point.velocity_slope * point.theta[..., None], velocity, e_p, e_v)
         tau = self.torque(q, qd, tracking) + self.friction_torque(qd, velocity)
         drift, regular = np.zeros_like(s), np.ones(s.shape, dtype=bool)
-        return ControlOutput(tau, point.theta[..., None], s, point.theta, point.dtheta, drift, e_p, e_v, regular)
+        out = ControlOutput(tau, point.theta[..., None], s, point.theta, point.dtheta, drift, e_p, e_v, regular)
+        return self.compensate(t, q, qd, z, out)
 
 
 class ProportionalDerivative(MotionController):

@@ -71,11 +71,9 @@ class Projection(Controller):
         self.branches = BranchPolicy(branch, capture)
         self.k_p, self.K_v = scalar_gain("k_p", k_p), diagonal_gain("K_v", K_v, robot.n, robot.joint_names)
 
-    def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
-        """Return the state z, (*batch, 1): σ̄ of an arm that starts at (q, q̇), on the branch that ``start`` names."""
-        z = super().start(q, qd)
-        q, qd = np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64)
-        return self._project(q, np.broadcast_to(qd, q.shape), z[..., 0])[0][..., None]
+    def first_parameter(self, q: Array, qd: Array) -> Array:
+        """Return σ̄, (*batch,), of an arm that starts at (q, q̇), on the branch that ``start`` names."""
+        return self._project(q, qd, super().first_parameter(q, qd))[0]
 
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         last, none = z[..., 0], np.zeros(z.shape[:-1])
@@ -91,7 +89,8 @@ class Projection(Controller):
         tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd, point.velocity)
         # in continuous time the state integrates dσ̄/dt; its offset, as after a change of branch, decays exponentially
         zdot = sdot + np.where(regular, (s - last) / _CATCH_UP, 0.0)
-        return ControlOutput(tau, zdot[..., None], s, sdot, slope, none, e_p, e_v, regular)
+        out = ControlOutput(tau, zdot[..., None], s, sdot, slope, none, e_p, e_v, regular)
+        return self.compensate(t, q, qd, z, out)
 
     def speed_response(self, s: Array, theta: Array) -> Array:
         return np.where(self.timed(s), theta, 0.0)

@@ -52,6 +52,7 @@ class LawWrapper(Controller):
         inner = self.inner
         self.robot, self.task, self.friction, self.start_at = inner.robot, inner.task, inner.friction, inner.start_at
         self.ending, self._viscous, self.gains = inner.ending, inner._viscous, inner.gains
+        self.observer, self.observer_hz = inner.observer, inner.observer_hz
         for name in inner.gains:
             setattr(self, name, getattr(inner, name))
 
@@ -110,6 +111,10 @@ class LawWrapper(Controller):
             zdot += [after.rate[..., None], rule.memory_rate(moment, before, tau, x)]
         drift = out.drift + taken * moment.law.speed_response(own[..., 0], moment.theta)
         return out._replace(tau=tau, zdot=np.concatenate(zdot, axis=-1), drift=drift)
+
+    def rate(self, out: ControlOutput) -> Array:
+        own, *rates = self.split(out.zdot)
+        return np.concatenate([self.inner.rate(out._replace(zdot=own)), *rates], axis=-1)
 
     def advance(self, z: Array, out: ControlOutput, period: float) -> Array:
         own, *states = self.split(z)

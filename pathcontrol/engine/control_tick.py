@@ -31,9 +31,12 @@ class ControlTick:
 
     A law that is wrapped, by :class:`SpeedOverride` or another :class:`LawWrapper`, is run in Python, and has the
     methods of its speed input: :meth:`hold`, :meth:`resume`, :meth:`override` and :meth:`reverse` act at the next call.
+    So is one with ``friction="observed"``, whose observer takes the returned torques to act up to the next call, within
+    the effort limits of its robot.
 
     Args:
-        law: one of the five laws of the library, with one task and gains for one arm, or any law that is wrapped.
+        law: one of the five laws of the library, with one task and gains for one arm, or any law that is wrapped or
+            has an observer.
         period: control period [s].
 
     Attributes:
@@ -45,10 +48,11 @@ class ControlTick:
     """
 
     def __init__(self, law: Controller, period: float) -> None:
-        if isinstance(law.task, TaskBatch) or any(np.ndim(getattr(law, gain)) > 1 for gain in law.gains):
+        gains = [law.observer_hz, *(getattr(law, name) for name in law.gains)]
+        if isinstance(law.task, TaskBatch) or any(np.ndim(gain) > 1 for gain in gains):
             raise InputError("the law is for several rollouts, expected one task and one set of gains")
         self.law, self._period = law, as_scalar("period", period, positive=True)
-        make = _PythonTick if isinstance(law, LawWrapper) else _CompiledTick
+        make = _PythonTick if isinstance(law, LawWrapper) or law.observer is not None else _CompiledTick
         self._tick: _PythonTick | _CompiledTick = make(law, self._period)
         self.start(np.zeros(law.robot.n) if law.start_at == "s0" else law.task.q_d(np.array(law.task.s0)))
 
@@ -128,6 +132,8 @@ class _PythonTick:
         self._law, self._period, self._ticks = law, period, 0
         self._z = np.zeros((1, 1))
         self._tau = np.zeros(law.robot.n)
+        effort = law.robot.limits.effort
+        self._most = np.where(effort > 0, effort, np.inf)  # some robots state 0
 
     @property
     def s(self) -> float:
@@ -142,6 +148,7 @@ class _PythonTick:
         """Return the torques, and advance."""
         position, velocity = np.array(q, dtype=np.float64)[None], np.array(qd, dtype=np.float64)[None]
         out = self._law.law(self._ticks * self._period, position, velocity, self._z)
-        self._z, self._ticks = self._law.advance(self._z, out, self._period), self._ticks + 1
+        acting = out._replace(tau=np.clip(out.tau, -self._most, self._most))
+        self._z, self._ticks = self._law.advance(self._z, acting, self._period), self._ticks + 1
         self._tau[:] = out.tau[0]
         return self._tau

@@ -43,6 +43,8 @@ def add_law(setup: Setup, controller: Controller, memory: Memory) -> None:
     kind = type(controller)
     if kind not in GAINS:
         raise EngineError(f"the law {kind.__name__} is not one of the library")
+    if controller.observer is not None:
+        raise EngineError("the law has a momentum observer, friction='observed'")
     n = controller.robot.n
     setup.joints, setup.law = n, list(GAINS).index(kind)
     setup.compensation = _COMPENSATION.index(controller.friction)

@@ -50,10 +50,11 @@ class ClosedLoop:
         """Return dy/dt of states (N, 2n + m)."""
         q, qd, _ = self.split(y)
         out, tau = self.control(t, y)
+        zdot = self.controller.rate(out._replace(tau=tau))
         friction = self.robot.friction.smoothed(qd, self.mode.friction_width)
         if self._push is not None:
             tau = tau + self._push(t, q, qd)
-        return np.concatenate([qd, self.robot.forward_dynamics(q, qd, tau - friction), out.zdot], axis=-1)
+        return np.concatenate([qd, self.robot.forward_dynamics(q, qd, tau - friction), zdot], axis=-1)
 
 
 class ContinuousArm:

@@ -46,8 +46,8 @@ class LossyLine:
             return out
         if self._missed.any():
             last = out if begins or self._said is None else self._said
-            kept = (_choose(self._missed, old, new) for old, new in zip(last, out, strict=True))
-            out = ControlOutput(*kept)
+            kept = (_choose(self._missed, old, new) for old, new in zip(last[:-1], out[:-1], strict=True))
+            out = ControlOutput(*kept, observation=out.observation)  # counts where the tick is not missed
             tau = np.where(self._silent[:, None], 0.0, _choose(self._missed, self._tau, out.tau))
             out = out._replace(tau=tau, regular=out.regular & ~self._missed)
         self._said, self._tau = out, out.tau

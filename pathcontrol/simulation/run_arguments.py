@@ -207,8 +207,13 @@ def _check_output(controller: Controller, out: Any, q: Array, z: Array) -> None:
     name = type(controller).__name__
     if not isinstance(out, ControlOutput):
         raise InputError(f"{name}.law returns {type(out).__name__}, expected a ControlOutput")
+    if controller.observer is not None and out.observation is None:
+        raise InputError(
+            f"{name}.law does not compensate what friction='observed' estimates; end it with "
+            "return self.compensate(t, q, qd, z, ControlOutput(...))"
+        )
     wanted = {"tau": q.shape, "e_p": q.shape, "e_v": q.shape, "zdot": np.shape(z)}
-    for field in ControlOutput._fields:
+    for field in ControlOutput._fields[:-1]:
         shape, value = wanted.get(field, q.shape[:1]), getattr(out, field)
         if np.shape(value) != shape:
             raise InputError(

@@ -69,6 +69,13 @@ class Actuator:
         """Return the torque in each part of the period that begins with ``tau``."""
         return [*self._queue, tau][: len(self._parts)]
 
+    def mean(self, torques: Sequence[Array]) -> Array:
+        """Return the mean over a period of the torques in its parts."""
+        if len(torques) == 1:
+            return torques[0]
+        first, last = self._parts
+        return (first * torques[0] + last * torques[1]) / (first + last)
+
     def hold(self, tau: Array) -> None:
         """End the period that began with ``tau``."""
         self._queue.append(tau)
@@ -145,7 +152,8 @@ class SampledArm:
                     break
                 if finish is not None and finish(t, out.s, self.qd, lost.lost):
                     break
-                z = self._line.keep(z, controller.advance(z, out, self._period))
+                acting = out._replace(tau=self._actuator.mean(torques))
+                z = self._line.keep(z, controller.advance(z, acting, self._period))
                 self._advance(torques)
                 self._actuator.hold(tau)
         arrays = recorder.arrays()

@@ -42,7 +42,7 @@ def warn_if_still(run: Run, robot: Arm, friction: str) -> None:
     """Warn of an arm that has not moved at all, held by dry friction that its law does not compensate."""
     arm = robot.robots[0] if isinstance(robot, RobotBatch) else robot
     dry = any(bool(np.any(level > 0)) for level in levels_of(arm.friction, np.zeros(arm.n)))
-    if not dry or friction == "full" or run.time[-1] < _LONG or (run.status != "running").any():
+    if not dry or friction in ("full", "observed") or run.time[-1] < _LONG or (run.status != "running").any():
         return
     q = run.array("q")
     if (np.abs(q[:, -1] - q[:, 0]) > _MOVED).any():  # as most do, found without a look at all samples

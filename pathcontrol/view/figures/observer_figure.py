@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.disturbance_estimate import momentum_observer
-from pathcontrol.control.base import FrictionCompensation
+from pathcontrol.control.base import KnownFriction
 from pathcontrol.view.figures.joint_panels import figure_of_joints, joint_panels
 from pathcontrol.view.figures.lettering import joint_label, legend
 from pathcontrol.view.figures.limits import over_time, span
@@ -22,7 +22,7 @@ from pathcontrol.view.figures.style import GREY, SMALL, style
 
 
 def observer_figure(
-    run: Runs, *, cutoff_hz: ArrayLike = 20.0, friction: FrictionCompensation = "none", rollout: int = 0
+    run: Runs, *, cutoff_hz: ArrayLike = 20.0, friction: KnownFriction = "none", rollout: int = 0
 ) -> Figure:
     """Draw the estimate r of the torque that acts beside the motors [N m] over time, one panel for each joint.
 

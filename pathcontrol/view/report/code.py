@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from pathcontrol.arguments import parameters_of
-from pathcontrol.registry import Kind
+from pathcontrol.registry import Kind, load
 
 _LONGEST_LINE = 100
 _NOT_IMPORTED = ("__main__", "pathcontrol_file_")  # modules that a script cannot import
@@ -38,7 +38,8 @@ def class_code(kind: Kind, name: Any, described: Collection[str]) -> tuple[str, 
     """Return the name of a class of a ``kind`` in a script, and its import line, empty for the library's.
 
     ``None`` where nobody knows: a class of the user that is not in a module that can be imported, one without
-    parameters that would say what it is, or one with some that are not ``described``.
+    parameters that would say what it is, or one with some that are not ``described``. Those of the base of the kind
+    that are ``None`` by default are described where they are something else.
     """
     if not isinstance(name, str) or kind.has(name):
         return (f"pc.{name}", "") if isinstance(name, str) else None
@@ -47,4 +48,6 @@ def class_code(kind: Kind, name: Any, described: Collection[str]) -> tuple[str, 
     if own is None or getattr(module, name, None) is not own or own.__module__.startswith(_NOT_IMPORTED):
         return None
     parameters = parameters_of(own).keys() - set(kind.given)
-    return (name, f"from {own.__module__} import {name}") if parameters and parameters <= set(described) else None
+    of_base = {key for key, one in parameters_of(load(kind.base)).items() if not one.required and one.default is None}
+    known = parameters - of_base <= set(described)
+    return (name, f"from {own.__module__} import {name}") if parameters and known else None

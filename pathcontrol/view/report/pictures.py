@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
-from pathcontrol.simulation.config import table
+from pathcontrol.simulation.config import laws, table
 from pathcontrol.simulation.run import Run
 
 if TYPE_CHECKING:
@@ -83,8 +83,9 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
 
 
 def _are_pushed(runs: Mapping[str, Run]) -> bool:
-    """Return whether a disturbance acts in one of the runs, and the models of all know their masses."""
-    pushed = any(table(run.config, "disturbance") for run in runs.values())
+    """Return whether a disturbance acts in one of the runs or its law observes any, and all models know their masses."""
+    observed = any(law.get("friction") == "observed" for run in runs.values() for law in laws(run.config))
+    pushed = observed or any(table(run.config, "disturbance") for run in runs.values())
     return pushed and all(run.model.has_mass for run in runs.values())
 
 

@@ -1,0 +1,109 @@
+"""The momentum observer in the loop, which estimates the torque that acts on the joints beside the motors."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
+
+#: corner frequency of both low passes of the observer in the loop [Hz]
+CUTOFF = 35.0
+_NEVER = -1.0  # s, the time of a tick that has not been
+
+
+class Observation(NamedTuple):
+    """The values of a momentum observer at one moment, (*batch, n) each.
+
+    Attributes:
+        t: the time [s], a number.
+        momentum: p = M(q)q̇ [N m s].
+        rate: c = C(q,q̇)ᵀq̇ − g(q) [N m], so that ṗ = τ + c + d.
+        first: r₁, the disturbance torque d behind the first low pass [N m].
+        torque: r, behind both [N m].
+    """
+
+    t: float
+    momentum: Array
+    rate: Array
+    first: Array
+    torque: Array
+
+
+class MomentumObserver:
+    """A momentum observer with two low passes of one corner frequency; its memory goes in and comes out.
+
+        ṙ₁ = K (d − r₁),  ṙ = K (r₁ − r),  r(s) = (K/(s + K))² d(s),  K = 2π · ``cutoff_hz``
+
+    The first low pass is the observer r₁ = K (p − p(0) − ∫(τ + c + r₁)dt) of A. De Luca and R. Mattone (ICRA 2005). It
+    differentiates p, so that r₁ has K times its noise; the second one takes that away where it is above the corner.
+
+    In a sampled loop τ is held, and the mean of d over a period h follows from the change of p, with the trapezoidal
+    rule for c. To this mean, held, both low passes respond exactly. The memory, (*batch, 4n + 1), is r₁, r, p and
+    τ + c/2 of the tick before, and its time, from which h follows. At the first tick, and in continuous time, where the
+    memory is integrated, there is none before, and the same formulas hold with h = 0.
+
+    Args:
+        robot: the model of the arm.
+        cutoff_hz: K/2π [Hz], a number or (n,), or a row for each rollout, (N, n).
+
+    Attributes:
+        gain: K [1/s].
+        size: length of the memory, 4n + 1.
+    """
+
+    def __init__(self, robot: RobotModel, cutoff_hz: Array) -> None:
+        self.robot, self.gain = robot, 2 * np.pi * cutoff_hz
+        self.size = 4 * robot.n + 1
+
+    def start(self, q: Array, qd: Array) -> Array:
+        """Return the memory, (*batch, 4n + 1), of an arm that starts at (q, q̇), with r = 0."""
+        p = self.robot.momentum(q, qd)
+        none = np.zeros_like(p)
+        return np.concatenate([none, none, p, none, none[..., :1] + _NEVER], axis=-1)
+
+    def observe(
+        self, t: float, q: Array, qd: Array, memory: Array, kept: NDArray[np.bool_] | bool = False
+    ) -> Observation:
+        """Return the estimates at t [s] for measured q [rad] and q̇ [rad/s], (*batch, n).
+
+        Those of joints that are ``kept`` stay what they were.
+
+        Raises:
+            InputError: the memory is not that of this observer, as where a law drops it.
+        """
+        first, torque, before, known, last = self._split(memory)
+        h = np.where(last < 0, 0.0, t - last)
+        p, c = self.robot.momentum(q, qd), self.robot.momentum_rate(q, qd, np.zeros(self.robot.n))
+        share = -np.expm1(-self.gain * h)
+        slope = np.divide(share, h, out=np.broadcast_to(self.gain, share.shape).copy(), where=h > 0)
+        new = first + slope * (p - before) - share * (known + 0.5 * c + first)
+        passed = 1 - (1 - share) * self.gain / slope
+        both = torque + share * (first - torque) + passed * (new - first)
+        return Observation(t, p, c, np.where(kept, first, new), np.where(kept, torque, both))
+
+    def rate(self, seen: Observation, tau: Array) -> Array:
+        """Return the rate of the memory in continuous time, (*batch, 4n + 1), where τ acts [N m]."""
+        first = -self.gain * (tau + seen.rate + seen.first)
+        none = np.zeros_like(first)
+        return np.concatenate([first, self.gain * (seen.first - seen.torque), none, none, none[..., :1]], axis=-1)
+
+    def advance(self, seen: Observation, tau: Array) -> Array:
+        """Return the memory at the next tick, (*batch, 4n + 1), up to which τ acts in the mean [N m]."""
+        t = np.full((*seen.torque.shape[:-1], 1), seen.t)
+        return np.concatenate([seen.first, seen.torque, seen.momentum, tau + 0.5 * seen.rate, t], axis=-1)
+
+    def _split(self, memory: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Return r₁, r, p and τ + c/2 of the tick before, (*batch, n) each, and its time, (*batch, 1)."""
+        n = self.robot.n
+        if memory.shape[-1] != self.size:
+            raise InputError(
+                f"the momentum observer of friction='observed' got {memory.shape[-1]} numbers of memory, expected "
+                f"{self.size}: start and advance of a law have to begin with what those of Controller return"
+            )
+        parts = memory[..., : 4 * n].reshape(*memory.shape[:-1], 4, n)
+        return parts[..., 0, :], parts[..., 1, :], parts[..., 2, :], parts[..., 3, :], memory[..., 4 * n :]
