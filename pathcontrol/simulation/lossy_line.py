@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,8 +48,9 @@ class LossyLine:
             return out
         if self._missed.any():
             last = out if begins or self._said is None else self._said
-            kept = (_choose(self._missed, old, new) for old, new in zip(last[:-1], out[:-1], strict=True))
-            out = ControlOutput(*kept, observation=out.observation)  # counts where the tick is not missed
+            pairs: list[tuple[Any, Any]] = list(zip(last[:-1], out[:-1], strict=True))
+            kept = [_choose(self._missed, old, new) for old, new in pairs]
+            out = ControlOutput._make([*kept, out.observation])  # which counts where the tick is not missed
             tau = np.where(self._silent[:, None], 0.0, _choose(self._missed, self._tau, out.tau))
             out = out._replace(tau=tau, regular=out.regular & ~self._missed)
         self._said, self._tau = out, out.tau

@@ -185,7 +185,7 @@ STICKY = CICESE.with_friction(Stribeck([7.17, 1.734], [10.7, 2.6], [0.1, 0.1]) +
 @pytest.mark.parametrize("kind", [ExtendedMotionPlan, Projection, ComputedTorque])
 @pytest.mark.parametrize("loop", [SampledLoop(), paper_loop()], ids=["exact", "encoders"])
 def test_an_arm_that_has_arrived_rests_and_its_torque_does_not_grow(kind, loop):
-    """Static friction is half more than Coulomb's; the arm rests at the end of its path and asks for the same torque."""
+    """Static friction is half more than Coulomb's; at the end of its path the arm rests, with the same torque."""
     gains = {name: 800.0 if "p" in name else 60.0 for name in LAWS[kind]}
     controller = kind(CICESE, Line([0.3, 0.2], [1.0, 0.6], 0.5), **gains, friction="observed")
     run = simulate(
@@ -253,7 +253,7 @@ def test_a_law_with_a_speed_input_has_it_too(loop):
 
 def test_ticks_that_are_missed_are_no_disturbance():
     """The torque is held meanwhile, and the time since the last tick is known."""
-    run = moved(law(ARMS[2]), loop=SampledLoop(period=1e-3), disturbance=Dropout("missed", 0.2, 0.02))
+    run = moved(law(ARMS[2]), loop=SampledLoop(period=1e-3), disturbance=Dropout(0.2, 0.02))
     assert np.abs(np.diff(run.array("tau_demand")[0, :195], axis=0)).max() < 1.0
     assert np.abs(compensated(run, ARMS[2])[run.time > 0.23]).max() < 0.1
 
@@ -318,7 +318,7 @@ def test_a_cutoff_that_is_none_is_refused(given):
 
 
 def test_a_cutoff_without_an_observer_is_told():
-    with pytest.warns(PathControlWarning, match="observer_hz = 20.0, but friction = 'full' has no observer"):
+    with pytest.warns(PathControlWarning, match=r"observer_hz = 20\.0, but friction = 'full' has no observer"):
         law(CICESE, friction="full", observer_hz=20.0)
 
 
@@ -347,7 +347,7 @@ def test_a_law_of_a_user_compensates_with_one_call():
         moved(cls(ARMS[2], task, friction=friction), 3.0, disturbance=push)
         for cls, friction in ((Plain, "none"), (Compensating, "observed"))
     )
-    with pytest.raises(InputError, match="return self.compensate"):
+    with pytest.raises(InputError, match=r"return self\.compensate"):
         moved(Plain(ARMS[2], task, friction="observed"))
     first, second = (np.abs(run.array("e_p")[0, -100:]).max() for run in (plain, observed))
     assert second < first

@@ -83,7 +83,7 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
 
 
 def _are_pushed(runs: Mapping[str, Run]) -> bool:
-    """Return whether a disturbance acts in one of the runs or its law observes any, and all models know their masses."""
+    """Return whether one of the runs is disturbed, or its law observes that, and all models know their masses."""
     observed = any(law.get("friction") == "observed" for run in runs.values() for law in laws(run.config))
     pushed = observed or any(table(run.config, "disturbance") for run in runs.values())
     return pushed and all(run.model.has_mass for run in runs.values())
