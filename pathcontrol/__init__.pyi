@@ -90,6 +90,7 @@ from .simulation.arm.friction_change import FrictionChange as FrictionChange
 from .simulation.arm.jam import JammedJoint as JammedJoint
 from .simulation.arm.noise import SensorNoise as SensorNoise
 from .simulation.arm.plant import Plant as Plant
+from .simulation.arm.wall import Wall as Wall
 from .simulation.loops import ContinuousTime as ContinuousTime
 from .simulation.loops import SampledLoop as SampledLoop
 from .simulation.run import Run as Run

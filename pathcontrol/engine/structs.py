@@ -9,7 +9,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 
-MOST_JOINTS, MOST_STRIBECK = 16, 4
+MOST_JOINTS, MOST_STRIBECK, MOST_WALLS = 16, 4, 4
 
 _Doubles = c_void_p  # address of an array of doubles
 
@@ -67,7 +67,7 @@ class Arms(Structure):
 
 
 class Disturbance(Structure):
-    """A push, a sinusoid or a force on a frame."""
+    """A push, a sinusoid, a force on a frame, a jam, a drop of torque limits or a wall."""
 
     _fields_ = [
         ("kind", c_int),
@@ -75,6 +75,7 @@ class Disturbance(Structure):
         ("offset", c_double * 3),
         ("arm", c_void_p),
         *((name, Rows) for name in ("magnitude", "start", "duration", "frequency", "phase")),
+        *((name, Rows) for name in ("axes", "stiffness", "damping", "roughness")),
     ]
 
 
@@ -85,7 +86,7 @@ class Setup(Structure):
         *((name, c_int) for name in ("joints", "law", "compensation", "branch", "finish", "ends_run", "laps")),
         *((name, c_int) for name in ("substeps", "parts", "delayed")),
         *((name, c_int) for name in ("encoders", "differentiates", "filters", "limited")),
-        *((name, c_int) for name in ("disturbances", "jams", "drops")),
+        *((name, c_int) for name in ("disturbances", "jams", "drops", "walls")),
         ("period", c_double),
         ("part", c_double * 2),
         ("keep", c_double),

@@ -16,6 +16,7 @@ from pathcontrol.engine.arm_constants import arm_struct
 from pathcontrol.engine.library import lanes, load_library
 from pathcontrol.engine.run_settings import add_law, add_plant, rows_or_none
 from pathcontrol.engine.structs import (
+    MOST_WALLS,
     RECORDED,
     SAID_NUMBERS,
     SEEN_AND_SAID,
@@ -43,7 +44,8 @@ from pathcontrol.simulation.arm.dropout import Dropout, Dropouts
 from pathcontrol.simulation.arm.friction_change import FrictionChange
 from pathcontrol.simulation.arm.jam import JammedJoint
 from pathcontrol.simulation.arm.noise import NoiseSource
-from pathcontrol.simulation.arm.plant import has_strong_friction
+from pathcontrol.simulation.arm.plant import Walls, has_strong_friction
+from pathcontrol.simulation.arm.wall import Wall
 from pathcontrol.simulation.divergence import BEYOND, NO_NUMBERS, Divergence
 from pathcontrol.simulation.finish import AfterLaps, AtEnd, Finish, detection_ticks
 from pathcontrol.simulation.loops import Arm as SimulatedArm
@@ -52,7 +54,7 @@ from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sampled import Actuator
 
 _BLOCK = 1 << 17  # ticks of all rollouts together between checks of Ctrl-C and the progress bar
-_DISTURBANCES = (Push, Harmonic, FrameForce, JammedJoint, TorqueLimitDrop)  # in the order of the engine's numbers
+_DISTURBANCES = (Push, Harmonic, FrameForce, JammedJoint, TorqueLimitDrop, Wall)  # in the order of the engine's numbers
 _BETWEEN = (FrictionChange, Dropout)  # what is set for each block of ticks
 _REASONS = {1: BEYOND, 2: NO_NUMBERS}
 
@@ -73,8 +75,16 @@ class CompiledPlant:
         add_plant(self._setup, robot, has_strong_friction(robot), self._memory)
         self._advance = load_library().pathcontrol_advance
 
-    def advance(self, q: Array, qd: Array, tau: Array, held: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
-        """Return (q, q̇) one step later under the constant torque ``tau``, with ``held`` joints; all (N, n)."""
+    def advance(
+        self, q: Array, qd: Array, tau: Array, held: NDArray[np.bool_] | None = None, walls: Walls | None = None
+    ) -> tuple[Array, Array]:
+        """Return (q, q̇) one step later under the constant torque ``tau``, with ``held`` joints; all (N, n).
+
+        Raises:
+            EngineError: there are walls, which only the whole loop knows here.
+        """
+        if walls:
+            raise EngineError("the compiled plant alone knows no walls")
         q, qd = np.array(q, order="C"), np.array(qd, order="C")
         torque = np.ascontiguousarray(tau)
         still = None if held is None or not held.any() else np.array(np.broadcast_to(held, q.shape), np.float64)
@@ -293,6 +303,9 @@ def _add_disturbances(setup: Setup, disturbance: Disturbance | None, memory: Mem
     structs = [_disturbance_struct(term, setup.joints, memory) for term in terms]
     kinds = {_DISTURBANCES[one.kind] for one in structs}
     setup.disturbances, setup.jams, setup.drops = len(structs), JammedJoint in kinds, TorqueLimitDrop in kinds
+    setup.walls = sum(_DISTURBANCES[one.kind] is Wall for one in structs)
+    if setup.walls > MOST_WALLS:
+        raise EngineError(f"there are {setup.walls} walls, the engine takes {MOST_WALLS} at most")
     if structs:
         setup.disturbance = addressof(memory.keep((DisturbanceStruct * len(structs))(*structs)))
 
@@ -314,13 +327,20 @@ def _disturbance_struct(term: Disturbance, n: int, memory: Memory) -> Disturbanc
     elif isinstance(term, JammedJoint):
         struct.magnitude = memory.rows(term.joints == np.arange(n), n)
     elif isinstance(term, FrameForce):
+        struct.magnitude = memory.rows(term.force, 3)
+        _set_frame(struct, term, memory)
+    elif isinstance(term, Wall):
+        stiffness, damping = term.springs
+        struct.magnitude = memory.rows(term.point, 3)
+        struct.axes = memory.rows(term.axes.reshape(*term.axes.shape[:-2], 9), 9)
+        struct.stiffness, struct.damping = memory.numbers(stiffness), memory.numbers(damping)
+        struct.roughness = memory.numbers(term.friction)
         _set_frame(struct, term, memory)
     return struct
 
 
-def _set_frame(struct: DisturbanceStruct, term: FrameForce, memory: Memory) -> None:
+def _set_frame(struct: DisturbanceStruct, term: FrameForce | Wall, memory: Memory) -> None:
     """Set the place where a force acts, and the arm whose kinematics it acts through."""
-    body, offset = frame_carrier(term.robot, term.frame)
-    struct.magnitude, struct.body = memory.rows(term.force, 3), body
+    struct.body, offset = frame_carrier(term.robot, term.frame)
     struct.offset[:] = offset.tolist()
     struct.arm = addressof(memory.keep((Arm * 1)(arm_struct(term.robot))))

@@ -11,6 +11,8 @@ from pathcontrol._expect import expect_choice
 from pathcontrol.control.base import Controller
 from pathcontrol.engine.library import load_library
 from pathcontrol.errors import EngineError, warn
+from pathcontrol.simulation.arm.disturbance import list_terms
+from pathcontrol.simulation.arm.wall import Wall
 from pathcontrol.simulation.compiled import CompiledArm, CompiledPlant
 from pathcontrol.simulation.continuous import ContinuousArm
 from pathcontrol.simulation.loops import Arm, ContinuousTime, Outside, SampledLoop
@@ -106,6 +108,8 @@ def _compile(
     try:
         return Choice(CompiledArm(loop, robot, q, qd, outside, controllers), {"engine": "compiled"})
     except EngineError as error:
+        if any(isinstance(term, Wall) for term in list_terms(outside.disturbance)):
+            raise EngineError(f"{error}, and the compiled plant alone knows no walls") from error
         arm = SampledArm(loop, robot, q, qd, outside, CompiledPlant)
         return Choice(arm, {"engine": "compiled", "engine_reason": f"only the plant is compiled: {error}"})
 

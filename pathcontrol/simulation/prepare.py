@@ -11,7 +11,8 @@ from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance, list_terms
 from pathcontrol.simulation.arm.dropout import Dropout
-from pathcontrol.simulation.checks.slips import warn_of_idle_changes, warn_of_slips
+from pathcontrol.simulation.arm.wall import Wall
+from pathcontrol.simulation.checks.slips import warn_of_idle_changes, warn_of_slips, warn_of_walls
 from pathcontrol.simulation.checks.too_long import warn_of_steps
 from pathcontrol.simulation.engines import Engine, choose_engine
 from pathcontrol.simulation.loops import Arm, Outside, SampledLoop
@@ -68,6 +69,7 @@ def prepare(
     check_disturbance(disturbance, q, qd)
     _check_loop(disturbance, loop, q)
     warn_of_idle_changes(robot, disturbance)
+    warn_of_walls(disturbance, q, first)
     arm, said = choose_engine(engine, controllers, loop, robot, q, qd, Outside(disturbance, first))
     slow = "" if first else warn_of_steps(controllers, loop, robot, q, qd, disturbance, duration)
     return Prepared(arm, said, slip or slow)
@@ -100,4 +102,6 @@ def _do_at_once(term: Disturbance, q: Array) -> str:
         return "torque limits drop at once"
     if isinstance(term, Dropout):
         return "a Dropout loses ticks or measurements"
+    if isinstance(term, Wall):
+        return "a Wall stops the arm at once"
     return f"{type(term).__name__} changes the arm at once" if term.arm_change_times.size else ""

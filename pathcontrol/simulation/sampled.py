@@ -13,10 +13,12 @@ from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
 from pathcontrol.simulation.arm.changing_arm import ChangingArm
+from pathcontrol.simulation.arm.disturbance import list_terms
 from pathcontrol.simulation.arm.dropout import Dropouts
 from pathcontrol.simulation.arm.noise import NoiseSource
-from pathcontrol.simulation.arm.plant import Plant
+from pathcontrol.simulation.arm.plant import Plant, Walls
 from pathcontrol.simulation.arm.sensors import Reading
+from pathcontrol.simulation.arm.wall import Wall
 from pathcontrol.simulation.divergence import Divergence
 from pathcontrol.simulation.finish import Finish
 from pathcontrol.simulation.loops import Arm, Outside, SampledLoop, check_rows, torque_limits
@@ -31,8 +33,10 @@ class Stepper(Protocol):
 
     step: float
 
-    def advance(self, q: Array, qd: Array, tau: Array, held: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
-        """Return (q, q̇) one step later under the constant torque ``tau``, with ``held`` joints; all (N, n)."""
+    def advance(
+        self, q: Array, qd: Array, tau: Array, held: NDArray[np.bool_] | None = None, walls: Walls | None = None
+    ) -> tuple[Array, Array]:
+        """Return (q, q̇) one step later under the constant torque ``tau``, with ``held`` joints and ``walls``."""
 
 
 class Actuator:
@@ -116,6 +120,7 @@ class SampledArm:
         self._reading = self._sensors.start(*self._add_noise())
         self._reading = self._sensors.read(*self._add_noise(), self._reading)
         self._disturbance, self._ticks = outside.disturbance, 0
+        self._walls = [term for term in list_terms(outside.disturbance) if isinstance(term, Wall)]
         self._line = LossyLine(Dropouts(outside.disturbance, loop.period, outside.first, len(q)), self._reading)
         self.divergence = Divergence(q, qd)
 
@@ -174,10 +179,11 @@ class SampledArm:
         for plant, acting in zip(self._plants, torques, strict=True):
             for _ in range(self._substeps):
                 pushed, held, middle = acting, None, t + 0.5 * plant.step
+                walls = [(wall, wall.stands(middle, len(self.q))) for wall in self._walls]
                 if self._disturbance is not None:
                     pushed = acting + self._disturbance.torque(middle, self.q, self.qd)
                     held = self._disturbance.held_joints(middle, self.q)
-                self.q, self.qd = plant.advance(self.q, self.qd, pushed, held)
+                self.q, self.qd = plant.advance(self.q, self.qd, pushed, held, walls)
                 t += plant.step
         self._ticks += 1
         self._reading = self._sensors.read(*self._add_noise(), self._reading)

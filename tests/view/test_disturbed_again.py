@@ -28,6 +28,9 @@ ROWS = {
     "drops": pc.TorqueLimitDrop([[0.1, 0.2], [0.0, 1.0]], [0.02, 0.0], 0.03),
     "changes of friction": pc.FrictionChange([[2.0], [0.5]], [0.02, 0.0], 0.03, coulomb=[0.1, 0.2]),
     "dropouts": pc.Dropout([0.02, 0.0], 0.03, probability=[0.5, 0.9]),
+    "walls": pc.Wall(
+        "tool", [[0.5, 0.0, 0.0], [0.6, 0.0, 0.0]], [-1.0, 0.0, 0.0], [1e4, 1e5], [0.0, 0.3], damping=[0, 9]
+    ),
     "jams": pc.JammedJoint(["joint_2", "joint_1"], [0.02, 0.0], 0.03),
     "forces": pc.FrameForce(ROBOT, "tool", [[0.1, 0.2, -5.0], [1.0, 0.0, 0.0]], duration=0.03),
 }
@@ -79,6 +82,13 @@ def test_a_run_with_weak_motors_is_made_again(tmp_path, monkeypatch):
 @pytest.mark.parametrize("what", ["ticks", "measurements"])
 def test_a_run_with_a_dropout_is_made_again(what, tmp_path, monkeypatch):
     run = simulated(PUSH + pc.Dropout(0.02, 0.03, what, "zero", 0.5, seed=3))
+    assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
+
+
+@pytest.mark.parametrize("kind", [{"stiffness": 1e5, "friction": 0.3}, {"rigid": True}])
+def test_a_run_that_meets_a_wall_is_made_again(kind, tmp_path, monkeypatch):
+    tool = ROBOT.frame_pose(np.array([0.7, 1.2]), "tool")[:3, 3]
+    run = simulated(PUSH + pc.Wall("tool", tool, [-1.0, 0.0, 2.0], start=0.02, **kind))
     assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
 
 

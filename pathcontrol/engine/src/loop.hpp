@@ -173,6 +173,21 @@ template <class V> static NOINLINE void weaken(const Setup &setup, const Place<V
   }
 }
 
+// The walls that stand at time t; return whether there are any.
+template <class V> static NOINLINE bool find_walls(const Setup &setup, const Place<V> &place, double t, Walls<V> &walls) {
+  Mask<V> some{};
+  walls.count = 0;
+  for (int d = 0; d < setup.disturbances; d++) {
+    const Disturbance &one = setup.disturbance[d];
+    if (one.kind != WALL) continue;
+    Wall<V> &wall = walls.at[walls.count++];
+    wall.arm = one.arm, wall.body = one.body, wall.offset = one.offset, wall.stands = acts(place, one, t), some |= wall.stands;
+    load(place, one.magnitude, 3, wall.point), load(place, one.axes, 9, wall.axes);
+    load(place, one.stiffness, 1, &wall.stiffness), load(place, one.damping, 1, &wall.damping), load(place, one.roughness, 1, &wall.roughness);
+  }
+  return any(some);
+}
+
 // Torques of the disturbances at time t, added to `tau`.
 template <int N, class V> static NOINLINE void add_disturbances(const Setup &setup, const Place<V> &place_, const V *q, double t, V *tau) {
   const int n = size<N>(setup.joints);
@@ -340,7 +355,9 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
         if (setup.disturbances) add_disturbances<N>(setup, place, r.q, now + 0.5 * step, pushed);
         Mask<V> held[room<N>()];
         const bool holds = setup.jams && find_held(setup, place, now + 0.5 * step, held);
-        advance_plant<N>(plant_arm, plant_friction, damped, step, r.q, r.qd, pushed, holds ? held : nullptr);
+        Walls<V> walls;
+        const bool meets = setup.walls && find_walls(setup, place, now + 0.5 * step, walls);
+        advance_plant<N>(plant_arm, plant_friction, damped, step, r.q, r.qd, pushed, holds ? held : nullptr, meets ? &walls : nullptr);
       }
     }
     if (setup.delayed) {
@@ -387,7 +404,7 @@ static void advance_packs(const Setup &setup, double step, double *q, double *qd
     if (held) load(place, held, n, n, flag);
     for (int i = 0; held && i < n; i++) own_held[i] = less(V{}, flag[i]);
     const Arm<C> &arm = copy(place, setup.plant_arms);
-    advance_plant<N>(arm, friction, load_mask<V>(place, setup.damped), step, own_q, own_qd, own_tau, held ? own_held : nullptr);
+    advance_plant<N>(arm, friction, load_mask<V>(place, setup.damped), step, own_q, own_qd, own_tau, held ? own_held : nullptr, (const Walls<V> *)nullptr);
     store(place, own_q, n, q), store(place, own_qd, n, qd);
   }
 }

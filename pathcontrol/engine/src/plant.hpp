@@ -1,6 +1,6 @@
 // One step of the simulated arm: the scheme that simulation/arm/plant.py and simulation/arm/damping.py explain, with their names.
 #pragma once
-#include "friction.hpp"
+#include "wall.hpp"
 
 // C(q,u)u + g(q), M(q), and the levels of dry friction at u with that in the direction of u, at one place of a step.
 template <int N, class V> struct Dynamics {
@@ -124,21 +124,46 @@ template <int N, class V> static NOINLINE bool stop(int n, const Mask<V> *held, 
   return true;
 }
 
-// v = start + t M⁻¹(drive − dry friction − C u − g), with dry friction that holds; M is the inertia of the step.
+// Stop at once the approach to walls that the step h is too long for; return whether any lane did.
 template <int N, class V>
-static void step_velocity(int joints, V (*M)[room<N>()], const Dynamics<N, V> &at, const V *u, const V *start, const V *drive, double t, V *v) {
+static NOINLINE bool stop_at_walls(int joints, const Walls<V> &walls, const Met<N, V> &met, V (*M)[room<N>()], double h, V *v) {
+  const int n = size<N>(joints);
+  const Mask<V> near = find_near<N>(n, walls, met, v, v, h);
+  if (!any(near)) return false;
+  V momentum[room<N>()], none[room<N>()], start[room<N>()];
+  for (int i = 0; i < n; i++) {
+    momentum[i] = M[i][0] * v[0], none[i] = V{}, start[i] = v[i];
+    for (int j = 1; j < n; j++) momentum[i] += M[i][j] * v[j];
+  }
+  meet_walls<N>(n, walls, met, near, true, M, momentum, none, none, start, h, h, v);
+  return true;
+}
+
+// v = start + t M⁻¹(drive − dry friction − C u − g), with dry friction that holds and, where there are some, walls that a part t of
+// the step h meets; M is the inertia of the step.
+template <int N, class V>
+static void step_velocity(int joints, V (*M)[room<N>()], const Dynamics<N, V> &at, const V *u, const V *start, const V *drive, double t, V *v, const Walls<V> *walls, const Met<N, V> &met, double h) {
   const int n = size<N>(joints);
   V force[room<N>()], acceleration[room<N>()];
   Factors<N, V> factors;
   for (int i = 0; i < n; i++) force[i] = drive[i] - at.dry[i] - at.load[i];
   factorise<N>(n, M, factors), solve<N>(n, factors, force, acceleration);
   for (int i = 0; i < n; i++) v[i] = start[i] + t * acceleration[i];
+  if (!walls) return hinder<N>(n, M, at, u, t, v);
+  V momentum[room<N>()], low[room<N>()], high[room<N>()];
+  for (int i = 0; i < n; i++) {
+    V sum = M[i][0] * v[0];
+    for (int j = 1; j < n; j++) sum += M[i][j] * v[j];
+    momentum[i] = sum + t * at.dry[i], low[i] = t * at.backward[i], high[i] = t * at.forward[i];
+  }
   hinder<N>(n, M, at, u, t, v);
+  const Mask<V> near = find_near<N>(n, *walls, met, start, v, t);
+  if (any(near)) meet_walls<N>(n, *walls, met, near, false, M, momentum, low, high, start, t, h, v);
 }
 
 // (q, q̇) one step h later under the constant torque `tau`. `damped`: lanes whose viscous friction is condensed; `held`: joints.
 template <int N, class V, class C>
-static NOINLINE void advance_plant(const Arm<C> &arm, const Friction<V> &law, Mask<V> damped, double h, V *q, V *qd, const V *tau, const Mask<V> *held) {
+static NOINLINE void advance_plant(const Arm<C> &arm, const Friction<V> &law, Mask<V> damped, double h, V *q, V *qd, const V *tau, const Mask<V> *held, const Walls<V> *walls) {
   const int n = size<N>(arm.joints);
   V drive[room<N>()], middle_q[room<N>()], middle_qd[room<N>()], next[room<N>()], travel[room<N>()][room<N>()];
   V inertia[room<N>()][room<N>()];
@@ -146,15 +171,24 @@ static NOINLINE void advance_plant(const Arm<C> &arm, const Friction<V> &law, Ma
   dynamics_at<N>(arm, law, q, qd, at);
   if (held && stop<N>(n, held, at.M, qd)) dynamics_at<N>(arm, law, q, qd, at);
   if (held) hold<N>(n, held, at);
+  Met<N, V> met;
+  if (walls) {
+    measure_walls<N>(n, *walls, q, held, true, met);
+    if (stop_at_walls<N>(n, *walls, met, at.M, h, qd)) {
+      dynamics_at<N>(arm, law, q, qd, at);
+      if (held) hold<N>(n, held, at);
+    }
+  }
   for (int i = 0; i < n; i++) {
     drive[i] = tau[i] - law.viscous[i] * qd[i];
     if (held) drive[i] = select(held[i], V{}, drive[i]);
     at.M[i][i] += 0.5 * h * law.viscous[i];
   }
-  step_velocity<N>(n, at.M, at, qd, qd, drive, 0.5 * h, middle_qd);
+  step_velocity<N>(n, at.M, at, qd, qd, drive, 0.5 * h, middle_qd, walls, met, h);
   for (int i = 0; i < n; i++) middle_q[i] = q[i] + 0.25 * h * (qd[i] + middle_qd[i]);
   dynamics_at<N>(arm, law, middle_q, middle_qd, at);
   if (held) hold<N>(n, held, at);
+  if (walls) measure_walls<N>(n, *walls, middle_q, held, false, met);
   if (any(damped)) {
     Mask<V> moving[room<N>()];
     for (int i = 0; i < n; i++) moving[i] = ~equal(qd[i], V{}) | ~equal(middle_qd[i], V{}) | less_equal(at.forward[i], at.backward[i]);
@@ -167,7 +201,7 @@ static NOINLINE void advance_plant(const Arm<C> &arm, const Friction<V> &law, Ma
   } else {
     for (int i = 0; i < n; i++) at.M[i][i] += 0.5 * h * law.viscous[i];
   }
-  step_velocity<N>(n, at.M, at, middle_qd, qd, drive, h, next);
+  step_velocity<N>(n, at.M, at, middle_qd, qd, drive, h, next, walls, met, h);
   for (int i = 0; i < n; i++) q[i] += 0.5 * h * (qd[i] + next[i]);
   if (any(damped)) {
     for (int i = 0; i < n; i++) {

@@ -16,23 +16,24 @@ enum LawKind { COMPUTED_TORQUE, PD_PLUS, SLOTINE_LI, EXTENDED_MOTION_PLAN, PROJE
 enum Compensation { NO_FRICTION, VISCOUS_FRICTION, FULL_FRICTION };
 enum Branch { FOLLOW, NEAREST, LOCAL };
 enum FinishKind { NEVER, AT_END, AFTER_LAPS };
-enum DisturbanceKind { PUSH, HARMONIC, FRAME_FORCE, JAMMED_JOINT, TORQUE_LIMIT_DROP };
+enum DisturbanceKind { PUSH, HARMONIC, FRAME_FORCE, JAMMED_JOINT, TORQUE_LIMIT_DROP, WALL };
 enum Reason { SOUND, BEYOND_BOUNDS, NO_NUMBERS };
 
 struct Disturbance {
-  int kind, body;               // the body that carries the frame of a force
+  int kind, body;               // the body that carries the frame of a force or a wall
   double offset[3];             // of the frame's origin in it [m]
   const Arm<double> *arm;       // the arm whose kinematics the force acts through
-  Rows magnitude;               // torque [N m], force [N], 1 for each joint that jams, or shares of torque limits
+  Rows magnitude;               // torque [N m], force [N], 1 for each joint that jams, shares of torque limits, or a point of a wall [m]
   Rows start, duration;         // [s]
   Rows frequency, phase;        // [Hz], [rad]
+  Rows axes, stiffness, damping, roughness;  // of a wall: normal and directions along it, [N/m], [N s/m], coefficient of friction
 };
 
 struct Setup {
   int joints, law, compensation, branch, finish, ends_run, laps;
   int substeps, parts, delayed;       // parts of a period with torques of their own; periods that a torque waits
   int encoders, differentiates, filters, limited, disturbances;
-  int jams, drops;                    // 1 where a disturbance holds joints, and where one lowers torque limits
+  int jams, drops, walls;             // 1 where a disturbance holds joints, and where one lowers torque limits; number of walls
   double period, part[2], keep, capture;  // keep: share of the last velocity that the filter keeps
   Arms law_arms, plant_arms;
   const Path *paths;

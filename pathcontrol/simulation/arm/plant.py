@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,8 +12,10 @@ from pathcontrol._expect import expect
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.arm.contact import Meeting, Problem, solve_contact, touch_at_once, touch_during
 from pathcontrol.simulation.arm.damping import Damping
 from pathcontrol.simulation.arm.dry_friction import stick_slip
+from pathcontrol.simulation.arm.wall import Wall
 from pathcontrol.simulation.checks.mobility import mobility
 
 #: rate of viscous friction [1/s] up to which the trapezoidal rule suffices: its error is (h × rate)²/12, 1e-5 in 2.5 ms
@@ -19,6 +23,7 @@ _WEAK = 4.0
 
 _Rows = NDArray[np.intp]
 _Held = NDArray[np.bool_]  # joints that are held still, (N, n)
+Walls = Sequence[tuple[Wall, NDArray[np.bool_]]]  # each with the rollouts for which it is there, (N,)
 _Dry = tuple[Array, Array, Array]  # friction of forward and of backward motion, and (N, n) of the present direction
 
 
@@ -44,6 +49,9 @@ class Plant:
     Joints that are held are stopped at the beginning of a step, which leaves (Mv)_i of all others as it was, and then
     stand still: M has no entries between them and others, and nothing drives them.
 
+    Walls are solved together with dry friction, see :mod:`~pathcontrol.simulation.arm.contact`: with gaps at q, in both
+    stages with the Jacobian of the stage. What the step is too long for of an approach is stopped at its beginning.
+
     Args:
         robot: the arm, or one for each rollout; its ``friction`` is the friction of the plant.
         step: h [s].
@@ -57,23 +65,31 @@ class Plant:
         self._strong = has_strong_friction(robot)
         self._damps = bool(self._strong.any())
 
-    def advance(self, q: Array, qd: Array, tau: Array, held: _Held | None = None) -> tuple[Array, Array]:
-        """Return (q, q̇) one step later under the constant torque ``tau``, with ``held`` joints; all (N, n)."""
+    def advance(
+        self, q: Array, qd: Array, tau: Array, held: _Held | None = None, walls: Walls | None = None
+    ) -> tuple[Array, Array]:
+        """Return (q, q̇) one step later under the constant torque ``tau``, with ``held`` joints and ``walls``.
+
+        All arrays are (N, n); of walls each has the rollouts for which it is there, (N,).
+        """
         held = None if held is None or not held.any() else np.broadcast_to(held, q.shape)
         if held is not None and qd[held].any():
             qd = _hold(self.robot, q, qd, held)
+        met = _Met(walls, q, self.step, held) if walls else None
+        if met is not None:
+            qd = met.stop(self.robot, q, qd)
         h, drive, dry = self.step, tau - self._viscous * qd, self._dry_friction(qd, held)
         middle_qd = self._advance_freely(q, qd, qd, drive, dry, 0.5 * h, held)
-        self._apply_stiction(middle_qd, q, qd, dry, 0.5 * h, held)
+        self._settle(middle_qd, q, qd, qd, dry, 0.5 * h, held, met)
         dry = self._dry_friction(middle_qd, held)
         middle_q = q + 0.25 * h * (qd + middle_qd)
         next_qd = self._advance_freely(middle_q, middle_qd, qd, drive, dry, h, held)
         if not self._damps:
-            self._apply_stiction(next_qd, middle_q, middle_qd, dry, h, held)
+            self._settle(next_qd, middle_q, middle_qd, qd, dry, h, held, met)
             return q + 0.5 * h * (qd + next_qd), next_qd
         damped = np.flatnonzero(np.broadcast_to(self._strong, len(q)))
         inertia, travel = self._condense(damped, middle_q, qd, next_qd, dry, middle_qd, held)
-        self._apply_stiction(next_qd, middle_q, middle_qd, dry, h, held, (damped, inertia))
+        self._settle(next_qd, middle_q, middle_qd, qd, dry, h, held, met, (damped, inertia))
         next_q = q + 0.5 * h * (qd + next_qd)
         next_q[damped] += h * _multiply(travel, (next_qd - qd)[damped])
         return next_q, next_qd
@@ -113,37 +129,101 @@ class Plant:
         v[rows] = qd[rows] + np.linalg.solve(inertia, momentum[..., None])[..., 0]
         return inertia, travel
 
-    def _apply_stiction(
+    def _settle(
         self,
         v: Array,
         q: Array,
         u: Array,
+        start: Array,
         dry: _Dry,
         duration: float,
         held: _Held | None,
+        met: _Met | None,
         damped: tuple[_Rows, Array] | None = None,
     ) -> None:
-        """Stop joints of ``v`` that dry friction does not let turn since ``u``.
+        """Change v to what dry friction and walls leave of it a ``duration`` after ``start``; all (N, n).
 
-        The inertia is M + h/2 B, and M̃ (k, n, n) for the rows (k,) that are ``damped``.
+        Joints stop that dry friction does not let turn since ``u``. The inertia is M + h/2 B, and M̃ (k, n, n) for the
+        rows (k,) that are ``damped``.
         """
+        free = v if met is None else v.copy()
         turned = v * u <= 0
-        if not turned.any():  # the common case
-            return
+        if turned.any():  # rarely
+            forward, backward, _ = np.broadcast_arrays(*dry)
+            # a diverged arm must not count as one that sticks
+            turned &= np.isfinite(v) & (forward > backward)
+            rows = np.flatnonzero(turned.any(-1))
+            if len(rows):
+                problem = self._state_problem(rows, free, q, dry, duration, held, damped)
+                v[rows] = stick_slip(*problem, guess=np.where(turned[rows], 0.0, u[rows]))
+        if met is not None and len(rows := met.find_near(q, start, v, duration)):
+            problem = self._state_problem(rows, free, q, dry, duration, held, damped)
+            for row, *parts in zip(rows.tolist(), *problem, strict=True):
+                v[row] = met.solve(row, Problem(*parts), start[row], v[row], duration)
+
+    def _state_problem(
+        self,
+        rows: _Rows,
+        free: Array,
+        q: Array,
+        dry: _Dry,
+        duration: float,
+        held: _Held | None,
+        damped: tuple[_Rows, Array] | None,
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return inertia, momentum without dry friction and bounds of its impulses, for ``rows`` (k,)."""
         forward, backward, friction = np.broadcast_arrays(*dry)
-        # a diverged arm must not count as one that sticks
-        turned &= np.isfinite(v) & (forward > backward)
-        rows = np.flatnonzero(turned.any(-1))
-        if not len(rows):
-            return
         M = _decouple(_mass_matrix(self._inertia, q[rows], rows), held, rows)
         if damped is not None:
             _, here, there = np.intersect1d(rows, damped[0], assume_unique=True, return_indices=True)
             M[here] = damped[1][there]
         # undo the friction that a joint at rest was given
-        momentum = _multiply(M, v[rows]) + duration * friction[rows]
-        low, high = duration * backward[rows], duration * forward[rows]
-        v[rows] = stick_slip(M, momentum, low, high, guess=np.where(turned[rows], 0.0, u[rows]))
+        momentum = _multiply(M, free[rows]) + duration * friction[rows]
+        return M, momentum, duration * backward[rows], duration * forward[rows]
+
+
+class _Met:
+    """The walls of one step, and the rollouts that may meet them."""
+
+    def __init__(self, walls: Walls, q: Array, step: float, held: _Held | None) -> None:
+        self._walls, self._step, self._held = walls, step, held
+        self._gaps = [wall.gap(q) for wall, _ in walls]
+        self._jacobians: list[Array] = []
+
+    def stop(self, robot: RobotModel | RobotBatch, q: Array, qd: Array) -> Array:
+        """Return q̇ (N, n) without the approaches that the step is too long for."""
+        rows = self.find_near(q, qd, qd, self._step)
+        still = qd.copy()
+        for row, M in zip(rows.tolist(), _decouple(_mass_matrix(robot, q[rows], rows), self._held, rows), strict=True):
+            none = np.zeros(len(M))
+            problem = Problem(M, M @ qd[row], none, none)
+            found = (touch_at_once(at, problem, qd[row], self._step) for at in self._meetings(row))
+            still[row] = solve_contact(problem, [touch for touch in found if touch is not None], qd[row])
+        return still
+
+    def find_near(self, q: Array, start: Array, v: Array, t: float) -> _Rows:
+        """Return the rows that are beyond a wall, or will be a time t after ``start`` with v at its end."""
+        self._jacobians = [self._jacobian(wall, q) for wall, _ in self._walls]
+        near = np.zeros(len(q), dtype=bool)
+        for (_, stands), gap, jacobian in zip(self._walls, self._gaps, self._jacobians, strict=True):
+            change = 0.5 * t * (jacobian[:, 0] * (start + v)).sum(-1)
+            near |= stands & ((gap <= 0) | (gap + change <= 0))
+        return np.flatnonzero(near & np.isfinite(v).all(-1))
+
+    def solve(self, row: int, problem: Problem, start: Array, v: Array, t: float) -> Array:
+        """Return v⁺ (n,) of a row with its walls, from v (n,) without them."""
+        found = (touch_during(at, problem, start, t, self._step) for at in self._meetings(row))
+        return solve_contact(problem, [touch for touch in found if touch is not None], v)
+
+    def _meetings(self, row: int) -> list[Meeting]:
+        """Return a row before each of the walls that are there."""
+        known = zip(self._walls, self._gaps, self._jacobians, strict=True)
+        return [wall.meet(gap, jacobian, row) for (wall, stands), gap, jacobian in known if stands[row]]
+
+    def _jacobian(self, wall: Wall, q: Array) -> Array:
+        """Return the Jacobian of a wall, (N, 3, n), without the joints that are held."""
+        jacobian = wall.jacobian(q)
+        return jacobian if self._held is None else np.where(self._held[:, None], 0.0, jacobian)
 
 
 def has_strong_friction(robot: RobotModel | RobotBatch) -> NDArray[np.bool_]:

@@ -10,6 +10,7 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import levels_of
 from pathcontrol.simulation.arm.disturbance import Disturbance, list_terms
 from pathcontrol.simulation.arm.friction_change import FrictionChange
+from pathcontrol.simulation.arm.wall import Wall
 from pathcontrol.simulation.checks.weight import PathPostures, check_weight
 from pathcontrol.simulation.loops import Arm
 from pathcontrol.simulation.run import Run
@@ -17,6 +18,7 @@ from pathcontrol.tasks.task import PathTask
 
 _TURNS = 4 * np.pi  # rad, beyond which the start of a joint without limits is unlikely
 _FAR = 10.0  # rad, beyond which an angle outside its limits is probably in degrees
+_AWAY = 10.0  # m, beyond which a point of a wall is probably in millimetres
 _MOVED, _LONG = 1e-9, 0.25  # rad, s: an arm is still if it moves by less in a longer time
 
 
@@ -59,6 +61,20 @@ def warn_of_idle_changes(robot: Arm, disturbance: Disturbance | None) -> None:
     for term in list_terms(disturbance):
         if isinstance(term, FrictionChange) and term.is_idle(robot.friction):
             warn(f"{robot.name} has no friction, so FrictionChange(factor=…) changes nothing; add some by coulomb=…")
+
+
+def warn_of_walls(disturbance: Disturbance | None, q: Array, first: int = 0) -> None:
+    """Warn of walls that are there at the start with the arm (N, n) beyond them, or that are far from it."""
+    for term in list_terms(disturbance):
+        if not isinstance(term, Wall) or first:
+            continue
+        gap = term.gap(q)
+        row = int(np.where(term.stands(0.0, len(q)), gap, np.inf).argmin())
+        if term.stands(0.0, len(q))[row] and gap[row] < 0:
+            whose = f" of rollout {row}" if len(q) > 1 else ""
+            warn(f"the frame {term.frame!r}{whose} starts {-gap[row]:.3g} m beyond its wall, which will push it out")
+        elif (away := float(np.abs(gap).min())) > _AWAY:
+            warn(f"the wall is {away:.3g} m from the frame {term.frame!r} at the start; points are in metres")
 
 
 def _check_start(robot: Arm, q: Array) -> str:

@@ -48,7 +48,8 @@ def _term(kind: Any, described: Mapping[str, Any], run: Run) -> Code | None:
     found = class_code(DISTURBANCES, kind, described)
     if found is None:
         return None
-    parameters = dict(parameters_of(DISTURBANCES.find(kind)))
+    known = parameters_of(DISTURBANCES.find(kind)).items()
+    parameters = {name: one for name, one in known if one.default is not None or described.get(name) is not None}
     arm = _arm(described.get("robot"), run) if parameters.pop("robot", None) else ""
     if arm is None or not all(_is_argument(one, described.get(name), run) for name, one in parameters.items()):
         return None
