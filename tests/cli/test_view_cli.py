@@ -188,11 +188,12 @@ def test_a_run_without_its_robot_needs_one(folder):
         ([], ["RUN"]),
     ],
 )
-def test_errors_name_the_value_and_write_nothing(folder, run, command, arguments, said):
+def test_errors_name_the_value_and_write_nothing(folder, command, arguments, said):
     Path("text.nc").write_text("no run", encoding="utf-8")
-    Path("empty").mkdir()
+    for name in ("empty", "many"):
+        Path(name).mkdir()
     for name in "ab":
-        run.save(f"many/{name}.nc")
+        shutil.copy("first.nc", f"many/{name}.nc")
     before = sorted(folder.rglob("*"))
     result = call(command, *arguments)
     assert result.exit_code == 2

@@ -98,8 +98,8 @@ def test_recovery_of_what_never_leaves_comes_back_or_ends():
 
 
 @given(st.floats(-3.0, 3.0), st.floats(0.0, 20.0))
-def test_time_lost_is_the_planned_time_between_both(lost, end):
-    arm, task = pc.load_robot("cicese_2dof"), Uneven()
+def test_time_lost_is_the_planned_time_between_both(arm, lost, end):
+    task = Uneven()
     here, there = made(arm, task, s=end - lost), made(arm, task, s=end)
     exact = lost + 0.5 * (np.sin(end) - np.sin(end - lost))
     assert_allclose(measure(here, there, (0.0, 4.0), None)["time_lost_s"], exact, atol=1e-9)

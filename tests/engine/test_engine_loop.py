@@ -174,8 +174,8 @@ def test_runs_end_where_those_of_the_reference_end():
     laps = _pair(_law("ComputedTorque", robot, pc.Circle(1.0, 6.0)), [1.0, 0.0], duration=5.0, laps=2)
     assert laps[0].time[-1] == laps[1].time[-1]
     assert laps[0].data.laps.values == laps[1].data.laps.values == 2
-    starts = np.array([0.7, 1.2]) + np.random.default_rng(1).normal(0, 0.02, (300, 2))
-    lines = pc.TaskBatch([pc.Line([0.7, 1.2], [0.2, 0.0], speed=v) for v in np.linspace(0.5, 3.0, 300)])
+    starts = np.array([0.7, 1.2]) + np.random.default_rng(1).normal(0, 0.02, (100, 2))
+    lines = pc.TaskBatch([pc.Line([0.7, 1.2], [0.2, 0.0], speed=v) for v in np.linspace(0.5, 3.0, 100)])
     many = _pair(_law("ExtendedMotionPlan", robot, lines), starts, duration=20.0, loop=SampledLoop(period=0.01))
     assert many[0].time[-1] == many[1].time[-1]
     assert np.array_equal(many[0].data.finish_time, many[1].data.finish_time)

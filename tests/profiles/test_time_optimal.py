@@ -184,7 +184,7 @@ def by_toppra(robot, path, s, rates, dry, velocity):
 
 @every_arm
 def test_it_is_as_fast_as_toppra(name):
-    for seed in range(20):
+    for seed in range(12):
         dry = (seed % 4 == 3) * 0.05 * load(name).limits.effort
         robot = load(name).with_friction(Coulomb(dry))
         path = spline(robot, seed, count=3 + seed % 7, reach=(0.4, 1.2)[seed % 2])

@@ -97,6 +97,12 @@ def chained(depth):
     return recipe
 
 
+@pytest.fixture(scope="module")
+def content(run, tmp_path_factory):
+    """What the file of the run has."""
+    return read_run(run.save(tmp_path_factory.mktemp("content") / "run.nc"))
+
+
 @pytest.mark.parametrize(
     "task",
     [
@@ -116,9 +122,8 @@ def chained(depth):
     ],
     ids=lambda task: json.dumps(task)[:60],
 )
-def test_what_no_task_is_made_of_is_refused(task, run, tmp_path):
-    file = run.save(tmp_path / "run.nc")
-    data, config, stored = read_run(file)
+def test_what_no_task_is_made_of_is_refused(task, content, tmp_path):
+    file, (data, config, stored) = tmp_path / "run.nc", content
     recipes = json.loads(stored.text) | {"task": task, "first_rollout": 0}
     write_run(file, data, config, stored._replace(text=json.dumps(recipes)))
     with pytest.raises(PathControlError):
