@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -38,7 +39,6 @@ from pathcontrol.view.figures.sweep_columns import (
 
 _LOST: Look = {"marker": "x", "color": INK, "linestyle": "none", "markersize": 3.5}
 _NEVER: Look = {"marker": "s", "color": GREY, "linestyle": "none", "mew": 0}
-_DIVERGED = "diverged"
 _BINS = 20  # bins of a distribution, with equally many samples
 
 
@@ -57,43 +57,46 @@ def basin_figure(sweep: SweepResult | xr.Dataset, x: str, y: str, metric: str = 
         UnknownNameError: there is no such parameter or metric.
     """
     table = table_of(sweep)
-    right, up, (value, unit) = (
-        column_of_parameter(table, x),
-        column_of_parameter(table, y),
-        readable_metric(table, metric),
-    )
+    right, up = (column_of_parameter(table, name) for name in (x, y))
+    value, unit = readable_metric(table, metric)
+    side = min(180.0 / np.sqrt(len(value)), 12.0)  # so that the points of a square grid nearly touch, in pt
     with style():
         figure = new_figure(COLUMN, 2.9)
         axes = apply_style(figure.add_subplot())
-        known = np.isfinite(value)
-        side = min(180.0 / np.sqrt(len(value)), 12.0)  # so that the points of a square grid nearly touch, in pt
-        many: Look = {"rasterized": len(value) > VECTORS}
-        points = axes.scatter(
-            right[known],
-            up[known],
-            c=value[known],
-            s=side**2,
-            marker="s",
-            cmap=error_colours(),
-            norm=LogNorm() if wide(value) else None,
-            lw=0,
-            **many,
-        )
-        colour_bar(figure, points, axes, label(metric, unit))
-        lost = {
-            _DIVERGED: ((table["status"] == "diverged").to_numpy(), _LOST),
-            "never": (never(table, metric), _NEVER),
-        }
-        sizes = {_DIVERGED: min(side, 3.5), "never": side, "unfinished": min(side, 3.5)}
-        if (short := (table["status"] == "unfinished").to_numpy()).any():
-            lost["unfinished"] = (short, _LOST | {"marker": "+"})
-        for word, (rows, look) in lost.items():
-            axes.plot(right[rows], up[rows], **(look | {"markersize": sizes[word]}), **many)
+        colour_bar(figure, _draw_known(axes, right, up, value, side), axes, label(metric, unit))
+        entries = _cross_out(axes, right, up, _find_lost(table, metric), side)
         axes.set(xlabel=x, ylabel=y)
         set_scales(axes, right, up)
-        if entries := {word: Line2D([], [], **look) for word, (rows, look) in lost.items() if rows.any()}:
+        if entries:
             legend(figure, entries)
     return figure
+
+
+def _draw_known(axes: Axes, right: Array, up: Array, value: Array, side: float) -> PathCollection:
+    """Draw the samples that have a finite value, as squares with a ``side`` [pt]."""
+    known, norm = np.isfinite(value), LogNorm() if wide(value) else None
+    many: Look = {"rasterized": len(value) > VECTORS}
+    at, shade = (right[known], up[known]), value[known]
+    return axes.scatter(*at, c=shade, s=side**2, marker="s", cmap=error_colours(), norm=norm, lw=0, **many)
+
+
+def _find_lost(table: xr.Dataset, metric: str) -> dict[str, tuple[Array, Look]]:
+    """Return the rows of samples without a finite value, and their looks, by the word for what became of them."""
+    status = table["status"].to_numpy()
+    lost = {"diverged": (status == "diverged", _LOST), "never": (never(table, metric), _NEVER)}
+    short = status == "unfinished"
+    return lost | ({"unfinished": (short, _LOST | {"marker": "+"})} if short.any() else {})
+
+
+def _cross_out(
+    axes: Axes, right: Array, up: Array, lost: dict[str, tuple[Array, Look]], side: float
+) -> dict[str, Line2D]:
+    """Mark the samples that are lost; return the entries of the legend."""
+    many: Look = {"rasterized": len(right) > VECTORS}
+    for word, (rows, look) in lost.items():
+        size = side if word == "never" else min(side, _LOST["markersize"])
+        axes.plot(right[rows], up[rows], **(look | {"markersize": size}), **many)
+    return {word: Line2D([], [], **look) for word, (rows, look) in lost.items() if rows.any()}
 
 
 def robustness_figure(sweep: SweepResult | xr.Dataset, parameter: str, metric: str = "contour_error_peak") -> Figure:
