@@ -1,4 +1,4 @@
-"""Helpers of metrics: find the task of a run, apply a function per task, and leave out samples that are not finite."""
+"""Helpers of metrics: find the task of a run, apply a function per task, leave out what is not finite, and reduce."""
 
 from __future__ import annotations
 
@@ -100,3 +100,8 @@ def apply_where_finite(function: Callable[..., Array], *arrays: Array, shape: tu
     if known.any():
         values[known] = function(*(a[known] for a in arrays))
     return values
+
+
+def root_mean_square(values: Array) -> float:
+    """Return the root mean square of all values."""
+    return float(np.sqrt(np.mean(values**2)))

@@ -14,7 +14,13 @@ from pathcontrol.analysis.coverage import measure_coverage, path_points
 from pathcontrol.analysis.gamma import distance_to_gamma, planned_rate
 from pathcontrol.analysis.lap_table import lap_time
 from pathcontrol.analysis.limit_shares import RATIOS, limit_ratios
-from pathcontrol.analysis.metric_helpers import apply_by_task, apply_where_finite, resolve_task, split_by_task
+from pathcontrol.analysis.metric_helpers import (
+    apply_by_task,
+    apply_where_finite,
+    resolve_task,
+    root_mean_square,
+    split_by_task,
+)
 from pathcontrol.analysis.metric_names import LABELS, UNITS
 from pathcontrol.analysis.progress import progress
 from pathcontrol.analysis.tool_metrics import NAMES as TOOL_METRICS
@@ -235,7 +241,7 @@ def _measure_errors(run: Run, task: PathTask, counted: Samples, wanted: Collecti
         "gamma_distance": lambda: _gamma_distance(task, *of("q", "qd")),
     }
     for name, signal in signals.items():
-        of_it: dict[str, Callable[..., float | Array]] = {f"{name}_peak": np.max, f"{name}_rms": _rms}
+        of_it: dict[str, Callable[..., float | Array]] = {f"{name}_peak": np.max, f"{name}_rms": root_mean_square}
         if not set(wanted).isdisjoint(of_it):
             with suppress(TaskError):  # no nearest point on an endless path
                 found = signal()
@@ -274,8 +280,3 @@ def _cover_path(run: Run, task: PathTask, own: Samples, band: float) -> dict[str
         return {}
     share, farthest = own.reduce(lambda q: np.array(measure_coverage(points, q, band)), run.array("q")).T
     return {"coverage": share, "path_deviation_peak": farthest}
-
-
-def _rms(values: Array) -> float:
-    """Return the root mean square of all values."""
-    return float(np.sqrt(np.mean(values**2)))

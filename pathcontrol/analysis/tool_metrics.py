@@ -9,6 +9,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import contour_deviation, geometry_of
+from pathcontrol.analysis.metric_helpers import root_mean_square
 from pathcontrol.analysis.tool_following import tool_signals
 from pathcontrol.analysis.window import Samples
 from pathcontrol.errors import TaskError
@@ -48,10 +49,5 @@ def tool_metrics(run: Run, task: PathTask, counted: Samples, only: Collection[st
         with suppress(TaskError):  # an endless path leads the tool on an endless curve
             away = contour_deviation(run, geometry_of(task, run.model), signals.position)
             values |= {"tool_deviation_peak": counted.reduce(np.max, away)}
-            values |= {"tool_deviation_rms": counted.reduce(_rms, away)}
+            values |= {"tool_deviation_rms": counted.reduce(root_mean_square, away)}
     return values
-
-
-def _rms(values: Array) -> float:
-    """Return the root mean square of all values."""
-    return float(np.sqrt(np.mean(values**2)))

@@ -9,6 +9,7 @@ import click
 from rich.table import Table
 from rich.text import Text
 
+from pathcontrol.analysis.readable import count_words
 from pathcontrol.cli.group import printable
 
 if TYPE_CHECKING:
@@ -99,8 +100,8 @@ def toolpath_table(content: dict[str, Any]) -> list[Text | Table]:
     size = " × ".join(f"{1e3 * (b - a):.6g}" for a, b in zip(*content["bounds_m"], strict=True))
     cuts, rapids = (f"{1e3 * content[key]:.6g}" for key in ("cut_length_m", "rapid_length_m"))
     head = (
-        f"{content['source']}: {_counted(len(contours), 'contour')}, drawn in {content['unit']}: {cuts} mm of cuts and "
-        f"{rapids} mm of rapids, within {size} mm"
+        f"{content['source']}: {count_words(len(contours), 'contour')}, drawn in {content['unit']}: {cuts} mm of cuts "
+        f"and {rapids} mm of rapids, within {size} mm"
     )
     table = Table()
     for column in ("contour", "", "length [mm]", "feed [mm/s]", "points", "corners", "sharpest [°]"):
@@ -122,8 +123,3 @@ def _contour_row(contour: dict[str, Any]) -> list[Text | str]:
         str(contour["corners"]),
         f"{contour['sharpest_deg']:.1f}" if contour["corners"] else "",
     ]
-
-
-def _counted(number: int, word: str) -> str:
-    """Return a number of things in words."""
-    return f"{number} {word}{'' if number == 1 else 's'}"

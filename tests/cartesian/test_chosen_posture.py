@@ -13,7 +13,7 @@ from pathcontrol.cartesian.ik.continuation import Stop, Trail
 from pathcontrol.cartesian.ik.preference import sort_by_preference
 from pathcontrol.cartesian.orientation import FreeOrientation
 from pathcontrol.cartesian.tool import Tool
-from pathcontrol.toolpaths.gcode.builder import ContourBuilder
+from pathcontrol.toolpaths.gcode.strokes import ContourBuilder
 
 FRAMES = {"ur5": "tool0", "ur10": "tool0", "panda": "panda_hand_tcp", "cicese_2dof": "tool"}
 REACH = {"ur5": 0.85, "ur10": 1.25, "panda": 0.85}

@@ -27,7 +27,7 @@ from pathcontrol import (
     toolpath_metrics,
 )
 from pathcontrol.cartesian.contour_links import link_contours
-from pathcontrol.toolpaths.gcode.builder import ContourBuilder
+from pathcontrol.toolpaths.gcode.strokes import ContourBuilder
 from pathcontrol.toolpaths.segments.arc import Arc
 
 BOARD = np.array([[1, 0, 0, 0.3], [0, 0, -1, -0.05], [0, 1, 0, 0.7], [0, 0, 0, 1.0]])  # upright, in the arm's plane

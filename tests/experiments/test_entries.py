@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from pathcontrol import Contour, RobotModel, Toolpath, ToolpathTask, load_robot, read_gcode, smooth
 from pathcontrol.cartesian.contour_links import link_contours
-from pathcontrol.toolpaths.gcode.builder import ContourBuilder
+from pathcontrol.toolpaths.gcode.strokes import ContourBuilder
 from pathcontrol.toolpaths.segments.segment import Polyline
 
 UP, TOLERANCE, CLEARANCE = np.array([0.0, 0.0, 1.0]), 1e-4, 0.01

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from strategies import floats
 
 from pathcontrol import Contour, InputError, ToolCurve, UnknownNameError, smooth
-from pathcontrol.toolpaths.gcode.builder import ContourBuilder
+from pathcontrol.toolpaths.gcode.strokes import ContourBuilder
 from pathcontrol.toolpaths.segments.arc import Arc
 from pathcontrol.toolpaths.segments.bezier import Bezier
 from pathcontrol.toolpaths.segments.segment import Polyline

@@ -34,3 +34,9 @@ def first(element: etree._Element, path: str) -> etree._Element | None:
 def links_and_joints(root: etree._Element) -> Iterator[etree._Element]:
     """Yield the links and joints of a robot, in the order of the file."""
     return root.iterchildren("link", "joint")
+
+
+def link_at(joint: etree._Element, end: str) -> str | None:
+    """Return the name of the link at an end of a joint, its ``"parent"`` or ``"child"``."""
+    element = joint.find(end)
+    return None if element is None else element.get("link")

@@ -9,7 +9,7 @@ from lxml import etree
 
 from pathcontrol._arrays import as_scalar
 from pathcontrol.errors import InputError, UnknownNameError
-from pathcontrol.robot.urdf.elements import MOVABLE_TYPES
+from pathcontrol.robot.urdf.elements import MOVABLE_TYPES, link_at
 from pathcontrol.robot.urdf.numbers import read_numbers
 
 
@@ -149,7 +149,7 @@ def _check_known(argument: str, name: str, joints: Collection[str]) -> str:
 
 def _supporting_joints(root: etree._Element, tip: str, joints: Collection[str]) -> Iterator[str]:
     """Yield the movable joints between the base and a link, or a joint and those that carry it."""
-    over = {_end(joint, "child"): joint for joint in root.iterfind("joint")}
+    over = {link_at(joint, "child"): joint for joint in root.iterfind("joint")}
     links = [link.get("name", "") for link in root.iterfind("link")]
     by_name = {joint.get("name", ""): joint for joint in root.iterfind("joint")}
     if tip not in links and tip not in by_name:
@@ -164,7 +164,7 @@ def _supporting_joints(root: etree._Element, tip: str, joints: Collection[str]) 
         seen.add(joint)
         if joint.get("name") in joints:
             yield joint.get("name")
-        joint = over.get(_end(joint, "parent"))
+        joint = over.get(link_at(joint, "parent"))
 
 
 def _position(
@@ -203,9 +203,3 @@ def _number(element: etree._Element, name: str, default: float) -> float:
     """Return an attribute as a number, or the default; text that is no number is left to the checks."""
     values = read_numbers(element.get(name, ""), 1)
     return default if values is None else values[0]
-
-
-def _end(joint: etree._Element, end: str) -> str | None:
-    """Return the name of the link at an end of a joint."""
-    element = joint.find(end)
-    return None if element is None else element.get("link")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +15,8 @@ import numpy as np
 from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError, warn
 from pathcontrol.simulation.context import StoredContext
-from pathcontrol.simulation.samples import Samples
+from pathcontrol.simulation.samples import Labelled, Samples
 from pathcontrol.simulation.storage.file_form import check_form, check_sizes
-from pathcontrol.simulation.storage.labels import put_labelled
 from pathcontrol.simulation.storage.seal import check_seal, digest_of, seal
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 
@@ -48,7 +47,7 @@ def write_run(path: Path, data: xr.Dataset | Samples, config: Mapping[str, Any],
         _put(file, data)
         file.attrs.update({_CONFIG: text, _DIGEST: _digest_of_run(data, text)})
         group = file.create_group(_GROUP)
-        put_labelled(group, origin, {}, 4)
+        _put_labelled(group, origin, {}, 4)
         group.attrs[_DIGEST] = _digest_of_origin(stored)
     content = memory.getbuffer()
     with whole_file(path) as temporary, temporary.open("wb") as written:
@@ -136,9 +135,54 @@ def _digest_of_origin(stored: StoredContext) -> str:
 def _put(file: h5netcdf.File, data: xr.Dataset | Samples) -> None:
     """Write the data of a run."""
     if isinstance(data, Samples):
-        put_labelled(file, *data.label_all(), _LEVEL)
+        _put_labelled(file, *data.label_all(), _LEVEL)
         return
     from xarray.backends import H5NetCDFStore  # loaded already, and it handles any other content of the data
 
     packed = {name: {"zlib": True, "complevel": _LEVEL, "shuffle": True} for name in data.data_vars}
     data.dump_to_store(H5NetCDFStore(file), encoding=packed)
+
+
+def _put_labelled(
+    group: h5netcdf.Group, variables: Mapping[str, Labelled], coordinates: Mapping[str, Labelled], level: int
+) -> None:
+    """Write variables, compressed at a ``level``, and the coordinates along which they are laid out.
+
+    By the conventions of CF and of xarray a variable names its coordinates, words are text of any length, truth values
+    are bytes that are called ``bool``, and a missing number is NaN.
+    """
+    everything = {**coordinates, **variables}
+    for dims, array, _ in everything.values():
+        group.dimensions.update({d: n for d, n in zip(dims, np.shape(array), strict=True) if d not in group.dimensions})
+    for name, (dims, array, attributes) in everything.items():
+        about = dict(attributes)
+        if name in variables and (named := _list_coordinates(dims, coordinates)):
+            about["coordinates"] = named
+        _put_variable(group, name, (dims, array, about), level if name in variables else None)
+    loose = _list_unused_coordinates(variables.values(), coordinates)
+    if loose:
+        group.attrs["coordinates"] = loose
+
+
+def _put_variable(group: h5netcdf.Group, name: str, labelled: Labelled, level: int | None) -> None:
+    """Write one labelled array."""
+    dims, array, attributes = labelled
+    kind = array.dtype.kind
+    packed = {} if level is None else {"compression": "gzip", "compression_opts": level, "shuffle": True}
+    numbers = array.astype("i1") if kind == "b" else array.astype(object) if kind == "U" else array
+    dtype = h5py.string_dtype() if kind == "U" else numbers.dtype
+    variable = group.create_variable(
+        name, dims, dtype=dtype, data=numbers, fillvalue=np.nan if kind == "f" else None, **packed
+    )
+    variable.attrs.update({**attributes, **({"dtype": "bool"} if kind == "b" else {})})
+
+
+def _list_coordinates(dims: Iterable[str], coordinates: Mapping[str, Labelled]) -> str:
+    """Return the names of the coordinates of a variable over ``dims``, without the axes themselves."""
+    return " ".join(sorted(name for name, (over, *_) in coordinates.items() if over != (name,) and {*over} <= {*dims}))
+
+
+def _list_unused_coordinates(variables: Iterable[Labelled], coordinates: Mapping[str, Labelled]) -> str:
+    """Return the names of the coordinates that belong to no variable."""
+    seen = {name for dims, *_ in variables for name in _list_coordinates(dims, coordinates).split()}
+    return " ".join(sorted(name for name, (over, *_) in coordinates.items() if over != (name,) and name not in seen))

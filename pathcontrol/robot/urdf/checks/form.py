@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from lxml import etree
 
 from pathcontrol.robot.urdf.checks.finding import Finding, place, quote
-from pathcontrol.robot.urdf.elements import JOINT_TYPES, MOMENTS, first, links_and_joints, place_of
+from pathcontrol.robot.urdf.elements import JOINT_TYPES, MOMENTS, first, link_at, links_and_joints, place_of
 from pathcontrol.robot.urdf.numbers import check_numbers
 
 MAX_LINKS = 1000  # the reader recurses: a chain of some thousand links ends the process
@@ -131,7 +131,7 @@ def check_ends(root: etree._Element) -> Iterator[Finding]:
     links = {link.get("name") for link in root.findall("link")}
     for joint in root.findall("joint"):
         for end in ("parent", "child"):
-            name = _end(joint, end)
+            name = link_at(joint, end)
             if name is not None and name not in links:
                 message = f"the {end} link {quote(name)} does not exist; add that <link> or correct the name"
                 yield Finding("error", f"{end}-unknown", place_of(joint), message)
@@ -142,8 +142,8 @@ def check_tree(root: etree._Element) -> Iterator[Finding]:
     parents: dict[str, str] = {}
     holders: dict[str, list[str]] = {}
     for joint in root.findall("joint"):
-        if (child := _end(joint, "child")) is not None:
-            parents[child] = _end(joint, "parent") or ""
+        if (child := link_at(joint, "child")) is not None:
+            parents[child] = link_at(joint, "parent") or ""
             holders.setdefault(child, []).append(joint.get("name", ""))
     links = dict.fromkeys(link.get("name", "") for link in root.findall("link"))
     roots = [name for name in links if name not in parents]
@@ -158,12 +158,6 @@ def check_tree(root: etree._Element) -> Iterator[Finding]:
         chain = " -> ".join(map(quote, loop))
         message = f"the links {chain} form a loop; expected a tree, remove one of the joints"
         yield Finding("error", "loop", place("link", loop[0]), message)
-
-
-def _end(joint: etree._Element, end: str) -> str | None:
-    """Return the name of the link at an end of a joint."""
-    element = joint.find(end)
-    return None if element is None else element.get("link")
 
 
 def _loop(parents: dict[str, str]) -> list[str]:
