@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from pathcontrol import Space, sweep, tune
 from pathcontrol._units import parse_quantity
 from pathcontrol.arguments import Form, Unit, parameters_of
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.load import load_experiment
 from pathcontrol.experiments.runner import run_experiment
 from pathcontrol.experiments.schema.derived import section_of
+from pathcontrol.experiments.schema.sweep_sections import SweepSection, TuneSection
 from pathcontrol.experiments.template import example_text
 from pathcontrol.registry import KINDS, LOOPS, Kind
 
@@ -95,3 +97,11 @@ def test_a_joint_is_named_or_numbered(write_experiment, joint, tmp_path):
     run = run_experiment(write_experiment({"disturbance": jam}), tmp_path, progress=False).run
     held = run.array("q")[0, (run.time > 0.011) & (run.time < 0.029)]
     assert np.ptp(held[:, 1]) == 0.0 < np.ptp(held[:, 0])
+
+
+def test_sweeps_and_tunings_of_files_have_the_arguments_of_their_functions():
+    """Their sections are not derived, as the file's values make the space; but an argument is not forgotten."""
+    of_the_call = {"build", "space", "out", "chunk", "resume", "progress", "cluster", "security", "engine"}
+    swept = parameters_of(sweep).keys() | parameters_of(Space).keys()
+    assert SweepSection.model_fields.keys() == swept - of_the_call
+    assert TuneSection.model_fields.keys() == parameters_of(tune).keys() - of_the_call | {"parameters"}
