@@ -66,7 +66,9 @@ def test_threads_of_one_process_take_turns(here, tmp_path):
 
 
 @pytest.mark.parametrize("victims", [1, 2], ids=["one", "all"])
-def test_killed_workers_lose_nothing(victims, workers, here, tmp_path):
+def test_killed_workers_lose_nothing(victims, workers, here, tmp_path, monkeypatch):
+    monkeypatch.setattr(dispatch, "_LOOK", 1.0)  # two such times pass where all that was known of the job has died,
+    monkeypatch.setattr(dispatch, "_SILENCE", 5.0)  # or this one, where a chunk was on its way
     killed = []
 
     def kill():

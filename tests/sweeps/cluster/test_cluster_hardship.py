@@ -69,7 +69,9 @@ def test_others_take_over_from_a_frozen_worker(here, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("mortal", [1, 2], ids=["one of two", "both"])
-def test_workers_that_die_every_second_do_not_end_a_sweep(mortal, here, tmp_path):
+def test_workers_that_die_every_second_do_not_end_a_sweep(mortal, here, tmp_path, monkeypatch):
+    monkeypatch.setattr(dispatch, "_LOOK", 1.0)  # two such times pass whenever all that was known of the job has died,
+    monkeypatch.setattr(dispatch, "_SILENCE", 5.0)  # or this one, where a chunk was on its way
     over, deaths = threading.Event(), []
     with distributed.LocalCluster(**TWO) as cluster:
 
