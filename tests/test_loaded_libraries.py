@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-LARGE = "{'xarray', 'pandas', 'trimesh', 'yourdfpy', 'sympy', 'pydantic', 'matplotlib.pyplot', 'scipy.interpolate'}"
+LARGE = "{'xarray', 'pandas', 'trimesh', 'yourdfpy', 'sympy', 'pydantic', 'matplotlib.pyplot', 'scipy'}"
 RUN = "import pathcontrol as pc; from pathcontrol.experiments.reproduce import paper_experiment; " + (
     "robot = pc.load_robot('cicese_2dof'); run = paper_experiment('projection', robot, False, 'compiled').run"
 )

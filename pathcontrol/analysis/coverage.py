@@ -9,6 +9,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
 from pathcontrol.geometry.closest_point.cells import FARTHEST
+from pathcontrol.geometry.nearest_rows import nearest_rows
 from pathcontrol.tasks.task import PathTask
 
 _POINTS = 1000  # points of a path, at least
@@ -81,9 +82,7 @@ def distance_to_trace(x: Array, trace: Array, resolution: float) -> Array:
     fine = refine(trace[(np.abs(trace) < FARTHEST).all(-1)], _FINER * resolution)
     if not len(fine):
         return np.full(len(x), np.inf)
-    from scipy.spatial import cKDTree  # takes a fifth of a second to load
-
-    nearest = cKDTree(fine, balanced_tree=False).query(x)[1]
+    nearest = nearest_rows(x, fine)
     sides = [(np.maximum(nearest - 1, 0), nearest), (nearest, np.minimum(nearest + 1, len(fine) - 1))]
     return np.min([_line_distance(x, fine[a], fine[b]) for a, b in sides], axis=0)
 

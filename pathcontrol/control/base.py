@@ -272,6 +272,8 @@ class Controller(ABC):
 
 def _phi(x: Array) -> tuple[Array, Array]:
     """Return φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x, by their series where x is small."""
+    if not x.any():  # laws whose rate does not depend on s
+        return np.ones_like(x), np.full_like(x, 0.5)
     small = np.abs(x) < 1e-3
     if not small.any():
         phi_1 = np.expm1(x) / x

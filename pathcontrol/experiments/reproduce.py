@@ -117,6 +117,8 @@ def load_writers() -> None:
         import pathcontrol.view.figures.path_figures
         import pathcontrol.view.page.html  # noqa: F401
 
+        PIL.Image.preinit()
+
 
 def _collect(results: Iterable[T], update: Callable[[int], None]) -> dict[str, T]:
     """Return the results by the names of the experiments, as they come."""

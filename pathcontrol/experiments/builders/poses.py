@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import ExperimentError
+from pathcontrol.robot.rotations import rotation_of_rpy
 
 
 def pose_of(key: str, arguments: Mapping[str, Any]) -> Array:
@@ -23,6 +23,6 @@ def pose_of(key: str, arguments: Mapping[str, Any]) -> Array:
         if len(value) != 3:
             raise ExperimentError(f"{key}.{name} = {value}, expected three numbers")
     pose = np.eye(4)
-    pose[:3, :3] = Rotation.from_euler("xyz", given["rpy"]).as_matrix()
+    pose[:3, :3] = rotation_of_rpy(given["rpy"])
     pose[:3, 3] = given["position"]
     return pose

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pathcontrol._arrays import Array
+from pathcontrol.robot.rotations import rotation_between, rotation_of_rpy
 from pathcontrol.robot.urdf import parse_urdf
 from pathcontrol.robot.urdf.numbers import read_numbers
 from pathcontrol.view.bodies.body_links import joint_offset
@@ -52,7 +52,7 @@ def _rail(joint: Any, x: Array) -> tuple[Array, Array]:
     origin, axis = joint.find("origin"), joint.find("axis")
     rpy = None if origin is None else read_numbers(origin.get("rpy", "0 0 0"), 3)
     along = None if axis is None else read_numbers(axis.get("xyz", ""), 3)
-    direction = Rotation.from_euler("xyz", rpy or (0.0, 0.0, 0.0)).apply(along or (1.0, 0.0, 0.0))
+    direction = rotation_of_rpy(rpy or (0.0, 0.0, 0.0)) @ (along or (1.0, 0.0, 0.0))
     direction = direction / (np.linalg.norm(direction) or 1.0)
     low, high = (_limit(joint, name) for name in ("lower", "upper"))
     return x + min(low, 0.0) * direction, x + max(high, 0.0) * direction
@@ -71,6 +71,6 @@ def _stick(link: str, name: str, start: Array, end: Array, radius: float) -> lis
     if length <= radius / 10:
         return []
     pose = np.eye(4)
-    pose[:3, :3] = Rotation.align_vectors([end - start], [[0.0, 0.0, 1.0]])[0].as_matrix()
+    pose[:3, :3] = rotation_between([0.0, 0.0, 1.0], end - start)
     pose[:3, 3] = (start + end) / 2
     return [LinkVisual(link, name, pose, Cylinder(radius, length), STICK)]

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from pathcontrol._arrays import Array
+from pathcontrol.robot.rotations import quaternions_of, rotation_of_quaternion
 from pathcontrol.view.animation.scene.keyframes import Indices, inside, interpolate, key_samples
 
 STILL = 1e-9  # m, and the same of the quaternion: what does not move by more is at rest
@@ -50,7 +50,7 @@ class Track:
     @property
     def first_rotation(self) -> Array:
         """The first rotation, (3, 3)."""
-        return Rotation.from_quat(self.quaternions[0]).as_matrix()
+        return rotation_of_quaternion(self.quaternions[0])
 
     def thin(self, error: float = ERROR) -> Track:
         """Return the track with the fewest keys that give every other within ``error`` [m; entries of the rotation].
@@ -73,7 +73,7 @@ class Track:
 
 def continuous_quaternions(rotations: Array) -> Array:
     """Return unit quaternions (x, y, z, w) of rotations (k, 3, 3), without changes of sign on the way."""
-    quaternions = Rotation.from_matrix(rotations).as_quat()
+    quaternions = quaternions_of(rotations)
     turned = (quaternions[1:] * quaternions[:-1]).sum(-1) < 0
     signs = np.cumprod(np.where(turned, -1.0, 1.0))
     return quaternions * np.concatenate([[1.0], signs])[:, None]
