@@ -6,6 +6,7 @@ import gc
 import json
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -13,6 +14,7 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import repeat
 from multiprocessing import active_children, get_context
 from pathlib import Path
@@ -35,6 +37,17 @@ from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
 
 T = TypeVar("T")
+_WRITERS = (
+    "pathcontrol.simulation.storage.netcdf",
+    "pathcontrol.simulation.storage.task_recipes",
+    "pathcontrol.view.animation.record",
+    "pathcontrol.view.figures.error_figures",
+    "pathcontrol.view.figures.path_figures",
+    "pathcontrol.view.page.html",
+    "matplotlib.backends.backend_svg",
+    "matplotlib.style",
+    "PIL.Image",
+)
 
 #: the paper's steady-state peaks and the numbers of its figures
 PAPER: dict[str, dict[str, float]] = {
@@ -108,16 +121,11 @@ def reproduce(out: str | Path) -> dict[str, Any]:
 
 
 def load_writers() -> None:
-    """Import what writes the files."""
+    """Import what writes the files, before processes are made that would each import it."""
     with delay_interrupt():
-        import pathcontrol.simulation.storage.netcdf
-        import pathcontrol.simulation.storage.task_recipes
-        import pathcontrol.view.animation.record
-        import pathcontrol.view.figures.error_figures
-        import pathcontrol.view.figures.path_figures
-        import pathcontrol.view.page.html  # noqa: F401
-
-        PIL.Image.preinit()
+        for name in _WRITERS:
+            import_module(name)
+        sys.modules["PIL.Image"].preinit()
 
 
 def _collect(results: Iterable[T], update: Callable[[int], None]) -> dict[str, T]:
