@@ -89,6 +89,7 @@ from .simulation.arm.dropout import Dropout as Dropout
 from .simulation.arm.friction_change import FrictionChange as FrictionChange
 from .simulation.arm.jam import JammedJoint as JammedJoint
 from .simulation.arm.noise import SensorNoise as SensorNoise
+from .simulation.arm.pick_up import PickUp as PickUp
 from .simulation.arm.plant import Plant as Plant
 from .simulation.arm.wall import Wall as Wall
 from .simulation.loops import ContinuousTime as ContinuousTime

@@ -117,6 +117,7 @@ DISTURBANCES = Kind(
         "harmonic": "simulation.arm.disturbance:Harmonic",
         "frame_force": "simulation.arm.disturbance:FrameForce",
         "jammed_joint": "simulation.arm.jam:JammedJoint",
+        "pick_up": "simulation.arm.pick_up:PickUp",
         "wall": "simulation.arm.wall:Wall",
         "dropout": "simulation.arm.dropout:Dropout",
         "friction_change": "simulation.arm.friction_change:FrictionChange",

@@ -100,6 +100,7 @@ class Setup(Structure):
         ("plant_friction", FrictionRows),
         ("damped", Rows),
         ("disturbance", c_void_p),
+        ("struck", c_void_p),
     ]
 
 

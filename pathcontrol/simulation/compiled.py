@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from ctypes import addressof
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,7 @@ from pathcontrol.simulation.arm.dropout import Dropout, Dropouts
 from pathcontrol.simulation.arm.friction_change import FrictionChange
 from pathcontrol.simulation.arm.jam import JammedJoint
 from pathcontrol.simulation.arm.noise import NoiseSource
+from pathcontrol.simulation.arm.pick_up import PickUp
 from pathcontrol.simulation.arm.plant import Walls, has_strong_friction
 from pathcontrol.simulation.arm.wall import Wall
 from pathcontrol.simulation.divergence import BEYOND, NO_NUMBERS, Divergence
@@ -55,8 +57,16 @@ from pathcontrol.simulation.sampled import Actuator
 
 _BLOCK = 1 << 17  # ticks of all rollouts together between checks of Ctrl-C and the progress bar
 _DISTURBANCES = (Push, Harmonic, FrameForce, JammedJoint, TorqueLimitDrop, Wall)  # in the order of the engine's numbers
-_BETWEEN = (FrictionChange, Dropout)  # what is set for each block of ticks
+_BETWEEN = (FrictionChange, PickUp, Dropout)  # what is set for each block of ticks
 _REASONS = {1: BEYOND, 2: NO_NUMBERS}
+
+
+class _Block(NamedTuple):
+    """Ticks that are run together: how many came before, how many these are, and whether they are the last."""
+
+    done: int
+    ticks: int
+    last: bool
 
 
 class CompiledPlant:
@@ -122,6 +132,7 @@ class CompiledArm:
         self._loop, self._shape, self._ticks = loop, q.shape, 0
         self._threads = max(1, min(_threads(robot), -(-len(q) // lanes(self._library))))
         self._noise = None if loop.noise is None else NoiseSource(loop.noise, q.shape, outside.first)
+        self._drawn = np.empty((0, 2, *q.shape))
         sensors, actuator = loop.sensors(robot), Actuator(loop, robot, q.shape)
         check_rows(sensors.resolution, "encoders", len(q))
         self._add_loop(sensors.resolution, actuator)
@@ -159,10 +170,9 @@ class CompiledArm:
             while not over:
                 count = self._begin_block(setup, min(block, ticks - done))
                 last = done + count == ticks
-                samples = self._run_block(setup, recorder, done, count, last, pool)
+                over = self._run_block(setup, finish, recorder, _Block(done, count, last), pool) or last
                 done += count
                 update(min(done, ticks))
-                over = last or samples < count or self._is_over(finish, setup)
         return self._close_record(recorder, finish, setup)
 
     def _add_law(self, controller: Controller) -> Setup:
@@ -188,15 +198,18 @@ class CompiledArm:
             return most
         arm, self._arm_memory = self._changing.at(self._ticks), Memory()
         add_plant(setup, arm, has_strong_friction(arm), self._arm_memory)
+        qd = self._changing.strike(self._ticks, self._state["q"], self._state["qd"])
+        setup.struck = None if qd is self._state["qd"] else self._arm_memory.address(qd)
         return int(min(most, self._changing.next_change(self._ticks) - self._ticks))
 
     def _run_block(
-        self, setup: Setup, recorder: Recorder, done: int, count: int, last: bool, pool: ThreadPoolExecutor
-    ) -> int:
-        """Run ``count`` ticks and return the number of samples recorded; this thread takes part."""
+        self, setup: Setup, finish: Finish | None, recorder: Recorder, block: _Block, pool: ThreadPoolExecutor
+    ) -> bool:
+        """Run some ticks and return whether the run is over; this thread takes part."""
+        done, count, last = block
         rollouts = self._shape[0]
         width = lanes(self._library)
-        noise = None if self._noise is None else self._noise.samples(count)
+        noise = self._draw_noise(count)
         arrays = recorder.reserve(count + last)
         record = Record(**{name: arrays[name].ctypes.data for name in RECORDED}, stride=arrays["q"].strides[0])
         state = State(**{name: array.ctypes.data for name, array in self._state.items()})
@@ -214,9 +227,21 @@ class CompiledArm:
         cuts = [min(rollouts, width * round(packs * i / self._threads)) for i in range(self._threads + 1)]
         others = pool.map(work, cuts[1:-1], cuts[2:])
         samples = max([work(cuts[0], cuts[1]), *others])
-        self._ticks += min(samples, count)
         recorder.add(samples)
-        return samples
+        over = self._is_over(finish, setup)
+        # the sample at which all packs end together has no period after it
+        advanced = samples - 1 if last or (over and span.stops) else count
+        self._ticks += advanced
+        self._drawn = self._drawn[advanced:]
+        return over or samples < count
+
+    def _draw_noise(self, count: int) -> Array | None:
+        """Return the noise of the next ``count`` readings, (count, 2, N, n); what a block does not use is kept."""
+        if self._noise is None:
+            return None
+        if len(self._drawn) < count:
+            self._drawn = np.concatenate([self._drawn, self._noise.samples(count - len(self._drawn))])
+        return self._drawn[:count]
 
     def _lose(self, count: int) -> NDArray[np.uint8] | None:
         """Return what is lost at the next ``count`` ticks, missed ticks and measurements, (2, count, N)."""

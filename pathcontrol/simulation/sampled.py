@@ -176,6 +176,7 @@ class SampledArm:
         t, arm = self._ticks * self._period, self._changing.at(self._ticks)
         if arm is not self._robot:
             self._robot, self._plants = arm, self._make_plants(arm)
+        self.qd = self._changing.strike(self._ticks, self.q, self.qd)
         for plant, acting in zip(self._plants, torques, strict=True):
             for _ in range(self._substeps):
                 pushed, held, middle = acting, None, t + 0.5 * plant.step

@@ -31,6 +31,7 @@ ROWS = {
     "walls": pc.Wall(
         "tool", [[0.5, 0.0, 0.0], [0.6, 0.0, 0.0]], [-1.0, 0.0, 0.0], [1e4, 1e5], [0.0, 0.3], damping=[0, 9]
     ),
+    "picks": pc.PickUp([1.0, 2.0], "tool", [0.02, 0.03], 0.03),
     "jams": pc.JammedJoint(["joint_2", "joint_1"], [0.02, 0.0], 0.03),
     "forces": pc.FrameForce(ROBOT, "tool", [[0.1, 0.2, -5.0], [1.0, 0.0, 0.0]], duration=0.03),
 }
@@ -89,6 +90,11 @@ def test_a_run_with_a_dropout_is_made_again(what, tmp_path, monkeypatch):
 def test_a_run_that_meets_a_wall_is_made_again(kind, tmp_path, monkeypatch):
     tool = ROBOT.frame_pose(np.array([0.7, 1.2]), "tool")[:3, 3]
     run = simulated(PUSH + pc.Wall("tool", tool, [-1.0, 0.0, 2.0], start=0.02, **kind))
+    assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
+
+
+def test_a_run_with_a_pick_up_is_made_again(tmp_path, monkeypatch):
+    run = simulated(PUSH + pc.PickUp(1.0, "tool", 0.02, 0.03, velocity=[0.1, 0.0, 0.0]))
     assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
 
 

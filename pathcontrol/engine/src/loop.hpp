@@ -346,6 +346,11 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
     if (final || (span.stops && !any(going))) { sample++; break; }
     const V next_s = advance_parameter(setup, paths, out);
     r.s = select(lost, r.first_s, span.missed ? select(line.missed, r.s, next_s) : next_s);
+    if (sample == 0 && setup.struck) {
+      V struck[room<N>()];
+      load(place, setup.struck, n, n, struck);
+      for (int i = 0; i < n; i++) r.qd[i] = select(lost, r.qd[i], struck[i]);
+    }
     double now = (span.arm_tick + sample) * setup.period;
     for (int part = 0; part < setup.parts; part++) {
       const double step = setup.part[part] / setup.substeps;

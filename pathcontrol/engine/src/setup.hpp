@@ -42,6 +42,7 @@ struct Setup {
   FrictionRows law_friction, plant_friction;
   Rows damped;                        // 1 for rollouts whose viscous friction is condensed, see plant.hpp
   const Disturbance *disturbance;
+  const double *struck;               // velocities after an impulse at the first tick of a call, (rollouts, joints), or null
 };
 
 // (rollouts, joints) or (rollouts,) each; `queue` is (delayed, rollouts, joints). What was seen and said last is kept where

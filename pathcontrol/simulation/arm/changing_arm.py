@@ -37,11 +37,29 @@ class ChangingArm:
 
     def at(self, tick: int) -> Arm:
         """Return the arm of the period that begins at a tick; the same object until it changes."""
-        interval = int(np.searchsorted(self._ticks, tick, side="right")) if self.changes else 0
+        interval = self._find_interval(tick)
         if interval != self._interval and self._disturbance is not None:
             self._arm = self._disturbance.change_arm(self._middle(interval), self._robot)
             self._interval = interval
         return self._arm
+
+    def strike(self, tick: int, q: Array, qd: Array) -> Array:
+        """Return q̇ (N, n) after the change of the arm that comes at a tick: by M⁻¹ times its impulse, M after it."""
+        interval, before = self._find_interval(tick), self._find_interval(tick - 1)
+        if interval == before or self._disturbance is None:
+            return qd
+        impulse = self._disturbance.strike(self._middle(before), self._middle(interval), q, qd)
+        if impulse is None or not impulse.any():
+            return qd
+        rows, after, arm = np.flatnonzero(impulse.any(-1)), qd.copy(), self.at(tick)
+        M = arm.mass_matrix(q[rows], rows) if isinstance(arm, RobotBatch) else arm.mass_matrix(q[rows])
+        after[rows] += np.linalg.solve(M, impulse[rows][..., None])[..., 0]
+        return after
+
+    def _find_interval(self, tick: int) -> int:
+        """Return the number of changes up to a tick; those before the start have come before tick 0."""
+        early = int((self._times < 0).sum())
+        return max(early, int(np.searchsorted(self._ticks, tick, side="right"))) if self.changes else 0
 
     def next_change(self, tick: int) -> float:
         """Return the first tick after ``tick`` at which the arm may change, inf without one."""

@@ -57,6 +57,10 @@ class Disturbance(ABC):
         """Return what it makes of the arm, or of the arms of all rollouts, at t [s]; the arm itself by default."""
         return arm
 
+    def strike(self, before: float, now: float, q: Array, qd: Array) -> Array | None:
+        """Return the impulse [N m s] of a change of the arm between two times, (N, n); ``None`` where there is none."""
+        return None
+
     def find_names(self, robot: RobotModel) -> Disturbance:
         """Return the disturbance with the joints and frames that it names found in an arm.
 
@@ -101,6 +105,10 @@ class _Sum(Disturbance):
 
     def change_arm(self, t: float, arm: RobotModel | RobotBatch) -> RobotModel | RobotBatch:
         return reduce(lambda changed, term: term.change_arm(t, changed), self.terms, arm)
+
+    def strike(self, before: float, now: float, q: Array, qd: Array) -> Array | None:
+        impulses = [one for term in self.terms if (one := term.strike(before, now, q, qd)) is not None]
+        return reduce(np.add, impulses) if impulses else None
 
     def find_names(self, robot: RobotModel) -> Disturbance:
         return _Sum(tuple(term.find_names(robot) for term in self.terms))
@@ -220,9 +228,7 @@ class FrameForce(TimedDisturbance):
         expect("robot", robot, RobotModel)
         robot.frame_pose(np.zeros(robot.n), frame)  # raises where there is no such frame
         self._robot, self.frame = robot, frame
-        self.force = freeze(check_finite("force", as_array("force", force)))
-        if self.force.shape[-1:] != (3,):
-            raise InputError(f"force has shape {self.force.shape}, expected (3,), or (N, 3) for each rollout")
+        self.force = check_vectors("force", force)
 
     @property
     def robot(self) -> RobotModel:
@@ -297,6 +303,14 @@ def jump_times(disturbance: Disturbance) -> Array:
     except (TypeError, ValueError) as error:
         name = type(disturbance).__name__
         raise InputError(f"{name}.jumps cannot be used: {error}; expected times [s], (k,)", argument=name) from error
+
+
+def check_vectors(name: str, value: ArrayLike) -> Array:
+    """Check vectors (3,) or (N, 3); return them read-only."""
+    array = freeze(check_finite(name, as_array(name, value)))
+    if array.shape[-1:] != (3,) or array.ndim > 2:
+        raise InputError(f"{name} has shape {array.shape}, expected (3,), or (N, 3) for each rollout", argument=name)
+    return array
 
 
 def _check_each(name: str, value: ArrayLike) -> Array:

@@ -7,12 +7,12 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pathcontrol._arrays import Array, as_array, check_finite, freeze
+from pathcontrol._arrays import Array, as_array, freeze
 from pathcontrol.arguments import Direction, Form, Point, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.contact import Meeting
-from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance
+from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance, check_vectors
 
 _RELAXATION = 1e-3  # s, damping over stiffness by default
 
@@ -58,7 +58,7 @@ class Wall(TimedDisturbance):
             raise InputError(f"frame = {frame!r}, expected the name of a frame, such as 'tool'", argument="frame")
         self.frame, self.rigid = frame, bool(rigid)
         self._robot: RobotModel | None = None
-        self.point, self.normal = _check_vectors("point", point), _check_vectors("normal", normal)
+        self.point, self.normal = check_vectors("point", point), check_vectors("normal", normal)
         length = np.linalg.norm(self.normal, axis=-1, keepdims=True)
         if (length == 0).any():
             raise InputError("normal = [0, 0, 0], expected the direction out of the wall, of any other length")
@@ -134,14 +134,6 @@ class Wall(TimedDisturbance):
         """Return a rollout before the wall; ``gap`` (N,) and ``jacobian`` (N, 3, n) are those of all."""
         k, c, friction = (float(np.ravel(part)[row % np.size(part)]) for part in (*self.springs, self.friction))
         return Meeting(float(gap[row]), jacobian[row], k, c, friction)
-
-
-def _check_vectors(name: str, value: ArrayLike) -> Array:
-    """Check vectors (3,) or (N, 3); return them read-only."""
-    array = freeze(check_finite(name, as_array(name, value)))
-    if array.shape[-1:] != (3,) or array.ndim > 2:
-        raise InputError(f"{name} has shape {array.shape}, expected (3,), or (N, 3) for each rollout", argument=name)
-    return array
 
 
 def _check_each(name: str, value: ArrayLike, most: float = np.finfo(np.float64).max) -> Array:
