@@ -47,6 +47,8 @@ _WRITERS = (
     "matplotlib.backends.backend_svg",
     "matplotlib.style",
     "PIL.Image",
+    "rich.console",  # for the table of the command
+    "rich.table",
 )
 
 #: the paper's steady-state peaks and the numbers of its figures
@@ -121,7 +123,7 @@ def reproduce(out: str | Path) -> dict[str, Any]:
 
 
 def load_writers() -> None:
-    """Import what writes the files, before processes are made that would each import it."""
+    """Import what writes the files and tells of them, before processes are made that would each import it."""
     with delay_interrupt():
         for name in _WRITERS:
             import_module(name)
@@ -144,7 +146,7 @@ def _mapped() -> Iterator[Callable[..., Iterable[Any]]]:
         yield map
         return
     gc.freeze()  # or its next round would copy all pages into each process
-    with ProcessPoolExecutor(len(PAPER), get_context("fork"), _leave_at_signals) as pool:
+    with ProcessPoolExecutor(len(PAPER), get_context("fork"), _prepare_process) as pool:
         try:
             yield pool.map
         except KeyboardInterrupt:
@@ -158,11 +160,12 @@ def _mapped() -> Iterator[Callable[..., Iterable[Any]]]:
             ) from error
 
 
-def _leave_at_signals() -> None:
-    """Have this process leave at once at Ctrl-C and when it is terminated.
+def _prepare_process() -> None:
+    """Have this process leave at once at Ctrl-C and when it is terminated, and collect no garbage until then.
 
     An exception, which Python raises else, is lost and printed where it comes while an object is cleared away.
     """
+    gc.disable()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _leave)
 
