@@ -322,15 +322,16 @@ def test_labels_of_arms_in_one_place_stand_apart(arm: RobotModel, circle: Circle
     run = short_run(arm, circle)
     ghosts = record({f"a law with the name {k}": run for k in range(4)}, arm, circle, layout="ghosted")
     written = ghosts.save(tmp_path / "ghosts.html")
-    for size in ((390, 844), (1440, 900), (700, 400)):
-        with opened(written, size, hash="#t=0") as film:
+    with opened(written, hash="#t=0") as film:
+        for width, height in ((390, 844), (1440, 900), (700, 400)):
+            film.tab.set_viewport_size({"width": width, "height": height})
             settle(film)
             labels = film.tab.locator("#labels span")
             boxes = [labels.nth(k).bounding_box() for k in range(labels.count())]
             assert len(boxes) == 4
             heights = sorted((box["y"], box["height"]) for box in boxes)
-            for (above, height), (below, _) in pairwise(heights):
-                assert below >= above + height, size
+            for (above, high), (below, _) in pairwise(heights):
+                assert below >= above + high, (width, height)
 
 
 def test_a_path_that_fills_the_picture_needs_no_view_from_near(film: Opened) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import browser
 import pytest
+from browser import Opened
 from lxml import html
 from test_report import HOSTILE, followed, hostile_run
 
@@ -25,6 +27,21 @@ def file(runs: dict[str, Run], tmp_path_factory: pytest.TempPathFactory) -> Path
     return report(runs, tmp_path_factory.mktemp("report") / "two.html")
 
 
+@pytest.fixture(scope="module")
+def still(file: Path) -> Iterator[Opened]:
+    with browser.opened(file, hash="#t=1") as page:
+        yield page
+
+
+@pytest.fixture
+def page(still: Opened) -> Iterator[Opened]:
+    """The report, paused, on a light screen of a middle size."""
+    still.tab.emulate_media(media="screen", color_scheme="light")
+    still.tab.set_viewport_size({"width": 900, "height": 600})
+    yield still
+    assert still.complaints == []
+
+
 def test_it_opens_without_a_complaint_and_plays(file):
     with browser.opened(file) as page:
         began = page("film.time")
@@ -35,40 +52,34 @@ def test_it_opens_without_a_complaint_and_plays(file):
 
 @pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_nothing_is_wider_than_the_window(file, size, scheme):
-    with browser.opened(file, size, "#t=1", color_scheme=scheme) as page:
-        assert page("document.documentElement.scrollWidth <= innerWidth")
-        # figures are drawn for white paper, so they lie on some in the dark, too
-        assert (
-            page("getComputedStyle(document.querySelector('.figures figure')).backgroundColor") == "rgb(255, 255, 255)"
-        )
-        broken = "[...document.images].filter(image => !image.complete || image.naturalWidth === 0).length"
-        assert page(broken) == 0
-        assert page.complaints == []
+def test_nothing_is_wider_than_the_window(page, size, scheme):
+    page.tab.emulate_media(color_scheme=scheme)
+    page.tab.set_viewport_size({"width": size[0], "height": size[1]})
+    page.until("document.documentElement.scrollWidth <= innerWidth")  # charts follow the window with the next pictures
+    # figures are drawn for white paper, so they lie on some in the dark, too
+    assert page("getComputedStyle(document.querySelector('.figures figure')).backgroundColor") == "rgb(255, 255, 255)"
+    broken = "[...document.images].filter(image => !image.complete || image.naturalWidth === 0).length"
+    assert page(broken) == 0
 
 
-def test_the_files_can_be_saved(file, runs):
-    with browser.opened(file, hash="#t=1") as page:
-        saved = {}
-        for link in page.tab.locator(".files a").all():
-            with page.tab.expect_download() as waiting:
-                link.click()
-            saved[waiting.value.suggested_filename] = Path(waiting.value.path()).read_text(encoding="utf-8")
-        assert page.complaints == []
+def test_the_files_can_be_saved(page, runs):
+    saved = {}
+    for link in page.tab.locator(".files a").all():
+        with page.tab.expect_download() as waiting:
+            link.click()
+        saved[waiting.value.suggested_filename] = Path(waiting.value.path()).read_text(encoding="utf-8")
     assert json.loads(saved["configuration.json"]) == {name: run.config for name, run in runs.items()}
     peaks = json.loads(saved["metrics.json"])["metrics"]["plan"]["e_p_peak"]
     assert peaks == metrics(runs["plan"], runs["plan"].task)["e_p_peak"]
     assert {"plan-signals.csv", "projection-signals.csv"} < set(saved)
 
 
-def test_the_contents_lead_to_the_sections(file):
-    with browser.opened(file, hash="#t=1") as page:
-        for link in page.tab.locator("#contents a").all():
-            link.click()
-            title = link.inner_text()
-            heading = page.tab.get_by_role("heading", name=title, exact=True)
-            assert heading.bounding_box()["y"] < 600
-        assert page.complaints == []
+def test_the_contents_lead_to_the_sections(page):
+    for link in page.tab.locator("#contents a").all():
+        link.click()
+        title = link.inner_text()
+        heading = page.tab.get_by_role("heading", name=title, exact=True)
+        assert heading.bounding_box()["y"] < 600
 
 
 def test_hostile_names_do_nothing(runs, tmp_path):
@@ -96,10 +107,9 @@ CUT = """[...document.querySelectorAll(".section *")].filter(
     (e) => e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).overflowX !== "visible").length"""
 
 
-def test_it_prints(file, tmp_path):
-    with browser.opened(file, (720, 1000), "#t=1") as page:
-        page.tab.pdf(path=tmp_path / "r.pdf", format="A4")
-        page.tab.emulate_media(media="print")
-        assert page(CUT) == 0
-        assert page.complaints == []
+def test_it_prints(page, tmp_path):
+    page.tab.set_viewport_size({"width": 720, "height": 1000})
+    page.tab.pdf(path=tmp_path / "r.pdf", format="A4")
+    page.tab.emulate_media(media="print")
+    assert page(CUT) == 0
     assert (tmp_path / "r.pdf").read_bytes().startswith(b"%PDF")
