@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from pathcontrol import Space, sweep, tune
+from pathcontrol import Space, load_robot, simulate, sweep, tune
 from pathcontrol._units import parse_quantity
 from pathcontrol.arguments import Form, Unit, parameters_of
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.load import load_experiment
 from pathcontrol.experiments.runner import run_experiment
+from pathcontrol.experiments.schema.arm_sections import Robot
 from pathcontrol.experiments.schema.derived import section_of
+from pathcontrol.experiments.schema.experiment import Experiment, Start
 from pathcontrol.experiments.schema.sweep_sections import SweepSection, TuneSection
 from pathcontrol.experiments.template import example_text
 from pathcontrol.registry import KINDS, LOOPS, Kind
@@ -99,9 +101,17 @@ def test_a_joint_is_named_or_numbered(write_experiment, joint, tmp_path):
     assert np.ptp(held[:, 1]) == 0.0 < np.ptp(held[:, 0])
 
 
-def test_sweeps_and_tunings_of_files_have_the_arguments_of_their_functions():
-    """Their sections are not derived, as the file's values make the space; but an argument is not forgotten."""
-    of_the_call = {"build", "space", "out", "chunk", "resume", "progress", "cluster", "security", "engine"}
-    swept = parameters_of(sweep).keys() | parameters_of(Space).keys()
-    assert SweepSection.model_fields.keys() == swept - of_the_call
-    assert TuneSection.model_fields.keys() == parameters_of(tune).keys() - of_the_call | {"parameters"}
+def arguments_of(function, but=""):
+    return parameters_of(function).keys() - set(but.split())
+
+
+def test_sections_that_are_not_derived_have_the_arguments_of_their_functions():
+    """A file says them in other words, as [sweep] says its space by keys of the file; but none is forgotten."""
+    of_the_call = "build space out chunk resume progress cluster security engine"
+    swept = arguments_of(sweep, of_the_call) | arguments_of(Space)
+    assert SweepSection.model_fields.keys() == swept
+    assert TuneSection.model_fields.keys() == arguments_of(tune, of_the_call) | {"parameters"}
+    assert Robot.model_fields.keys() == arguments_of(load_robot, "threads") | {"payload", "tool"}
+    assert Start.model_fields.keys() | Experiment.model_fields.keys() >= arguments_of(
+        simulate, "first_rollout progress"
+    )
