@@ -73,7 +73,7 @@ class Recorder:
         self._samples = min(self._samples, samples)
 
     def arrays(self) -> dict[str, Array]:
-        """Return all samples, rollouts first, and release the room that was not needed."""
+        """Return all samples, rollouts first; room that was not written takes no memory."""
         return {name: self._block[name][: self._samples].swapaxes(0, 1) for name in VARIABLES}
 
     def _reserve_block(self, samples: int) -> Array:
