@@ -148,10 +148,10 @@ def test_numbers_stand_apart(offset, size):
         assert_readable(figure, name)
 
 
-@pytest.mark.parametrize("names", [NAMES[k : k + 2] for k in range(0, len(NAMES), 2)])
+@pytest.mark.parametrize("names", [NAMES[k : k + 3] for k in range(0, len(NAMES), 3)])
 def test_names_are_words(names):
-    """Names of joints and of runs, two at a time."""
-    runs = {name: made(3, joints=[*names, "b", "c"][:3], seed=k) for k, name in enumerate(names)}
+    """Names of joints and of runs, three at a time."""
+    runs = {name: made(3, joints=[*names, "b"][:3], seed=k) for k, name in enumerate(names)}
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a font without the letter, no matter of ours
         for kind, figure in {"path": path_figure(runs), "torque": torque_figure(runs)}.items():
