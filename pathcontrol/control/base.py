@@ -257,17 +257,30 @@ class Controller(ABC):
         return self._viscous * qd + np.where(direction > 0, plus, 0.0) - np.where(direction < 0, minus, 0.0)
 
     def compensate(self, t: float, q: Array, qd: Array, z: Array, out: ControlOutput) -> ControlOutput:
-        """Return ``out`` with the torque that the observer estimates compensated; the same for a law without one.
+        """Return ``out`` with what the observer sees, and with that compensated where ``friction`` is ``"observed"``.
 
-        The estimate of a joint that rests, and is to rest, stays what it was: friction would hold the arm whatever the
-        torque, and the smallest error be summed up until the arm broke loose, for ever.
+        It is the same for a law without observer. Compensated, the estimate of a joint that rests, and is to rest, stays
+        what it was: friction would hold the arm whatever the torque, and the smallest error be summed up until the arm
+        broke loose, for ever.
         """
         if self.observer is None:
             return out
-        memory = z[..., 1 : 1 + self.observer.size]
-        seen = self.observer.observe(t, q, qd, memory, kept=(qd == 0) & (np.abs(out.e_v) < _RESTING))
-        out = out._replace(tau=out.tau - seen.torque, observation=seen)
+        memory, compensates = z[..., 1 : 1 + self.observer.size], self.friction == "observed"
+        kept = (qd == 0) & (np.abs(out.e_v) < _RESTING) & compensates
+        seen = self.observer.observe(t, q, qd, memory, kept)
+        out = out._replace(tau=out.tau - seen.torque if compensates else out.tau, observation=seen)
         return out._replace(zdot=self.rate(out))
+
+    def watching(self, observer_hz: ArrayLike = CUTOFF) -> Self:
+        """Return this law with a momentum observer, whose estimate is in ``observation`` of its output.
+
+        A law that has one is returned as it is; another compensates nothing more than before.
+        """
+        if self.observer is not None:
+            return self
+        law, cutoff = copy(self), diagonal_gain("observer_hz", observer_hz, self.robot.n, self.robot.joint_names)
+        law.observer = MomentumObserver(self.robot, cutoff)
+        return law
 
 
 def _phi(x: Array) -> tuple[Array, Array]:
