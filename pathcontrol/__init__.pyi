@@ -31,6 +31,7 @@ from .control.base import Controller as Controller
 from .control.base import ControlOutput as ControlOutput
 from .control.base import diagonal_gain as diagonal_gain
 from .control.branch import BranchPolicy as BranchPolicy
+from .control.event_plan import EventPlan as EventPlan
 from .control.extended_motion_plan import ExtendedMotionPlan as ExtendedMotionPlan
 from .control.motion_control import ComputedTorque as ComputedTorque
 from .control.motion_control import MotionController as MotionController

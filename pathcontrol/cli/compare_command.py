@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 @click.argument("file", type=click.Path(path_type=Path), required=False, metavar="[FILE.toml]")
 @click.option("--scenario", metavar="NAME", help="One of the scenarios that --list names, or a FILE.toml.")
 @click.option("--list", "listed", is_flag=True, help="List the scenarios and stop.")
-@click.option("--law", "laws", multiple=True, metavar="NAME", help="Compare this law; repeat for more. Default: all.")
+@click.option(
+    "--law", "laws", multiple=True, metavar="NAME", help="Compare this law; repeat for more. Default: all five."
+)
 @click.option(
     "--rollouts", type=click.IntRange(1), default=16, show_default=True, metavar="N", help="How many initial postures."
 )

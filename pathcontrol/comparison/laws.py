@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array
 from pathcontrol._expect import did_you_mean
 from pathcontrol.control.base import Controller, Start, diagonal_gain
+from pathcontrol.control.event_plan import EventPlan
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
@@ -108,7 +109,10 @@ _MAKERS = {
     "extended_motion_plan": _extended_motion_plan,
     "projection": _projection,
 }
+#: the laws that are compared where none are named
 KNOWN_LAWS = tuple(_MAKERS)
+#: laws around these, compared where they are named
+_WRAPPED = {"event_plan": lambda *scenario: EventPlan(_extended_motion_plan(*scenario))}
 
 
 def recover_gains(law: Controller) -> Gains:
@@ -178,10 +182,11 @@ def _list_laws(laws: Laws | None) -> list[tuple[str, Law]]:
 def _make_law(law: Law, robot: RobotModel, task: PathTask, gains: Gains) -> Controller:
     """Return one law."""
     if isinstance(law, str):
-        if law not in _MAKERS:
-            choices = ", ".join(KNOWN_LAWS)
-            raise UnknownNameError(f"there is no law {law!r}, expected one of {choices}{did_you_mean(law, _MAKERS)}")
-        return _MAKERS[law](robot, task, gains, "nearest" if task.closed else "s0")
+        makers = _MAKERS | _WRAPPED
+        if law not in makers:
+            choices = ", ".join(makers)
+            raise UnknownNameError(f"there is no law {law!r}, expected one of {choices}{did_you_mean(law, makers)}")
+        return makers[law](robot, task, gains, "nearest" if task.closed else "s0")
     made = law(robot, task) if callable(law) else law
     check_controller("laws", made)
     if made.robot.joint_names != robot.joint_names:

@@ -259,9 +259,9 @@ class Controller(ABC):
     def compensate(self, t: float, q: Array, qd: Array, z: Array, out: ControlOutput) -> ControlOutput:
         """Return ``out`` with what the observer sees, and with that compensated where ``friction`` is ``"observed"``.
 
-        It is the same for a law without observer. Compensated, the estimate of a joint that rests, and is to rest, stays
-        what it was: friction would hold the arm whatever the torque, and the smallest error be summed up until the arm
-        broke loose, for ever.
+        It is the same for a law without observer. Compensated, the estimate of a joint that rests, and is to rest,
+        stays what it was: friction would hold the arm whatever the torque, and the smallest error be summed up until
+        the arm broke loose, for ever.
         """
         if self.observer is None:
             return out

@@ -17,17 +17,19 @@ from pathcontrol.robot.model import RobotModel
 
 _SHARE = 0.1  # of the effort limits, the threshold where none is given
 _GONE = 0.5  # share of the threshold below which a contact counts as gone
-_ALERT = 5e-3  # s, time constant with which the halt is wound up
+_ALERT = 5e-3  # s, time constant T with which the halt is wound up
 
 
 class ContactRule(SpeedRule):
     """The factor w goes to 0 while a contact is seen and for a while after it, and else to what is asked for.
 
-    The contact torque of a joint is what the law's observer sees beyond the friction of the model, with the dry level F:
-    |r + b q̇| − F. A contact begins where it exceeds the threshold at a joint, and is gone where it is less than
-    half of that at all joints (hysteresis). The state is (w, ẇ, c), c the time [s] for which the plan is still halted:
+    The contact torque of a joint is what the law's observer sees beyond the friction of the model, with the dry level
+    F: |r + b q̇| − F. A contact begins where it exceeds the threshold at a joint, and is gone where it is less than half
+    of that at all joints (hysteresis). The state is (w, ẇ, c), c the time [s] for which the plan is still halted:
 
-        ċ = (p − c)/5 ms  in contact,   ċ = −1  else, down to 0.
+        ċ = (p − c)/T  in contact,   ċ = −min(1, (c + p)/T)  else,   T = 5 ms.
+
+    It goes on where c ≤ 0, and passes 0 at the rate −1, so that it can be integrated in continuous time.
 
     Args:
         robot: the model of the arm.
@@ -52,7 +54,7 @@ class ContactRule(SpeedRule):
         return np.asarray(np.abs(observation.torque + viscous_of(friction) * moment.qd) - dry)
 
     def start(self, law: Controller, q: Array, qd: Array, s: Array) -> Array:
-        return np.concatenate([self._ramp.start(law, q, qd, s), np.zeros((*s.shape, 1))], axis=-1)
+        return np.concatenate([self._ramp.start(law, q, qd, s), np.full((*s.shape, 1), -self.pause)], axis=-1)
 
     def rate(self, moment: Moment, asked: Speed, x: Array) -> Array:
         return self._ramp.rate(moment, asked, x[..., :2])
@@ -61,12 +63,13 @@ class ContactRule(SpeedRule):
         left = x[..., 2]
         contact = self._is_in_contact(moment, left > 0)
         wanted = Speed(np.where(contact | (left > 0), 0.0, asked.factor), asked.rate)
-        winding = np.where(contact, (self.pause - left) / _ALERT, np.where(left > 0, -1.0, 0.0))
+        unwinding = np.minimum(1.0, (left + self.pause) / _ALERT)
+        winding = np.where(contact, (self.pause - left) / _ALERT, -unwinding)
         ramp = self._ramp.memory_rate(moment, wanted, tau, x[..., :2])
         return np.concatenate([ramp, winding[..., None]], axis=-1)
 
     def advance(self, x: Array, xdot: Array, period: float) -> Array:
-        left = np.clip(x[..., 2:] + period * xdot[..., 2:], 0.0, self.pause)
+        left = np.clip(x[..., 2:] + period * xdot[..., 2:], -self.pause, self.pause)
         return np.concatenate([self._ramp.advance(x[..., :2], xdot[..., :2], period), left], axis=-1)
 
     def describe(self) -> dict[str, Any]:

@@ -190,3 +190,10 @@ def test_json_has_the_keys_in_si_units_for_every_scenario():
             assert set(MEASURES) <= set(numbers)
             assert all(numbers[key] is None or isinstance(numbers[key], float) for key in MEASURES)
             assert set(numbers["spread"]) == set(numbers["rollouts"]) == set(MEASURES)
+
+
+def test_an_event_plan_is_compared_where_it_is_named():
+    said = compared("extended_motion_plan", "event_plan", scenario="jammed-joint", rollouts=1).to_dict()["controllers"]
+    assert list(said) == ["extended_motion_plan", "event_plan"]
+    assert said["event_plan"]["contour_peak"] < 0.5 * said["extended_motion_plan"]["contour_peak"]
+    assert "event_plan" not in KNOWN_LAWS
