@@ -8,7 +8,7 @@ from drawings import U, dxf_reader, samples
 from ezdxf import path as ezpath
 from ezdxf.math import OCS, Matrix44, Vec3
 from ezdxf.render import R12Spline
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol.errors import InputError, ToolpathError, UnknownNameError
@@ -154,6 +154,7 @@ def random_insert(rng: np.random.Generator) -> dict:
     return {"rotation": rng.uniform(0, 360), "extrusion": (0, 0, rng.choice([-1, 1])), **scale}
 
 
+@settings(max_examples=25)
 @given(st.integers(0, 10**6), st.integers(1, 3))
 def test_nested_blocks_are_the_product_of_their_matrices(read, seed, depth):
     rng = np.random.default_rng(seed)

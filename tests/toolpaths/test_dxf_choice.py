@@ -9,7 +9,7 @@ import ezdxf
 import pytest
 from click.testing import CliRunner
 from drawings import dxf_reader
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol.cli import main
@@ -101,6 +101,7 @@ def test_points_text_and_dimensions_are_skipped_when_asked(read):
         read(draw, skip=[1])
 
 
+@settings(max_examples=20)
 @given(st.floats(1.5e-6, 4.5e-5))
 def test_a_gap_that_stays_open_is_told_with_the_option_that_closes_it(read, gap):
     def draw(m):
