@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array
 from pathcontrol._expect import expect, expect_choice
@@ -125,14 +125,38 @@ def _unfiltered(run: Run) -> Array:
 
 
 def _mean_torque(run: Run, time: Array) -> Array:
-    """Return the mean torques τ of a run between some times (k,), (rollout, k − 1, n): differences of its impulse."""
+    """Return the mean torques τ of a run between some times (k,), (rollout, k − 1, n): differences of its impulse.
+
+    A velocity by difference is the mean one of its period. So is the impulse then, as a torque that begins to act
+    within a period, after a part of the delay, does not give the arm this velocity in the middle of it.
+    """
     tau, begin = run.array("tau"), run.time - _torque_lead(run)
     begin[0] = run.time[0]
-    impulse = np.zeros(tau.shape)
-    np.cumsum(tau[:, :-1] * np.diff(begin)[:, None], axis=1, out=impulse[:, 1:])
-    held = np.searchsorted(begin, time, side="right") - 1
-    until = impulse[:, held] + tau[:, held] * (time - begin[held])[:, None]
+    dt = np.diff(begin)[:, None]
+    impulse, area = np.zeros(tau.shape), np.zeros(tau.shape)  # ∫τdt, and ∫∫τdt dt
+    np.cumsum(tau[:, :-1] * dt, axis=1, out=impulse[:, 1:])
+    np.cumsum((impulse[:, :-1] + 0.5 * tau[:, :-1] * dt) * dt, axis=1, out=area[:, 1:])
+    since = _since(begin, time)
+    until = impulse[:, since.held] + tau[:, since.held] * since.time
+    if (late := time < run.time).any():
+        now = _since(begin, run.time)
+        areas = area[:, now.held] + (impulse[:, now.held] + 0.5 * tau[:, now.held] * now.time) * now.time
+        means = np.diff(areas, axis=1) / np.diff(run.time)[:, None]
+        until[:, 1:] = np.where(late[1:, None], means, until[:, 1:])
     return np.diff(until, axis=1) / np.diff(time)[:, None]
+
+
+class _Since(NamedTuple):
+    """The torque, by its number, that is held at some times, (k,), and for how long it has been [s], (k, 1)."""
+
+    held: NDArray[np.intp]
+    time: Array
+
+
+def _since(begin: Array, time: Array) -> _Since:
+    """Return which torque is held at some times, where each begins to act at ``begin``, and since when."""
+    held = np.searchsorted(begin, time, side="right") - 1
+    return _Since(held, (time - begin[held])[:, None])
 
 
 def _torque_lead(run: Run) -> float:

@@ -42,6 +42,7 @@ LOOPS = {
     "difference": {"velocity": "difference"},
     "filter": {"filter_hz": 30.0},
     "filtered difference": {"velocity": "difference", "filter_hz": 30.0},
+    "late difference": {"velocity": "difference", "delay": 1.3e-3},
     "two substeps": {"substeps": 2},
 }
 every_arm = pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS)
