@@ -17,12 +17,22 @@ from pathcontrol.registry import FRICTION_LAWS
 Payload = Annotated[Any, table_for("robot.model:RobotModel.with_payload")]
 
 
-class ToolFrame(Section):
-    """A frame ``name`` more, at ``position`` [m] and ``rpy``, in ``angle_unit``, in ``frame``."""
+class Pose(Section):
+    """The place of a frame in another one.
 
-    frame: Text
+    Attributes:
+        position: its origin [m], three numbers.
+        rpy: roll, pitch and yaw, in ``angle_unit``: turned about the other frame's x, then y, then z, as in a URDF.
+    """
+
     position: Annotated[Numbers | None, Unit("m")] = None
     rpy: Annotated[Numbers | None, Unit("rad")] = None
+
+
+class ToolFrame(Pose):
+    """A frame ``name`` more, at its pose in ``frame``."""
+
+    frame: Text
     name: Text = "tip"
 
 

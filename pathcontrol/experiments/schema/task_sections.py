@@ -7,10 +7,10 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import PlainValidator, create_model
 
-from pathcontrol.arguments import Unit
+from pathcontrol.experiments.schema.arm_sections import Pose
 from pathcontrol.experiments.schema.derived import Chosen, OwnSection, fields_of, make_chooser
 from pathcontrol.experiments.schema.section import Section
-from pathcontrol.experiments.schema.validators import Numbers, Text
+from pathcontrol.experiments.schema.validators import Text
 from pathcontrol.registry import PROFILES, TASKS, load
 
 
@@ -29,30 +29,19 @@ class OwnTask(TaskSection, OwnSection):
     """A :class:`pathcontrol.PathTask` subclass in a Python file."""
 
 
-class Workpiece(Section):
-    """Where the workpiece's frame is in the base frame.
-
-    Attributes:
-        position: its origin [m], three numbers.
-        rpy: roll, pitch and yaw, in ``angle_unit``: turned about the base frame's x, then y, then z, as in a URDF.
-    """
-
-    position: Annotated[Numbers | None, Unit("m")] = None
-    rpy: Annotated[Numbers | None, Unit("rad")] = None
-
-
 class ToolpathSection(Section):
     """``toolpath``: see :func:`pathcontrol.read_toolpath` and :class:`pathcontrol.ToolpathTask`.
 
-    ``file`` is relative to the experiment file; the options of all readers are keys of the same name, but for their
-    ``start``, which is ``tool_start``. Lengths are in metres and metres per second, ``start`` is in ``angle_unit``.
+    ``file`` is relative to the experiment file, ``workpiece`` the pose of its frame in the base frame; the options of
+    all readers are keys of the same name, but for their ``start``, which is ``tool_start``. Lengths are in metres and
+    metres per second, ``start`` is in ``angle_unit``.
     """
 
     reader_options: ClassVar[tuple[str, ...]] = ()
     not_arguments: ClassVar[tuple[str, ...]] = ("type", "file", "workpiece")
     type: Literal["toolpath"] = "toolpath"
     file: Text
-    workpiece: Workpiece = Workpiece()
+    workpiece: Pose = Pose()
 
     @property
     def reading(self) -> dict[str, Any]:
