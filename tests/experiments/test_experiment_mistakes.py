@@ -30,7 +30,7 @@ BAD = {
     "true is no number": ({"task.radius": True}, "task.radius = true, expected a number greater than 0"),
     "not finite": ({"controller.k": math.nan}, "controller.k = nan, expected a finite number"),
     "endless digits": ({"start.q": [10**400, 0]}, "start.q = [1000"),
-    "wrong choice": ({"controller.friction": "viscos"}, "or 'full'; did you mean 'viscous'?"),
+    "wrong choice": ({"controller.friction": "viscos"}, "or 'observed'; did you mean 'viscous'?"),
     "wrong kind of task": ({"task.type": "circel"}, "task.type = 'circel', expected one of 'circle'"),
     "no kind": ({"task.type": None}, "task.type: missing; choose one of 'circle'"),
     "kind is no text": ({"loop.mode": 3}, "loop.mode = 3, expected one of 'sampled', 'continuous'"),
