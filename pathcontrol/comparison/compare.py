@@ -108,13 +108,13 @@ def compare(
     - ``recovery_s``: time after the end of the event until the contour error stays below 1.1 times its own undisturbed
       peak [s]; inf where it does not, NaN where no event ends.
     - ``time_lost_s``: path parameter behind that of the undisturbed run at the end, over ϑ [s]. It is 0 for motion
-      control, whose s waits for nobody; what that costs are contour error and lag.
+      control, whose s waits for nobody but for ticks that are missed; what that costs are contour error and lag.
     - ``energy_j``: ∫|τ·q̇| dt [J].
     - ``saturated_s``: time with any torque at its limit [s].
 
     Args:
         laws: names of known laws, laws for ``scenario.robot`` and ``scenario.task``, or functions (robot, task) that
-            make one; one, several, or by names of your own. By default all known ones.
+            make one; one, several, or by names of your own. By default all known ones and those of the scenario.
         scenario: a name of :func:`known_scenarios`, or a :class:`Scenario`.
         rollouts: how many starts: that of the scenario, and others near the path, see :meth:`Scenario.starts`.
         seed: of these starts.
@@ -129,7 +129,7 @@ def compare(
     if isinstance(scenario, str):
         scenario = make_scenario(scenario)
     expect("scenario", scenario, Scenario)
-    made = make_laws(laws, scenario.robot, scenario.task, scenario.gains)
+    made = make_laws(laws, scenario.robot, scenario.task, scenario.gains, scenario.laws)
     if engine is not None:
         check_engine(engine)
     starts = scenario.starts(rollouts, seed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -25,8 +26,10 @@ _RATE = 20.0  # 1/s, of the paper's plan towards the nearest point, k‖q_d'‖�
 _POINTS = 256  # along the path, of means
 _SAME = 1e-9  # share of the size of a path up to which two are the same
 
-Law = str | Controller | Callable[[RobotModel, PathTask], Controller]
+Maker = Callable[[RobotModel, PathTask], Controller]
+Law = str | Controller | Maker
 Laws = Law | Iterable[Law] | Mapping[str, Law]
+_NONE: Mapping[str, Maker] = MappingProxyType({})
 
 
 class Gains(NamedTuple):
@@ -142,10 +145,13 @@ def recover_gains(law: Controller) -> Gains:
     return gains
 
 
-def make_laws(laws: Laws | None, robot: RobotModel, task: PathTask, gains: Gains) -> dict[str, Controller]:
+def make_laws(
+    laws: Laws | None, robot: RobotModel, task: PathTask, gains: Gains, more: Mapping[str, Maker] = _NONE
+) -> dict[str, Controller]:
     """Return control laws by name for one arm and one task, from names, laws, or functions of arm and task.
 
-    On a closed path the known laws begin at the point that is nearest to the arm, on an open one at its begin.
+    On a closed path the known laws begin at the point that is nearest to the arm, on an open one at its begin. ``more``
+    are laws that have names too, here only.
 
     Raises:
         UnknownNameError: there is no law of that name.
@@ -154,8 +160,8 @@ def make_laws(laws: Laws | None, robot: RobotModel, task: PathTask, gains: Gains
     for name in ("K_p", "K_v"):
         diagonal_gain(name, getattr(gains, name), robot.n, robot.joint_names)
     made: dict[str, Controller] = {}
-    for name, law in _list_laws(laws):
-        one = _make_law(law, robot, task, gains)
+    for name, law in _list_laws([*KNOWN_LAWS, *more] if laws is None else laws):
+        one = _make_law(law, robot, task, gains, more)
         key = name or (law if isinstance(law, str) else type(one).__name__)
         if key in made:
             raise InputError(f"two laws are called {key!r}; give them names: {{'first': …, 'second': …}}")
@@ -165,10 +171,8 @@ def make_laws(laws: Laws | None, robot: RobotModel, task: PathTask, gains: Gains
     return made
 
 
-def _list_laws(laws: Laws | None) -> list[tuple[str, Law]]:
+def _list_laws(laws: Laws) -> list[tuple[str, Law]]:
     """Return laws with their names, empty where none is given."""
-    if laws is None:
-        return [("", name) for name in KNOWN_LAWS]
     if isinstance(laws, Mapping):
         return [(str(name), law) for name, law in laws.items()]
     if isinstance(laws, str | Controller) or callable(laws):
@@ -179,13 +183,16 @@ def _list_laws(laws: Laws | None) -> list[tuple[str, Law]]:
         raise InputError(f"laws = {laws!r:.80}, expected names, control laws, or a table of them by name") from error
 
 
-def _make_law(law: Law, robot: RobotModel, task: PathTask, gains: Gains) -> Controller:
+def _make_law(law: Law, robot: RobotModel, task: PathTask, gains: Gains, more: Mapping[str, Maker]) -> Controller:
     """Return one law."""
+    if isinstance(law, str) and law in more:
+        law = more[law]
     if isinstance(law, str):
         makers = _MAKERS | _WRAPPED
         if law not in makers:
-            choices = ", ".join(makers)
-            raise UnknownNameError(f"there is no law {law!r}, expected one of {choices}{did_you_mean(law, makers)}")
+            known = [*makers, *more]
+            choices = ", ".join(known)
+            raise UnknownNameError(f"there is no law {law!r}, expected one of {choices}{did_you_mean(law, known)}")
         return makers[law](robot, task, gains, "nearest" if task.closed else "s0")
     made = law(robot, task) if callable(law) else law
     check_controller("laws", made)

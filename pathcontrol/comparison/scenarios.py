@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import did_you_mean
-from pathcontrol.comparison.laws import Gains
+from pathcontrol.comparison.laws import Gains, Maker
 from pathcontrol.comparison.paper import DURATION, K_P, K_V, PERIOD, START_DEG, K, paper_task
+from pathcontrol.control.base import Controller
+from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.arm.dropout import Dropout
 from pathcontrol.simulation.arm.jam import JammedJoint
 from pathcontrol.simulation.arm.noise import SensorNoise
+from pathcontrol.simulation.arm.wall import Wall
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
 from pathcontrol.tasks.curves import Circle
@@ -25,6 +29,8 @@ from pathcontrol.tasks.task import PathTask
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 _NEAR = 0.05  # rad, standard deviation of initial postures from the path
 _JAM = (4.0, 4.6)  # s
+_WALL, _WALL_AT = (4.0, 7.2), 0.7  # s, m: longer than a lap, across a path that reaches 0.795 m
+_LOST = (4.0, 4.1)  # s
 _FAST = 11.0  # rad/s; a lap takes 0.571 s, of which the motors need 0.673 s at least
 _HEAVIER = 1.3
 
@@ -47,6 +53,7 @@ class Scenario:
         gains: what all laws share.
         engine: which engine runs it, see :func:`simulate`.
         undisturbed: the scenario without what happens in it; ``None`` if nothing does.
+        laws: laws of its own beside the known ones, functions of arm and task by name.
 
     Raises:
         InputError: the event does not begin within the run.
@@ -65,6 +72,7 @@ class Scenario:
     gains: Gains = field(default_factory=Gains)
     engine: Engine = "auto"
     undisturbed: Scenario | None = None
+    laws: Mapping[str, Maker] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.event is not None and not 0 <= self.event[0] < min(self.event[1], self.duration):
@@ -146,6 +154,32 @@ def _jam(calm: Scenario) -> Scenario:
     return replace(calm, disturbance=jam, event=_JAM, undisturbed=calm)
 
 
+def _meet_wall(calm: Scenario) -> Scenario:
+    """Return the scenario with a wall across the path for a while, and a plan that hardly waits for the arm."""
+    wall = Wall(
+        "tool",
+        [_WALL_AT, 0.0, 0.0],
+        [-1.0, 0.0, 0.0],
+        rigid=True,
+        friction=0.2,
+        start=_WALL[0],
+        duration=_WALL[1] - _WALL[0],
+    )
+    return replace(calm, disturbance=wall, event=_WALL, undisturbed=calm, laws={"plan_small_k": _plan_with_small_k})
+
+
+def _plan_with_small_k(robot: RobotModel, task: PathTask) -> Controller:
+    """Return the paper's plan with a twentieth of its k."""
+    return ExtendedMotionPlan(robot, task, K_P, K_V, K / 20.0, start="nearest")
+
+
+def _lose_measurements(calm: Scenario) -> Scenario:
+    """Return the scenario in which the law sees the same measurement for a while."""
+    return replace(
+        calm, disturbance=Dropout(_LOST[0], _LOST[1] - _LOST[0], "measurements"), event=_LOST, undisturbed=calm
+    )
+
+
 def _weaken(calm: Scenario) -> Scenario:
     """Return the scenario at a speed that the motors cannot keep, from a start on the path."""
     task = Circle(1.0, _FAST)
@@ -169,6 +203,8 @@ def _measure_badly(calm: Scenario) -> Scenario:
 _SCENARIOS: dict[str, tuple[str, Callable[[Scenario], Scenario]]] = {
     "undisturbed": ("The paper's circle at 2 rad/s with exact sensors; nothing happens.", lambda calm: calm),
     "jammed-joint": ("Joint 2 is held still from 4.0 to 4.6 s and let go.", _jam),
+    "wall": ("A rigid wall stands across the path of the tool from 4.0 to 7.2 s.", _meet_wall),
+    "dropout": ("No measurement comes to the law from 4.0 to 4.1 s.", _lose_measurements),
     "weak-motors": ("The circle is to be followed at 11 rad/s, which the motors cannot do.", _weaken),
     "payload": ("Link 2 is 30 % heavier than the laws know.", _load),
     "noisy-loop": ("Encoders, noise of 0.1 mrad, velocity by differences, and a delay of 2.5 ms.", _measure_badly),

@@ -125,6 +125,31 @@ def test_motors_that_are_too_weak_saturate_and_the_same_ones_without_limits_do_n
     assert weak.mean("computed_torque", "contour_peak") > 3 * weak.mean("projection", "contour_peak")
 
 
+def test_at_a_wall_a_plan_with_a_small_k_is_no_better_than_computed_torque():
+    wall = pc.compare(None, "wall", rollouts=4, progress=False)
+    contour = {law: wall.mean(law, "contour_peak") for law in wall.measures}
+    assert set(contour) == {*KNOWN_LAWS, "plan_small_k"}
+    assert contour["plan_small_k"] == pytest.approx(contour["computed_torque"], rel=0.1)
+    assert contour["extended_motion_plan"] < 0.4 * contour["computed_torque"]
+    assert contour["projection"] < 0.3 * contour["computed_torque"]
+    tool = wall.scenario.robot.frame_pose(wall.runs["projection"].array("q"), "tool")[..., 0, 3]
+    stands = (wall.runs["projection"].time > 7.0) & (wall.runs["projection"].time < 7.2)
+    assert tool[:, stands].max() < 0.7 + 1e-4
+    assert list(pc.compare("plan_small_k", "wall", rollouts=1, progress=False).measures) == ["plan_small_k"]
+    with pytest.raises(pc.UnknownNameError, match="plan_small_k"):
+        pc.compare("plan_smal_k", "wall")
+    with pytest.raises(pc.UnknownNameError):
+        pc.compare("plan_small_k", "undisturbed")
+
+
+def test_without_measurements_path_laws_wait_or_stay_and_motion_control_is_carried_away():
+    lost = pc.compare(None, "dropout", rollouts=4, progress=False)
+    contour = {law: lost.mean(law, "contour_peak") for law in lost.measures}
+    assert contour["computed_torque"] > 2 * contour["extended_motion_plan"]
+    assert contour["extended_motion_plan"] > contour["projection"]
+    assert lost.mean("projection", "speed_peak") < 0.5 * lost.mean("extended_motion_plan", "speed_peak")
+
+
 # --- laws and scenarios of one's own ------------------------------------------------------------------------------
 
 
