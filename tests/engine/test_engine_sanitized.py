@@ -23,6 +23,10 @@ robot = pc.load_robot("cicese_2dof")
 loop = pc.SampledLoop(encoders=True, velocity="difference", torque_limits=True, delay=3e-3, filter_hz=90.0,
                       noise=pc.SensorNoise(position=1e-6, seed=1))
 push = pc.Push([30.0, 2.0], 0.1, 0.1) + pc.FrameForce(robot, "tool", [5.0, 0.0, 5.0])
+events = (pc.Wall("tool", [0.6, 0.0, 0.0], [-1.0, 0.0, 0.0], [1e4, np.inf, 1e6, 1e5, 1e3, 1e12, 1e4], 0.3, start=0.05)
+          + pc.Wall("tool", [0.0, 0.0, 0.4], [0.0, 0.0, 1.0], rigid=True) + pc.JammedJoint(1, 0.2, 0.1)
+          + pc.TorqueLimitDrop(0.1, 0.1, 0.1) + pc.FrictionChange(2.0, 0.1, 0.1, 0.5) + pc.PickUp(1.0, "tool", 0.15)
+          + pc.Dropout(0.1, 0.2, probability=0.5) + pc.Dropout(0.0, 0.3, "measurements", probability=0.5))
 starts = np.random.default_rng(0).normal(0, 0.2, (7, 2)) + [0.9, 0.1]
 circle, line = pc.Circle(1.0, 2.0), pc.Line([0.7, 1.2], [0.5, 1.0], speed=2.0)
 for task in (circle, line):
@@ -31,6 +35,10 @@ for task in (circle, line):
                 pc.PDPlus(robot, task, 80.0, 5.0), pc.SlotineLi(robot, task, 8.0, 4.0)):
         pc.simulate(law, starts, duration=0.6, loop=loop, disturbance=push, engine="compiled", progress=False)
         pc.simulate(law, starts[0], duration=0.3, engine="compiled", progress=False)
+law = pc.ExtendedMotionPlan(robot, circle, 800.0, 45.0, k=20.0)
+pc.simulate(law, starts, duration=0.4, loop=loop, disturbance=events, engine="compiled", progress=False)
+pc.simulate(law, starts, duration=0.4, loop=loop, disturbance=events, engine="compiled", progress=False,
+            plant=[robot.with_payload(0.1 * i, "tool") for i in range(7)])
 plants = [robot.with_payload(0.1 * i, "tool") for i in range(7)]
 law = pc.ComputedTorque(robot, pc.TaskBatch([pc.Circle(0.7 + 0.05 * i, 2.0) for i in range(7)]), 800.0, 45.0)
 pc.simulate(law, starts, duration=0.2, plant=plants, engine="compiled", progress=False)

@@ -1,57 +1,7 @@
 // The sampled loop of simulation/sampled.py, for one rollout or a pack of them: measure, compute, hold.
 #pragma once
+#include "disturbances.hpp"
 #include "law.hpp"
-#include "plant.hpp"
-
-// --- from arrays to lanes ---------------------------------------------------------------------------------------------
-template <class V> struct Place { integer first, live; };  // rollouts first, first + 1, …; lanes beyond `live` repeat the first
-
-template <class V> ALWAYS_INLINE integer rollout_of(const Place<V> &place, int lane) { return place.first + (lane < place.live ? lane : 0); }
-template <class V> static void load(const Place<V> &place, const double *from, integer stride, int count, V *to) {
-  for (int lane = 0; lane < Lanes<V>::count; lane++)
-    for (int i = 0; i < count; i++) set_lane(to[i], lane, from[rollout_of(place, lane) * stride + i]);
-}
-template <class V> static void load(const Place<V> &place, const Rows &rows, int count, V *to) {
-  if (rows.data) load(place, rows.data, rows.stride, count, to);
-}
-template <class V> static Mask<V> load_mask(const Place<V> &place, const Rows &rows) {
-  V flag;
-  load(place, rows, 1, &flag);
-  return less(V{}, flag);
-}
-template <class V> ALWAYS_INLINE void store(const Place<V> &place, const V *from, int count, double *to) {
-  for (int lane = 0; lane < place.live; lane++)
-    for (int i = 0; i < count; i++) to[(place.first + lane) * count + i] = lane_of(from[i], lane);
-}
-template <class V> static void load_friction(const Place<V> &place, const FrictionRows &rows, int n, Friction<V> &law) {
-  load(place, rows.viscous, n, law.viscous), load(place, rows.forward, n, law.forward), load(place, rows.backward, n, law.backward);
-  law.stribeck = (int)rows.stribeck;
-  for (int j = 0; j < law.stribeck; j++) load(place, rows.fall[j], n, law.fall[j]), load(place, rows.velocity[j], n, law.velocity[j]);
-}
-template <class V> static void load_arm(const Place<V> &place, const Arms &arms, Arm<V> &to) {
-  const Arm<double> &one = arms.arms[0];
-  to.joints = one.joints;
-  for (int i = 0; i < one.joints; i++) to.parent[i] = one.parent[i], to.slides[i] = one.slides[i];
-  for (int k = 0; k < 3; k++) to.gravity[k] = one.gravity[k];
-  for (int lane = 0; lane < Lanes<V>::count; lane++) {
-    const Arm<double> &arm = arms.arms[arms.index ? arms.index[rollout_of(place, lane)] : 0];
-    for (int i = 0; i < one.joints; i++) {
-      for (int k = 0; k < 9; k++) set_lane(to.rotation[i][k], lane, arm.rotation[i][k]);
-      for (int k = 0; k < 6; k++) set_lane(to.inertia[i][k], lane, arm.inertia[i][k]);
-      for (int k = 0; k < 3; k++) set_lane(to.origin[i][k], lane, arm.origin[i][k]), set_lane(to.moment[i][k], lane, arm.moment[i][k]);
-      set_lane(to.mass[i], lane, arm.mass[i]), set_lane(to.armature[i], lane, arm.armature[i]);
-    }
-  }
-}
-// The arm of all lanes: the shared one itself, or a copy with one in each lane.
-template <class V, class C> struct ArmOf {
-  Arm<C> own;
-  const Arm<C> &operator()(const Place<V> &place, const Arms &arms) { return load_arm(place, arms, own), own; }
-};
-template <class V> struct ArmOf<V, double> {
-  Arm<double> own;
-  const Arm<double> &operator()(const Place<V> &place, const Arms &arms) { return arms.arms[arms.index ? arms.index[place.first] : 0]; }
-};
 
 // --- the rollouts of a pack -------------------------------------------------------------------------------------------
 template <class V> struct Rollouts {
@@ -125,7 +75,7 @@ template <class V> static void look_at_finish(const Setup &setup, const Path *co
   r.finish_time = select(open, news, r.finish_time);
 }
 
-// --- sensors, disturbances, record ------------------------------------------------------------------------------------
+// --- sensors and record ------------------------------------------------------------------------------------
 template <class V> struct Senses { V resolution[MOST_JOINTS], limit[MOST_JOINTS]; };
 
 // The next reading; `noise` holds this sample's noise of positions and velocities, or is null.
@@ -136,84 +86,6 @@ template <class V> static void read_sensors(const Setup &setup, const Senses<V> 
     if (setup.differentiates) qd = (q - r.q_read[i]) / setup.period;
     if (setup.filters) qd = setup.keep * r.qd_read[i] + (1 - setup.keep) * qd;
     r.q_read[i] = q, r.qd_read[i] = qd;
-  }
-}
-
-// Whether a disturbance with a beginning and a duration acts at time t.
-template <class V> static Mask<V> acts(const Place<V> &place, const Disturbance &one, double t) {
-  V start, duration;
-  load(place, one.start, 1, &start), load(place, one.duration, 1, &duration);
-  const V since = t - start;
-  return less_equal(V{}, since) & less(since, duration);
-}
-// The joints that are held at time t; return whether there are any.
-template <class V> static NOINLINE bool find_held(const Setup &setup, const Place<V> &place, double t, Mask<V> *held) {
-  Mask<V> some{};
-  for (int i = 0; i < setup.joints; i++) held[i] = Mask<V>{};
-  for (int d = 0; d < setup.disturbances; d++) {
-    const Disturbance &one = setup.disturbance[d];
-    if (one.kind != JAMMED_JOINT) continue;
-    const Mask<V> now = acts(place, one, t);
-    V joint[MOST_JOINTS];
-    load(place, one.magnitude, setup.joints, joint);
-    for (int i = 0; i < setup.joints; i++) held[i] |= now & less(V{}, joint[i]), some |= held[i];
-  }
-  return any(some);
-}
-
-// What disturbances leave of the torque limits at time t.
-template <class V> static NOINLINE void weaken(const Setup &setup, const Place<V> &place, double t, V *limit) {
-  for (int d = 0; d < setup.disturbances; d++) {
-    const Disturbance &one = setup.disturbance[d];
-    if (one.kind != TORQUE_LIMIT_DROP) continue;
-    const Mask<V> now = acts(place, one, t);
-    V share[MOST_JOINTS];
-    load(place, one.magnitude, setup.joints, share);
-    for (int i = 0; i < setup.joints; i++) limit[i] = select(now, limit[i] * share[i], limit[i]);
-  }
-}
-
-// The walls that stand at time t; return whether there are any.
-template <class V> static NOINLINE bool find_walls(const Setup &setup, const Place<V> &place, double t, Walls<V> &walls) {
-  Mask<V> some{};
-  walls.count = 0;
-  for (int d = 0; d < setup.disturbances; d++) {
-    const Disturbance &one = setup.disturbance[d];
-    if (one.kind != WALL) continue;
-    Wall<V> &wall = walls.at[walls.count++];
-    wall.arm = one.arm, wall.body = one.body, wall.offset = one.offset, wall.stands = acts(place, one, t), some |= wall.stands;
-    load(place, one.magnitude, 3, wall.point), load(place, one.axes, 9, wall.axes);
-    load(place, one.stiffness, 1, &wall.stiffness), load(place, one.damping, 1, &wall.damping), load(place, one.roughness, 1, &wall.roughness);
-  }
-  return any(some);
-}
-
-// Torques of the disturbances at time t, added to `tau`.
-template <int N, class V> static NOINLINE void add_disturbances(const Setup &setup, const Place<V> &place_, const V *q, double t, V *tau) {
-  const int n = size<N>(setup.joints);
-  for (int d = 0; d < setup.disturbances; d++) {
-    const Disturbance &one = setup.disturbance[d];
-    if (one.kind > FRAME_FORCE) continue;  // it adds no torque
-    V magnitude[MOST_JOINTS], frequency, phase, share = number<V>(1.0);
-    load(place_, one.magnitude, one.kind == FRAME_FORCE ? 3 : n, magnitude);
-    if (one.kind == HARMONIC) {
-      V cosine;
-      load(place_, one.frequency, 1, &frequency), load(place_, one.phase, 1, &phase);
-      sine_cosine(V(2 * M_PI * frequency * t + phase), share, cosine);
-    } else {
-      share = select(acts(place_, one, t), share, V{});
-    }
-    if (one.kind != FRAME_FORCE) {
-      for (int i = 0; i < n; i++) tau[i] += share * magnitude[i];
-      continue;
-    }
-    if (!any(less(V{}, share))) continue;
-    Body<V> bodies[room<N>()];
-    V force[3], torque[MOST_JOINTS];
-    for (int k = 0; k < 3; k++) force[k] = share * magnitude[k];
-    place<N>(*one.arm, q, bodies);
-    point_force_torque<N>(*one.arm, bodies, one.body, one.offset, force, torque);
-    for (int i = 0; i < n; i++) tau[i] += torque[i];
   }
 }
 
