@@ -62,6 +62,10 @@ from .experiments.sweep_runner import run_sweep as run_sweep
 from .experiments.tune_runner import run_tune as run_tune
 from .export.export import export_trajectory as export_trajectory
 from .export.plan import plan_trajectory as plan_trajectory
+from .hardware.control_loop import ControlLoop as ControlLoop
+from .hardware.control_loop import Mode as Mode
+from .hardware.control_loop import Status as Status
+from .hardware.envelope import Envelope as Envelope
 from .profiles.jerk.start_stop import SmoothStartStop as SmoothStartStop
 from .profiles.limited.limited import limited as limited
 from .profiles.limited.motion_limit import MotionLimit as MotionLimit

@@ -24,6 +24,7 @@ FLOORS = [
     "cartesian",
     "simulation",
     "analysis",
+    "hardware",
     "sweeps",
     "tuning",
     "comparison",

@@ -68,6 +68,15 @@ class ControlTick:
         velocity = np.zeros(n) if qd is None else as_joint_array("qd", qd, n)
         self._tick.start(self.law.start(position, velocity))
 
+    @property
+    def state(self) -> Array:
+        """The state z of the law at the next call, (m,)."""
+        return self._tick.state
+
+    def start_from(self, state: ArrayLike) -> None:
+        """Start again from a ``state`` of the law, (m,), as :attr:`state` gives it."""
+        self._tick.start(np.array(state, dtype=np.float64))
+
     def __call__(self, q: Array, qd: Array) -> Array:
         """Return the torques [N m], (n,), for measured q [rad] and q̇ [rad/s]; advance the plan by a period."""
         return self._tick(q, qd)
@@ -114,6 +123,11 @@ class _CompiledTick:
         """The path parameter of the plan at the next call."""
         return float(self._io[len(self._q) * 2])
 
+    @property
+    def state(self) -> Array:
+        """The state z (1,)."""
+        return np.array([self.s])
+
     def start(self, z: Array) -> None:
         """Start with the state z (1,)."""
         self._io[len(self._q) * 2] = z[..., 0]
@@ -139,6 +153,11 @@ class _PythonTick:
     def s(self) -> float:
         """The path parameter of the plan at the next call."""
         return float(self._z[0, 0])
+
+    @property
+    def state(self) -> Array:
+        """The state z (m,)."""
+        return self._z[0].copy()
 
     def start(self, z: Array) -> None:
         """Start with the state z (m,)."""

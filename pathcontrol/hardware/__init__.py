@@ -1,0 +1,1 @@
+"""Control loops for real arms: a law behind a safety envelope."""

@@ -1,0 +1,213 @@
+"""The control loop of a real arm: a law behind a safety envelope, which never raises and never jumps."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._arrays import Array, as_joint_array, as_scalar, check_finite
+from pathcontrol._expect import expect
+from pathcontrol.control.base import Controller
+from pathcontrol.hardware.envelope import Envelope
+from pathcontrol.hardware.held_plan import HeldPlan
+from pathcontrol.hardware.measurements import Screen
+
+_FAR = 2.0  # tubes from the path, from which holding on it is no help
+
+
+class Mode(IntEnum):
+    """What the loop does, the more the later."""
+
+    RUN = 0
+    HOLD = 1
+    DAMP = 2
+    GRAVITY = 3
+
+
+class Status(NamedTuple):
+    """The state of a control loop.
+
+    Attributes:
+        mode: ``RUN`` follows the path; ``HOLD`` stays on it; ``DAMP`` brakes all joints, τ = g(q) − Dq̇; ``GRAVITY``
+            carries the weight of the arm at its last known posture, τ = g(q).
+        reason: why, in a sentence; empty while it runs.
+        faults: how often each kind of fault occurred: ``measurement``, ``deadline``, ``motion``, ``tube``, ``law``.
+        saturated: whether the last torque was limited, by itself or by its rate.
+        ticks: number of steps.
+        s: path parameter of the plan.
+    """
+
+    mode: Mode
+    reason: str
+    faults: Mapping[str, int]
+    saturated: bool
+    ticks: int
+    s: float
+
+
+class ControlLoop:
+    """A control law for one arm as one call per period, with a safety envelope around it.
+
+    >>> loop = ControlLoop(law, period=1e-3)
+    >>> loop.start(q, qd, t)
+    >>> tau = loop.step(q, qd, t)  # every period
+
+    Within the envelope the torques are those of :class:`ControlTick`, to the last bit. Beyond it the loop reacts and
+    says why in :attr:`status`; each reaction lasts until :meth:`resume`, and a worse one takes over:
+
+    - Torques are limited, and their rate, always. Nothing else follows from that.
+    - A bad measurement (no number, out of order, repeated, frozen, a jump) is bridged by the last torque; after
+      ``patience`` of them in a row only gravity is compensated, and when they are good again the arm is damped.
+    - A late step is counted; after a gap of ``lost`` periods the plan is held on the path.
+    - Out of the tube around the path the plan is held; at twice the distance the arm is damped.
+    - A joint beyond its velocity limit, or too near to a position limit to be braked before it, is damped.
+    - A law that raises, or returns no numbers, is damped.
+
+    Args:
+        law: the law, with one task and one set of gains.
+        period: control period [s].
+        envelope: the limits; what it does not say is taken from the law's robot.
+
+    Raises:
+        InputError: a limit is missing, or the law is for several rollouts.
+    """
+
+    def __init__(self, law: Controller, period: float, envelope: Envelope | None = None) -> None:
+        expect("law", law, Controller)
+        self.law, self.period = law, as_scalar("period", period, positive=True)
+        self.envelope = (Envelope() if envelope is None else envelope).complete(law.robot)
+        self._plan = HeldPlan(law, self.period)
+        self._damping = self._find_damping()
+        n = law.robot.n
+        posture = law.task.q_d(np.array(law.task.s0, dtype=np.float64))
+        self.start(np.asarray(posture, dtype=np.float64).reshape(n))
+
+    def start(self, q: ArrayLike, qd: ArrayLike | None = None, t: float = 0.0, tau: ArrayLike | None = None) -> None:
+        """Start again with an arm at q [rad] and q̇ [rad/s], each (n,), at time t [s].
+
+        Args:
+            q: joint positions.
+            qd: joint velocities; at rest by default.
+            t: time on the clock that :meth:`step` is given.
+            tau: the torques that act already [N m], (n,), which the first follow by their rate; by default those that
+                carry the weight of the arm.
+        """
+        n = self.law.robot.n
+        position = check_finite("q", as_joint_array("q", q, n))
+        velocity = np.zeros(n) if qd is None else check_finite("qd", as_joint_array("qd", qd, n))
+        acting = self.law.robot.gravity(position) if tau is None else check_finite("tau", as_joint_array("tau", tau, n))
+        self._plan.start(position, velocity)
+        self._screen = Screen(self.envelope, position, velocity, as_scalar("t", t) - self.period)
+        self._tau = np.minimum(np.maximum(acting, -self.envelope.torque), self.envelope.torque)
+        self._mode, self._reason, self._faults = Mode.RUN, "", Counter[str]()
+        self._bad, self._ticks, self._saturated, self._inside = 0, 0, False, False
+
+    @property
+    def status(self) -> Status:
+        """What the loop does, and why."""
+        return Status(self._mode, self._reason, dict(self._faults), self._saturated, self._ticks, self._plan.s)
+
+    def step(self, q: Any, qd: Any, t: Any) -> Array:
+        """Return the torques [N m], (n,), for measured q [rad] and q̇ [rad/s] at time t [s]; it never raises.
+
+        The array is a new one each time.
+        """
+        self._ticks += 1
+        try:
+            wanted = self._decide(q, qd, t)
+        except Exception as error:  # whatever a law of one's own raises, the arm must not fall
+            self._react(Mode.DAMP, "law", f"the law raised {type(error).__name__}: {error}")
+            wanted = self._brake()
+        limited = self.envelope.clip(wanted, self._tau, self.period)
+        self._saturated = bool((limited != wanted).any())
+        self._tau = limited
+        return limited.copy()
+
+    # --- the operator ---------------------------------------------------------------------------------------
+
+    def hold(self) -> None:
+        """Let the plan come to rest on the path and stay there."""
+        self._react(Mode.HOLD, "operator", "held by the operator")
+
+    def resume(self) -> None:
+        """Go on along the path from where the arm is, from rest, after any reaction."""
+        if self._mode >= Mode.DAMP:
+            self._plan.restart(self._screen.q, self._screen.qd)
+        self._plan.resume()
+        self._mode, self._reason, self._bad, self._inside = Mode.RUN, "", 0, False
+
+    # --- decisions ------------------------------------------------------------------------------------------
+
+    def _decide(self, q: Any, qd: Any, t: Any) -> Array:
+        """Return the torques that are wanted."""
+        before = self._screen.t
+        if fault := self._screen.take(q, qd, t):
+            return self._bridge(fault)
+        self._bad = 0
+        self._check_time(self._screen.t - before)
+        if fault := self.envelope.find_motion_fault(self._screen.q, self._screen.qd):
+            self._react(Mode.DAMP, "motion", fault)
+        if self._mode >= Mode.DAMP:
+            self._mode = Mode.DAMP  # measurements are good again
+            return self._brake()
+        return self._follow()
+
+    def _bridge(self, fault: str) -> Array:
+        """Return the torques without a measurement: the last ones, or after a while those that carry the weight."""
+        self._bad += 1
+        self._faults["measurement"] += 1
+        if self._bad > self.envelope.patience:
+            self._mode, self._reason = Mode.GRAVITY, fault
+        if self._mode >= Mode.DAMP:
+            return self.law.robot.gravity(self._screen.q)
+        return self._tau
+
+    def _check_time(self, gap: float) -> None:
+        """Count a late step, and hold the plan after a long gap [s]."""
+        if gap > self.envelope.late * self.period:
+            self._faults["deadline"] += 1
+        if gap > self.envelope.lost * self.period:
+            self._react(Mode.HOLD, "deadline", f"no step for {gap:.3g} s")
+
+    def _follow(self) -> Array:
+        """Return the torques of the law, or of braking where these are no numbers or the arm is far from its path."""
+        tau = self._plan.tick(self._screen.q, self._screen.qd)
+        self._check_tube()
+        if not np.isfinite(tau).all():
+            self._react(Mode.DAMP, "law", "the law gave torques that are no numbers")
+        return self._brake() if self._mode >= Mode.DAMP else tau
+
+    def _check_tube(self) -> None:
+        """React to an arm that leaves the tube around its path."""
+        if self.envelope.tube == np.inf:
+            return
+        away = self._plan.distance(self._screen.q)
+        self._inside = self._inside or away <= self.envelope.tube
+        if self._inside and away > self.envelope.tube:
+            mode = Mode.DAMP if away > _FAR * self.envelope.tube else Mode.HOLD
+            self._react(mode, "tube", f"the arm is {away:.3g} rad from its path, its tube is {self.envelope.tube:g}")
+
+    def _react(self, mode: Mode, kind: str, reason: str) -> None:
+        """Take a reaction, unless a worse one is taken already."""
+        self._faults[kind] += 1
+        if mode <= self._mode:
+            return
+        self._mode, self._reason = mode, reason
+        if mode == Mode.HOLD:
+            self._plan.hold()
+
+    def _brake(self) -> Array:
+        """Return g(q) − Dq̇ at the last good measurement, (n,)."""
+        return self.law.robot.gravity(self._screen.q) - self._damping * self._screen.qd
+
+    def _find_damping(self) -> Array:
+        """Return D [N m s/rad], (n,): the torque limit at the velocity limit, or less where that would ring."""
+        robot = self.law.robot
+        M = robot.mass_matrix(np.asarray(self.law.task.q_d(np.array(self.law.task.s0))).reshape(robot.n))
+        lightest = 1.0 / np.linalg.inv(M).diagonal()
+        return np.minimum(self.envelope.torque / self.envelope.velocity, 0.3 * lightest / self.period)

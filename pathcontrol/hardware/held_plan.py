@@ -1,0 +1,90 @@
+"""The plan of a control loop, which can be held and resumed whatever its law."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.control.base import Controller
+from pathcontrol.control.speed_override import SpeedOverride
+from pathcontrol.control.wrapper import LawWrapper
+from pathcontrol.engine.control_tick import ControlTick
+from pathcontrol.errors import EngineError
+
+_FULL = 1e-9  # of the speed that may be missing when the law goes on without the speed input
+
+
+class HeldPlan:
+    """A law that runs compiled while nothing holds it, and with a speed input while something does.
+
+    Args:
+        law: the law; one that is wrapped, or has an observer, always keeps its speed input.
+        period: control period [s].
+    """
+
+    def __init__(self, law: Controller, period: float) -> None:
+        self._law = law
+        self._wrapper = law if isinstance(law, LawWrapper) else SpeedOverride(law)
+        self._held = ControlTick(self._wrapper, period)
+        self._free = None if isinstance(law, LawWrapper) or law.observer is not None else _compiled(law, period)
+        self._tick = self._free or self._held
+
+    @property
+    def s(self) -> float:
+        """The path parameter of the plan."""
+        return self._tick.s
+
+    def start(self, q: Array, qd: Array) -> None:
+        """Start with an arm at (q, q̇), (n,), at full speed."""
+        self._held.resume()
+        self._held.start(q, qd)
+        if self._free is not None:
+            self._free.start(q, qd)
+        self._tick = self._free or self._held
+
+    def tick(self, q: Array, qd: Array) -> Array:
+        """Return the torques of the law, (n,), and advance its plan by a period."""
+        tau = self._tick(q, qd)
+        if self._tick is not self._free and self._free is not None:
+            self._leave_speed_input(self._free)
+        return tau
+
+    def hold(self) -> None:
+        """Let the plan come to rest on the path."""
+        if self._tick is self._free and self._free is not None:
+            self._held.start_from(np.concatenate([self._free.state, [1.0, 0.0]]))
+            self._tick = self._held
+        self._held.hold()
+
+    def resume(self) -> None:
+        """Let the plan go on."""
+        self._held.resume()
+
+    def restart(self, q: Array, qd: Array) -> None:
+        """Begin at the point of the path that is nearest to the arm, at rest."""
+        own, *speeds = self._wrapper.split(self._wrapper.start(q, qd))
+        own[0] = self._law.task.sigma_bar(q)
+        for speed in speeds:
+            speed[0] = 0.0
+        self._held.start_from(np.concatenate([own, *speeds]))
+        self._tick = self._held
+
+    def distance(self, q: Array) -> float:
+        """Return ‖q_d(s) − q‖ [rad] of an arm at q (n,)."""
+        away = np.asarray(self._law.task.q_d(np.array(self.s))).reshape(q.shape) - q
+        return float(np.sqrt(away @ away))
+
+    def _leave_speed_input(self, free: ControlTick) -> None:
+        """Go on without the speed input where the plan has its full speed again."""
+        state = self._held.state
+        if abs(state[-2] - 1.0) < _FULL and abs(state[-1]) < _FULL:
+            free.start_from(state[:-2])
+            self._tick = free
+
+
+def _compiled(law: Controller, period: float) -> ControlTick | None:
+    """Return the compiled tick of a law, None where there is none."""
+    try:
+        return ControlTick(law, period)
+    except EngineError:
+        return None

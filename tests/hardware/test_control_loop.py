@@ -1,0 +1,295 @@
+"""The control loop: the law's torques within the envelope, and one reaction to each fault."""
+
+import numpy as np
+import pytest
+
+import pathcontrol as pc
+from pathcontrol.errors import InputError
+from pathcontrol.hardware.control_loop import ControlLoop, Mode
+from pathcontrol.hardware.envelope import Envelope
+from pathcontrol.simulation.arm.plant import Plant
+
+H = 2e-3
+WIDE = {"torque": 1e6, "torque_rate": 1e12, "velocity": 1e3, "lower": -1e3, "upper": 1e3, "tube": np.inf}
+
+
+def arm_of(n):
+    if n == 2:
+        return pc.load_robot("cicese_2dof"), [0.2, 0.4], 0.3
+    if n == 6:
+        return pc.load_robot("ur5"), [0.0, -1.2, 1.4, -0.2, 1.5, 0.0], 0.2
+    fingers = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}
+    return pc.load_robot("panda", lock=fingers), [0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.8], 0.2
+
+
+def law_of(n, kind=pc.Projection):
+    robot, center, size = arm_of(n)
+    task = pc.Lissajous(np.full(n, size), list(range(1, n + 1)), 0.5, center=center)
+    if kind is pc.Projection:
+        return pc.Projection(robot, task, k_p=400.0, K_v=40.0)
+    if kind is pc.ExtendedMotionPlan:
+        return pc.ExtendedMotionPlan(robot, task, K_p=400.0, K_v=40.0, k=5.0)
+    return pc.ComputedTorque(robot, task, K_p=400.0, K_v=40.0)
+
+
+LAWS = [pc.ComputedTorque, pc.ExtendedMotionPlan, pc.Projection]
+
+
+def run_of(law, duration=0.5, push=None, **sensors):
+    loop = pc.SampledLoop(period=H, **sensors)
+    start = law.task.q_d(np.array(law.task.s0))
+    return pc.simulate(law, start, duration=duration, loop=loop, disturbance=push, progress=False)
+
+
+# --- within the envelope ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", LAWS)
+@pytest.mark.parametrize("n", [2, 6, 7])
+def test_measurements_of_a_run_give_its_torques_to_the_last_bit(n, kind):
+    law = law_of(n, kind)
+    run = run_of(law, encoders=np.full(n, 2.0**20), velocity="difference", filter_hz=50.0)
+    assert run.config["engine"] == "compiled"
+    loop = ControlLoop(law, H, Envelope(**WIDE))
+    q, qd, tau = (run.array(name)[0] for name in ("q_measured", "qd_measured", "tau_demand"))
+    loop.start(run.array("q")[0, 0], run.array("qd")[0, 0])
+    for k, t in enumerate(run.time):
+        assert (loop.step(q[k], qd[k], t) == tau[k]).all(), k
+    status = loop.status
+    assert (status.mode, status.reason, status.ticks, status.saturated) == (Mode.RUN, "", len(run.time), False)
+    assert status.faults == {}
+
+
+@pytest.mark.parametrize("kind", LAWS)
+def test_a_law_that_was_held_and_resumed_is_the_compiled_one_again(kind):
+    law = law_of(2, kind)
+    arm = Simulated(law)
+    loop = ControlLoop(law, H, Envelope(**WIDE))
+    arm.drive(loop, 100)
+    loop.hold()
+    held = arm.drive(loop, 700)[-200:]
+    assert loop.status.mode == Mode.HOLD
+    assert np.abs(np.diff(held["q"], axis=0)).max() < 1e-5
+    s = loop.status.s
+    loop.resume()
+    gone = arm.drive(loop, 1500)
+    assert loop.status.mode == Mode.RUN
+    assert loop.status.s > s
+    steps = np.abs(np.diff(gone["tau"], axis=0)).max()
+    assert steps < 20.0  # no jump, neither on resuming nor when the compiled law takes over
+
+
+class Simulated:
+    """The arm of a law, stepped by hand, with what it did."""
+
+    def __init__(self, law):
+        self.plant = Plant(law.robot, H)
+        self.q = np.asarray(law.task.q_d(np.array(law.task.s0)), float).reshape(1, -1)
+        self.qd, self.t = np.zeros_like(self.q), 0.0
+
+    def drive(self, loop, ticks, fault=None):
+        """Take ticks; ``fault`` changes what is measured, (q, qd, t) of a tick."""
+        kind = [("q", float, self.q.shape[1:]), ("qd", float, self.q.shape[1:]), ("tau", float, self.q.shape[1:])]
+        done = np.empty(ticks, dtype=kind)
+        for k in range(ticks):
+            measured = self.q[0].copy(), self.qd[0].copy(), self.t
+            tau = loop.step(*(measured if fault is None else fault(k, *measured)))
+            done[k] = self.q[0], self.qd[0], tau
+            self.q, self.qd = self.plant.advance(self.q, self.qd, tau[None])
+            self.t += H
+        return done
+
+
+# --- one fault each ------------------------------------------------------------------------------------------------
+
+
+def started(n=2, **options):
+    law = law_of(n)
+    arm, loop = Simulated(law), ControlLoop(law, H, Envelope(**options))
+    loop.start(arm.q[0], arm.qd[0])
+    arm.drive(loop, 200)
+    assert loop.status.mode == Mode.RUN
+    return arm, loop
+
+
+BAD = {
+    "not a number": lambda q, qd, t: (q * np.nan, qd, t),
+    "infinite": lambda q, qd, t: (q, qd + np.inf, t),
+    "no array": lambda q, qd, t: (None, qd, t),
+    "a word": lambda q, qd, t: ("lost", qd, t),
+    "another shape": lambda q, qd, t: (q[:1], qd, t),
+    "no time": lambda q, qd, t: (q, qd, np.nan),
+    "old": lambda q, qd, t: (q, qd, t - 10 * H),
+    "a jump": lambda q, qd, t: (q + 1.0, qd, t),
+}
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_a_few_bad_measurements_are_bridged_and_many_end_in_gravity_then_damping(what):
+    arm, loop = started(patience=4)
+    last = arm.drive(loop, 1)["tau"][-1]
+    bridged = arm.drive(loop, 4, lambda k, *measured: BAD[what](*measured))
+    assert loop.status.mode == Mode.RUN
+    assert (bridged["tau"] == last).all()
+    arm.drive(loop, 50)
+    assert loop.status.mode == Mode.RUN
+    arm.drive(loop, 6, lambda k, *measured: BAD[what](*measured))
+    assert loop.status.mode == Mode.GRAVITY
+    assert loop.status.reason
+    assert loop.status.faults["measurement"] == 10
+    arm.drive(loop, 800)
+    assert loop.status.mode == Mode.DAMP
+    assert np.abs(arm.qd).max() < 1e-2
+
+
+def test_frozen_measurements_of_a_moving_arm_are_bad():
+    arm, loop = started(frozen=10, patience=3)
+    q, qd = arm.q[0].copy(), arm.qd[0].copy()
+    arm.drive(loop, 9, lambda k, _q, _qd, t: (q, qd, t))
+    assert loop.status.mode == Mode.RUN
+    arm.drive(loop, 8, lambda k, _q, _qd, t: (q, qd, t))
+    assert loop.status.mode == Mode.GRAVITY
+    assert "equal measurements" in loop.status.reason
+
+
+def test_a_missed_deadline_is_counted_and_a_long_gap_holds_the_plan():
+    arm, loop = started(late=1.5, lost=5.0)
+    arm.t += 2 * H
+    arm.drive(loop, 1)
+    assert (loop.status.mode, loop.status.faults["deadline"]) == (Mode.RUN, 1)
+    arm.t += 10 * H
+    arm.drive(loop, 700)
+    assert loop.status.mode == Mode.HOLD
+    assert "no step for" in loop.status.reason
+    assert np.abs(arm.qd).max() < 1e-2
+
+
+def test_a_joint_that_is_too_fast_is_damped():
+    arm, loop = started()
+    arm.qd = arm.qd + 1.2 * loop.envelope.velocity
+    arm.drive(loop, 1)
+    assert loop.status.mode == Mode.DAMP
+    assert "its limit is" in loop.status.reason
+    speeds = np.abs(arm.drive(loop, 800)["qd"]).max(-1)
+    assert speeds[-1] < 1e-2
+
+
+def test_a_joint_that_cannot_be_braked_before_its_limit_is_damped_and_stops_there():
+    law = law_of(2)
+    upper = law.task.q_d(np.linspace(0, 6, 200)).max(0) + 0.5
+    arm, loop = Simulated(law), ControlLoop(law, H, Envelope(upper=upper, velocity=4.0, deceleration=20.0))
+    loop.start(arm.q[0], arm.qd[0])
+    arm.q, arm.qd = np.array([upper - [0.35, 0.6]]), np.array([[3.9, 0.0]])
+    loop.start(arm.q[0], arm.qd[0])
+    arm.drive(loop, 1)
+    assert loop.status.mode == Mode.DAMP
+    assert "cannot be braked" in loop.status.reason
+
+
+@pytest.mark.parametrize(("away", "mode"), [(0.7, Mode.HOLD), (1.5, Mode.DAMP)])
+def test_an_arm_that_leaves_the_tube_is_held_or_damped(away, mode):
+    law = law_of(2, pc.ExtendedMotionPlan)
+    arm, loop = Simulated(law), ControlLoop(law, H, Envelope(tube=0.5, jump=10.0))
+    loop.start(arm.q[0], arm.qd[0])
+    arm.drive(loop, 50)
+    middle = np.array([0.2, 0.4])
+    out = (arm.q[0] - middle) / np.linalg.norm(arm.q[0] - middle)
+    arm.q = arm.q + away * out
+    arm.drive(loop, 1)
+    assert loop.status.mode == mode
+    assert "from its path" in loop.status.reason
+
+
+def test_a_start_off_the_path_is_no_leaving():
+    law = law_of(2)
+    arm, loop = Simulated(law), ControlLoop(law, H, Envelope(tube=0.2))
+    arm.q = arm.q + 0.4
+    loop.start(arm.q[0], arm.qd[0])
+    arm.drive(loop, 500)
+    assert loop.status.mode == Mode.RUN
+
+
+@pytest.mark.parametrize("broken", [lambda q: 1 / 0, lambda q: np.full(2, np.nan), lambda q: "torque"])
+def test_a_law_that_breaks_is_damped(broken):
+    class Broken(pc.MotionController):
+        gains = ()
+        breaks = False
+
+        def torque(self, q, qd, at):
+            if self.breaks:
+                return broken(q)
+            return self.robot.gravity(q) + 100 * at.position_error + 20 * at.velocity_error
+
+    law = Broken(law_of(2).robot, law_of(2).task)
+    arm, loop = Simulated(law), ControlLoop(law, H)
+    loop.start(arm.q[0], arm.qd[0])
+    arm.drive(loop, 20)
+    assert loop.status.mode == Mode.RUN
+    law.breaks = Broken.breaks = True
+    done = arm.drive(loop, 800)
+    assert loop.status.mode == Mode.DAMP
+    assert np.isfinite(done["tau"]).all()
+    assert np.abs(arm.qd).max() < 1e-2
+
+
+@pytest.mark.parametrize("n", [2, 6, 7])
+def test_after_damping_the_loop_goes_on_from_where_the_arm_is_without_a_jump(n):
+    arm, loop = started(n)
+    arm.drive(loop, 20, lambda k, *measured: BAD["not a number"](*measured))
+    arm.drive(loop, 500)
+    assert loop.status.mode == Mode.DAMP
+    loop.resume()
+    done = arm.drive(loop, 900)
+    assert loop.status.mode == Mode.RUN
+    change = np.abs(np.diff(done["tau"], axis=0))
+    assert (change <= loop.envelope.torque_rate * H * (1 + 1e-9)).all()
+    assert loop._plan.distance(arm.q[0]) < 0.05
+
+
+# --- any sequence of faults ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n", [2, 6, 7])
+def test_no_torque_is_beyond_its_limit_or_its_rate_whatever_happens(n):
+    law, rng = law_of(n), np.random.default_rng(n)
+    loop = ControlLoop(law, H, Envelope(patience=2, frozen=5))
+    limit, change = loop.envelope.torque, loop.envelope.torque_rate * H
+    center = np.asarray(law.task.q_d(np.array(0.0)))
+    for _ in range(60):
+        q, qd, t = center + rng.normal(0, 0.3, n), rng.normal(0, 0.5, n), rng.uniform(0, 9)
+        loop.start(q, qd, t)
+        last = np.clip(law.robot.gravity(q), -limit, limit)
+        for _ in range(25):
+            t += H * rng.choice([1.0, 1.0, 1.0, 0.0, -3.0, 2.0, 40.0])
+            q, qd = q + rng.normal(0, rng.choice([1e-3, 0.1, 3.0]), n), rng.normal(0, rng.choice([0.1, 5.0, 1e4]), n)
+            measured = (q, qd, t)
+            if rng.random() < 0.3:
+                measured = BAD[rng.choice(list(BAD))](*measured)
+            if rng.random() < 0.1:
+                [loop.hold, loop.resume][rng.integers(2)]()
+            tau = loop.step(*measured)
+            assert tau.shape == (n,)
+            assert np.isfinite(tau).all()
+            assert (np.abs(tau) <= limit).all()
+            assert (np.abs(tau - last) <= change * (1 + 1e-12)).all()
+            last = tau
+
+
+# --- arguments -------------------------------------------------------------------------------------------------------
+
+
+def test_limits_that_are_missing_or_wrong_are_told():
+    law = law_of(2)
+    for bad in ({"torque": -1.0}, {"torque_rate": [1.0, 0.0]}, {"velocity": np.nan}, {"tube": 0.0}, {"patience": 0.5}):
+        with pytest.raises(InputError, match=next(iter(bad))):
+            Envelope(**bad)
+    with pytest.raises(InputError, match="late"):
+        Envelope(late=3.0, lost=2.0)
+    with pytest.raises(InputError, match="not below"):
+        ControlLoop(law, H, Envelope(lower=1.0, upper=0.0))
+    with pytest.raises(InputError, match=r"expected a number or \(2,\)"):
+        ControlLoop(law, H, Envelope(torque=[1.0, 2.0, 3.0]))
+    with pytest.raises(InputError, match="period"):
+        ControlLoop(law, 0.0)
+    with pytest.raises(InputError, match="q has"):
+        ControlLoop(law, H).start([0.0])
