@@ -128,6 +128,13 @@ class Controller(ABC):
         """Return the path parameter, (*batch,), of an arm that starts at (q, q̇), (*batch, n) each."""
         return np.full(q.shape[:-1], self.task.s0) if self.start_at == "s0" else self.task.sigma_bar(q)
 
+    def inherit(self, z: Array, before: Array, t: float) -> Array:
+        """Return the first state z, in which the observer goes on from the state ``before`` of a law at its t [s]."""
+        size = 0 if self.observer is None else self.observer.size
+        memory = before[..., 1 : 1 + size].copy()
+        memory[..., -1:] -= t  # its time, as this law's begins with 0
+        return np.concatenate([z[..., :1], memory, z[..., 1 + size :]], axis=-1)
+
     def rate(self, out: ControlOutput) -> Array:
         """Return ż in continuous time, (*batch, m), where the torque that acts is ``out.tau``."""
         if self.observer is None or out.observation is None:

@@ -13,7 +13,7 @@ from pathcontrol.robot.model import RobotModel
 
 #: corner frequency of both low passes of the observer in the loop [Hz]
 CUTOFF = 35.0
-_NEVER = -1.0  # s, the time of a tick that has not been
+_NEVER = -1e9  # s, the time of a tick that has not been
 
 
 class Observation(NamedTuple):
@@ -77,7 +77,7 @@ class MomentumObserver:
             InputError: the memory is not that of this observer, as where a law drops it.
         """
         first, torque, before, known, last = self._split(memory)
-        h = np.where(last < 0, 0.0, t - last)
+        h = np.where(last < 0.5 * _NEVER, 0.0, t - last)
         p, c = self.robot.momentum(q, qd), self.robot.momentum_rate(q, qd, np.zeros(self.robot.n))
         share = -np.expm1(-self.gain * h)
         slope = np.divide(share, h, out=np.broadcast_to(self.gain, share.shape).copy(), where=h > 0)

@@ -17,6 +17,7 @@ from pathcontrol.simulation.divergence import CRAWLED, NO_NUMBERS, STOPPED, Dive
 from pathcontrol.simulation.finish import Finish
 from pathcontrol.simulation.loops import Arm, ContinuousTime, Outside, check_rows, torque_limits
 from pathcontrol.simulation.recorder import Recorder
+from pathcontrol.simulation.seam import Left, start_next
 
 if TYPE_CHECKING:
     from scipy.integrate import LSODA
@@ -76,6 +77,7 @@ class ContinuousArm:
         self.q, self.qd = q, qd
         self._mode, self._robot, self._period = mode, robot, mode.output_period
         self._disturbance, self._began = outside.disturbance, 0.0
+        self._left: Left | None = None
         self.divergence = Divergence(q, qd)
 
     def run(
@@ -90,11 +92,11 @@ class ContinuousArm:
         loop = ClosedLoop(controller, self._robot, self._mode, push)
         recorder = Recorder(len(self.q), self._robot.n, len(time))
         lost = self.divergence = Divergence(self.q, self.qd)
-        z = controller.start(self.q, self.qd) if z is None else z
+        z = start_next(controller, self.q, self.qd, self._left) if z is None else z
         start = np.concatenate([self.q, self.qd, z], axis=-1)
         with progress_bar("integrating", duration, progress) as update:
             for t, y in zip(time, _Solution(loop, start, lost, push).at(time, update), strict=False):
-                self.q, self.qd, _ = loop.split(y)
+                self.q, self.qd, z = loop.split(y)
                 out, tau = loop.control(t, y)
                 recorder.write(self.q, self.qd, Reading(self.q, self.qd), out, tau)
                 lost.check_torque(t, out.tau)
@@ -102,7 +104,7 @@ class ContinuousArm:
                     break
         arrays = recorder.arrays()
         lost.erase(arrays, time)
-        self._began += t
+        self._began, self._left = self._began + t, Left(controller, z, float(t))
         return arrays
 
 

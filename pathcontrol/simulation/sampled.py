@@ -24,6 +24,7 @@ from pathcontrol.simulation.finish import Finish
 from pathcontrol.simulation.loops import Arm, Outside, SampledLoop, check_rows, torque_limits
 from pathcontrol.simulation.lossy_line import LossyLine
 from pathcontrol.simulation.recorder import Recorder
+from pathcontrol.simulation.seam import Left, start_next
 
 _UPDATE_EVERY = 64  # ticks between updates of the progress bar
 
@@ -122,6 +123,7 @@ class SampledArm:
         self._disturbance, self._ticks = outside.disturbance, 0
         self._walls = [term for term in list_terms(outside.disturbance) if isinstance(term, Wall)]
         self._line = LossyLine(Dropouts(outside.disturbance, loop.period, outside.first, len(q)), self._reading)
+        self._left: Left | None = None
         self.divergence = Divergence(q, qd)
 
     def run(
@@ -133,7 +135,7 @@ class SampledArm:
         """
         ticks = max(1, round(duration / self._period))
         recorder, lost = Recorder(len(self.q), controller.robot.n, ticks + 1), Divergence(self.q, self.qd)
-        first = z = controller.start(self.q, self.qd) if z is None else z
+        first = z = start_next(controller, self.q, self.qd, self._left) if z is None else z
         self.divergence = lost
         # a rollout that diverges may overflow in the step before
         with progress_bar("simulating", ticks, progress) as update, np.errstate(over="ignore", invalid="ignore"):
@@ -161,6 +163,7 @@ class SampledArm:
                 z = self._line.keep(z, controller.advance(z, acting, self._period))
                 self._advance(torques)
                 self._actuator.hold(tau)
+        self._left = Left(controller, z, t)
         arrays = recorder.arrays()
         lost.erase(arrays, self._period * np.arange(arrays["s"].shape[1]))
         return arrays

@@ -258,11 +258,20 @@ def test_ticks_that_are_missed_are_no_disturbance():
     assert np.abs(compensated(run, ARMS[2])[run.time > 0.23]).max() < 0.1
 
 
-def test_a_sequence_runs_with_it():
-    line, back = Line([0.3, 0.2], [0.6, 0.4], 0.5), Line([0.6, 0.4], [0.3, 0.2], 0.5)
-    laws = [ExtendedMotionPlan(CICESE, task, 800.0, 60.0, 20.0, friction="observed") for task in (line, back)]
-    run = simulate_sequence(laws, [0.3, 0.2], duration=5.0, loop=paper_loop(), progress=False)
+@pytest.mark.parametrize("loop", [SampledLoop(1e-3), ContinuousTime(1e-3)], ids=["sampled", "continuous"])
+def test_from_path_to_path_of_a_sequence_the_observer_goes_on(loop):
+    """A steady push stays compensated at the seam, where a law that begins anew would lose it."""
+    line, back = Line([0.3, 0.2], [0.5, 0.3], 0.5), Line([0.5, 0.3], [0.3, 0.2], 0.5)
+    laws = [ExtendedMotionPlan(ARMS[2], task, 200.0, 30.0, 5.0, friction="observed") for task in (line, back)]
+    push = np.array([6.0, 2.0])
+    run = simulate_sequence(laws, [0.3, 0.2], duration=9.0, loop=loop, disturbance=Push(push), progress=False)
     assert run.status[0] == "finished"
+    without = ExtendedMotionPlan(ARMS[2], back, 200.0, 30.0, 5.0, friction="none")
+    second = run.path(1)
+    s = second.array("s")[0][:, None]
+    asked = without.law(0.0, second.array("q_measured")[0], second.array("qd_measured")[0], s).tau
+    taken = (asked - second.array("tau_demand")[0])[s[:, 0] < 0.1]
+    assert_allclose(taken, np.broadcast_to(push, taken.shape), rtol=0, atol=0.05)
 
 
 FILE = """
