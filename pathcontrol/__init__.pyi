@@ -38,6 +38,7 @@ from .control.motion_control import MotionController as MotionController
 from .control.motion_control import PDPlus as PDPlus
 from .control.motion_control import SlotineLi as SlotineLi
 from .control.motion_control import Tracking as Tracking
+from .control.paced import Paced as Paced
 from .control.projection import Projection as Projection
 from .control.speed_override import SpeedOverride as SpeedOverride
 from .control.speed_rule import SpeedRule as SpeedRule

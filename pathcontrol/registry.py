@@ -52,6 +52,8 @@ LAWS = Kind(
         "computed_torque": "control.motion_control:ComputedTorque",
         "pd_plus": "control.motion_control:PDPlus",
         "slotine_li": "control.motion_control:SlotineLi",
+        "speed_override": "control.speed_override:SpeedOverride",
+        "paced": "control.paced:Paced",
     },
     ("robot", "task"),
 )

@@ -14,6 +14,8 @@ from pathcontrol.comparison.laws import Laws, make_laws
 from pathcontrol.comparison.measures import MEASURES, measure
 from pathcontrol.comparison.scenarios import Scenario, make_scenario
 from pathcontrol.control.base import Controller
+from pathcontrol.control.paced import Paced
+from pathcontrol.control.speed_override import SpeedOverride
 from pathcontrol.errors import SimulationError
 from pathcontrol.simulation.engines import Engine, check_engine
 from pathcontrol.simulation.run import Run
@@ -143,6 +145,10 @@ def compare(
 
 def _run(law: Controller, scenario: Scenario, starts: Array, engine: Engine | None, progress: bool) -> Run:
     """Return the run of one law; where all rollouts diverged, what happened until then."""
+    if scenario.override is not None:
+        law = SpeedOverride(law, scenario.override)
+    if isinstance(law, Paced) and not np.any(scenario.loop.torque_limits):  # nothing is there to be paced by
+        law = law.wrapped
     try:
         return simulate(
             law,

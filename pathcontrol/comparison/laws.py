@@ -15,6 +15,7 @@ from pathcontrol.control.base import Controller, Start, diagonal_gain
 from pathcontrol.control.event_plan import EventPlan
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
+from pathcontrol.control.paced import Paced
 from pathcontrol.control.projection import Projection
 from pathcontrol.control.wrapper import unwrap
 from pathcontrol.errors import InputError, TaskError, UnknownNameError
@@ -114,8 +115,14 @@ _MAKERS = {
 }
 #: the laws that are compared where none are named
 KNOWN_LAWS = tuple(_MAKERS)
+#: the path laws with a plan that knows the torque limits
+PACED_LAWS = ("paced_extended_motion_plan", "paced_projection")
 #: laws around these, compared where they are named
-_WRAPPED = {"event_plan": lambda *scenario: EventPlan(_extended_motion_plan(*scenario))}
+_WRAPPED = {
+    "event_plan": lambda *scenario: EventPlan(_extended_motion_plan(*scenario)),
+    PACED_LAWS[0]: lambda *scenario: Paced(_extended_motion_plan(*scenario)),
+    PACED_LAWS[1]: lambda *scenario: Paced(_projection(*scenario)),
+}
 
 
 def recover_gains(law: Controller) -> Gains:
@@ -146,7 +153,7 @@ def recover_gains(law: Controller) -> Gains:
 
 
 def make_laws(
-    laws: Laws | None, robot: RobotModel, task: PathTask, gains: Gains, more: Mapping[str, Maker] = _NONE
+    laws: Laws | None, robot: RobotModel, task: PathTask, gains: Gains, more: Mapping[str, Law] = _NONE
 ) -> dict[str, Controller]:
     """Return control laws by name for one arm and one task, from names, laws, or functions of arm and task.
 
@@ -167,7 +174,10 @@ def make_laws(
             raise InputError(f"two laws are called {key!r}; give them names: {{'first': …, 'second': …}}")
         made[key] = one
     if not made:
-        raise InputError(f"there is no law to compare; expected some of {', '.join(KNOWN_LAWS)}, or laws of your own")
+        raise InputError(
+            f"there is no law to compare; expected some of {', '.join(_MAKERS | _WRAPPED)}, or "
+            "laws of your own"
+        )
     return made
 
 
@@ -183,14 +193,14 @@ def _list_laws(laws: Laws) -> list[tuple[str, Law]]:
         raise InputError(f"laws = {laws!r:.80}, expected names, control laws, or a table of them by name") from error
 
 
-def _make_law(law: Law, robot: RobotModel, task: PathTask, gains: Gains, more: Mapping[str, Maker]) -> Controller:
+def _make_law(law: Law, robot: RobotModel, task: PathTask, gains: Gains, more: Mapping[str, Law]) -> Controller:
     """Return one law."""
     if isinstance(law, str) and law in more:
         law = more[law]
     if isinstance(law, str):
         makers = _MAKERS | _WRAPPED
         if law not in makers:
-            known = [*makers, *more]
+            known = list(dict.fromkeys([*makers, *more]))
             choices = ", ".join(known)
             raise UnknownNameError(f"there is no law {law!r}, expected one of {choices}{did_you_mean(law, known)}")
         return makers[law](robot, task, gains, "nearest" if task.closed else "s0")

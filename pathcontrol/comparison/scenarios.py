@@ -9,10 +9,11 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import did_you_mean
-from pathcontrol.comparison.laws import Gains, Maker
+from pathcontrol.comparison.laws import PACED_LAWS, Gains, Law
 from pathcontrol.comparison.paper import DURATION, K_P, K_V, PERIOD, START_DEG, K, paper_task
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
+from pathcontrol.control.override_rule import Override
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel
@@ -31,6 +32,7 @@ _NEAR = 0.05  # rad, standard deviation of initial postures from the path
 _JAM = (4.0, 4.6)  # s
 _WALL, _WALL_AT = (4.0, 7.2), 0.7  # s, m: longer than a lap, across a path that reaches 0.795 m
 _LOST = (4.0, 4.1)  # s
+_HOLD = (4.0, 6.0)  # s
 _FAST = 11.0  # rad/s; a lap takes 0.571 s, of which the motors need 0.673 s at least
 _HEAVIER = 1.3
 
@@ -51,9 +53,10 @@ class Scenario:
         disturbance: what else acts on the arm, or ``None``.
         event: from when to when something happens [s]; ``None`` where all of the run is as it is.
         gains: what all laws share.
+        override: an operator's input to the speed of all laws, as for :class:`SpeedOverride`, or ``None``.
         engine: which engine runs it, see :func:`simulate`.
         undisturbed: the scenario without what happens in it; ``None`` if nothing does.
-        laws: laws of its own beside the known ones, functions of arm and task by name.
+        laws: laws beside the known ones, by name: names of others, or functions of arm and task.
 
     Raises:
         InputError: the event does not begin within the run.
@@ -70,9 +73,10 @@ class Scenario:
     disturbance: Disturbance | None = None
     event: tuple[float, float] | None = None
     gains: Gains = field(default_factory=Gains)
+    override: Override | None = None
     engine: Engine = "auto"
     undisturbed: Scenario | None = None
-    laws: Mapping[str, Maker] = field(default_factory=dict)
+    laws: Mapping[str, Law] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.event is not None and not 0 <= self.event[0] < min(self.event[1], self.duration):
@@ -183,8 +187,14 @@ def _lose_measurements(calm: Scenario) -> Scenario:
 def _weaken(calm: Scenario) -> Scenario:
     """Return the scenario at a speed that the motors cannot keep, from a start on the path."""
     task = Circle(1.0, _FAST)
-    fast = replace(calm, task=task, q=task.q_d(np.array(task.s0)))
+    paced = {name: name for name in PACED_LAWS}
+    fast = replace(calm, task=task, q=task.q_d(np.array(task.s0)), laws=paced)
     return replace(fast, undisturbed=replace(fast, loop=SampledLoop(period=PERIOD)))
+
+
+def _hold(calm: Scenario) -> Scenario:
+    """Return the scenario with an operator who holds all plans for a while."""
+    return replace(calm, override=[[_HOLD[0], 0.0], [_HOLD[1], 1.0]], event=_HOLD, undisturbed=calm)
 
 
 def _load(calm: Scenario) -> Scenario:
@@ -206,6 +216,7 @@ _SCENARIOS: dict[str, tuple[str, Callable[[Scenario], Scenario]]] = {
     "wall": ("A rigid wall stands across the path of the tool from 4.0 to 7.2 s.", _meet_wall),
     "dropout": ("No measurement comes to the law from 4.0 to 4.1 s.", _lose_measurements),
     "weak-motors": ("The circle is to be followed at 11 rad/s, which the motors cannot do.", _weaken),
+    "hold": ("An operator holds the plan from 4.0 to 6.0 s and lets it go on.", _hold),
     "payload": ("Link 2 is 30 % heavier than the laws know.", _load),
     "noisy-loop": ("Encoders, noise of 0.1 mrad, velocity by differences, and a delay of 2.5 ms.", _measure_badly),
 }

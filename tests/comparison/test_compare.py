@@ -225,3 +225,21 @@ def test_an_event_plan_is_compared_where_it_is_named():
     assert list(said) == ["extended_motion_plan", "event_plan"]
     assert said["event_plan"]["contour_peak"] < 0.5 * said["extended_motion_plan"]["contour_peak"]
     assert "event_plan" not in KNOWN_LAWS
+
+
+# --- an operator, and weak motors -------------------------------------------------------------------------------
+
+
+def test_a_held_plan_loses_the_time_it_is_held_and_stays_on_the_path():
+    held = compared("computed_torque", "projection", scenario="hold", rollouts=2)
+    for law in held.measures:
+        assert 1.7 < held.mean(law, "time_lost_s") < 2.1  # of the 2 s
+        calm = pc.contour_error(held.undisturbed[law]).max()
+        assert held.measures[law]["contour_peak"].max() < 1.1 * calm
+
+
+def test_paced_laws_stay_on_the_path_that_weak_motors_leave():
+    weak = compared("projection", "paced_projection", scenario="weak-motors", rollouts=1)
+    assert weak.mean("paced_projection", "contour_peak") < 0.25 * weak.mean("projection", "contour_peak")
+    assert weak.mean("paced_projection", "time_lost_s") < 1.2 * weak.mean("projection", "time_lost_s")
+    assert {"paced_projection", "paced_extended_motion_plan"} < set(pc.make_scenario("weak-motors").laws)

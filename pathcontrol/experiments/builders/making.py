@@ -14,7 +14,7 @@ from pathcontrol.experiments.builders.file_errors import report_by_key, report_u
 from pathcontrol.experiments.builders.own_class import find_own_class
 from pathcontrol.experiments.schema.derived import OwnSection
 from pathcontrol.experiments.schema.section import Section, convert_angles, read_quantities, units_of
-from pathcontrol.registry import Kind
+from pathcontrol.registry import Kind, find_kind
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
@@ -94,11 +94,18 @@ def arguments_of(
     """
     if isinstance(section, OwnSection):
         return _own_arguments(f"{key}.parameters", target_of(key, section, kind, place), section.parameters, place)
-    found = section.arguments(place.to_radians)
+    target, found = target_of(key, section, kind, place), section.arguments(place.to_radians)
     return {
-        name: make(f"{key}.{name}", value, None, place, given) if isinstance(value, Section) else value
+        name: make(f"{key}.{name}", value, _kind_of(target, name), place, given)
+        if isinstance(value, Section)
+        else value
         for name, value in found.items()
     }
+
+
+def _kind_of(target: Callable[..., Any], name: str) -> Kind | None:
+    """Return the kind of object that an argument of a class is, or ``None`` where files name none."""
+    return next(filter(None, map(find_kind, parameters_of(target)[name].types)), None)
 
 
 def _own_arguments(key: str, target: Callable[..., Any], parameters: Mapping[str, Any], place: Place) -> dict[str, Any]:

@@ -31,6 +31,7 @@ from pathcontrol.experiments.samples.dotted_keys import check_keys, put, section
 from pathcontrol.experiments.samples.named_files import find_files, make_relative
 from pathcontrol.experiments.samples.swept_tasks import SweptTask, build_tasks, group_rows, join_tasks, refuse_sequence
 from pathcontrol.experiments.schema.experiment import Experiment
+from pathcontrol.experiments.schema.section import Section
 from pathcontrol.experiments.schema.validators import show_value
 from pathcontrol.registry import LAWS
 from pathcontrol.robot.model import RobotModel
@@ -152,8 +153,10 @@ class SweptExperiment:
         return law_of(first, model, task, Place(self._base_dir, first.to_radians), gains)
 
     def _law_arguments(self, experiment: Experiment) -> dict[str, Any]:
-        place = Place(self._base_dir, experiment.to_radians)
-        return arguments_of("controller", experiment.controller, LAWS, place)
+        """Return the arguments of the law without those that are objects, such as a law that it wraps."""
+        place, section = Place(self._base_dir, experiment.to_radians), experiment.controller
+        objects = {name: None for name, value in section if isinstance(value, Section)}
+        return arguments_of("controller", section.model_copy(update=objects), LAWS, place)
 
     def _gains(self, experiment: Experiment) -> dict[str, bool]:
         """Return the gains of the law, of which a batch may have a row for each rollout, and whether each may be 0."""

@@ -1,0 +1,195 @@
+"""The pace within torque limits: the fast circle, other arms, traps, and the theorem along paced runs."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import pathcontrol as pc
+from pathcontrol.control.pace_rule import rate_bounds
+
+LIMITS = np.array([150.0, 15.0])
+LOOPS = {
+    "exact": pc.SampledLoop(torque_limits=True),
+    "encoders": pc.SampledLoop(encoders=True, velocity="difference", torque_limits=True),
+}
+LAWS = ("extended_motion_plan", "projection")
+
+
+def make_law(name, arm, task):
+    if name == "projection":
+        return pc.Projection(arm, task, k_p=800.0, K_v=[45.0, 100.0])
+    return pc.ExtendedMotionPlan(arm, task, K_p=800.0, K_v=[45.0, 100.0], k=20.0)
+
+
+def run(law, **settings):
+    begin = law.task.q_d(np.array(law.task.s0))
+    return pc.simulate(law, begin, progress=False, **{"duration": 2.4, "loop": LOOPS["exact"]} | settings)
+
+
+def late_contour(one):
+    """The largest contour error [deg] in the second half."""
+    return np.rad2deg(pc.contour_error(one)[0, len(one.time) // 2 :].max())
+
+
+def lap_time(one):
+    half, s = len(one.time) // 2, one.array("s")[0]
+    return 2 * np.pi * (one.time[-1] - one.time[half]) / (s[-1] - s[half])
+
+
+@pytest.mark.parametrize("loop", ["exact", "encoders"])
+@pytest.mark.parametrize("name", LAWS)
+def test_the_circle_that_the_motors_cannot_do(arm, name, loop):
+    """A lap asked in 0.571 s takes 0.673 s at least."""
+    law = make_law(name, arm, pc.Circle(1.0, 11.0))
+    paced = run(pc.Paced(law), loop=LOOPS[loop])
+    assert late_contour(paced) < 1.5
+    assert 0.673 < lap_time(paced) < 0.74
+    assert late_contour(run(law, loop=LOOPS[loop])) > 5.5
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_where_the_motors_can_the_pace_changes_nothing(arm, name):
+    law = make_law(name, arm, pc.Circle(1.0, 6.0))
+    plain, paced = run(law), run(pc.Paced(law))
+    assert late_contour(paced) < 1.005 * late_contour(plain)
+    assert lap_time(paced) == pytest.approx(lap_time(plain), rel=2e-3)
+    assert pc.contour_error(paced).max() < 1.005 * pc.contour_error(plain).max()
+
+
+def test_the_pace_is_the_speed_that_is_asked_for_or_the_fastest_one(arm):
+    task = pc.Circle(1.0, 11.0)
+    law = pc.Paced(pc.ComputedTorque(arm.with_friction(pc.Viscous(arm.friction.viscous)), task, 800.0, [45.0, 100.0]))
+    paced = run(law, plant=law.robot)
+    w, s = pc.speed_factor(paced)[0], paced.array("s")[0]
+    fastest = task.with_profile(pc.time_optimal(law.robot, task, velocity=None, margin=0.1))
+    late = paced.time > 2.0
+    np.testing.assert_allclose(w[late], np.minimum(1.0, fastest.theta(s[late]) / 11.0), rtol=0, atol=0.02)
+    assert w[0] == 0.0
+    assert (np.abs(paced.array("tau_demand")[0]) <= LIMITS * (1 + 1e-9)).all()
+
+
+def arms():
+    fingers = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}
+    return {
+        "ur5": (pc.load_robot("ur5"), [0.0, -1.2, 1.4, -0.4, 0.5, 0.2]),
+        "panda": (pc.load_robot("panda", lock=fingers), [0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.8]),
+    }
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_arms_with_half_of_their_torque_stay_on_a_contour(name):
+    robot, home = arms()[name]
+    inertia = robot.mass_matrix(home).diagonal()
+    robot = robot.with_friction(pc.Viscous(np.full(robot.n, 0.2)) + pc.Coulomb(2.0 * inertia))
+    half = 0.5 * robot.limits.effort
+    points = np.array(home) + np.random.default_rng(3).normal(size=(6, robot.n)) * 0.3
+    path = pc.WaypointPath(points, speed=1.0, closed=True)
+
+    def follow(lap, duration, pace):
+        task = path.with_profile(pc.ConstantRate(path.period / lap))
+        law = pc.ExtendedMotionPlan(robot, task, 400.0, 40.0, 20.0)
+        law = pc.Paced(law, torque_limits=half) if pace else law
+        return late_contour(run(law, duration=duration, loop=pc.SampledLoop(2e-3, torque_limits=half)))
+
+    slow = follow(8.0, 16.0, pace=False)
+    assert follow(0.8, 2.4, pace=True) < 1.5 * slow
+    assert follow(0.8, 2.4, pace=False) > 3 * slow
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_v_falls_as_the_theorem_says_along_a_paced_run(ideal_arm, name):
+    law = pc.Paced(make_law(name, ideal_arm, pc.Circle(1.0, 11.0)))
+    near = law.task.q_d(np.array(0.0)) + np.array([0.05, -0.05])
+    paced = pc.simulate(law, near, duration=0.6, loop=pc.SampledLoop(2.5e-4), progress=False)
+    V, Vdot = (part[0] for part in pc.lyapunov(law, paced))
+    change = np.concatenate([[0.0], np.cumsum(1.25e-4 * (Vdot[1:] + Vdot[:-1]))])
+    np.testing.assert_allclose(V, V[0] + change, rtol=0, atol=0.02 * V[0])  # of order h
+    assert (Vdot <= 1e-15).all()
+    w = pc.speed_factor(paced)[0]
+    assert w.max() < 1.02
+    assert np.ptp(w[w.size // 2 :]) > 0.1
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_paced_open_path_begins_and_ends_at_rest_within_the_limits(arm, name):
+    task = pc.Line([-0.8, -0.6], [1.0, 1.4], speed=12.0)
+    law = pc.Paced(make_law(name, arm, task))
+    there = run(law)
+    assert there.status[0] == "finished"
+    np.testing.assert_allclose(there.array("q")[0, -1], task.q_d(np.array(task.s_end)), rtol=0, atol=0.03)
+    assert late_contour(there) < 1.5
+    assert np.rad2deg(pc.contour_error(there).max()) < 1.5
+
+
+@pytest.mark.parametrize("order", ["outside", "inside"])
+@pytest.mark.parametrize("name", LAWS)
+def test_an_operator_slows_holds_and_reverses_a_paced_law(arm, name, order):
+    u = [[1.0, 0.0], [2.0, -1.0], [3.5, 0.5]]
+    law = make_law(name, arm, pc.Circle(1.0, 11.0))
+    both = pc.SpeedOverride(pc.Paced(law), u) if order == "outside" else pc.Paced(pc.SpeedOverride(law, u))
+    assert [type(rule).__name__ for rule in both.rules][-1] == "PaceRule"
+    played = run(both, duration=5.0)
+    t, w = played.time, pc.speed_factor(played)[0]
+    assert np.abs(w[(t > 1.9) & (t < 2.0)]).max() < 1e-4
+    assert w[(t > 2.7) & (t < 3.4)].max() < -0.7
+    assert w[t > 4.7] == pytest.approx(0.5, abs=1e-3)
+    assert np.rad2deg(pc.contour_error(played).max()) < 1.7
+    assert np.abs(np.diff(w)).max() < 0.25
+
+
+def test_an_arm_that_is_moving_is_met_at_its_speed(arm):
+    task = pc.Circle(1.0, 6.0)
+    law = pc.Paced(make_law("extended_motion_plan", arm, task))
+    point = task.at(np.array([0.0]))
+    z = law.start(point.q_d[0], 0.5 * point.velocity[0])
+    assert z[-1] == pytest.approx(0.5)
+    assert law.start(point.q_d[0], -point.velocity[0])[-1] == 0.0
+    fast = law.start(point.q_d[0], 9 * point.velocity[0])[-1]
+    assert fast == pytest.approx(law.rules[-1].plan.forward(np.zeros(1))[0][0])
+
+
+@given(st.integers(0, 10**6))
+def test_bounds_of_the_rate_keep_the_limits_and_are_sharp(seed):
+    rng = np.random.default_rng(seed)
+    limits, tau, gradient = rng.uniform(4, 9, 5), rng.normal(size=5), rng.normal(size=5)
+    gradient[rng.random(5) < 0.2] = 0.0
+    least, most = rate_bounds(tau, gradient, limits)
+    assert least <= most
+    if gradient.any() and (np.abs(tau) <= limits)[gradient == 0].all():
+        for rate in (least, most):
+            assert (np.abs(tau + rate * gradient) / limits).max() == pytest.approx(1.0, rel=1e-9)
+
+
+def test_the_tasks_of_a_batch_have_their_own_pace(arm):
+    @cache
+    def circle(speed):
+        return pc.Circle(1.0, speed)
+
+    batch = pc.TaskBatch([circle(11.0), circle(4.0), circle(11.0)])
+    together = pc.simulate(
+        pc.Paced(make_law("projection", arm, batch)),
+        [1.0, 0.0],
+        duration=0.5,
+        loop=LOOPS["exact"],
+        progress=False,
+    )
+    for row, speed in enumerate((11.0, 4.0, 11.0)):
+        alone = run(pc.Paced(make_law("projection", arm, circle(speed))), duration=0.5)
+        np.testing.assert_allclose(together.array("q")[row], alone.array("q")[0], rtol=0, atol=1e-12)
+
+
+def test_bad_arguments_are_told(arm):
+    law = make_law("projection", arm, pc.Circle(1.0, 2.0))
+    for margin in (1.0, -0.1, np.nan, "much"):
+        with pytest.raises(pc.InputError, match="torque_margin"):
+            pc.Paced(law, margin)
+    for limits in ([1.0, 2.0, 3.0], [0.0, 1.0], None, [np.inf, np.inf]):
+        with pytest.raises(pc.InputError, match="torque_limits"):
+            pc.Paced(law, torque_limits=limits)
+    with pytest.raises(pc.TaskError, match="torque limit"):
+        pc.Paced(law, torque_limits=[1.0, 1.0])

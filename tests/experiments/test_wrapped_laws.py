@@ -1,0 +1,90 @@
+"""Laws around laws in experiment files, saved runs and sweeps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pathcontrol as pc
+
+FILE = """
+duration = 0.5
+robot.source = "cicese_2dof"
+task = { type = "circle", radius = 1.0, speed = 11.0 }
+loop = { torque_limits = true }
+[controller]
+type = "paced"
+torque_margin = 0.2
+[controller.law]
+type = "speed_override"
+override = [[0.3, 0.0]]
+acceleration = 5.0
+[controller.law.law]
+"""
+PLAN = 'type = "extended_motion_plan"\nK_p = 800.0\nK_v = [45.0, 100.0]\nk = 20.0\n'
+OWN = 'type = "tasks.py:Law"\nparameters = {}\n'
+SWEPT = """
+[sweep.parameters]
+"controller.law.law.k" = { grid = [5.0, 20.0] }
+"controller.law.acceleration" = { grid = [5.0, 1.0] }
+"""
+
+
+def by_hand(arm, k=20.0, acceleration=5.0):
+    task = pc.Circle(1.0, 11.0)
+    law = pc.ExtendedMotionPlan(arm, task, 800.0, [45.0, 100.0], k)
+    law = pc.Paced(pc.SpeedOverride(law, [[0.3, 0.0]], acceleration), 0.2)
+    begin, loop = task.q_d(np.array(0.0)), pc.SampledLoop(torque_limits=True)
+    return pc.simulate(law, begin, duration=0.5, loop=loop, progress=False)
+
+
+def test_a_file_wraps_laws_by_tables_within_tables(tmp_path, arm):
+    path = tmp_path / "paced.toml"
+    path.write_text(FILE + PLAN, encoding="utf-8")
+    run, _, _ = pc.run_experiment(path, tmp_path / "out", progress=False)
+    np.testing.assert_array_equal(run.array("q"), by_hand(arm).array("q"))
+    said = run.config["controller"]
+    assert said["controller"] == "Paced(SpeedOverride(ExtendedMotionPlan))"
+    assert (said["torque_margin"], said["acceleration"], said["k"]) == (0.2, 5.0, 20.0)
+    saved = pc.Run.load(tmp_path / "out" / "run.nc")
+    assert saved.config["controller"] == said
+    assert pc.speed_factor(saved)[0, 0] == 0.0
+    pc.report(saved, tmp_path / "report.html")
+
+
+def test_a_law_of_ones_own_is_wrapped_too(tmp_path):
+    law = (
+        "import pathcontrol as pc\n"
+        "class Law(pc.ComputedTorque):\n"
+        "    def __init__(self, robot, task):\n"
+        "        super().__init__(robot, task, 800.0, 57.0)\n"
+    )
+    (tmp_path / "tasks.py").write_text(law, encoding="utf-8")
+    path = tmp_path / "own.toml"
+    path.write_text(FILE + OWN, encoding="utf-8")
+    run, _, _ = pc.run_experiment(path, tmp_path / "out", progress=False)
+    assert run.config["controller"]["controller"] == "Paced(SpeedOverride(Law))"
+
+
+def test_a_sweep_varies_what_is_inside(tmp_path):
+    path = tmp_path / "swept.toml"
+    path.write_text(FILE + PLAN + SWEPT, encoding="utf-8")
+    result = pc.run_sweep(path, tmp_path / "out", progress=False)
+    assert result.samples == 4
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("torque_margin = 0.2", "torque_margin = 1.5"), "torque_margin"),
+        (("override = [[0.3, 0.0]]", "override = 3.0"), "override"),
+        (("acceleration = 5.0", "acceleration = 0.0"), "acceleration"),
+        (("k = 20.0", "k = -1.0"), "k"),
+        (("[controller.law.law]", "[controller.law.lau]"), "law"),
+    ],
+)
+def test_mistakes_are_told_by_their_keys(tmp_path, change, told):
+    path = tmp_path / "bad.toml"
+    path.write_text((FILE + PLAN).replace(*change), encoding="utf-8")
+    with pytest.raises(pc.ExperimentError, match=told):
+        pc.run_experiment(path, tmp_path / "out", progress=False)
