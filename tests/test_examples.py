@@ -23,6 +23,8 @@ EXAMPLES = {
     "deburr_bracket": 3,
     "tune_gains": 3,
     "jammed_joint": 3,
+    "operators_override": 3,
+    "weak_motors": 3,
 }
 OF_THE_EXTRA = {"six_joints", "mill_pocket", "deburr_bracket"}
 ALONG_FILES = {"lettering", "mill_pocket", "deburr_bracket"}
