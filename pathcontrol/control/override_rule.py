@@ -20,6 +20,16 @@ MOST = 2.0  # largest |u|
 _SMOOTHING = 0.02  # s, time constant T of the rate of w
 
 
+class FixedSpeed:
+    """A speed that does not change: u, a number or (N,)."""
+
+    def __init__(self, factor: Array) -> None:
+        self.factor = freeze(factor)
+
+    def __call__(self, t: float) -> Array:
+        return self.factor
+
+
 class SpeedSteps:
     """A speed that changes in steps: u(t) is that of the last step, and 1 before the first.
 
@@ -72,7 +82,9 @@ class OverrideRule(SpeedRule):
         self._held, self._back = False, True
 
     def override(self, value: Override) -> None:
-        """Set how fast the plan goes when it is not held."""
+        """Set how fast the plan goes when it is not held; a number is not below 0, as :meth:`reverse` goes back."""
+        if not callable(value) and np.ndim(value) < 2 and np.any(as_array("override", value) < 0):
+            raise InputError(f"override = {value}, expected 0 to {MOST:g}; reverse() goes back")
         self._value = _make_function(value)
         self._given = value if callable(value) else np.asarray(value).tolist()
 
@@ -92,7 +104,12 @@ class OverrideRule(SpeedRule):
         return x[..., 1]
 
     def memory_rate(self, moment: Moment, asked: Speed, tau: Array, x: Array) -> Array:
-        wanted = (asked.factor * self.value(moment.t) - x[..., 0]) / (4 * _SMOOTHING)
+        u = self.value(moment.t)
+        if u.ndim and u.shape != x.shape[:-1]:
+            raise InputError(
+                f"override at t = {moment.t:g} s has {len(u)} values for {len(x)} rollouts, expected as many"
+            )
+        wanted = (asked.factor * u - x[..., 0]) / (4 * _SMOOTHING)
         wanted = np.minimum(np.maximum(wanted, -self.acceleration), self.acceleration)
         return ((wanted - x[..., 1]) / _SMOOTHING)[..., None]
 
@@ -133,8 +150,7 @@ def _make_function(override: Override) -> Callable[[float], ArrayLike]:
         steps = SpeedSteps(array)
         _check_range("override", steps.factors)
         return steps
-    fixed = freeze(_check_range("override", array))
-    return lambda t: fixed
+    return FixedSpeed(_check_range("override", array))
 
 
 def _check_range(name: str, u: ArrayLike) -> Array:

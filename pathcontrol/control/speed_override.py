@@ -23,8 +23,8 @@ class SpeedOverride(LawWrapper):
 
     Args:
         law: any law that is to be overridden.
-        override: u from −2 to 2: a number, one for each rollout (N,), a function of time [s] that returns either, or
-            steps [[t, u], …], (m, 2), with u = 1 before the first.
+        override: u from −2 to 2: a number, one for each rollout (N,), a function of the time since the law took over,
+            in seconds, that returns either, or steps [[t, u], …], (m, 2), with u = 1 before the first.
         acceleration: largest |ẇ| [1/s]: at 2 the full speed is left, or reached from rest, in half a second. The
             acceleration along the path is ẇ‖q_d'ϑ‖ [rad/s²].
 

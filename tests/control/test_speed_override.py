@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -239,6 +241,13 @@ def test_the_operators_buttons_in_a_control_tick(ideal_arm):
         pc.ControlTick(law.inner, 2.5e-3).hold()
 
 
+def test_laws_with_a_speed_input_can_be_sent_to_other_processes(arm):
+    for u in (0.5, [[0.1, 0.0]], np.cos):
+        law = pc.Paced(pc.SpeedOverride(path_laws(arm, pc.Circle(1.0, 9.0))[0], u))
+        there = pickle.loads(pickle.dumps(law))
+        np.testing.assert_array_equal(run(there, duration=0.25).array("q"), run(law, duration=0.25).array("q"))
+
+
 def test_bad_overrides_are_told(arm):
     law = path_laws(arm, pc.Circle(1.0, 2.0))[0]
     for bad in (2.1, -3.0, np.nan, [[0.0, 5.0]], [[1.0, 0.0], [0.5, 1.0]], [[0.0, 1.0, 2.0]], "fast", [0.5, 9.0]):
@@ -251,5 +260,9 @@ def test_bad_overrides_are_told(arm):
             pc.SpeedOverride(law, 1.0, bad)
     with pytest.raises(pc.InputError, match=r"t = 0\.5 s"):
         run(pc.SpeedOverride(law, lambda t: 1.0 if t < 0.5 else 3.0), duration=1.0)
+    with pytest.raises(pc.InputError, match=r"reverse\(\)"):
+        pc.SpeedOverride(law).override(-0.5)
+    with pytest.raises(pc.InputError, match="2 values for 1 rollouts"):
+        run(pc.SpeedOverride(law, lambda t: 1.0 if t < 0.5 else [1.0, 0.5]), duration=1.0)
     with pytest.raises(pc.InputError, match="expected a Controller"):
         pc.SpeedOverride(law.task)

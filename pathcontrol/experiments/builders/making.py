@@ -94,18 +94,20 @@ def arguments_of(
     """
     if isinstance(section, OwnSection):
         return _own_arguments(f"{key}.parameters", target_of(key, section, kind, place), section.parameters, place)
-    target, found = target_of(key, section, kind, place), section.arguments(place.to_radians)
+    found = section.arguments(place.to_radians)
     return {
-        name: make(f"{key}.{name}", value, _kind_of(target, name), place, given)
+        name: make(f"{key}.{name}", value, _kind_of(section, name), place, given)
         if isinstance(value, Section)
         else value
         for name, value in found.items()
     }
 
 
-def _kind_of(target: Callable[..., Any], name: str) -> Kind | None:
-    """Return the kind of object that an argument of a class is, or ``None`` where files name none."""
-    return next(filter(None, map(find_kind, parameters_of(target)[name].types)), None)
+def _kind_of(section: Section, name: str) -> Kind | None:
+    """Return the kind of object that an argument of a section's class is, or ``None`` where files name none."""
+    target = getattr(section, "target", None)  # toolpaths are made of several
+    types = parameters_of(target)[name].types if target is not None else ()
+    return next(filter(None, map(find_kind, types)), None)
 
 
 def _own_arguments(key: str, target: Callable[..., Any], parameters: Mapping[str, Any], place: Place) -> dict[str, Any]:
