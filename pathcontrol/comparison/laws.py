@@ -30,7 +30,7 @@ _SAME = 1e-9  # share of the size of a path up to which two are the same
 Maker = Callable[[RobotModel, PathTask], Controller]
 Law = str | Controller | Maker
 Laws = Law | Iterable[Law] | Mapping[str, Law]
-_NONE: Mapping[str, Maker] = MappingProxyType({})
+_NONE: Mapping[str, Law] = MappingProxyType({})
 
 
 class Gains(NamedTuple):
