@@ -175,8 +175,7 @@ def make_laws(
         made[key] = one
     if not made:
         raise InputError(
-            f"there is no law to compare; expected some of {', '.join(_MAKERS | _WRAPPED)}, or "
-            "laws of your own"
+            f"there is no law to compare; expected some of {', '.join(_MAKERS | _WRAPPED)}, or laws of your own"
         )
     return made
 

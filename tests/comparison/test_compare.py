@@ -242,4 +242,4 @@ def test_paced_laws_stay_on_the_path_that_weak_motors_leave():
     weak = compared("projection", "paced_projection", scenario="weak-motors", rollouts=1)
     assert weak.mean("paced_projection", "contour_peak") < 0.25 * weak.mean("projection", "contour_peak")
     assert weak.mean("paced_projection", "time_lost_s") < 1.2 * weak.mean("projection", "time_lost_s")
-    assert {"paced_projection", "paced_extended_motion_plan"} < set(pc.make_scenario("weak-motors").laws)
+    assert {"paced_projection", "paced_extended_motion_plan"} <= set(pc.make_scenario("weak-motors").laws)
