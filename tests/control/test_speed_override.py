@@ -168,7 +168,7 @@ def test_a_held_plan_stays_whatever_pushes_the_arm(arm, which):
     heavy = arm.with_masses({arm.joint_names[1]: 1.5})
     push = pc.Push([6.0, 0.5], 2.0, 1e9)
     ends = []
-    for hold in (10.0, 100.0):
+    for hold in (5.0, 30.0):
         override = pc.SpeedOverride(law, [[1.0, 0.0], [1.0 + hold, 1.0]])
         held = run(override, duration=3.0 + hold, plant=heavy, disturbance=push)
         s = held.array("s")[0]
