@@ -307,7 +307,8 @@ def test_a_file_a_saved_run_and_a_report_have_it(tmp_path):
     assert saved.config["controller"]["observer_hz"] == 25.0
     page = report({"again": saved}, tmp_path / "report.html").read_text(encoding="utf-8")
     assert "observer_hz=25.0" in page
-    assert "Torques beside those of motors" in page
+    assert "Torques beside those of motors, as the law compensates them" in page
+    assert "Torques beside those of motors and friction" not in page
 
 
 def test_its_cutoff_is_swept_in_one_batch(tmp_path):

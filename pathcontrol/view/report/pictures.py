@@ -70,8 +70,11 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
         yield "Speed along the path", speed_figure(shown)
     if "tau" in recorded:
         yield "Torques", torque_figure(shown)
-    if {"q", "qd", "tau"} <= recorded and _are_pushed(runs):
-        yield "Torques beside those of motors and friction", observer_figure(shown, friction="full")
+    if {"q", "qd", "tau"} <= recorded and all(run.model.has_mass for run in runs.values()):
+        if any(law.get("friction") == "observed" for run in runs.values() for law in laws(run.config)):
+            yield "Torques beside those of motors, as the law compensates them", observer_figure(shown)
+        if any(table(run.config, "disturbance") for run in runs.values()):
+            yield "Torques beside those of motors and friction", observer_figure(shown, friction="full")
     if any(largest_shares(run) for run in runs.values()):
         yield "Shares of limits", limits_figure(shown)
     if "qd" in recorded:
@@ -80,13 +83,6 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
         if isinstance(run.task, ToolpathTask) and "path_index" in run.data.coords:
             of = f" of {name}" if len(runs) > 1 else ""
             yield f"Distance of the tool from the drawing{of}", deviation_figure(run, run.robot, run.task)
-
-
-def _are_pushed(runs: Mapping[str, Run]) -> bool:
-    """Return whether one of the runs is disturbed, or its law observes that, and all models know their masses."""
-    observed = any(law.get("friction") == "observed" for run in runs.values() for law in laws(run.config))
-    pushed = observed or any(table(run.config, "disturbance") for run in runs.values())
-    return pushed and all(run.model.has_mass for run in runs.values())
 
 
 def picture(figure: Figure, caption: str) -> Picture:
