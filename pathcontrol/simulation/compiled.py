@@ -24,6 +24,7 @@ from pathcontrol.engine.structs import (
     Arm,
     Memory,
     Record,
+    Rows,
     Setup,
     Span,
     State,
@@ -82,25 +83,39 @@ class CompiledPlant:
 
     def __init__(self, robot: SimulatedArm, step: float) -> None:
         self.step, self._memory, self._setup = step, Memory(), Setup(joints=robot.n)
+        self._begins: list[Array] = []
         add_plant(self._setup, robot, has_strong_friction(robot), self._memory)
         self._advance = load_library().pathcontrol_advance
 
     def advance(
         self, q: Array, qd: Array, tau: Array, held: NDArray[np.bool_] | None = None, walls: Walls | None = None
     ) -> tuple[Array, Array]:
-        """Return (q, q̇) one step later under the constant torque ``tau``, with ``held`` joints; all (N, n).
+        """Return (q, q̇) one step later under the constant torque ``tau``, with ``held`` joints and ``walls``.
+
+        All arrays are (N, n); of walls, the same at all steps, each has the rollouts for which it is there, (N,).
 
         Raises:
-            EngineError: there are walls, which only the whole loop knows here.
+            EngineError: there are too many walls.
         """
         if walls:
-            raise EngineError("the compiled plant alone knows no walls")
+            self._set_walls(walls)
         q, qd = np.array(q, order="C"), np.array(qd, order="C")
         torque = np.ascontiguousarray(tau)
         still = None if held is None or not held.any() else np.array(np.broadcast_to(held, q.shape), np.float64)
         arrays = [q.ctypes.data, qd.ctypes.data, torque.ctypes.data, None if still is None else still.ctypes.data]
         self._advance(addressof(self._setup), self.step, *arrays, 0, len(q))
         return q, qd
+
+    def _set_walls(self, walls: Walls) -> None:
+        """Set the walls of a step: they begin at time 0 for the rollouts for which they are there, and else never."""
+        if not self._begins:
+            self._begins = [np.empty(len(stands)) for _, stands in walls]
+            structs = [_disturbance_struct(wall, self._setup.joints, self._memory) for wall, _ in walls]
+            for struct, begin in zip(structs, self._begins, strict=True):
+                struct.start, struct.duration = Rows(begin.ctypes.data, 1), self._memory.numbers(np.inf)
+            _add_structs(self._setup, structs, self._memory)
+        for begin, (_, stands) in zip(self._begins, walls, strict=True):
+            begin[...] = np.where(stands, 0.0, np.inf)
 
 
 class CompiledArm:
@@ -325,14 +340,31 @@ def _add_disturbances(setup: Setup, disturbance: Disturbance | None, memory: Mem
         EngineError: one of them is the user's own.
     """
     terms = [term for term in list_terms(disturbance) if type(term) not in _BETWEEN]
-    structs = [_disturbance_struct(term, setup.joints, memory) for term in terms]
-    kinds = {_DISTURBANCES[one.kind] for one in structs}
+    _add_structs(setup, [_disturbance_struct(term, setup.joints, memory) for term in terms], memory)
+
+
+def _add_structs(setup: Setup, structs: Sequence[DisturbanceStruct], memory: Memory) -> None:
+    """Set disturbances as structs.
+
+    Raises:
+        EngineError: there are too many walls.
+    """
+    kinds = [_DISTURBANCES[one.kind] for one in structs]
     setup.disturbances, setup.jams, setup.drops = len(structs), JammedJoint in kinds, TorqueLimitDrop in kinds
-    setup.walls = sum(_DISTURBANCES[one.kind] is Wall for one in structs)
-    if setup.walls > MOST_WALLS:
-        raise EngineError(f"there are {setup.walls} walls, the engine takes {MOST_WALLS} at most")
+    setup.walls = kinds.count(Wall)
+    check_walls(setup.walls)
     if structs:
         setup.disturbance = addressof(memory.keep((DisturbanceStruct * len(structs))(*structs)))
+
+
+def check_walls(count: int) -> None:
+    """Check that there are no more walls than the engine takes.
+
+    Raises:
+        EngineError: there are.
+    """
+    if count > MOST_WALLS:
+        raise EngineError(f"there are {count} walls, the engine takes {MOST_WALLS} at most")
 
 
 def _disturbance_struct(term: Disturbance, n: int, memory: Memory) -> DisturbanceStruct:

@@ -13,7 +13,7 @@ from pathcontrol.engine.library import load_library
 from pathcontrol.errors import EngineError, warn
 from pathcontrol.simulation.arm.disturbance import list_terms
 from pathcontrol.simulation.arm.wall import Wall
-from pathcontrol.simulation.compiled import CompiledArm, CompiledPlant
+from pathcontrol.simulation.compiled import CompiledArm, CompiledPlant, check_walls
 from pathcontrol.simulation.continuous import ContinuousArm
 from pathcontrol.simulation.loops import Arm, ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.sampled import SampledArm
@@ -108,8 +108,7 @@ def _compile(
     try:
         return Choice(CompiledArm(loop, robot, q, qd, outside, controllers), {"engine": "compiled"})
     except EngineError as error:
-        if any(isinstance(term, Wall) for term in list_terms(outside.disturbance)):
-            raise EngineError(f"{error}, and the compiled plant alone knows no walls") from error
+        check_walls(sum(isinstance(term, Wall) for term in list_terms(outside.disturbance)))
         arm = SampledArm(loop, robot, q, qd, outside, CompiledPlant)
         return Choice(arm, {"engine": "compiled", "engine_reason": f"only the plant is compiled: {error}"})
 

@@ -267,13 +267,23 @@ class MyPlan(pc.ExtendedMotionPlan):
     """The same law, which the engine does not know."""
 
 
-def test_a_law_in_python_meets_it_in_the_reference_and_the_run_says_so():
+def test_a_law_in_python_meets_the_same_walls():
     mine = MyPlan(ARM, pc.Circle(1.0, 2.0), 800.0, [45.0, 100.0], 20.0)
-    runs = [simulated(across(1e5, friction=0.2), law, (0.2, 0.3), 0.8) for law in (LAW, mine)]
-    assert "knows no walls" in runs[1].config["engine_reason"]
+    walls = across([1e5, np.inf], friction=[0.2, 0.4], start=[0.0, 0.3]) + across(1e4, x=0.65, duration=0.6)
+    runs = [simulated(walls, law, (0.2, 0.3), 0.8) for law in (LAW, mine)]
+    assert "only the plant" in runs[1].config["engine_reason"]
     assert_allclose(runs[1].array("q"), runs[0].array("q"), rtol=0, atol=1e-9)
-    with pytest.raises(pc.EngineError, match="knows no walls"):
-        simulated(across(1e5), mine, engine="compiled")
+
+
+def test_more_walls_than_the_engine_takes_are_met_in_the_reference_and_the_run_says_so():
+    mine = MyPlan(ARM, pc.Circle(1.0, 2.0), 800.0, [45.0, 100.0], 20.0)
+    walls = sum((across(1e5, x=2.0 + i) for i in range(4)), start=across(1e5))
+    for law in (LAW, mine):
+        run = simulated(walls, law, (0.2, 0.3), 0.05)
+        assert run.config["engine"] == "pinocchio"
+        assert "4 at most" in run.config["engine_reason"]
+        with pytest.raises(pc.EngineError, match="4 at most"):
+            simulated(walls, law, engine="compiled")
 
 
 def test_what_is_likely_a_slip_is_told():

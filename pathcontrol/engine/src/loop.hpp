@@ -265,7 +265,7 @@ static integer run_packs(const Setup &setup, const State &state, const Record &r
 }
 
 // Take (q, q̇) of rollouts begin … end one step on under the torques `tau`, (rollouts, joints) each, for laws in Python; joints
-// with `held` > 0 are held, none where it is null.
+// with `held` > 0 are held, none where it is null. Walls are those of the setup that stand at time 0.
 template <int N, class V, class C>
 static void advance_packs(const Setup &setup, double step, double *q, double *qd, const double *tau, const double *held, integer begin, integer end) {
   const int n = size<N>(setup.joints);
@@ -281,7 +281,9 @@ static void advance_packs(const Setup &setup, double step, double *q, double *qd
     if (held) load(place, held, n, n, flag);
     for (int i = 0; held && i < n; i++) own_held[i] = less(V{}, flag[i]);
     const Arm<C> &arm = copy(place, setup.plant_arms);
-    advance_plant<N>(arm, friction, load_mask<V>(place, setup.damped), step, own_q, own_qd, own_tau, held ? own_held : nullptr, (const Walls<V> *)nullptr);
+    Walls<V> walls;
+    const bool meets = setup.walls && find_walls(setup, place, 0.0, walls);
+    advance_plant<N>(arm, friction, load_mask<V>(place, setup.damped), step, own_q, own_qd, own_tau, held ? own_held : nullptr, meets ? &walls : nullptr);
     store(place, own_q, n, q), store(place, own_qd, n, qd);
   }
 }
