@@ -68,8 +68,7 @@ def broadcast(n: int, arguments: Mapping[str, ArrayLike], joints: Sequence[str] 
         InputError: one of them has another last axis than n, or their batch axes do not fit together.
     """
     arrays = [as_joint_array(name, value, n, joints) for name, value in arguments.items()]
-    first = arrays[0].shape
-    if all(a.shape == first for a in arrays):
+    if len({a.shape for a in arrays}) == 1:
         return arrays
     try:
         shape = np.broadcast_shapes(*(a.shape for a in arrays))

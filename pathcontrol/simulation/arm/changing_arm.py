@@ -28,6 +28,7 @@ class ChangingArm:
         times = np.empty(0) if disturbance is None else as_array("arm_change_times", disturbance.arm_change_times)
         self._times = np.unique(times[np.isfinite(times)])
         self._ticks = np.ceil(self._times / period - 0.5)
+        self._early = int((self._times < 0).sum())
         self._interval, self._arm = 0, robot
 
     @property
@@ -58,8 +59,9 @@ class ChangingArm:
 
     def _find_interval(self, tick: int) -> int:
         """Return the number of changes up to a tick; those before the start have come before tick 0."""
-        early = int((self._times < 0).sum())
-        return max(early, int(np.searchsorted(self._ticks, tick, side="right"))) if self.changes else 0
+        if not self.changes:  # the common case, asked three times a tick
+            return 0
+        return max(self._early, int(np.searchsorted(self._ticks, tick, side="right")))
 
     def next_change(self, tick: int) -> float:
         """Return the first tick after ``tick`` at which the arm may change, inf without one."""
