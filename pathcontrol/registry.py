@@ -54,6 +54,7 @@ LAWS = Kind(
         "slotine_li": "control.motion_control:SlotineLi",
         "speed_override": "control.speed_override:SpeedOverride",
         "paced": "control.paced:Paced",
+        "event_plan": "control.event_plan:EventPlan",
     },
     ("robot", "task"),
 )

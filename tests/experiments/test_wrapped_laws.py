@@ -88,3 +88,33 @@ def test_mistakes_are_told_by_their_keys(tmp_path, change, told):
     path.write_text((FILE + PLAN).replace(*change), encoding="utf-8")
     with pytest.raises(pc.ExperimentError, match=told):
         pc.run_experiment(path, tmp_path / "out", progress=False)
+
+
+EVENTS = """
+duration = 1.0
+robot.source = "cicese_2dof"
+task = { type = "circle", radius = 0.5, speed = 1.0 }
+disturbance = { type = "jammed_joint", joint = 1, start = 0.3, duration = 0.3 }
+[controller]
+type = "event_plan"
+threshold = 8.0
+pause = 0.1
+[controller.law]
+"""
+
+
+def test_an_event_plan_of_a_file_halts_at_a_jam(tmp_path):
+    path = tmp_path / "events.toml"
+    path.write_text(EVENTS + PLAN, encoding="utf-8")
+    run, _, _ = pc.run_experiment(path, tmp_path / "out", progress=False)
+    assert run.config["controller"]["controller"] == "EventPlan(ExtendedMotionPlan)"
+    factor = pc.speed_factor(pc.Run.load(tmp_path / "out" / "run.nc"))[0]
+    assert factor[0] == 1.0
+    assert factor[run.time < 0.6].min() < 0.05
+
+
+def test_a_threshold_that_is_none_is_told_by_its_key(tmp_path):
+    path = tmp_path / "events.toml"
+    path.write_text(EVENTS.replace("threshold = 8.0", "threshold = -8.0") + PLAN, encoding="utf-8")
+    with pytest.raises(pc.ExperimentError, match="threshold"):
+        pc.run_experiment(path, tmp_path / "out", progress=False)
