@@ -102,7 +102,7 @@ class MomentumObserver:
         n = self.robot.n
         if memory.shape[-1] != self.size:
             raise InputError(
-                f"the momentum observer of friction='observed' got {memory.shape[-1]} numbers of memory, expected "
+                f"the momentum observer in the loop got {memory.shape[-1]} numbers of memory, expected "
                 f"{self.size}: start and advance of a law have to begin with what those of Controller return"
             )
         parts = memory[..., : 4 * n].reshape(*memory.shape[:-1], 4, n)

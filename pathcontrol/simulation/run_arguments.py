@@ -209,7 +209,7 @@ def _check_output(controller: Controller, out: Any, q: Array, z: Array) -> None:
         raise InputError(f"{name}.law returns {type(out).__name__}, expected a ControlOutput")
     if controller.observer is not None and out.observation is None:
         raise InputError(
-            f"{name}.law does not compensate what friction='observed' estimates; end it with "
+            f"{name}.law does not compensate what its observer estimates; end it with "
             "return self.compensate(t, q, qd, z, ControlOutput(...))"
         )
     wanted = {"tau": q.shape, "e_p": q.shape, "e_v": q.shape, "zdot": np.shape(z)}
