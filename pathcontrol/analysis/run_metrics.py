@@ -231,7 +231,7 @@ def _measure_errors(run: Run, task: PathTask, counted: Samples, wanted: Collecti
     late, values = counted.of_span(), dict[str, Array]()
 
     def of(*names: str) -> list[Array]:
-        return [late.within(run.array(name)[:, counted.span]) for name in names]
+        return [late.within(run.array(name, counted.span)) for name in names]
 
     signals: dict[str, Callable[[], Array]] = {
         "e_p": lambda: norms(*of("e_p")),

@@ -212,14 +212,17 @@ class Run:
             raise InputError("the run counts no laps: its path is not closed, or it is a sequence of paths")
         return self.array("laps")
 
-    def array(self, name: str) -> Array:
-        """Return one variable as a plain array, (rollout, time, …).
+    def array(self, name: str, span: slice = slice(None)) -> Array:
+        """Return one variable as a plain array, (rollout, time, …), or its samples in a ``span`` of time.
 
         Raises:
             UnknownNameError: the run has no such variable.
         """
-        plain = None if self._samples is None else self._samples.plain(name)
-        return self[name].to_numpy() if plain is None else plain
+        plain = None if self._samples is None else self._samples.plain(name, span)
+        if plain is not None:
+            return plain
+        whole = self[name].to_numpy()
+        return whole if span == slice(None) else whole[:, span]
 
     def unit(self, name: str) -> str:
         """Return the unit of a variable, ``"1"`` where it has none.

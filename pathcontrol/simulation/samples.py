@@ -34,13 +34,15 @@ class Samples(NamedTuple):
     outcome: Mapping[str, Array]
     rollout: NDArray[np.intp]
 
-    def plain(self, name: str) -> Array | None:
-        """Return one of the arrays by its name, or ``None`` if there is none."""
+    def plain(self, name: str, span: slice = slice(None)) -> Array | None:
+        """Return one of the arrays by its name, a variable in a ``span`` of time, or ``None`` if there is none."""
         if name == "joint":
             return np.array(list(self.joints))
         if name in ("time", "rollout"):
             return self.time if name == "time" else self.rollout
-        return self.arrays[name] if name in self.arrays else self.outcome.get(name)
+        if name not in self.arrays:
+            return self.outcome.get(name)
+        return self.arrays.between(name, span) if isinstance(self.arrays, _Cut) else self.arrays[name][:, span]
 
     def excerpt(self, rows: NDArray[np.intp], stop: int, start: int = 0) -> Samples:
         """Return the samples from ``start`` to ``stop`` of some ``rows``, laid out as if these had been alone."""
@@ -89,12 +91,18 @@ class _Cut(Mapping[str, Array]):
 
     def __init__(self, whole: Mapping[str, Array], rows: slice | NDArray[np.intp], moments: slice) -> None:
         self._whole, self._rows, self._moments = whole, rows, moments
-        self._copied: dict[str, Array] = {}
+        self._copied: dict[tuple[str, int, int], Array] = {}
 
     def __getitem__(self, name: str) -> Array:
-        if name not in self._copied:
-            self._copied[name] = copy_vectors(self._whole[name][self._rows, self._moments])
-        return self._copied[name]
+        return self.between(name, slice(None))
+
+    def between(self, name: str, span: slice) -> Array:
+        """Return the samples of a variable in a ``span`` of time: only these are copied."""
+        start, stop, _ = span.indices(len(range(*self._moments.indices(self._whole[name].shape[1]))))
+        if (key := (name, start, stop)) not in self._copied:
+            begin = self._moments.start or 0
+            self._copied[key] = copy_vectors(self._whole[name][self._rows, begin + start : begin + stop])
+        return self._copied[key]
 
     def __contains__(self, name: object) -> bool:
         return name in self._whole
