@@ -158,6 +158,8 @@ def _mapped() -> Iterator[Callable[..., Iterable[Any]]]:
                 "a process that ran an experiment has ended before it was done, as when it is killed or memory runs "
                 "out; free some, or run it with one core, as `taskset 1 pathcontrol reproduce` does on Linux"
             ) from error
+        finally:
+            gc.unfreeze()
 
 
 def _prepare_process() -> None:
