@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from circle_file import CIRCLE_FILE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
@@ -141,19 +142,8 @@ def test_a_sequence_meets_it_where_its_time_is():
 def test_a_file_says_it_with_one_number(tmp_path):
     file = tmp_path / "rough.toml"
     file.write_text(
-        """
-        duration = 0.3
-        [robot]
-        source = "cicese_2dof"
-        [task]
-        type = "circle"
-        radius = 0.5
-        speed = 1.0
-        [controller]
-        type = "extended_motion_plan"
-        K_p = 800.0
-        K_v = [45.0, 100.0]
-        k = 20.0
+        CIRCLE_FILE
+        + """
         [[disturbance]]
         type = "friction_change"
         factor = 3.0

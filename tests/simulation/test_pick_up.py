@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from circle_file import CIRCLE_FILE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
@@ -160,19 +161,8 @@ def test_a_jammed_joint_does_not_move_when_a_flying_mass_is_caught():
 def test_a_file_says_it(tmp_path):
     file = tmp_path / "pick.toml"
     file.write_text(
-        """
-        duration = 0.3
-        [robot]
-        source = "cicese_2dof"
-        [task]
-        type = "circle"
-        radius = 0.5
-        speed = 1.0
-        [controller]
-        type = "extended_motion_plan"
-        K_p = 800.0
-        K_v = [45.0, 100.0]
-        k = 20.0
+        CIRCLE_FILE
+        + """
         [disturbance]
         type = "pick_up"
         mass = "500 g"
