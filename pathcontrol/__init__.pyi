@@ -44,6 +44,7 @@ from .control.speed_override import SpeedOverride as SpeedOverride
 from .control.speed_rule import SpeedRule as SpeedRule
 from .control.wrapper import LawWrapper as LawWrapper
 from .engine.control_tick import ControlTick as ControlTick
+from .errors import ArmError as ArmError
 from .errors import ClusterError as ClusterError
 from .errors import EngineError as EngineError
 from .errors import ExperimentError as ExperimentError
@@ -63,9 +64,13 @@ from .experiments.sweep_runner import run_sweep as run_sweep
 from .experiments.tune_runner import run_tune as run_tune
 from .export.export import export_trajectory as export_trajectory
 from .export.plan import plan_trajectory as plan_trajectory
+from .hardware.arm import Arm as Arm
+from .hardware.arm import Measurement as Measurement
 from .hardware.control_loop import ControlLoop as ControlLoop
 from .hardware.control_loop import Mode as Mode
 from .hardware.control_loop import Status as Status
+from .hardware.drive import DriveRecord as DriveRecord
+from .hardware.drive import drive as drive
 from .hardware.envelope import Envelope as Envelope
 from .profiles.jerk.start_stop import SmoothStartStop as SmoothStartStop
 from .profiles.limited.limited import limited as limited

@@ -116,6 +116,10 @@ class EngineError(PathControlError, RuntimeError):
     """The compiled engine cannot be used, or not for what is asked of it; the message says why and what to do."""
 
 
+class ArmError(PathControlError, RuntimeError):
+    """A real arm cannot be reached, or has stopped by itself; the message says why and what to do."""
+
+
 class StorageError(PathControlError, OSError):
     """A file cannot be written, as on a full disk; the message says which and why.
 

@@ -36,7 +36,8 @@ class Status(NamedTuple):
         mode: ``RUN`` follows the path; ``HOLD`` stays on it; ``DAMP`` brakes all joints, τ = g(q) − Dq̇; ``GRAVITY``
             carries the weight of the arm at its last known posture, τ = g(q).
         reason: why, in a sentence; empty while it runs.
-        faults: how often each kind of fault occurred: ``measurement``, ``deadline``, ``motion``, ``tube``, ``law``.
+        faults: how often each kind of fault occurred: ``measurement``, ``deadline``, ``motion``, ``tube``, ``law``;
+            ``operator`` and ``arm`` where it was held, or stopped by the arm.
         saturated: whether the last torque was limited, by itself or by its rate.
         ticks: number of steps.
         s: path parameter of the plan.
@@ -112,6 +113,11 @@ class ControlLoop:
         """What the loop does, and why."""
         return Status(self._mode, self._reason, dict(self._faults), self._saturated, self._ticks, self._plan.s)
 
+    @property
+    def gravity(self) -> Array:
+        """The torques that carry the arm at its last good measurement, g(q) [N m], (n,)."""
+        return self.law.robot.gravity(self._screen.q)
+
     def step(self, q: Any, qd: Any, t: Any) -> Array:
         """Return the torques [N m], (n,), for measured q [rad] and q̇ [rad/s] at time t [s]; it never raises.
 
@@ -133,6 +139,10 @@ class ControlLoop:
     def hold(self) -> None:
         """Let the plan come to rest on the path and stay there."""
         self._react(Mode.HOLD, "operator", "held by the operator")
+
+    def stop(self, reason: str) -> None:
+        """Carry only the weight of the arm, because it has stopped by itself or cannot be reached, for a ``reason``."""
+        self._react(Mode.GRAVITY, "arm", reason)
 
     def resume(self) -> None:
         """Go on along the path from where the arm is, from rest, after any reaction."""
@@ -163,9 +173,7 @@ class ControlLoop:
         self._faults["measurement"] += 1
         if self._bad > self.envelope.patience:
             self._mode, self._reason = Mode.GRAVITY, fault
-        if self._mode >= Mode.DAMP:
-            return self.law.robot.gravity(self._screen.q)
-        return self._tau
+        return self.gravity if self._mode >= Mode.DAMP else self._tau
 
     def _check_time(self, gap: float) -> None:
         """Count a late step, and hold the plan after a long gap [s]."""
@@ -203,7 +211,7 @@ class ControlLoop:
 
     def _brake(self) -> Array:
         """Return g(q) − Dq̇ at the last good measurement, (n,)."""
-        return self.law.robot.gravity(self._screen.q) - self._damping * self._screen.qd
+        return self.gravity - self._damping * self._screen.qd
 
     def _find_damping(self) -> Array:
         """Return D [N m s/rad], (n,): the torque limit at the velocity limit, or less where that would ring."""

@@ -1,0 +1,134 @@
+"""Driving an arm by a control loop, from the first measurement to the end of the torque control."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pathcontrol._arrays import Array, as_scalar
+from pathcontrol._expect import expect
+from pathcontrol.errors import ArmError
+from pathcontrol.hardware.arm import Arm, Measurement
+from pathcontrol.hardware.control_loop import ControlLoop, Status
+from pathcontrol.hardware.real_time import real_time
+
+_FIRST = 100  # periods in which the first measurement must come
+
+
+@dataclass(frozen=True, eq=False)
+class DriveRecord:
+    """The ticks of a drive, K of them, an array each.
+
+    Attributes:
+        t: time of the measurement [s], from 0, (K,); NaN where none came.
+        q: measured joint positions [rad], (K, n).
+        qd: measured joint velocities [rad/s], (K, n).
+        tau: torques of the loop [N m], with those that carry the weight of the arm, (K, n).
+        s: path parameter of the plan after the tick, (K,).
+        mode: the :class:`Mode` of the loop, (K,).
+        status: that of the loop at the end.
+        stopped: why the arm stopped by itself, a sentence; empty where it did not.
+        real_time: whether the loop had real-time priority.
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    tau: Array
+    s: Array
+    mode: Array
+    status: Status
+    stopped: str
+    real_time: bool
+
+
+def drive(loop: ControlLoop, arm: Arm, duration: float, settle: float = 0.7) -> DriveRecord:
+    """Drive an arm along the path of a loop's law, let the plan come to rest, and return what was measured.
+
+    The loop starts at the first measurement. A measurement that does not come in time is one that is no number to the
+    loop, which bridges it. The torques are those of the loop, without g(q) where the arm carries its own weight. Ctrl-C
+    ends the drive early, in the same way: the plan comes to rest on its path before the torque control ends. Where the
+    arm stops by itself the loop is stopped (:meth:`ControlLoop.stop`), and the record says why.
+
+    Args:
+        loop: the law behind its envelope.
+        arm: a :class:`Franka`, a :class:`UR`, or whatever has the three methods of :class:`Arm`.
+        duration: time along the path [s].
+        settle: time for coming to rest at the end [s].
+
+    Raises:
+        ArmError: the arm gives no measurement to start with.
+        InputError: a time is not positive.
+    """
+    expect("loop", loop, ControlLoop)
+    span = as_scalar("duration", duration, positive=True)
+    rest = as_scalar("settle", settle, least=0.0)
+    try:
+        with real_time() as allowed:
+            driver = _Driver(loop, arm, span + rest)
+            stopped = driver.drive(span, rest)
+    finally:
+        arm.finish()
+    return driver.record(stopped, allowed)
+
+
+class _Driver:
+    """A loop and an arm at work, and the rows of their record, made before the first tick."""
+
+    def __init__(self, loop: ControlLoop, arm: Arm, longest: float) -> None:
+        self._loop, self._arm = loop, arm
+        self._k, self._start, self._elapsed = 0, 0.0, 0.0
+        n = loop.law.robot.n
+        self._none = Measurement(np.full(n, np.nan), np.full(n, np.nan), np.nan)
+        joints = [(name, np.float64, (n,)) for name in ("q", "qd", "tau")]
+        self._rows = np.zeros(self._ticks(longest), [("t", np.float64), *joints, ("s", np.float64), ("mode", np.int8)])
+
+    def drive(self, span: float, rest: float) -> str:
+        """Drive for both times [s], and return why the arm stopped, or ""."""
+        first = self._read_first()
+        self._start = first.t
+        self._loop.start(*first)
+        try:
+            try:
+                self._tick(first)
+                self._follow(span)
+            except KeyboardInterrupt:
+                pass  # the operator ends the drive, and the arm comes to rest
+            self._loop.hold()
+            self._follow(self._elapsed + rest)
+        except ArmError as error:
+            self._loop.stop(str(error))
+            return str(error)
+        return ""
+
+    def record(self, stopped: str, allowed: bool) -> DriveRecord:
+        """Return what was driven."""
+        rows = self._rows[: self._k]
+        arrays = {name: rows[name].copy() for name in ("t", "q", "qd", "tau", "s", "mode")}
+        return DriveRecord(**arrays, status=self._loop.status, stopped=stopped, real_time=allowed)
+
+    def _read_first(self) -> Measurement:
+        """Return the first measurement."""
+        for _ in range(_FIRST):
+            if (measured := self._arm.read()) is not None:
+                return measured
+        raise ArmError(f"no measurement in {_FIRST} reads of the arm; is it connected, switched on and not stopped?")
+
+    def _follow(self, until: float) -> None:
+        """Take ticks up to a time on the clock of the arm [s], or to as many as fill it where that clock stands."""
+        most = min(self._ticks(until), len(self._rows))
+        while self._elapsed < until and self._k < most:
+            self._tick(self._arm.read() or self._none)
+
+    def _tick(self, measured: Measurement) -> None:
+        """Take a tick: step the loop, send its torques, and write the row."""
+        tau = self._loop.step(*measured)
+        self._arm.write(tau - self._loop.gravity if self._arm.carries_weight else tau)
+        status, t = self._loop.status, measured.t - self._start
+        self._rows[self._k] = t, measured.q, measured.qd, tau, status.s, status.mode
+        self._k, self._elapsed = self._k + 1, max(self._elapsed, t)  # a time that is no number changes nothing
+
+    def _ticks(self, time: float) -> int:
+        """Return the number of ticks in a time [s]."""
+        return int(np.ceil(time / self._loop.period - 1e-6)) + 1
