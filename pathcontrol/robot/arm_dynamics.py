@@ -100,7 +100,7 @@ class ArmDynamics:
         """Rotor inertia [kg m²] on the diagonal of M, (n,)."""
         return np.array(self.pinocchio_model.armature)
 
-    @property
+    @cached_property
     def has_mass(self) -> bool:
         """True if the joints move any mass; an arm without mass has kinematics and no dynamics."""
         bodies = list(self.pinocchio_model.inertias)[1:]

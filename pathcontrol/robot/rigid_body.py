@@ -75,7 +75,16 @@ def broadcast(n: int, arguments: Mapping[str, ArrayLike], joints: Sequence[str] 
     except ValueError as error:
         shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(arguments, arrays, strict=True))
         raise InputError(f"the batch axes do not fit together: {shapes}") from error
-    return [np.broadcast_to(a, shape) for a in arrays]
+    return [_repeat(a, shape) for a in arrays]
+
+
+def _repeat(array: Array, shape: tuple[int, ...]) -> Array:
+    """Return an array repeated to a shape; a copy, as a view without strides costs more where it is read."""
+    if array.shape == shape:
+        return array
+    out = np.empty(shape)
+    out[...] = array
+    return out
 
 
 def _aba(*arguments: Any) -> Array:

@@ -7,6 +7,7 @@ friction are taken by the midpoint rule, and a disturbance is held over a step.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,32 +22,48 @@ _TIMES = 65
 _SPEEDS = np.geomspace(1e-4, 10.0, 41)  # rad/s, between which the slope of friction is taken
 
 
-def add_damping(robot: RobotModel, step: float) -> RobotModel:
-    """Return the arm with M̂ = M + hB/2, a lower bound of the inertia in a ``step`` of h [s]."""
-    return robot.with_armature(0.5 * step * np.atleast_2d(viscous_of(robot.friction))[0])
+class DampedArm(NamedTuple):
+    """An arm with M̂ = M + hB/2, a lower bound of the inertia in a step of h.
+
+    Attributes:
+        arm: the arm.
+        added: the diagonal of hB/2 [kg m²], (n,).
+    """
+
+    arm: RobotModel
+    added: Array
+
+    def mass_matrix(self, q: Array) -> Array:
+        """Return M̂ [kg m²] at q (k, n), (k, n, n)."""
+        return self.arm.mass_matrix(q) + np.diag(self.added)
 
 
-def rate_of_arm(arm: RobotModel, q: Array, qd: Array) -> float:
+def add_damping(robot: RobotModel, step: float) -> DampedArm:
+    """Return the arm with the inertia that it has at least in a ``step`` of h [s]."""
+    return DampedArm(robot, np.broadcast_to(0.5 * step * np.atleast_2d(viscous_of(robot.friction))[0], robot.n))
+
+
+def rate_of_arm(damped: DampedArm, q: Array, qd: Array) -> float:
     """Return the fastest mode [1/s] of an arm with M̂ under gravity and Coriolis forces, at the states (k, n).
 
     It is the largest |λ| of δq̈ = −M̂⁻¹ ∂(Cq̇ + g)/∂(q, q̇) (δq, δq̇), by central differences.
     """
-    n = arm.n
+    n = damped.arm.n
     nudges = _NUDGE * np.concatenate([np.eye(2 * n), -np.eye(2 * n)])
-    tau = arm.nonlinear_effects(q, qd)
-    q, qd = q[:, None] + nudges[:, :n], qd[:, None] + nudges[:, n:]
-    qdd = arm.forward_dynamics(q, qd, np.broadcast_to(tau[:, None], q.shape))
-    slope = np.swapaxes(qdd[:, : 2 * n] - qdd[:, 2 * n :], -1, -2) / (2 * _NUDGE)
+    effects = damped.arm.nonlinear_effects(q[:, None] + nudges[:, :n], qd[:, None] + nudges[:, n:])
+    rise = np.swapaxes(effects[:, : 2 * n] - effects[:, 2 * n :], -1, -2) / (2 * _NUDGE)
+    slope = -np.linalg.solve(damped.mass_matrix(q), rise)
     upper = np.broadcast_to(np.eye(n, 2 * n, n), slope.shape)
     return float(np.abs(np.linalg.eigvals(np.concatenate([upper, slope], axis=-2))).max())
 
 
-def rate_of_friction(robot: RobotModel, q: Array) -> tuple[float, int]:
+def rate_of_friction(damped: DampedArm, q: Array) -> tuple[float, int]:
     """Return the fastest acceleration −F'(q̇)/M̂ [1/s] of a joint by falling dry friction (Stribeck), and the joint."""
-    if not levels_vary(robot.friction):
+    friction = damped.arm.friction
+    if not levels_vary(friction):
         return 0.0, 0
-    mobility = np.diagonal(np.linalg.inv(robot.mass_matrix(q)), axis1=-2, axis2=-1).max(0)
-    rates = steepest_fall(robot.friction) * mobility
+    mobility = np.diagonal(np.linalg.inv(damped.mass_matrix(q)), axis1=-2, axis2=-1).max(0)
+    rates = steepest_fall(friction) * mobility
     joint = int(rates.argmax())
     return float(rates[joint]), joint
 
@@ -63,14 +80,14 @@ def steepest_fall(friction: FrictionLaw) -> Array:
 
 
 def rates_of_disturbance(
-    disturbance: Disturbance, robot: RobotModel, q: Array, qd: Array, duration: float
+    disturbance: Disturbance, damped: DampedArm, q: Array, qd: Array, duration: float
 ) -> tuple[float, float]:
     """Return the fastest damping and the fastest oscillation [1/s] that a disturbance gives the arm.
 
     They are the largest |λ| of M̂⁻¹ ∂d/∂q̇, and the square root of that of M̂⁻¹ ∂d/∂q. The torques d are evaluated at
     some times, at velocities and positions beside those of the start, (N, n).
     """
-    inverse = np.linalg.inv(robot.mass_matrix(q))
+    inverse = np.linalg.inv(damped.mass_matrix(q))
     damping = stiffness = 0.0
     for t in _sample_times(disturbance, duration):
         slopes = _slopes(disturbance, t, q, qd)

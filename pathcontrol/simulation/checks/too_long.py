@@ -16,10 +16,15 @@ from pathcontrol.control.wrapper import unwrap
 from pathcontrol.errors import PathControlWarning, warn
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import viscous_of
-from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.checks.extreme_arms import arm_of, find_extreme_arms
-from pathcontrol.simulation.checks.fast_modes import add_damping, rate_of_arm, rate_of_friction, rates_of_disturbance
+from pathcontrol.simulation.checks.fast_modes import (
+    DampedArm,
+    add_damping,
+    rate_of_arm,
+    rate_of_friction,
+    rates_of_disturbance,
+)
 from pathcontrol.simulation.checks.held_gains import linearize_law, longest_period, plan_gain_bound
 from pathcontrol.simulation.loops import MOST_SUBSTEPS, Arm, ContinuousTime, SampledLoop
 from pathcontrol.tasks.batch.task_batch import TaskBatch
@@ -182,20 +187,21 @@ class _TooLong(NamedTuple):
     sentence: str
 
 
-def _check_arm(loop: SampledLoop, arm: RobotModel, q: Array, qd: Array) -> Iterator[_TooLong]:
+def _check_arm(loop: SampledLoop, damped: DampedArm, q: Array, qd: Array) -> Iterator[_TooLong]:
     """Yield the warnings of a step that is too long for the arm itself."""
-    rate = rate_of_arm(arm, q, qd)
+    rate = rate_of_arm(damped, q, qd)
     yield from _check_rate(loop, rate, _OSCILLATION, "the arm under gravity at the speed of the task")
-    rate, joint = rate_of_friction(arm, q)
-    yield from _check_rate(loop, rate, _SLOW, f"the Stribeck friction of {arm.joint_names[joint]}, which falls so fast")
+    rate, joint = rate_of_friction(damped, q)
+    name = damped.arm.joint_names[joint]
+    yield from _check_rate(loop, rate, _SLOW, f"the Stribeck friction of {name}, which falls so fast")
 
 
 def _check_disturbance(
-    disturbance: Disturbance, loop: SampledLoop, arm: RobotModel, q: Array, qd: Array, duration: float
+    disturbance: Disturbance, loop: SampledLoop, damped: DampedArm, q: Array, qd: Array, duration: float
 ) -> Iterator[_TooLong]:
     """Yield the warnings of a step too long for a state-dependent disturbance that is held over it."""
     name = f"the disturbance {type(disturbance).__name__}".replace(" _Sum", "")
-    damping, oscillation = rates_of_disturbance(disturbance, arm, q, qd, duration)
+    damping, oscillation = rates_of_disturbance(disturbance, damped, q, qd, duration)
     yield from _check_rate(loop, damping, _SLOW, f"{name}, which damps the arm but is held over a step and so rings")
     if oscillation * loop.period / loop.substeps > _OSCILLATION:
         yield from _check_rate(loop, oscillation, _SPRING, f"{name}, a spring that is held over a step")
