@@ -7,22 +7,25 @@ import time
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 
-_PATIENCE = 2.0
+_PATIENCE = 2.0  # s
+_BETWEEN = 0.1  # s, between two drawings
 
 
 @contextlib.contextmanager
 def progress_bar(description: str, total: float, enabled: bool = True) -> Iterator[Callable[[float], None]]:
     """Give a function that takes how much of ``total`` is done; the bar appears after two seconds."""
-    began = time.monotonic()
+    due = time.monotonic() + _PATIENCE
     shown = None
 
     def update(done: float) -> None:
-        nonlocal shown
-        if shown is None and enabled and time.monotonic() - began > _PATIENCE:
+        nonlocal shown, due
+        if not enabled or time.monotonic() < due:
+            return
+        if shown is None:
             shown = _start()
             shown.add_task(description, total=total)
-        if shown is not None:
-            shown.update(shown.task_ids[0], completed=done)
+        shown.update(shown.task_ids[0], completed=done, refresh=True)
+        due = time.monotonic() + _BETWEEN
 
     try:
         yield update
@@ -32,13 +35,15 @@ def progress_bar(description: str, total: float, enabled: bool = True) -> Iterat
 
 
 def _start():  # type: ignore[no-untyped-def]
-    """Start a progress bar of rich."""
+    """Start a progress bar of rich, without its thread, which a process forked meanwhile would lose."""
     from rich.console import Console
     from rich.progress import Progress
 
     console = Console(stderr=True)
     # in a notebook without ipywidgets rich warns, and cannot draw a bar
     missing = console.is_jupyter and find_spec("ipywidgets") is None
-    bar = Progress(console=Console(force_jupyter=False, quiet=True) if missing else console, transient=True)
+    if missing:
+        console = Console(force_jupyter=False, quiet=True)
+    bar = Progress(console=console, transient=True, auto_refresh=False)
     bar.start()
     return bar
