@@ -109,7 +109,7 @@ def reproduce(out: str | Path) -> dict[str, Any]:
         What ``summary.json`` holds.
     """
     out, began = refuse_suffix(out, "a folder"), time.perf_counter()
-    with progress_bar("reproducing", 2 * len(PAPER)) as update:
+    with _without_collection(), progress_bar("reproducing", 2 * len(PAPER)) as update:
         with _mapped() as apply:
             simulated = apply(_simulate_one, PAPER)
             load_writers()
@@ -130,6 +130,18 @@ def load_writers() -> None:
         sys.modules["PIL.Image"].preinit()
 
 
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Collect no garbage inside: what is loaded stays, and a round would copy all pages into each process."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
+
+
 def _collect(results: Iterable[T], update: Callable[[int], None]) -> dict[str, T]:
     """Return the results by the names of the experiments, as they come."""
     found = {}
@@ -145,7 +157,6 @@ def _mapped() -> Iterator[Callable[..., Iterable[Any]]]:
     if threading.active_count() > 1 or len(os.sched_getaffinity(0)) < len(PAPER):
         yield map
         return
-    gc.freeze()  # or its next round would copy all pages into each process
     with ProcessPoolExecutor(len(PAPER), get_context("fork"), _prepare_process) as pool:
         try:
             yield pool.map
@@ -158,16 +169,13 @@ def _mapped() -> Iterator[Callable[..., Iterable[Any]]]:
                 "a process that ran an experiment has ended before it was done, as when it is killed or memory runs "
                 "out; free some, or run it with one core, as `taskset 1 pathcontrol reproduce` does on Linux"
             ) from error
-        finally:
-            gc.unfreeze()
 
 
 def _prepare_process() -> None:
-    """Have this process leave at once at Ctrl-C and when it is terminated, and collect no garbage until then.
+    """Have this process leave at once at Ctrl-C and when it is terminated.
 
     An exception, which Python raises else, is lost and printed where it comes while an object is cleared away.
     """
-    gc.disable()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _leave)
 
