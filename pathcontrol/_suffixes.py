@@ -14,6 +14,7 @@ _VIDEO = "save_video(record(run), 'name.mp4') writes a video"
 #: what writes the formats that people ask for
 _WRITERS = {
     ".nc": "run.save(path) writes netCDF",
+    ".mcap": "run.save(path) writes MCAP",
     **dict.fromkeys((".html", ".htm"), _PAGE),
     **dict.fromkeys((".svg", ".png", ".pdf"), _FIGURE),
     **dict.fromkeys((".jpg", ".jpeg", ".gif", ".webp", ".tif", ".tiff", ".bmp", ".eps", ".ps"), _FIGURE),

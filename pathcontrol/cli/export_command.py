@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command("export")
-@click.argument("file", type=click.Path(path_type=Path), metavar="RUN.nc|FILE.toml")
+@click.argument("file", type=click.Path(path_type=Path), metavar="RUN|FILE.toml")
 @click.option(
     "--format",
     "name",

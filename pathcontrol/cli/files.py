@@ -24,7 +24,7 @@ _COMMANDS = {
 }
 #: what to do where there is no such file
 _ABSENT = {"an experiment": "; `pathcontrol run --example` prints one to start from"}
-_HDF5 = b"\x89HDF\r\n\x1a\n"
+_RUNS = b"\x89HDF\r\n\x1a\n", b"\x89MCAP0\r\n"  # how netCDF and MCAP begin
 _GCODE = re.compile(rb"^[ \t]*(?:[%(;]|[GMNT][0-9])", re.MULTILINE | re.IGNORECASE)
 _BEGINNING = 4096
 
@@ -53,7 +53,7 @@ def recognise_file(path: Path) -> str:
         return kinds.get(suffix, "")
     with path.open("rb") as stream:
         beginning = stream.read(_BEGINNING)
-    if beginning.startswith(_HDF5):
+    if beginning.startswith(_RUNS):
         return "a saved run"
     if suffix == ".nc":  # a run, or G-code
         return "a toolpath" if _GCODE.search(beginning) and b"\0" not in beginning else ""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command("identify")
-@click.argument("run", type=click.Path(path_type=Path), metavar="RUN.nc")
+@click.argument("run", type=click.Path(path_type=Path), metavar="RUN")
 @click.option(
     "--form",
     type=click.Choice(["viscous", "coulomb", "stribeck"]),

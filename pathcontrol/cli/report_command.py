@@ -39,8 +39,8 @@ def command(
 ) -> None:
     """Write a report on saved runs: one HTML page.
 
-    A RUN is a file that Run.save or `pathcontrol run` has written (.nc), or the folder of one. Several are compared.
-    Of the folder of a sweep, its numbers and figures, and the histories that it has kept, the worst first.
+    A RUN is a file that Run.save or `pathcontrol run` has written (.nc, .mcap), or the folder of one. Several are
+    compared. Of the folder of a sweep, its numbers and figures, and the histories that it has kept, the worst first.
     The page has the animation, the metrics, the figures, the whole configuration and how to make the runs again; it
     needs no network, so that it can be kept and sent.
     """

@@ -115,7 +115,7 @@ def run_file(path: Path) -> Path:
     """
     if not path.is_dir():
         return path
-    found = [path / _DEFAULT] if (path / _DEFAULT).is_file() else sorted(path.glob("*.nc"))
+    found = [path / _DEFAULT] if (path / _DEFAULT).is_file() else sorted([*path.glob("*.nc"), *path.glob("*.mcap")])
     if not found:
         raise InputError(f"the folder {str(path)!r} holds no run; expected a file run.nc, as `pathcontrol run` writes")
     if len(found) > 1:

@@ -67,11 +67,11 @@ def command(
     """Write the animation of saved runs, or of a robot: one HTML page.
 
     The page plays in any browser and needs no network. A RUN is a file that Run.save or `pathcontrol run` has written
-    (.nc), or the folder of one. Several move side by side. Of the folder of a sweep the histories that it has kept are
-    shown, the worst first, as histories.html there. A URDF file, or the name of a known robot, is shown with its joints
-    moving in turn; --package-dir says where its meshes are. With --mp4 a video is written, which needs the extra
-    `video` and a Chromium, Chrome or Edge on this machine; the page is then written only if --out or --open asks for
-    it.
+    (.nc, .mcap), or the folder of one. Several move side by side. Of the folder of a sweep the histories that it
+    has kept are shown, the worst first, as histories.html there. A URDF file, or the name of a known robot, is
+    shown with its joints moving in turn; --package-dir says where its meshes are. With --mp4 a video is written,
+    which needs the extra `video` and a Chromium, Chrome or Edge on this machine; the page is then written only if
+    --out or --open asks for it.
     """
     check_runs(runs, robots=True)
     import_all()

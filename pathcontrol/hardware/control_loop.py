@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from enum import IntEnum
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,9 @@ from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
 from pathcontrol.hardware.envelope import Envelope
 from pathcontrol.hardware.held_plan import HeldPlan
+from pathcontrol.hardware.loop_log import LoopLog
 from pathcontrol.hardware.measurements import Screen
+from pathcontrol.hardware.sample_ring import SampleRing
 
 _FAR = 2.0  # tubes from the path, from which holding on it is no help
 
@@ -84,6 +87,7 @@ class ControlLoop:
         self.envelope = (Envelope() if envelope is None else envelope).complete(law.robot)
         self._plan = HeldPlan(law, self.period)
         self._damping = self._find_damping()
+        self._ring: SampleRing | None = None
         n = law.robot.n
         posture = law.task.q_d(np.array(law.task.s0, dtype=np.float64))
         self.start(np.asarray(posture, dtype=np.float64).reshape(n))
@@ -124,6 +128,7 @@ class ControlLoop:
         The array is a new one each time.
         """
         self._ticks += 1
+        plan = (0.0, 1.0) if self._ring is None else (self._plan.s, self._plan.factor)
         try:
             wanted = self._decide(q, qd, t)
         except Exception as error:  # whatever a law of one's own raises, the arm must not fall
@@ -132,7 +137,26 @@ class ControlLoop:
         limited = self.envelope.clip(wanted, self._tau, self.period)
         self._saturated = bool((limited != wanted).any())
         self._tau = limited
+        if self._ring is not None:
+            t = self._screen.t + self._bad * self.period
+            self._ring.put(t, *plan, self._mode, self._screen.q, self._screen.qd, wanted, limited)
         return limited.copy()
+
+    def record(self, path: str | Path | None = None) -> LoopLog:
+        """Return a log of all steps from now on, as an MCAP file ``NAME.mcap`` or in memory.
+
+        >>> with loop.record("arm.mcap") as log:
+        ...     drive(loop)
+        >>> run = log.run()
+
+        Raises:
+            InputError: the name does not end with ``.mcap``.
+            MissingExtraError: a file is to be written, and the extra ``mcap`` is not installed.
+            StorageError: the file cannot be written.
+        """
+        log = LoopLog(self.law, self.period, path)
+        self._ring = log.ring
+        return log
 
     # --- the operator ---------------------------------------------------------------------------------------
 

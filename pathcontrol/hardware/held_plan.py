@@ -34,6 +34,11 @@ class HeldPlan:
         """The path parameter of the plan."""
         return self._tick.s
 
+    @property
+    def factor(self) -> float:
+        """The factor of its speed at which the plan goes."""
+        return 1.0 if self._tick is self._free else float(self._wrapper.split(self._held.state)[-1][0])
+
     def start(self, q: Array, qd: Array) -> None:
         """Start with an arm at (q, q̇), (n,), at full speed."""
         self._held.resume()

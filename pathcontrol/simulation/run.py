@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol._suffixes import check_suffix
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.config import laws, table
 from pathcontrol.simulation.context import RunContext, StoredContext, check_sequence
 from pathcontrol.simulation.samples import Samples, complete_outcome, label_outcome
+from pathcontrol.simulation.storage.run_file import read_file, write_file
 from pathcontrol.simulation.trajectory import Trajectory, interpolate_motion
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 from pathcontrol.tasks.task import PathTask
@@ -323,33 +323,50 @@ class Run:
         return Trajectory(*interpolate_motion(self.time[:stop], q, qd, rate), self.joints, units)
 
     def save(self, path: str | Path) -> Path:
-        """Write netCDF, whole or not at all; :meth:`load` reads it back, :attr:`robot` and :attr:`task` included.
+        """Write netCDF or MCAP, whole or not at all; :meth:`load` reads it back.
 
         The robot is kept as its URDF and what was done to it, without the files of its meshes; the path as what it is
         made of where it is one of the library's, else as samples, see :class:`RecordedPath`. The file has checksums,
-        which :meth:`load` checks.
+        which :meth:`load` checks. MCAP, a message of JSON for each sample, is what PlotJuggler and Foxglove show.
 
         Raises:
-            InputError: the name does not end with ``.nc``; the message names what writes other formats.
+            InputError: the name ends with neither ``.nc`` nor ``.mcap``; the message names what writes other formats.
             StorageError: the file cannot be written, as on a full disk; what was there before stays.
+            MissingExtraError: the name ends with ``.mcap``, and the extra ``mcap`` is not installed.
         """
-        from pathcontrol.simulation.storage.netcdf import write_run  # loads HDF5
-
-        path = check_suffix(path, "a run", ".nc")
-        write_run(path, self._held, self.config, self._stored())
-        return path
+        return write_file(path, self._held, self.config, self._stored())
 
     @classmethod
     def load(cls, path: str | Path) -> Run:
         """Read what :meth:`save` wrote; of a file without a checksum, from an earlier version, a warning says so.
 
+        A log in MCAP whose writer was killed is read as far as it goes, and a warning says how far.
+
         Raises:
             InputError: there is no such file, it is damaged, or it is not a saved run.
+            MissingExtraError: it is MCAP, and the extra ``mcap`` is not installed.
         """
-        from pathcontrol.simulation.storage.netcdf import read_run  # loads xarray and HDF5
-
-        data, config, stored = read_run(Path(path))
+        data, config, stored = read_file(path)
         return cls(data, config, None if stored is None else RunContext.load(stored))
+
+    @classmethod
+    def from_log(
+        cls,
+        times: ArrayLike,
+        q: ArrayLike,
+        qd: ArrayLike | None = None,
+        tau: ArrayLike | None = None,
+        robot: RobotModel | None = None,
+        task: PathTask | None = None,
+    ) -> Run:
+        """Make a run of the log of any arm: times [s], (k,), and q [rad], q̇ [rad/s] and τ [N m], (k, n) each.
+
+        Times may be irregular. What a log lacks is derived or NaN, and what looks like a slip of units is told by a
+        warning: see :func:`~pathcontrol.simulation.log_arrays.make_log_run`, which raises InputError and TaskError.
+        """
+        from pathcontrol.simulation.log_arrays import make_log_run
+
+        return cls(*make_log_run(times, q, qd, tau, robot, task))
 
     @property
     def _held(self) -> xr.Dataset | Samples:

@@ -250,8 +250,13 @@ def make_config(
         "loop": summarize(loop.describe()),
         **({} if disturbance is None else {"disturbance": summarize(disturbance.describe())}),
         **settings,
-        "versions": dict(_versions()),
+        "versions": name_versions(),
     }
+
+
+def name_versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that results depend on, for the configuration of a run."""
+    return dict(_versions())
 
 
 @cache

@@ -8,6 +8,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import warn
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import levels_of
+from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance, list_terms
 from pathcontrol.simulation.arm.friction_change import FrictionChange
 from pathcontrol.simulation.arm.wall import Wall
@@ -75,6 +76,18 @@ def warn_of_walls(disturbance: Disturbance | None, q: Array, first: int = 0) -> 
             warn(f"the frame {term.frame!r}{whose} starts {-gap[row]:.3g} m beyond its wall, which will push it out")
         elif (away := float(np.abs(gap).min())) > _AWAY:
             warn(f"the wall is {away:.3g} m from the frame {term.frame!r} at the start; points are in metres")
+
+
+def describe_range(robot: RobotModel | None, q: Array) -> str:
+    """Return the sentence about the worst joint of a log (k, n) outside its limits, or many turns away, or ""."""
+    if robot is None:
+        turned = float(np.abs(q).max())
+        return f"the log has a joint at {turned:.4g} rad{_DEGREES}" if turned > _TURNS else ""
+    beyond = _excess(robot, q)
+    sample, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
+    if beyond[sample, joint] > 0:
+        return _describe_excess("the log has", robot, 0, int(joint), q[sample], "")
+    return _describe_turns("the log has", robot, q[:, None])
 
 
 def _check_start(robot: Arm, q: Array) -> str:

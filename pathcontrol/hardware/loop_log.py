@@ -1,0 +1,257 @@
+"""The log of a control loop: a thread empties the ring buffer into a file, or keeps the samples in memory."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol._files import writing
+from pathcontrol._suffixes import check_suffix
+from pathcontrol.control.base import Controller
+from pathcontrol.control.wrapper import unwrap
+from pathcontrol.errors import InputError, StorageError, warn
+from pathcontrol.hardware.sample_ring import Moments, SampleRing
+from pathcontrol.simulation.context import RunContext
+from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.run_arguments import map_position_units, name_versions
+from pathcontrol.simulation.samples import Labelled, Samples, complete_outcome, label_outcome
+from pathcontrol.simulation.storage.mcap_messages import Variable
+from pathcontrol.simulation.storage.mcap_records import load_mcap
+from pathcontrol.simulation.storage.mcap_run import McapRunWriter
+from pathcontrol.simulation.summaries import summarize
+
+_DRAIN = 0.05  # s between two looks at the ring
+_FLUSH = 0.25  # s after which what was written is handed to the operating system
+_PIECE = 4  # samples put into words at a time: the loop waits no longer for Python's lock
+_PAUSE = 2e-5  # s in which the loop can take the lock
+_SECONDS = 5.0  # of samples for which there is room
+_MODE = {"units": "1", "long_name": "what the loop did: 0 follow the path, 1 hold, 2 damp, 3 carry the weight"}
+_DIMS = ("rollout", "time", "joint")
+
+
+class LoopLog:
+    """The log of a control loop, written while it runs; :meth:`ControlLoop.record` makes it.
+
+    The loop puts a sample of each step into a ring buffer, which takes a few microseconds and never blocks; a thread
+    empties the buffer every 50 ms into an MCAP file, or into memory. The operating system has all samples after 0.3 s:
+    no more is lost if the process is killed, and :meth:`Run.load` reads a file without its end.
+
+    The variables are those of a run, and ``mode``. Of a step with a bad measurement the last good one is kept. ``sdot``
+    is the change of s from one step to the next over that of time, e_p = q_d(s) − q and e_v = wq_d'(s)ϑ(s) − q̇ with the
+    factor w of the speed.
+
+    Args:
+        law: the law of the loop.
+        period: its period [s].
+        path: the file to write, ``NAME.mcap``; None keeps the samples in memory.
+
+    Attributes:
+        ring: the buffer that the loop fills.
+
+    Raises:
+        InputError: the name does not end with ``.mcap``.
+        MissingExtraError: a file is to be written, and the extra ``mcap`` is not installed.
+        StorageError: the file cannot be written.
+    """
+
+    def __init__(self, law: Controller, period: float, path: str | Path | None = None) -> None:
+        self._law, self._period, self._path = (
+            law,
+            period,
+            None if path is None else check_suffix(path, "a log", ".mcap"),
+        )
+        self.ring = SampleRing(law.robot.n, max(16, round(_SECONDS / period)))
+        self._first: float | None = None
+        self._last: Moments | None = None  # the sample that waits for the one after it
+        self._sdot = np.zeros(1)
+        self._error: Exception | None = None
+        self._kept: list[dict[str, Array]] = []
+        if self._path is not None:
+            load_mcap()
+            with writing(self._path):
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+                self._stream = self._path.open("wb")
+        self._writer: McapRunWriter | None = None
+        self._flushed, self._stop = time.monotonic(), threading.Event()
+        self._thread = threading.Thread(target=self._drain_often, name="pathcontrol log", daemon=True)
+        self._thread.start()
+
+    @property
+    def lost(self) -> int:
+        """The number of samples that are not in the log, as there was no room for them."""
+        return self.ring.lost
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Write what is left and the end of the file; the loop goes on without a log.
+
+        Raises:
+            StorageError: the file could not be written, as on a full disk.
+        """
+        if self._stop.is_set():
+            return
+        self.ring.closed = True
+        self._stop.set()
+        self._thread.join()
+        self._drain()
+        if self._last is not None:
+            self._keep(self._last, self._sdot)
+        if self._path is not None:
+            self._end_file()
+        if self._error is not None:
+            raise StorageError(f"the log {str(self._path)!r} is not whole: {self._error}") from self._error
+        if self.lost:
+            warn(f"{self.lost} samples are not in the log: the thread that keeps it had no time for them")
+
+    def run(self) -> Run:
+        """Close the log, and return it as a run.
+
+        Raises:
+            InputError: the loop has taken no step.
+        """
+        self.close()
+        if self._path is not None:
+            return Run.load(self._path)
+        if not self._kept:
+            raise InputError("the log is empty: the loop has taken no step")
+        import xarray as xr  # it takes a third of a second to load
+
+        arrays = {name: np.concatenate([part[name] for part in self._kept])[None] for name in self._kept[0]}
+        moment = arrays.pop("time")[0]
+        mode: Labelled = (_DIMS[:2], arrays.pop("mode"), _MODE)
+        outcome = complete_outcome(1, {})
+        variables, axes = Samples(moment, self._joints, arrays, outcome, np.arange(1)).label_all()
+        return Run(xr.Dataset(variables | {"mode": mode}, axes), self._config(), self._context)
+
+    # --- the thread -----------------------------------------------------------------------------------------
+
+    def _drain_often(self) -> None:
+        """Empty the ring until the log is closed."""
+        while not self._stop.wait(_DRAIN):
+            self._drain()
+
+    def _drain(self) -> None:
+        """Empty the ring; an error of the file is kept for :meth:`close`."""
+        found = self.ring.take()
+        if not len(found["time"]) or self._error is not None:
+            return
+        try:
+            self._add(found)
+        except Exception as error:  # a full disk must not end the thread, and never the loop
+            self._error = error
+
+    def _add(self, found: Moments) -> None:
+        """Add samples to the log; the last one waits for that after it, which gives its ṡ."""
+        if self._last is not None:
+            found = Moments({name: np.concatenate([self._last[name], found[name]]) for name in found})
+        found = _only_later(found)
+        step = np.diff(found["time"])
+        if len(step):
+            rate = np.diff(found["s"]) / step
+            self._keep(Moments({name: array[:-1] for name, array in found.items()}), rate)
+            self._sdot = rate[-1:]
+        self._last = Moments({name: array[-1:] for name, array in found.items()})
+
+    def _keep(self, found: Moments, sdot: Array) -> None:
+        """Keep whole samples."""
+        self._first = float(found["time"][0]) if self._first is None else self._first
+        arrays = self._complete(found, sdot)
+        if self._path is None:
+            self._kept.append(arrays)
+            return
+        if self._writer is None:
+            self._writer = self._begin_file(arrays)
+        moment = arrays.pop("time")
+        for at in range(0, len(moment), _PIECE):
+            span = slice(at, at + _PIECE)
+            self._writer.write(moment[span], {name: array[None, span] for name, array in arrays.items()})
+            time.sleep(_PAUSE)
+        if time.monotonic() - self._flushed > _FLUSH:
+            self._writer.flush()
+            self._flushed = time.monotonic()
+
+    def _complete(self, found: Moments, sdot: Array) -> dict[str, Array]:
+        """Return all variables of samples, with times from that of the first one on."""
+        point = unwrap(self._law).at_speed(found["factor"]).point(found["s"])
+        q, qd = found["q"], found["qd"]
+        return {
+            "time": found["time"] - self._first,
+            "q": q,
+            "qd": qd,
+            "q_measured": q,
+            "qd_measured": qd,
+            "tau_demand": found["tau_demand"],
+            "tau": found["tau"],
+            "s": found["s"],
+            "sdot": sdot,
+            "e_p": point.q_d - q,
+            "e_v": point.velocity - qd,
+            "regular": np.ones(len(q), dtype=bool),
+            "mode": found["mode"].astype(np.int8),
+        }
+
+    # --- the file -------------------------------------------------------------------------------------------
+
+    def _begin_file(self, arrays: dict[str, Array]) -> McapRunWriter:
+        """Return the writer of the file, with all in it that is known before the first sample."""
+        several = {name: array[None] for name, array in arrays.items() if name not in ("time", "mode")}
+        labels, _ = Samples(arrays["time"], self._joints, several, {}, np.arange(1)).label_all()
+        labels["mode"] = (_DIMS[:2], arrays["mode"][None], _MODE)
+        variables = [Variable(name, dims == _DIMS, x.dtype.str, about) for name, (dims, x, about) in labels.items()]
+        axes = {
+            "rollout": [0],
+            "joint": list(self._joints),
+            "axes": {"rollout": {}, "time": {"units": "s"}, "joint": {}},
+        }
+        stored = self._context.stored(float(arrays["s"][0]) + 1.0)  # what is known so far of an endless path
+        return McapRunWriter(self._stream, variables, axes, self._config(), stored, begin=time.time_ns())
+
+    def _end_file(self) -> None:
+        """Write the end of the file."""
+        try:
+            with self._stream:
+                if self._writer is not None and self._error is None:
+                    outcome = label_outcome(complete_outcome(1, {}))
+                    upto = float(self._last["s"][0]) if self._last is not None else 0.0
+                    self._writer.attach_context(self._config(), self._context.stored(upto))
+                    self._writer.finish(outcome, list(outcome))
+        except OSError as error:
+            self._error = error
+
+    @property
+    def _context(self) -> RunContext:
+        """The arm and the task."""
+        return RunContext.of(self._law.robot, self._law.task, model=self._law.robot)
+
+    @property
+    def _joints(self) -> dict[str, str]:
+        """The units of the joints by their names."""
+        return map_position_units(self._law.robot)
+
+    def _config(self) -> dict[str, Any]:
+        """Return the configuration, as far as it is known."""
+        law = {name: value if name == "task" else summarize(value) for name, value in self._law.describe().items()}
+        return {
+            "controller": law,
+            "plant": {"robot": self._law.robot.name},
+            "loop": {"loop": "hardware", "period": self._period, "begin": self._first, "lost": self.lost},
+            "versions": name_versions(),
+        }
+
+
+def _only_later(found: Moments) -> Moments:
+    """Return the samples that are later than all before them: a clock may have been set back."""
+    before = np.maximum.accumulate(np.concatenate([[-np.inf], found["time"][:-1]]))
+    later = found["time"] > before
+    return found if later.all() else Moments({name: array[later] for name, array in found.items()})
