@@ -202,5 +202,6 @@ def test_every_writer_writes_whole_files():
             name = ast.unparse(call.func)
             writes = name.endswith((".write_text", ".write_bytes"))
             writes |= name.endswith("open") and any(ast.unparse(a) in ("'w'", "'wb'", "'a'") for a in call.args)
-            if writes and file.name != "shipping.py":  # on a worker's own scratch disk
+            # on a worker's own scratch disk, and a log that is written while its loop runs and read without its end
+            if writes and file.name not in ("shipping.py", "loop_log.py"):
                 assert name.startswith("temporary."), f"{file}: line {call.lineno}: {name}"

@@ -7,7 +7,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import warn
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.checks.slips import describe_range
+from pathcontrol.simulation.checks.position_range import describe_range
 
 _SLOWEST = 0.5  # s between samples from which times are probably no seconds
 _GAP = 5.0  # median steps from which a gap is told

@@ -8,17 +8,15 @@ from pathcontrol._arrays import Array
 from pathcontrol.errors import warn
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import levels_of
-from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance, list_terms
 from pathcontrol.simulation.arm.friction_change import FrictionChange
 from pathcontrol.simulation.arm.wall import Wall
+from pathcontrol.simulation.checks.position_range import describe_turns, find_excess
 from pathcontrol.simulation.checks.weight import PathPostures, check_weight
 from pathcontrol.simulation.loops import Arm
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.task import PathTask
 
-_TURNS = 4 * np.pi  # rad, beyond which the start of a joint without limits is unlikely
-_FAR = 10.0  # rad, beyond which an angle outside its limits is probably in degrees
 _AWAY = 10.0  # m, beyond which a point of a wall is probably in millimetres
 _MOVED, _LONG = 1e-9, 0.25  # rad, s: an arm is still if it moves by less in a longer time
 
@@ -78,25 +76,13 @@ def warn_of_walls(disturbance: Disturbance | None, q: Array, first: int = 0) -> 
             warn(f"the wall is {away:.3g} m from the frame {term.frame!r} at the start; points are in metres")
 
 
-def describe_range(robot: RobotModel | None, q: Array) -> str:
-    """Return the sentence about the worst joint of a log (k, n) outside its limits, or many turns away, or ""."""
-    if robot is None:
-        turned = float(np.abs(q).max())
-        return f"the log has a joint at {turned:.4g} rad{_DEGREES}" if turned > _TURNS else ""
-    beyond = _excess(robot, q)
-    sample, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
-    if beyond[sample, joint] > 0:
-        return _describe_excess("the log has", robot, 0, int(joint), q[sample], "")
-    return _describe_turns("the log has", robot, q[:, None])
-
-
 def _check_start(robot: Arm, q: Array) -> str:
     """Return the sentence about the worst joint at the start, or an empty text."""
-    beyond = _excess(robot, q)
+    beyond = find_excess(robot, q)
     row, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
     if beyond[row, joint] > 0:
-        return _describe_excess("the start has", robot, int(row), int(joint), q[min(int(row), len(q) - 1)], "")
-    return _describe_turns("the start has", robot, q[None])
+        return describeexcess("the start has", robot, int(row), int(joint), q[min(int(row), len(q) - 1)], "")
+    return describe_turns("the start has", robot, q[None])
 
 
 def _check_path(robot: Arm, along: PathPostures, ends: bool) -> str:
@@ -104,58 +90,16 @@ def _check_path(robot: Arm, along: PathPostures, ends: bool) -> str:
 
     One that goes on for ever may turn a joint as often as it likes.
     """
-    beyond = _excess(robot, along.q)
+    beyond = find_excess(robot, along.q)
     sample, row, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
     if beyond[sample, row, joint] <= 0:
-        return _describe_turns("the path goes to", robot, along.q if ends else along.q[:1])
+        return describe_turns("the path goes to", robot, along.q if ends else along.q[:1])
     path = min(int(row), along.q.shape[1] - 1)
     of = f" of rollout {row}" if beyond.shape[1] > 1 else ""
     where = f" at s = {along.s[sample, path]:.4g}"
-    return _describe_excess(f"the path{of} has", robot, int(row), int(joint), along.q[sample, path], where)
-
-
-def _describe_turns(begin: str, robot: Arm, q: Array) -> str:
-    """Return the sentence about a joint that is many turns away in postures (samples, N, n), or an empty text."""
-    turns = np.where(np.array(robot.position_units) == "rad", np.abs(q), 0.0)
-    place = np.unravel_index(int(turns.argmax()), turns.shape)
-    if turns[place] <= _TURNS:
-        return ""
-    name, value = robot.joint_names[int(place[-1])], q[place]
-    return f"{begin} {name} at {value:.4g} rad, which is {abs(value) / 2 / np.pi:.3g} turns{_DEGREES}"
+    return describeexcess(f"the path{of} has", robot, int(row), int(joint), along.q[sample, path], where)
 
 
 def _is_bounded(task: PathTask) -> bool:
     """Return whether a path, or each of a batch, ends or repeats."""
     return bool(np.all(task.closed | np.isfinite(task.s_end)))
-
-
-_DEGREES = "; did you mean degrees? Then give np.deg2rad(…), or '… deg' in a file"
-
-
-def _describe_excess(begin: str, robot: Arm, row: int, joint: int, q: Array, where: str) -> str:
-    """Return the sentence about a position outside its limits."""
-    lower, upper = ((ends if ends.ndim == 1 else ends[row])[joint] for ends in _range(robot))
-    unit = robot.position_units[joint]
-    return (
-        f"{begin} {robot.joint_names[joint]} at {q[joint]:.4g} {unit}{where}, outside its limits of {lower:.4g} to "
-        f"{upper:.4g} {unit}{_DEGREES if _is_in_degrees(robot, q) else ''}"
-    )
-
-
-def _range(robot: Arm) -> tuple[Array, Array]:
-    """Return the lower and the upper limits of the joints [rad], (n,), or (N, n) for arms that differ."""
-    return robot.limits.lower, robot.limits.upper
-
-
-def _excess(robot: Arm, q: Array) -> Array:
-    """Return the distance of positions (*batch, N, n) outside their limits [rad]; ≤ 0 inside, or without limits."""
-    lower, upper = _range(robot)
-    limited = lower < upper
-    return np.where(limited, np.maximum(lower - q, q - upper), 0.0) - 1e-9
-
-
-def _is_in_degrees(robot: Arm, q: Array) -> bool:
-    """Return whether a posture (n,) far outside its limits would be within all of them if it were in degrees."""
-    turning = np.array(robot.position_units) == "rad"
-    meant = np.where(turning, np.deg2rad(q), q)
-    return bool(np.abs(q[turning]).max(initial=0.0) > _FAR and (_excess(robot, meant[None]) <= 0).all())
