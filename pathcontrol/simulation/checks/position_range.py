@@ -21,7 +21,7 @@ def describe_range(robot: RobotModel | None, q: Array) -> str:
     beyond = find_excess(robot, q)
     sample, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
     if beyond[sample, joint] > 0:
-        return describeexcess("the log has", robot, 0, int(joint), q[sample], "")
+        return describe_excess("the log has", robot, 0, int(joint), q[sample], "")
     return describe_turns("the log has", robot, q[:, None])
 
 
@@ -35,7 +35,7 @@ def describe_turns(begin: str, robot: Arm, q: Array) -> str:
     return f"{begin} {name} at {value:.4g} rad, which is {abs(value) / 2 / np.pi:.3g} turns{_DEGREES}"
 
 
-def describeexcess(begin: str, robot: Arm, row: int, joint: int, q: Array, where: str) -> str:
+def describe_excess(begin: str, robot: Arm, row: int, joint: int, q: Array, where: str) -> str:
     """Return the sentence about a position outside its limits."""
     lower, upper = ((ends if ends.ndim == 1 else ends[row])[joint] for ends in _range(robot))
     unit = robot.position_units[joint]

@@ -81,7 +81,7 @@ def _check_start(robot: Arm, q: Array) -> str:
     beyond = find_excess(robot, q)
     row, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
     if beyond[row, joint] > 0:
-        return describeexcess("the start has", robot, int(row), int(joint), q[min(int(row), len(q) - 1)], "")
+        return describe_excess("the start has", robot, int(row), int(joint), q[min(int(row), len(q) - 1)], "")
     return describe_turns("the start has", robot, q[None])
 
 
@@ -97,7 +97,7 @@ def _check_path(robot: Arm, along: PathPostures, ends: bool) -> str:
     path = min(int(row), along.q.shape[1] - 1)
     of = f" of rollout {row}" if beyond.shape[1] > 1 else ""
     where = f" at s = {along.s[sample, path]:.4g}"
-    return describeexcess(f"the path{of} has", robot, int(row), int(joint), along.q[sample, path], where)
+    return describe_excess(f"the path{of} has", robot, int(row), int(joint), along.q[sample, path], where)
 
 
 def _is_bounded(task: PathTask) -> bool:
