@@ -11,7 +11,7 @@ from pathcontrol.robot.friction import levels_of
 from pathcontrol.simulation.arm.disturbance import Disturbance, list_terms
 from pathcontrol.simulation.arm.friction_change import FrictionChange
 from pathcontrol.simulation.arm.wall import Wall
-from pathcontrol.simulation.checks.position_range import describe_turns, find_excess
+from pathcontrol.simulation.checks.position_range import describe_excess, describe_turns, find_excess
 from pathcontrol.simulation.checks.weight import PathPostures, check_weight
 from pathcontrol.simulation.loops import Arm
 from pathcontrol.simulation.run import Run
