@@ -13,42 +13,24 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
-from pathcontrol.engine.arm_constants import arm_struct
 from pathcontrol.engine.library import lanes, load_library
 from pathcontrol.engine.run_settings import add_law, add_plant, rows_or_none
 from pathcontrol.engine.structs import (
-    MOST_WALLS,
     RECORDED,
     SAID_NUMBERS,
     SEEN_AND_SAID,
-    Arm,
     Memory,
     Record,
-    Rows,
     Setup,
     Span,
     State,
 )
-from pathcontrol.engine.structs import Disturbance as DisturbanceStruct
 from pathcontrol.errors import EngineError
-from pathcontrol.robot.constants import frame_carrier
 from pathcontrol.simulation.arm.changing_arm import ChangingArm
-from pathcontrol.simulation.arm.disturbance import (
-    Disturbance,
-    FrameForce,
-    Harmonic,
-    Push,
-    TimedDisturbance,
-    TorqueLimitDrop,
-    list_terms,
-)
-from pathcontrol.simulation.arm.dropout import Dropout, Dropouts
-from pathcontrol.simulation.arm.friction_change import FrictionChange
-from pathcontrol.simulation.arm.jam import JammedJoint
+from pathcontrol.simulation.arm.dropout import Dropouts
 from pathcontrol.simulation.arm.noise import NoiseSource
-from pathcontrol.simulation.arm.pick_up import PickUp
-from pathcontrol.simulation.arm.plant import Walls, has_strong_friction
-from pathcontrol.simulation.arm.wall import Wall
+from pathcontrol.simulation.arm.plant import has_strong_friction
+from pathcontrol.simulation.compiled_disturbances import add_disturbances
 from pathcontrol.simulation.divergence import BEYOND, NO_NUMBERS, Divergence
 from pathcontrol.simulation.finish import AfterLaps, AtEnd, Finish, detection_ticks
 from pathcontrol.simulation.loops import Arm as SimulatedArm
@@ -57,8 +39,6 @@ from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sampled import Actuator
 
 _BLOCK = 1 << 17  # ticks of all rollouts together between checks of Ctrl-C and the progress bar
-_DISTURBANCES = (Push, Harmonic, FrameForce, JammedJoint, TorqueLimitDrop, Wall)  # in the order of the engine's numbers
-_BETWEEN = (FrictionChange, PickUp, Dropout)  # what is set for each block of ticks
 _REASONS = {1: BEYOND, 2: NO_NUMBERS}
 
 
@@ -68,54 +48,6 @@ class _Block(NamedTuple):
     done: int
     ticks: int
     last: bool
-
-
-class CompiledPlant:
-    """The plant by the engine, a step at a time, for laws and disturbances that are evaluated in Python.
-
-    Args:
-        robot: the arm, or one for each rollout, with its friction.
-        step: h [s].
-
-    Raises:
-        EngineError: an arm or its friction is beyond the engine.
-    """
-
-    def __init__(self, robot: SimulatedArm, step: float) -> None:
-        self.step, self._memory, self._setup = step, Memory(), Setup(joints=robot.n)
-        self._begins: list[Array] = []
-        add_plant(self._setup, robot, has_strong_friction(robot), self._memory)
-        self._advance = load_library().pathcontrol_advance
-
-    def advance(
-        self, q: Array, qd: Array, tau: Array, held: NDArray[np.bool_] | None = None, walls: Walls | None = None
-    ) -> tuple[Array, Array]:
-        """Return (q, q̇) one step later under the constant torque ``tau``, with ``held`` joints and ``walls``.
-
-        All arrays are (N, n); of walls, the same at all steps, each has the rollouts for which it is there, (N,).
-
-        Raises:
-            EngineError: there are too many walls.
-        """
-        if walls:
-            self._set_walls(walls)
-        q, qd = np.array(q, order="C"), np.array(qd, order="C")
-        torque = np.ascontiguousarray(tau)
-        still = None if held is None or not held.any() else np.array(np.broadcast_to(held, q.shape), np.float64)
-        arrays = [q.ctypes.data, qd.ctypes.data, torque.ctypes.data, None if still is None else still.ctypes.data]
-        self._advance(addressof(self._setup), self.step, *arrays, 0, len(q))
-        return q, qd
-
-    def _set_walls(self, walls: Walls) -> None:
-        """Set the walls of a step: they begin at time 0 for the rollouts for which they are there, and else never."""
-        if not self._begins:
-            self._begins = [np.empty(len(stands)) for _, stands in walls]
-            structs = [_disturbance_struct(wall, self._setup.joints, self._memory) for wall, _ in walls]
-            for struct, begin in zip(structs, self._begins, strict=True):
-                struct.start, struct.duration = Rows(begin.ctypes.data, 1), self._memory.numbers(np.inf)
-            _add_structs(self._setup, structs, self._memory)
-        for begin, (_, stands) in zip(self._begins, walls, strict=True):
-            begin[...] = np.where(stands, 0.0, np.inf)
 
 
 class CompiledArm:
@@ -153,7 +85,7 @@ class CompiledArm:
         self._add_loop(sensors.resolution, actuator)
         self._changing = ChangingArm(robot, outside.disturbance, loop.period)
         add_plant(self._setup, robot, has_strong_friction(robot), self._memory)
-        _add_disturbances(self._setup, outside.disturbance, self._memory)
+        add_disturbances(self._setup, outside.disturbance, self._memory)
         self._laws = {controller: self._add_law(controller) for controller in controllers}
         reading = sensors.start(*self._add_noise(q, qd))
         reading = sensors.read(*self._add_noise(q, qd), reading)
@@ -331,73 +263,3 @@ def _add_finish(setup: Setup, finish: Finish | None) -> None:
         setup.finish, setup.laps = 2, finish.laps
     else:
         raise EngineError(f"the engine does not know when {type(finish).__name__} ends a run")
-
-
-def _add_disturbances(setup: Setup, disturbance: Disturbance | None, memory: Memory) -> None:
-    """Set pushes, sinusoids, forces on frames, joints that jam and motors that are weak.
-
-    Raises:
-        EngineError: one of them is the user's own.
-    """
-    terms = [term for term in list_terms(disturbance) if type(term) not in _BETWEEN]
-    _add_structs(setup, [_disturbance_struct(term, setup.joints, memory) for term in terms], memory)
-
-
-def _add_structs(setup: Setup, structs: Sequence[DisturbanceStruct], memory: Memory) -> None:
-    """Set disturbances as structs.
-
-    Raises:
-        EngineError: there are too many walls.
-    """
-    kinds = [_DISTURBANCES[one.kind] for one in structs]
-    setup.disturbances, setup.jams, setup.drops = len(structs), JammedJoint in kinds, TorqueLimitDrop in kinds
-    setup.walls = kinds.count(Wall)
-    check_walls(setup.walls)
-    if structs:
-        setup.disturbance = addressof(memory.keep((DisturbanceStruct * len(structs))(*structs)))
-
-
-def check_walls(count: int) -> None:
-    """Check that there are no more walls than the engine takes.
-
-    Raises:
-        EngineError: there are.
-    """
-    if count > MOST_WALLS:
-        raise EngineError(f"there are {count} walls, the engine takes {MOST_WALLS} at most")
-
-
-def _disturbance_struct(term: Disturbance, n: int, memory: Memory) -> DisturbanceStruct:
-    """Return a disturbance as struct of the engine."""
-    if type(term) not in _DISTURBANCES:
-        raise EngineError(f"the disturbance {type(term).__name__} is not one of the library")
-    struct = DisturbanceStruct(kind=_DISTURBANCES.index(type(term)))
-    if isinstance(term, TimedDisturbance):
-        struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)
-    if isinstance(term, Harmonic):
-        struct.magnitude = memory.rows(term.amplitude, n)
-        struct.frequency, struct.phase = memory.numbers(term.frequency), memory.numbers(term.phase)
-    elif isinstance(term, Push):
-        struct.magnitude = memory.rows(term.magnitude, n)
-    elif isinstance(term, TorqueLimitDrop):
-        struct.magnitude = memory.rows(term.factor, n)
-    elif isinstance(term, JammedJoint):
-        struct.magnitude = memory.rows(term.joints == np.arange(n), n)
-    elif isinstance(term, FrameForce):
-        struct.magnitude = memory.rows(term.force, 3)
-        _set_frame(struct, term, memory)
-    elif isinstance(term, Wall):
-        stiffness, damping = term.springs
-        struct.magnitude = memory.rows(term.point, 3)
-        struct.axes = memory.rows(term.axes.reshape(*term.axes.shape[:-2], 9), 9)
-        struct.stiffness, struct.damping = memory.numbers(stiffness), memory.numbers(damping)
-        struct.roughness = memory.numbers(term.friction)
-        _set_frame(struct, term, memory)
-    return struct
-
-
-def _set_frame(struct: DisturbanceStruct, term: FrameForce | Wall, memory: Memory) -> None:
-    """Set the place where a force acts, and the arm whose kinematics it acts through."""
-    struct.body, offset = frame_carrier(term.robot, term.frame)
-    struct.offset[:] = offset.tolist()
-    struct.arm = addressof(memory.keep((Arm * 1)(arm_struct(term.robot))))

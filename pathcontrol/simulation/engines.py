@@ -13,7 +13,9 @@ from pathcontrol.engine.library import load_library
 from pathcontrol.errors import EngineError, warn
 from pathcontrol.simulation.arm.disturbance import list_terms
 from pathcontrol.simulation.arm.wall import Wall
-from pathcontrol.simulation.compiled import CompiledArm, CompiledPlant, check_walls
+from pathcontrol.simulation.compiled import CompiledArm
+from pathcontrol.simulation.compiled_disturbances import check_walls
+from pathcontrol.simulation.compiled_plant import CompiledPlant
 from pathcontrol.simulation.continuous import ContinuousArm
 from pathcontrol.simulation.loops import Arm, ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.sampled import SampledArm
