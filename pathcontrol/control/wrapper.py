@@ -126,8 +126,11 @@ class LawWrapper(Controller):
 
     def split(self, z: Array) -> list[Array]:
         """Return the state of the law inside, (*batch, m), and those of the rules, (*batch, size)."""
-        sizes = [rule.size for rule in self.rules]
-        return np.split(z, z.shape[-1] - np.cumsum(sizes[::-1])[::-1], axis=-1)
+        parts, end = [], z.shape[-1]
+        for rule in reversed(self.rules):
+            parts.append(z[..., end - rule.size : end])
+            end -= rule.size
+        return [z[..., :end], *reversed(parts)]
 
     def _ask(self, t: float, q: Array, qd: Array, own: Array, factor: Array) -> Moment:
         """Return what the law inside says at a ``factor`` of its speed (*batch,)."""

@@ -140,7 +140,8 @@ class ArmDynamics:
 
     def gravity(self, q: ArrayLike) -> Array:
         """Return the gravity torque g(q) [N m], (*batch, n)."""
-        zero = np.zeros(self.n)
+        q = self._array("q", q)
+        zero = np.zeros_like(q)
         return self.inverse_dynamics(q, zero, zero)
 
     def mass_matrix(self, q: ArrayLike) -> Array:
@@ -163,7 +164,8 @@ class ArmDynamics:
 
     def momentum(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """Return the generalized momentum p = M(q)q̇ [N m s], (*batch, n)."""
-        return self._weightless.inverse_dynamics(q, np.zeros(self.n), qd)
+        q = self._array("q", q)
+        return self._weightless.inverse_dynamics(q, np.zeros_like(q), qd)
 
     def momentum_rate(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
         """Return ṗ = τ + C(q,q̇)ᵀq̇ − g(q) [N m], (*batch, n): the rate of the momentum p = M(q)q̇ under torques τ.
@@ -256,9 +258,9 @@ class ArmDynamics:
         model.gravity = pin.Motion.Zero()
         return RigidBody(model, self.threads)
 
-    def _centripetal(self, q: ArrayLike, x: ArrayLike) -> Array:
+    def _centripetal(self, q: ArrayLike, x: Array) -> Array:
         """Return c(q,x) = C(q,x)x [N m], (*batch, n)."""
-        return self._weightless.inverse_dynamics(q, x, np.zeros(self.n))
+        return self._weightless.inverse_dynamics(q, x, np.zeros_like(x))
 
     def _each(self, q: ArrayLike, shape: tuple[int, ...], function: Callable[..., Any], **more: ArrayLike) -> Array:
         """Apply a ``function`` without a batched call to each configuration, with a row of each of ``more``."""
@@ -270,6 +272,11 @@ class ArmDynamics:
         """Convert values of the joints to (*batch, n), ordered by name if they are labelled."""
         return as_joint_array(name, value, self.n, self.joint_names)
 
+    @cached_property
+    def _idle_joints(self) -> list[str]:
+        """Names of the joints that would move no mass."""
+        return idle_joints(self.pinocchio_model)
+
     def _check_mass(self) -> None:
         """Refuse to compute dynamics of an arm in which a joint moves no mass."""
         if not self.has_mass:
@@ -277,7 +284,7 @@ class ArmDynamics:
                 f"{self.name}: no link has a mass, so there are kinematics and no dynamics; give some with "
                 f"with_masses(kg={{{self.joint_names[0]!r}: 2.0, ...}}) or load_robot(..., estimated_inertia=True)"
             )
-        if idle := idle_joints(self.pinocchio_model):
+        if idle := self._idle_joints:
             raise UrdfError(
                 f"{self.name}: {', '.join(idle)} would move no mass, so there are no dynamics; give some with "
                 f"with_masses(kg={{{idle[-1]!r}: 2.0, ...}})"

@@ -51,18 +51,20 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array, guess: Array | None 
     fewest, patience = np.full(len(p), p.shape[-1] + 1), np.full(len(p), _PATIENCE)
     v, rows = np.empty_like(p), np.arange(len(p))
     for _ in range(_MAX_EXCHANGES):
-        if not len(rows):
-            return v + 0.0  # turns −0 into 0
-        some = problem.select(rows)
-        v[rows] = some.velocities(states[rows])
-        wanted = some.required_states(v[rows], states[rows])
-        wrong = wanted != states[rows]
+        v[rows] = tried = problem.velocities(states)
+        wanted = problem.required_states(tried, states)
+        wrong = wanted != states
         count = wrong.sum(-1)
-        patience[rows] = np.where(count < fewest[rows], _PATIENCE, patience[rows] - 1)
-        fewest[rows] = np.minimum(fewest[rows], count)
-        changed = np.where(patience[rows, None] < 0, _keep_last(wrong), wrong)
-        states[rows] = np.where(changed, wanted, states[rows])
-        rows = rows[count > 0]
+        if not count.any():
+            return v + 0.0  # turns −0 into 0
+        patience = np.where(count < fewest, _PATIENCE, patience - 1)
+        fewest = np.minimum(fewest, count)
+        changed = np.where(patience[:, None] < 0, _keep_last(wrong), wrong)
+        states = np.where(changed, wanted, states)
+        if not count.all():
+            left = count > 0
+            problem = problem.select(left)
+            rows, states, fewest, patience = rows[left], states[left], fewest[left], patience[left]
     raise SimulationError("the friction of some rollouts did not settle; is the mass matrix positive definite?")
 
 
@@ -79,18 +81,16 @@ class _Problem(NamedTuple):
         """True for joints without dry friction, which never stick, (N, n)."""
         return (self.low == 0) & (self.high == 0)
 
-    def select(self, rows: NDArray[np.intp]) -> _Problem:
-        """Return the problems of some ``rows`` only."""
+    def select(self, rows: NDArray[np.bool_]) -> _Problem:
+        """Return the problems of the marked ``rows`` (N,) only."""
         return _Problem(*(values[rows] for values in self))
 
     def velocities(self, states: _States) -> Array:
         """Solve M v = p − λ for the joints that slip; the others rest, (N, n)."""
         slips = states != 0
         M = np.where(slips[:, :, None] & slips[:, None, :], self.M, np.eye(states.shape[-1]))
-        with np.errstate(invalid="ignore"):
-            M[np.linalg.slogdet(M).sign == 0] = np.nan  # LinAlgError would end the other rows too
         momentum = np.where(slips, self.p - np.where(states > 0, self.high, self.low), 0.0)
-        return np.where(slips, np.linalg.solve(M, momentum[..., None])[..., 0], 0.0)
+        return np.where(slips, _solve(M, momentum), 0.0)
 
     def required_states(self, v: Array, states: _States) -> _States:
         """Return the states that the velocities, and the impulses where joints stick, require, (N, n)."""
@@ -107,6 +107,16 @@ def _keep_last(wrong: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Mark in each row only the last of the joints that are ``wrong``, (N, n)."""
     later = np.cumsum(wrong[:, ::-1], axis=-1)[:, ::-1]
     return wrong & (later == 1)
+
+
+def _solve(M: Array, b: Array) -> Array:
+    """Return M⁻¹b for each of N rows, (N, n), NaN where M is singular."""
+    try:
+        return np.linalg.solve(M, b[..., None])[..., 0]
+    except np.linalg.LinAlgError:  # it ends the other rows too
+        with np.errstate(invalid="ignore"):
+            M[np.linalg.slogdet(M).sign == 0] = np.nan
+        return np.linalg.solve(M, b[..., None])[..., 0]
 
 
 def _multiply(M: Array, x: Array) -> Array:
