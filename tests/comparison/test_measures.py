@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
@@ -97,6 +97,7 @@ def test_recovery_of_what_never_leaves_comes_back_or_ends():
     assert np.isnan(recovery_time(contour, np.full(3, 0.1), TIME, None)).all()
 
 
+@settings(max_examples=15)  # each measures all else as well
 @given(st.floats(-3.0, 3.0), st.floats(0.0, 20.0))
 def test_time_lost_is_the_planned_time_between_both(arm, lost, end):
     task = Uneven()

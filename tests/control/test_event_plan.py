@@ -16,7 +16,7 @@ from pathcontrol.comparison.paper import START_DEG, paper_loop, paper_task
 CICESE = pc.load_robot("cicese_2dof")
 SMOOTH = CICESE.with_friction(None)
 START = np.deg2rad(START_DEG)
-JAM = pc.JammedJoint(1, 4.0, 0.6)
+JAM = pc.JammedJoint(1, 1.0, 0.6)
 KINDS = (pc.ExtendedMotionPlan, pc.Projection, pc.ComputedTorque)
 every_law = pytest.mark.parametrize("kind", KINDS)
 
@@ -26,7 +26,7 @@ def law(kind, arm=CICESE, task=None, **options):
     return kind(arm, paper_task() if task is None else task, 800.0, [45.0, 100.0], **plan, **options)
 
 
-def run(controller, q=START, duration=8.0, **settings):
+def run(controller, q=START, duration=5.0, **settings):
     return pc.simulate(controller, q, duration=duration, progress=False, **{"loop": paper_loop()} | settings)
 
 
@@ -67,10 +67,10 @@ def test_what_any_motion_reference_does_to_v(ideal_arm, task, state, k_p, K_v, l
 @pytest.mark.parametrize("kind", KINDS[:2])
 def test_v_falls_as_the_theorem_says_from_where_the_arm_is_let_go(ideal_arm, kind):
     """A push halts the plan; from its end on, held, waiting and speeding up again, V follows the V̇ of the theorem."""
-    controller = pc.EventPlan(law(kind, ideal_arm), threshold=[5.0, 1.0])
+    controller = pc.EventPlan(law(kind, ideal_arm), threshold=[5.0, 1.0], acceleration=8.0, pause=0.1)
     loop = pc.ContinuousTime(output_period=2.5e-4)
-    pushed = run(controller, duration=2.0, loop=loop, disturbance=pc.Push([40.0, 6.0], 0.8, 0.2))
-    free, w = pushed.time > 1.0005, pc.speed_factor(pushed)[0]
+    pushed = run(controller, duration=1.2, loop=loop, disturbance=pc.Push([40.0, 6.0], 0.3, 0.3))
+    free, w = pushed.time > 0.6005, pc.speed_factor(pushed)[0]
     V, Vdot = (part[0, free] for part in pc.lyapunov(controller, pushed))
     change = np.concatenate([[0.0], np.cumsum(1.25e-4 * (Vdot[1:] + Vdot[:-1]))])
     assert_allclose(V, V[0] + change, rtol=0, atol=5e-4 * V[0])  # the trapezoidal rule: h²(2K_v)²/12
@@ -104,7 +104,8 @@ def test_nothing_changes_where_nothing_is_met(kind):
 @every_law
 def test_in_a_jam_it_does_not_push_on_and_leaves_its_path_less(kind):
     """The torque of the jammed joint is at its limit for less of the time; the arm goes on when it is let go."""
-    plain, event = run(law(kind), disturbance=JAM), run(pc.EventPlan(law(kind)), disturbance=JAM)
+    jam = pc.JammedJoint(1, 4.0, 0.6)  # when the errors that friction leaves are those of every lap
+    plain, event = (run(one, duration=7.0, disturbance=jam) for one in (law(kind), pc.EventPlan(law(kind))))
     jammed, after = (plain.time > 4.0) & (plain.time < 4.6), plain.time > 4.0
     peaks = [np.abs(pc.contour_error(one)[0, after]).max() for one in (plain, event)]
     pushes = [np.abs(one.array("tau")[0, jammed, 1]).mean() for one in (plain, event)]
@@ -113,7 +114,7 @@ def test_in_a_jam_it_does_not_push_on_and_leaves_its_path_less(kind):
     w = pc.speed_factor(event)[0]
     assert w[jammed].min() < 0.01
     assert w[event.time > 5.5].min() > 0.99
-    assert np.ptp(event.array("s")[0, event.time > 5.5]) > 0.8 * 2.0 * 2.5
+    assert np.ptp(event.array("s")[0, event.time > 5.5]) > 0.8 * 2.0 * 1.5
 
 
 @pytest.mark.parametrize("kind", KINDS[:2])
@@ -122,7 +123,7 @@ def test_at_a_wall_it_halts_and_when_that_is_gone_it_goes_on(kind):
     free = run(law(kind), duration=3.1)
     before, at = (CICESE.frame_pose(free.array("q")[0, round(t / 2.5e-3)], "tool")[:3, 3] for t in (2.95, 3.0))
     wall = pc.Wall("tool", at, before - at, stiffness=1e5, start=2.8, duration=1.5)
-    event = run(pc.EventPlan(law(kind)), disturbance=wall)
+    event = run(pc.EventPlan(law(kind)), duration=6.5, disturbance=wall)
     there, w = (event.time > 3.4) & (event.time < 4.3), pc.speed_factor(event)[0]
     away = np.array([CICESE.frame_pose(q, "tool")[:3, 3] - at for q in event.array("q")[0, there]]) @ (before - at)
     assert np.abs(away / np.linalg.norm(before - at)).max() < 1e-2
@@ -130,23 +131,23 @@ def test_at_a_wall_it_halts_and_when_that_is_gone_it_goes_on(kind):
     assert (np.abs(push[0, there]) < 0.5 * CICESE.limits.effort).all()
     assert w[there].min() < 0.01
     assert w[-1] > 0.99
-    assert np.ptp(event.array("s")[0, event.time > 5.0]) > 0.8 * 2.0 * 3.0
+    assert np.ptp(event.array("s")[0, event.time > 5.0]) > 0.8 * 2.0 * 1.5
 
 
 def test_with_an_observed_law_it_shares_the_observer():
     controller = pc.EventPlan(law(pc.Projection, friction="observed", observer_hz=25.0))
     assert_array_equal(controller.observer.gain, 2 * np.pi * 25.0)
     event = run(controller, disturbance=JAM)
-    assert pc.speed_factor(event)[0, (event.time > 4.3) & (event.time < 4.6)].max() < 0.01
+    assert pc.speed_factor(event)[0, (event.time > 1.3) & (event.time < 1.6)].max() < 0.01
     assert pc.speed_factor(event)[0, -1] > 0.99
 
 
 def test_the_speed_input_goes_on_working(arm):
-    outer = pc.SpeedOverride(pc.EventPlan(law(pc.ExtendedMotionPlan)), [[1.0, 0.5]])
-    event = run(outer, disturbance=JAM)
+    outer = pc.SpeedOverride(pc.EventPlan(law(pc.ExtendedMotionPlan)), [[0.5, 0.5]])
+    event = run(outer, disturbance=pc.JammedJoint(1, 2.0, 0.6))
     w = pc.speed_factor(event)[0]
-    assert_allclose(w[(event.time > 2.0) & (event.time < 4.0)], 0.5, atol=1e-6)
-    assert w[(event.time > 4.0) & (event.time < 4.6)].min() < 0.01
+    assert_allclose(w[(event.time > 1.5) & (event.time < 2.0)], 0.5, atol=1e-6)
+    assert w[(event.time > 2.0) & (event.time < 2.6)].min() < 0.01
     assert w[-1] == pytest.approx(0.5, abs=1e-3)
 
 
@@ -161,7 +162,7 @@ def test_thresholds_of_several_rollouts_are_those_of_each_alone():
 
 
 def test_a_control_tick_halts_too():
-    jammed = run(pc.EventPlan(law(pc.ExtendedMotionPlan)), duration=5.0, disturbance=JAM)
+    jammed = run(pc.EventPlan(law(pc.ExtendedMotionPlan)), duration=2.0, disturbance=JAM)
     tick = pc.ControlTick(pc.EventPlan(law(pc.ExtendedMotionPlan)), 2.5e-3)
     tick.start(START)
     pairs = zip(jammed.array("q_measured")[0], jammed.array("qd_measured")[0], strict=True)

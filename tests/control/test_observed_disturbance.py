@@ -160,7 +160,7 @@ def test_the_residual_error_of_the_papers_experiments_all_but_vanishes(kind):
     noise = {}
     for friction in ("viscous", "observed"):
         controller = kind(CICESE, paper_task(), *gains, friction=friction)
-        run = simulate(controller, np.deg2rad(START_DEG), duration=10.0, loop=paper_loop(), progress=False)
+        run = simulate(controller, np.deg2rad(START_DEG), duration=7.0, loop=paper_loop(), progress=False)
         noise[friction], late = metrics(run)["tau_noise"][0], steady_state(run)
     assert np.rad2deg(peak(late.norm("e_p"))[0]) <= 0.3
     assert np.rad2deg(peak(late.norm("e_v"))[0]) <= 8.0
@@ -174,7 +174,7 @@ def test_every_law_carries_a_load_that_it_does_not_know(kind):
     for friction in ("none", "observed"):
         controller = kind(smooth, Circle(0.8, 1.0), **LAWS[kind], friction=friction)
         heavy = smooth.with_payload(2.0, "tool")
-        run = simulate(controller, [0.8, 0.0], duration=8.0, plant=heavy, progress=False)
+        run = simulate(controller, [0.8, 0.0], duration=6.5, plant=heavy, progress=False)
         errors[friction] = peak(steady_state(run).norm("e_p"))[0]
     assert errors["observed"] < 0.1 * errors["none"]
 
@@ -189,7 +189,7 @@ def test_an_arm_that_has_arrived_rests_and_its_torque_does_not_grow(kind, loop):
     gains = {name: 800.0 if "p" in name else 60.0 for name in LAWS[kind]}
     controller = kind(CICESE, Line([0.3, 0.2], [1.0, 0.6], 0.5), **gains, friction="observed")
     run = simulate(
-        controller, [0.3, 0.2], duration=20.0, plant=STICKY, loop=loop, until="duration", progress=False
+        controller, [0.3, 0.2], duration=8.0, plant=STICKY, loop=loop, until="duration", progress=False
     ).rollout(0)
     late = run.time > 4.0
     assert np.ptp(run.array("q")[0, late], axis=0).max() < 1e-6
@@ -204,7 +204,7 @@ def test_without_the_rule_for_rest_the_torque_would_grow(monkeypatch):
     observe = controller.observer.observe
     monkeypatch.setattr(controller.observer, "observe", lambda t, q, qd, memory, kept: observe(t, q, qd, memory))
     run = simulate(
-        controller, [0.3, 0.2], duration=20.0, plant=STICKY, loop=paper_loop(), until="duration", progress=False
+        controller, [0.3, 0.2], duration=8.0, plant=STICKY, loop=paper_loop(), until="duration", progress=False
     )
     assert np.ptp(run.array("tau")[0, run.time > 4.0], axis=0).max() > 0.1
 

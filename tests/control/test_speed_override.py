@@ -151,8 +151,8 @@ def test_v_falls_as_the_theorem_says_while_an_operator_plays(ideal_arm, which):
 def test_holding_and_resuming_does_not_leave_the_path(arm, which):
     task = pc.Circle(1.0, 2.0)
     law = path_laws(arm, task)[which]
-    plain = run(law, duration=8.0)
-    held = run(pc.SpeedOverride(law, [[3.5, 0.0], [5.0, 1.0], [6.5, 0.0], [6.6, 1.0]]), duration=8.0)
+    plain = run(law, duration=10.0)
+    held = run(pc.SpeedOverride(law, [[4.0, 0.0], [6.0, 1.0], [9.0, 0.0], [9.1, 1.0]]), duration=10.0)
     late = plain.time > 3.0
     without, within = (pc.contour_error(one)[0, late].max() for one in (plain, held))
     assert within < 1.02 * without  # at other moments a joint may stick a little longer

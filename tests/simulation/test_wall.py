@@ -192,7 +192,7 @@ def test_the_engine_agrees_with_the_reference(seed, name, stiffness):
     normal = -ahead + 0.3 * np.linalg.norm(ahead) * rng.normal(size=3)
     kind = {"rigid": True} if stiffness is None else {"stiffness": stiffness}
     wall = pc.Wall(TIPS[name], at, normal, friction=rng.uniform(0, 0.5), duration=0.45, **kind)
-    runs = [simulated(wall + pc.Push(np.ones(n)), law, task.q_d(np.array(0.0)), 0.6, engine=e) for e in ENGINES]
+    runs = [simulated(wall + pc.Push(np.ones(n)), law, task.q_d(np.array(0.0)), 0.5, engine=e) for e in ENGINES]
     assert "engine_reason" not in runs[0].config
     assert_allclose(runs[0].array("q"), runs[1].array("q"), rtol=0, atol=1e-8)
 
@@ -203,14 +203,14 @@ def test_the_engine_agrees_with_the_reference(seed, name, stiffness):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_tool_stays_out_for_as_long_as_the_wall_stands(kind, engine):
     wall = pc.Wall("tool", [0.6, 0.0, 0.0], [-1.0, 0.0, 0.0], start=0.05, duration=0.75, **kind)
-    run, calm = (simulated(d, q=(0.2, 0.3), duration=1.5, engine=engine) for d in (wall, None))
+    run, calm = (simulated(d, q=(0.2, 0.3), duration=t, engine=engine) for d, t in ((wall, 1.2), (None, 0.05)))
     gap = wall.find_names(ARM).gap(run.array("q")[0])
     stands = (run.time >= 0.05) & (run.time <= 0.8 + 1e-9)
     assert gap[stands].min() > {"stiffness": -800.0 / kind.get("stiffness", 1.0)}.get(next(iter(kind)), -1e-4)
     assert (gap[stands] < 1e-3).mean() > 0.2
     assert gap[run.time > 0.9].min() < -0.01
     before = run.time <= 0.05 + 1e-9
-    assert_array_equal(run.array("q")[:, before], calm.array("q")[:, before])
+    assert_array_equal(run.array("q")[:, before], calm.array("q"))
 
 
 @pytest.mark.parametrize("engine", ENGINES)
