@@ -37,8 +37,8 @@ import pathcontrol as pc
 law = pc.Projection(pc.load_robot("cicese_2dof"), pc.Circle(1.0, 2.0), 800.0, [45.0, 100.0])
 loop = pc.ContinuousTime()
 pc.simulate(law, [0.7, 1.2], duration=0.01, loop=loop, progress=False)
-print("integrating", flush=True)
 try:
+    print("integrating", flush=True)
     pc.simulate(law, [0.7, 1.2], duration=1e3, loop=loop, progress=False)
 except KeyboardInterrupt:
     print("interrupted", flush=True)
