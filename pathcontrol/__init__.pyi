@@ -73,6 +73,7 @@ from .hardware.drive import DriveRecord as DriveRecord
 from .hardware.drive import drive as drive
 from .hardware.envelope import Envelope as Envelope
 from .hardware.loop_log import LoopLog as LoopLog
+from .hardware.position_command import PositionCommand as PositionCommand
 from .profiles.jerk.start_stop import SmoothStartStop as SmoothStartStop
 from .profiles.limited.limited import limited as limited
 from .profiles.limited.motion_limit import MotionLimit as MotionLimit
