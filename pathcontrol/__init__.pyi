@@ -1,5 +1,7 @@
 from . import analysis as analysis
 from . import figures as figures
+from .analysis.ballbar import Ballbar as Ballbar
+from .analysis.ballbar import ballbar as ballbar
 from .analysis.deviation import tool_deviation as tool_deviation
 from .analysis.deviation import toolpath_metrics as toolpath_metrics
 from .analysis.disturbance_estimate import momentum_observer as momentum_observer
@@ -8,6 +10,8 @@ from .analysis.friction_identification import identify_friction as identify_fric
 from .analysis.gamma import distance_to_gamma as distance_to_gamma
 from .analysis.lyapunov_functions import lyapunov as lyapunov
 from .analysis.pareto import non_dominated as non_dominated
+from .analysis.path_accuracy import PathAccuracy as PathAccuracy
+from .analysis.path_accuracy import accuracy as accuracy
 from .analysis.run_metrics import contour_error as contour_error
 from .analysis.run_metrics import end_error as end_error
 from .analysis.run_metrics import lag_error as lag_error
@@ -72,7 +76,6 @@ from .hardware.control_loop import Status as Status
 from .hardware.drive import DriveRecord as DriveRecord
 from .hardware.drive import drive as drive
 from .hardware.envelope import Envelope as Envelope
-from .hardware.franka import Franka as Franka
 from .hardware.loop_log import LoopLog as LoopLog
 from .hardware.position_command import PositionCommand as PositionCommand
 from .profiles.jerk.start_stop import SmoothStartStop as SmoothStartStop
@@ -148,6 +151,7 @@ from .toolpaths.tool_curve import ToolCurve as ToolCurve
 from .tuning.tune import tune as tune
 from .tuning.tuning_result import Tuning as Tuning
 from .view.animation.record import record as record
+from .view.figures.ballbar_figure import ballbar_figure as ballbar_figure
 from .view.figures.comparison_figure import comparison_figure as comparison_figure
 from .view.figures.deviation_figure import deviation_figure as deviation_figure
 from .view.figures.error_figures import error_bands_figure as error_bands_figure

@@ -1,5 +1,6 @@
 """All figures of runs, sweeps, tunings and toolpaths, and how they are saved; in :mod:`pathcontrol` as well."""
 
+from pathcontrol.view.figures.ballbar_figure import ballbar_figure as ballbar_figure
 from pathcontrol.view.figures.comparison_figure import comparison_figure as comparison_figure
 from pathcontrol.view.figures.deviation_figure import deviation_figure as deviation_figure
 from pathcontrol.view.figures.error_figures import error_bands_figure as error_bands_figure

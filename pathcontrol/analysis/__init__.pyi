@@ -1,3 +1,5 @@
+from .ballbar import Ballbar as Ballbar
+from .ballbar import ballbar as ballbar
 from .deviation import tool_deviation as tool_deviation
 from .deviation import toolpath_metrics as toolpath_metrics
 from .disturbance_estimate import momentum_observer as momentum_observer
@@ -6,6 +8,8 @@ from .friction_identification import identify_friction as identify_friction
 from .gamma import distance_to_gamma as distance_to_gamma
 from .lyapunov_functions import lyapunov as lyapunov
 from .pareto import non_dominated as non_dominated
+from .path_accuracy import PathAccuracy as PathAccuracy
+from .path_accuracy import accuracy as accuracy
 from .run_metrics import contour_error as contour_error
 from .run_metrics import end_error as end_error
 from .run_metrics import lag_error as lag_error

@@ -15,11 +15,11 @@ from scipy.spatial.transform import Rotation, Slerp
 from pathcontrol._arrays import Array, as_array, check_finite, freeze
 from pathcontrol.arguments import Direction, Form, Unit
 from pathcontrol.errors import InputError
+from pathcontrol.robot.rotations import rotation_vectors_of, scale_axis
 from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 _PARALLEL = 1e-6  # sine of an angle that counts as zero
 _NO_SINE = 1e-12  # rounding error of the sine of no turn, or of half a turn
-_WIDE = -0.9  # cosine of angles whose axis is better known from the symmetric part of the matrix
 
 
 class Orientation(ABC):
@@ -44,11 +44,11 @@ class Orientation(ABC):
         """
         wanted = self.frames(curve, s)
         if self.rows == 3:
-            return _rotation_vector(rotation @ wanted.swapaxes(-1, -2)), np.broadcast_to(np.eye(3), wanted.shape)
+            return rotation_vectors_of(rotation @ wanted.swapaxes(-1, -2)), np.broadcast_to(np.eye(3), wanted.shape)
         z, towards = rotation[..., :, 2], wanted[..., :, 2]
         across = wanted[..., :, :2].swapaxes(-1, -2)
         axis, cosine = np.cross(towards, z), (towards * z).sum(-1)
-        turn = _scale_axis(axis, cosine)
+        turn = scale_axis(axis, cosine)
         opposite = (np.linalg.norm(axis, axis=-1) <= _NO_SINE) & (cosine < 0)
         turn[opposite] = np.pi * wanted[opposite, :, 0]  # half a turn, about any axis across z
         return (across @ turn[..., None])[..., 0], across
@@ -207,40 +207,6 @@ def _perpendicular(direction: Array, axis: Array, axis_name: str, name: str, s: 
             f"{axis_name} is parallel to {name} = {direction.tolist()} at s = {where:g} m; give another {name}"
         )
     return across / length
-
-
-def _rotation_vector(rotation: Array) -> Array:
-    """Return the rotation vector [rad] of rotation matrices (N, 3, 3), (N, 3)."""
-    skew = 0.5 * (rotation - rotation.swapaxes(-1, -2))
-    axis = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
-    cosine = 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1)
-    turn = _scale_axis(axis, cosine)
-    wide = cosine < _WIDE
-    if wide.any():
-        turn[wide] = _wide_turn(rotation[wide], axis[wide], cosine[wide])
-    return turn
-
-
-def _wide_turn(rotation: Array, axis: Array, cosine: Array) -> Array:
-    """Return the rotation vector [rad] of turns by nearly or exactly π, (N, 3).
-
-    R − Rᵀ vanishes there. The symmetric part has the axis a instead: ½(R + Rᵀ) = cos θ I + (1 − cos θ) a aᵀ. Of the two
-    that it leaves, the sign is that of ``axis`` (N, 3), a sin θ; for half a turn both are right.
-    """
-    square = 0.5 * (rotation + rotation.swapaxes(-1, -2)) - cosine[:, None, None] * np.eye(3)
-    largest = np.diagonal(square, axis1=-2, axis2=-1).argmax(-1)
-    direction = np.take_along_axis(square, largest[:, None, None], axis=-1)[..., 0]
-    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
-    sign = np.where((direction * axis).sum(-1) < 0, -1.0, 1.0)
-    angle = np.arctan2(np.linalg.norm(axis, axis=-1), cosine)
-    return (sign * angle)[:, None] * direction
-
-
-def _scale_axis(axis: Array, cosine: Array) -> Array:
-    """Return the rotation vector of an axis (N, 3) whose length is the sine of the angle, given its ``cosine``."""
-    sine = np.linalg.norm(axis, axis=-1)
-    factor = np.divide(np.arctan2(sine, cosine), sine, out=np.ones_like(sine), where=sine > _NO_SINE)
-    return factor[..., None] * axis
 
 
 class TurningOrientation(Orientation):

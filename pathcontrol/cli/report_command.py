@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from pathcontrol.cli.group import import_all, json_option, open_option, open_page
 from pathcontrol.cli.saved import check_out, check_runs, load_runs, robot_option, runs_argument, sweep_of, worst_option
 from pathcontrol.cli.view_command import layout_option, one_or_all, tell
+
+if TYPE_CHECKING:
+    from pathcontrol.simulation.run import Run
 
 
 @click.command("report")
@@ -56,6 +61,14 @@ def command(
         words += [option, str(value)] if value is not None else []
     told = {"title": title, "command": shlex.join(words), "sweep": sweep_of(runs)}
     page = report(one_or_all(loaded), out, layout=layout, **told)  # type: ignore[arg-type]
-    tell(loaded, {"report": page}, as_json)
+    tell(loaded, {"report": page}, as_json, {"accuracy": _measure_accuracy(loaded)} if as_json else {})
     if opened:
         open_page(page)
+
+
+def _measure_accuracy(runs: Mapping[str, Run]) -> dict[str, Any]:
+    """Return the accuracy of each run that has cycles to compare, as JSON takes it."""
+    from pathcontrol.analysis.accuracy_table import find_accuracy
+
+    found = {name: find_accuracy(run) for name, run in runs.items()}
+    return {name: one.to_dict() for name, one in found.items() if one is not None}

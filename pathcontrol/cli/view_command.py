@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -24,6 +25,8 @@ from pathcontrol.cli.saved import (
 
 if TYPE_CHECKING:
     from pathcontrol.simulation.run import Run
+
+_NONE: Mapping[str, Any] = MappingProxyType({})
 
 layout_option = click.option(
     "--layout",
@@ -107,15 +110,20 @@ def _default(runs: tuple[Path, ...]) -> Path:
     return first.with_suffix(".html") if len(runs) == 1 else first.with_name("comparison.html")
 
 
-def tell(runs: Mapping[str, Run], written: Mapping[str, Path], as_json: bool) -> None:
-    """Print which runs were shown, what must not be overlooked in them, and which files were written."""
+def tell(
+    runs: Mapping[str, Run], written: Mapping[str, Path], as_json: bool, numbers: Mapping[str, Any] = _NONE
+) -> None:
+    """Print which runs were shown, what must not be overlooked in them, and which files were written.
+
+    As JSON ``numbers`` are printed as well.
+    """
     from pathcontrol.analysis.run_remarks import remarks
     from pathcontrol.cli.tables import remark_lines
 
     if as_json:
         files = {kind: str(path) for kind, path in written.items()}
         said = {name: found for name, run in runs.items() if (found := remarks(run))}
-        told = {"runs": {name: repr(run) for name, run in runs.items()}, "written": files}
+        told = {"runs": {name: repr(run) for name, run in runs.items()}, "written": files, **numbers}
         click.echo(json.dumps(told | ({"remarks": said} if said else {})))
         return
     for name, run in runs.items():

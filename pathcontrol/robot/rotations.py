@@ -8,6 +8,9 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 
+_WIDE = -0.9  # cosine of angles whose axis is better known from the symmetric part of the matrix
+_NO_SINE = 1e-12  # rounding error of the sine of no turn, or of half a turn
+
 
 def rotation_of_rpy(rpy: ArrayLike) -> Array:
     """Return the rotation matrix (3, 3) of roll, pitch and yaw [rad], as in a URDF: about fixed x, then y, then z."""
@@ -41,3 +44,37 @@ def quaternions_of(rotations: Array) -> Array:
     largest = np.einsum("kii->ki", products).argmax(-1)
     columns = products[np.arange(len(rotations)), largest]
     return columns / np.linalg.norm(columns, axis=-1, keepdims=True)
+
+
+def rotation_vectors_of(rotation: Array) -> Array:
+    """Return the rotation vectors [rad], (*batch, 3), of rotation matrices (*batch, 3, 3)."""
+    skew = 0.5 * (rotation - rotation.swapaxes(-1, -2))
+    axis = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
+    cosine = 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1)
+    turn = scale_axis(axis, cosine)
+    wide = cosine < _WIDE
+    if wide.any():
+        turn[wide] = _wide_turn(rotation[wide], axis[wide], cosine[wide])
+    return turn
+
+
+def _wide_turn(rotation: Array, axis: Array, cosine: Array) -> Array:
+    """Return the rotation vector [rad] of turns by nearly or exactly π, (N, 3).
+
+    R − Rᵀ vanishes there. The symmetric part has the axis a instead: ½(R + Rᵀ) = cos θ I + (1 − cos θ) a aᵀ. Of the two
+    that it leaves, the sign is that of ``axis`` (N, 3), a sin θ; for half a turn both are right.
+    """
+    square = 0.5 * (rotation + rotation.swapaxes(-1, -2)) - cosine[:, None, None] * np.eye(3)
+    largest = np.diagonal(square, axis1=-2, axis2=-1).argmax(-1)
+    direction = np.take_along_axis(square, largest[:, None, None], axis=-1)[..., 0]
+    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+    sign = np.where((direction * axis).sum(-1) < 0, -1.0, 1.0)
+    angle = np.arctan2(np.linalg.norm(axis, axis=-1), cosine)
+    return (sign * angle)[:, None] * direction
+
+
+def scale_axis(axis: Array, cosine: Array) -> Array:
+    """Return the rotation vector of an axis (N, 3) whose length is the sine of the angle, given its ``cosine``."""
+    sine = np.linalg.norm(axis, axis=-1)
+    factor = np.divide(np.arctan2(sine, cosine), sine, out=np.ones_like(sine), where=sine > _NO_SINE)
+    return factor[..., None] * axis

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.errors import InputError
 from pathcontrol.simulation.config import laws, table
 from pathcontrol.simulation.run import Run
 
@@ -66,6 +67,8 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
         yield "Errors", error_figure(shown)
         if any(run.rollouts > 1 for run in runs.values()):
             yield "Errors of all rollouts", error_bands_figure(shown)
+    if (round_trip := _draw_ballbar(shown)) is not None:
+        yield "Radial error round the circle", round_trip
     if {"s", "sdot"} <= recorded:
         yield "Speed along the path", speed_figure(shown)
     if "tau" in recorded:
@@ -83,6 +86,16 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
         if isinstance(run.task, ToolpathTask) and "path_index" in run.data.coords:
             of = f" of {name}" if len(runs) > 1 else ""
             yield f"Distance of the tool from the drawing{of}", deviation_figure(run, run.robot, run.task)
+
+
+def _draw_ballbar(runs: Run | Mapping[str, Run]) -> Figure | None:
+    """Return the figure of the radial error, where all runs go round a circle."""
+    from pathcontrol.view.figures.ballbar_figure import ballbar_figure
+
+    try:
+        return ballbar_figure(runs)
+    except (InputError, KeyError):
+        return None
 
 
 def picture(figure: Figure, caption: str) -> Picture:

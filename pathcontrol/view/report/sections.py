@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 from markupsafe import Markup, escape
 
+from pathcontrol.analysis.accuracy_table import accuracy_table
 from pathcontrol.analysis.contours import contour_table
 from pathcontrol.analysis.lap_table import lap_table
 from pathcontrol.analysis.readable import describe_outcomes
@@ -53,6 +54,7 @@ def sections(runs: Mapping[str, Run], made_by: str, sweep: SweepResult | None = 
             rows=rows(runs, numbers),
             remarks=[(name, sentence) for name, run in runs.items() for sentence in remarks(run)],
             contours=[(name, table) for name, run in runs.items() if (table := contour_table(run))],
+            accuracy=[(name, table) for name, run in runs.items() if (table := accuracy_table(run))],
             laps=[(name, table) for name, run in runs.items() if (table := lap_table(run))],
             window=describe_window(),
             files=[_metrics_file(numbers), json_file("configuration.json", configuration), *_signals(runs)],
