@@ -76,6 +76,7 @@ from .hardware.control_loop import Status as Status
 from .hardware.drive import DriveRecord as DriveRecord
 from .hardware.drive import drive as drive
 from .hardware.envelope import Envelope as Envelope
+from .hardware.franka import Franka as Franka
 from .hardware.loop_log import LoopLog as LoopLog
 from .hardware.position_command import PositionCommand as PositionCommand
 from .profiles.jerk.start_stop import SmoothStartStop as SmoothStartStop

@@ -30,6 +30,13 @@ class Arm(Protocol):
 
     carries_weight: bool
 
+    def locate(self) -> Measurement:
+        """Return the present state of the arm, which is not driven yet: the loop takes its time to start from there.
+
+        Raises:
+            ArmError: the arm is not there, or cannot be driven now.
+        """
+
     def read(self) -> Measurement | None:
         """Wait for the next measurement and return it; ``None`` where it has not come in time.
 

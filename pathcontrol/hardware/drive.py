@@ -8,11 +8,13 @@ import numpy as np
 
 from pathcontrol._arrays import Array, as_scalar
 from pathcontrol._expect import expect
+from pathcontrol.control.wrapper import LawWrapper
 from pathcontrol.errors import ArmError
 from pathcontrol.hardware.arm import Arm, Measurement
 from pathcontrol.hardware.control_loop import ControlLoop, Status
 from pathcontrol.hardware.real_time import real_time
 
+_WARM = 10
 _FIRST = 100  # periods in which the first measurement must come
 
 
@@ -46,14 +48,14 @@ class DriveRecord:
 def drive(loop: ControlLoop, arm: Arm, duration: float, settle: float = 0.7) -> DriveRecord:
     """Drive an arm along the path of a loop's law, let the plan come to rest, and return what was measured.
 
-    The loop starts at the first measurement. A measurement that does not come in time is one that is no number to the
+    The loop starts where the arm is, before it is driven. A measurement that does not come in time is no number to the
     loop, which bridges it. The torques are those of the loop, without g(q) where the arm carries its own weight. Ctrl-C
     ends the drive early, in the same way: the plan comes to rest on its path before the torque control ends. Where the
     arm stops by itself the loop is stopped (:meth:`ControlLoop.stop`), and the record says why.
 
     Args:
         loop: the law behind its envelope.
-        arm: a :class:`Franka`, a :class:`UR`, or whatever has the three methods of :class:`Arm`.
+        arm: a :class:`Franka`, a :class:`UR`, or whatever has the four methods of :class:`Arm`.
         duration: time along the path [s].
         settle: time for coming to rest at the end [s].
 
@@ -64,13 +66,27 @@ def drive(loop: ControlLoop, arm: Arm, duration: float, settle: float = 0.7) -> 
     expect("loop", loop, ControlLoop)
     span = as_scalar("duration", duration, positive=True)
     rest = as_scalar("settle", settle, least=0.0)
+    _warm_up(loop)
     try:
         with real_time() as allowed:
             driver = _Driver(loop, arm, span + rest)
             stopped = driver.drive(span, rest)
     finally:
         arm.finish()
+        if isinstance(loop.law, LawWrapper):
+            loop.law.resume()  # it is the caller's law that was held
     return driver.record(stopped, allowed)
+
+
+def _warm_up(loop: ControlLoop) -> None:
+    """Take steps that no arm sees: the first ones of a process last several periods, also those of a held plan."""
+    task = loop.law.task
+    q = np.asarray(task.q_d(np.array(task.s0)), dtype=np.float64).reshape(-1)
+    loop.start(q)
+    for k in range(2 * _WARM):
+        if k == _WARM:
+            loop.hold()
+        loop.step(q, np.zeros_like(q), k * loop.period)
 
 
 class _Driver:
@@ -86,9 +102,10 @@ class _Driver:
 
     def drive(self, span: float, rest: float) -> str:
         """Drive for both times [s], and return why the arm stopped, or ""."""
+        here = self._arm.locate()
+        self._loop.start(here.q, here.qd)
         first = self._read_first()
         self._start = first.t
-        self._loop.start(*first)
         try:
             try:
                 self._tick(first)
@@ -123,10 +140,11 @@ class _Driver:
 
     def _tick(self, measured: Measurement) -> None:
         """Take a tick: step the loop, send its torques, and write the row."""
-        tau = self._loop.step(*measured)
+        q, qd, t = measured.q, measured.qd, measured.t - self._start
+        tau = self._loop.step(q, qd, t)
         self._arm.write(tau - self._loop.gravity if self._arm.carries_weight else tau)
-        status, t = self._loop.status, measured.t - self._start
-        self._rows[self._k] = t, measured.q, measured.qd, tau, status.s, status.mode
+        status = self._loop.status
+        self._rows[self._k] = t, q, qd, tau, status.s, status.mode
         self._k, self._elapsed = self._k + 1, max(self._elapsed, t)  # a time that is no number changes nothing
 
     def _ticks(self, time: float) -> int:

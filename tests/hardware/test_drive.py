@@ -33,6 +33,9 @@ class SimulatedArm:
         self.q = np.asarray(law.task.q_d(np.array(law.task.s0)), float).reshape(1, -1)
         self.qd, self.reads, self.sent, self.finished = np.zeros_like(self.q), 0, [], 0
 
+    def locate(self):
+        return Measurement(self.q[0].copy(), self.qd[0].copy(), 3.0)
+
     def read(self):
         self.reads += 1
         if self.reads in self.events and self.events[self.reads](self) == "lost":
@@ -114,7 +117,7 @@ def test_an_arm_that_stops_by_itself_leaves_a_loop_that_only_carries_weight():
     assert (record.stopped, len(record.t), arm.finished) == ("protective stop", 49, 1)
     assert (record.status.mode, record.status.reason) == (Mode.GRAVITY, "protective stop")
     assert record.status.faults == {"arm": 1}
-    loop.step(arm.q[0], arm.qd[0], 8.0)
+    loop.step(arm.q[0], arm.qd[0], 1.0)
     assert loop.status.mode == Mode.DAMP  # measured again: braked, until it is resumed
     loop.resume()
     assert loop.status.mode == Mode.RUN

@@ -1,0 +1,71 @@
+"""A simulated Franka in an environment of its own, which franka-sim's old NumPy asks for."""
+
+import fcntl
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+ROTORS = [0.2, 0.2, 0.2, 0.2, 0.07, 0.07, 0.07]  # kg m², which the URDF lacks: without them wrists weigh 0.1 g m²
+STRICT = ["--enforce-motion-limits", "--enforce-comm-constraints"]
+NEEDS = ["numpy==1.26.4", "mujoco>=3.2,<3.3", "trimesh>=4"]
+
+
+@contextmanager
+def locked(path):
+    """Only one process of this computer at a time."""
+    with open(path, "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def install(folder):
+    """The interpreter of an environment with franka-sim, made once for all processes of the tests; skips without."""
+    python = folder / "bin" / "python"
+    with locked(f"{folder}.lock"):
+        if not (folder / "done").exists():
+            subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+            pip = [python, "-m", "pip", "install", "-q", "--only-binary=:all:"]
+            for asked in (NEEDS, ["--no-deps", "franka-sim==1.1.7"]):
+                done = subprocess.run([*pip, *asked], capture_output=True, text=True)
+                if done.returncode:
+                    pytest.skip(f"franka-sim cannot be installed here: {done.stderr.strip().splitlines()[-1]}")
+            (folder / "done").touch()
+    return python
+
+
+def urdf_of(python):
+    """The URDF that franka-sim serves to its clients."""
+    return next(python.parents[1].glob("lib/python3*/site-packages/franka_sim/models/fr3.urdf"))
+
+
+@contextmanager
+def serve(python):
+    """Serve a robot at its home posture on libfranka's port, of which there is one; yields the process."""
+    script = Path(__file__).with_name("franka_simulator.py")
+    command = [python, script, "--no-gripper", *STRICT, ",".join(map(str, ROTORS))]
+    port = Path(tempfile.gettempdir()) / "franka-1337.lock"
+    with locked(port), tempfile.NamedTemporaryFile("w") as log:
+        server = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
+        try:
+            wait_for(server, log)
+            yield server
+        finally:
+            server.kill()
+            server.wait()
+
+
+def wait_for(server, log):
+    """Wait until the server listens."""
+    for _ in range(600):
+        text = Path(log.name).read_text()
+        if "ready for new client" in text:
+            return
+        if server.poll() is not None:
+            break
+        time.sleep(0.1)
+    raise RuntimeError(text)

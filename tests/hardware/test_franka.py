@@ -1,0 +1,119 @@
+"""A simulated Franka, driven through Franka's own client: franka-sim speaks the protocol of its robots.
+
+It needs real-time priority: without it, a busy computer loses packets whatever the client does.
+"""
+
+import os
+import threading
+
+import numpy as np
+import pytest
+from franka_server import ROTORS, install, serve, urdf_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import pathcontrol as pc
+from pathcontrol.errors import ArmError
+from pathcontrol.hardware import franka
+from pathcontrol.hardware.control_loop import ControlLoop, Mode
+from pathcontrol.hardware.drive import drive
+from pathcontrol.hardware.real_time import real_time
+
+H = 1e-3
+HOME = np.array([0.0, 0.0, 0.0, -1.57, 0.0, 1.57, 0.785])
+DURATION = float(os.environ.get("PATHCONTROL_FRANKA_SECONDS", "10"))
+
+
+@pytest.fixture(scope="session")
+def simulator(tmp_path_factory):
+    """The interpreter that runs the simulated robot."""
+    pytest.importorskip("pylibfranka", reason="Franka publishes no client for this platform")
+    with real_time() as allowed:
+        if not allowed:
+            pytest.skip("no real-time priority here: packets would be lost to other programs")
+    shared = tmp_path_factory.getbasetemp()
+    return install((shared.parent if os.environ.get("PYTEST_XDIST_WORKER") else shared) / "franka-sim")
+
+
+class WatchedFranka(pc.Franka):
+    """It keeps the share of packets that came in time, of the last hundred."""
+
+    def __init__(self):
+        super().__init__("127.0.0.1", enforce_real_time=False)
+        self.rates = []
+
+    def read(self):
+        measured = super().read()
+        self.rates.append(self.state.control_command_success_rate)
+        return measured
+
+
+def law_of(kind, urdf):
+    robot = pc.load_robot(urdf).with_armature(ROTORS)
+    task = pc.Lissajous(np.full(7, 0.2), [1, 2, 1, 2, 1, 2, 1], 0.5, center=HOME)
+    extended = pc.ExtendedMotionPlan(robot, task, K_p=400.0, K_v=40.0, k=5.0)
+    return {"extended": extended, "paced": pc.Paced(extended), "projection": pc.Projection(robot, task, 400.0, 40.0)}[
+        kind
+    ]
+
+
+def rms_error(task, s, q):
+    """The root mean square of ‖e_p‖ [rad] over positions (K, n), with those of the plan (K,)."""
+    return np.sqrt((np.linalg.norm(task.q_d(s) - q, axis=-1) ** 2).mean())
+
+
+@pytest.mark.parametrize("kind", ["extended", "projection", "paced"])
+def test_a_law_drives_the_robot_as_it_drives_the_simulation(simulator, kind):
+    law = law_of(kind, urdf_of(simulator))
+    with serve(simulator):
+        arm = WatchedFranka()
+        record = drive(ControlLoop(law, H, pc.Franka.envelope), arm, DURATION)
+    ticks = len(record.t) - 700
+    assert record.stopped == ""
+    assert (record.mode[:ticks] == Mode.RUN).all()
+    assert record.status.mode == Mode.HOLD
+    assert not {"law", "measurement", "motion", "tube"} & set(record.status.faults)
+    assert record.t[-1] == pytest.approx(DURATION + 0.7, abs=0.05)
+    run = pc.simulate(law, record.q[0], record.qd[0], duration=DURATION, loop=pc.SampledLoop(period=H), progress=False)
+    settled = 2000  # once the first errors have gone
+    mine = rms_error(law.task, record.s[settled - 1 : ticks - 1], record.q[settled:ticks])
+    theirs = rms_error(law.task, run.array("s")[0, settled:], run.array("q")[0, settled:])
+    success = np.mean(arm.rates[100:ticks])
+    print(f"{kind}: success {success:.4f}, |e_p| {mine:.5g} rad, simulated {theirs:.5g} rad, ticks {ticks}")
+    assert mine == pytest.approx(theirs, rel=0.05)
+    assert success >= 0.99
+
+
+def test_a_connection_that_is_lost_ends_in_the_fallback_of_the_loop(simulator):
+    law = law_of("projection", urdf_of(simulator))
+    loop = ControlLoop(law, H, pc.Franka.envelope)
+    with serve(simulator) as server:
+        arm = pc.Franka("127.0.0.1", enforce_real_time=False)
+        threading.Timer(1.0, server.kill).start()
+        record = drive(loop, arm, 30.0)
+    assert "libfranka" in record.stopped
+    assert loop.status.mode == Mode.GRAVITY
+    assert 0.1 < record.t[-1] < 5.0
+
+
+def test_a_robot_that_is_not_there_is_an_error_and_priorities_stay_as_they_were():
+    pytest.importorskip("pylibfranka")
+    before = os.sched_getscheduler(0)
+    with pytest.raises(ArmError, match=r"192\.0\.2\.1|0\.0\.0\.1|cannot be used"):
+        pc.Franka("127.0.0.254", enforce_real_time=False)
+    assert os.sched_getscheduler(0) == before
+
+
+joints = st.lists(st.floats(-5, 5), min_size=7, max_size=7).map(np.array)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(joints, joints, st.lists(st.floats(-1.99, 1.99), min_size=7, max_size=7).map(np.array))
+def test_no_torque_is_a_step_away_from_what_the_robot_had_or_was_sent(tau, had, further):
+    sent = had + further
+    limited = franka._limit_step(tau, had, sent)
+    for reference in (had, sent):
+        assert (np.abs(limited - reference) <= 0.999 + 1e-9).all() or (np.abs(further) > 1.998).any()
+    within = (np.abs(tau - had) < 0.99) & (np.abs(tau - sent) < 0.99)
+    assert (limited[within] == tau[within]).all()
+    np.testing.assert_array_equal(franka._limit_step(tau, had, None), franka._limit_step(tau, had, had))
