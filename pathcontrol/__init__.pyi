@@ -46,6 +46,8 @@ from .control.paced import Paced as Paced
 from .control.projection import Projection as Projection
 from .control.speed_override import SpeedOverride as SpeedOverride
 from .control.speed_rule import SpeedRule as SpeedRule
+from .control.state_to_reference import Reference as Reference
+from .control.state_to_reference import StateToReferenceProjection as StateToReferenceProjection
 from .control.wrapper import LawWrapper as LawWrapper
 from .engine.control_tick import ControlTick as ControlTick
 from .errors import ArmError as ArmError

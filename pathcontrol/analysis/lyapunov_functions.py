@@ -9,6 +9,7 @@ error e_v = wr − q̇: no factor w(t) that is differentiable changes V̇.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from pathcontrol.analysis.speed_factor import speed_factor
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.projection import Projection
+from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.control.wrapper import LawWrapper
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
@@ -44,6 +46,27 @@ def extended_motion_plan_lyapunov(controller: ExtendedMotionPlan, s: Array, e_p:
         e_v: velocity error [rad/s], (*batch, n).
     """
     return _extended(controller.K_p, controller.K_v, controller.plan_gain(s), e_p, e_v, controller.point(s).dq_d)
+
+
+def state_to_reference_lyapunov(
+    controller: StateToReferenceProjection, s: Array, sdot: Array, e_p: Array, e_v: Array
+) -> Lyapunov:
+    """Return V and V̇ of control by any state-to-reference projection.
+
+    With the metric P of the law V = ½e_pᵀP e_p + ½e_vᵀP K_p⁻¹e_v, and V̇ = −e_vᵀP K_p⁻¹K_v e_v + e_pᵀP q_d'(ṡ − ϑ), in
+    rad² and rad²/s for P without a unit. V̇ is at most 0 where the projection meets condition 3 of
+    :class:`StateToReferenceProjection`, and only there.
+
+    Args:
+        controller: the law, for its gains, metric and task.
+        s: path parameter, (*batch,).
+        sdot: its rate [1/s], (*batch,).
+        e_p: position error [rad], (*batch, n).
+        e_v: velocity error [rad/s], (*batch, n).
+    """
+    point = controller.point(s)
+    gains = controller.K_p, controller.K_v, controller.metric
+    return _referred(gains, e_p, e_v, point.dq_d * (sdot - point.theta)[..., None])
 
 
 def projection_lyapunov(controller: Projection, e_p: Array, e_v: Array) -> Lyapunov:
@@ -78,6 +101,14 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
         return _extended(K_p, K_v, k, e_p, e_v, tangent)
     if isinstance(controller, Projection):
         return _projected(_add_time_axis(controller.k_p), _add_time_axis(controller.K_v), e_p, e_v)
+    if isinstance(controller, StateToReferenceProjection):
+        s, sdot = (
+            np.where(np.isfinite(part), part, controller.task.s0) for part in (run.array("s").T, run.array("sdot").T)
+        )
+        point = controller.point(s)
+        lead = (point.dq_d * (sdot - point.theta)[..., None]).swapaxes(0, 1)
+        gains = [_add_time_axis(gain) for gain in (controller.K_p, controller.K_v, controller.metric)]
+        return _referred(gains, e_p, e_v, lead)
     raise InputError(
         f"no Lyapunov function is given for {type(controller).__name__}; use ExtendedMotionPlan or Projection, "
         "or ExtendedMotionPlan with k = 0 for computed torque"
@@ -89,6 +120,13 @@ def _extended(K_p: Array, K_v: Array, k: Array, e_p: Array, e_v: Array, dq_d: Ar
     along = (e_p * dq_d).sum(-1)
     V = 0.5 * (e_p**2).sum(-1) + 0.5 * (e_v**2 / K_p).sum(-1)
     return Lyapunov(V, -(e_v**2 * (K_v / K_p)).sum(-1) - k * along**2)
+
+
+def _referred(gains: Sequence[Array], e_p: Array, e_v: Array, lead: Array) -> Lyapunov:
+    """Return V and V̇ of a state-to-reference projection for K_p, K_v and P, errors, and q_d'(ṡ − ϑ) [rad/s]."""
+    K_p, K_v, P = gains
+    V = 0.5 * (P * (e_p**2 + e_v**2 / K_p)).sum(-1)
+    return Lyapunov(V, (P * (e_p * lead - e_v**2 * (K_v / K_p))).sum(-1))
 
 
 def _projected(k_p: Array, K_v: Array, e_p: Array, e_v: Array) -> Lyapunov:

@@ -17,6 +17,7 @@ from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.paced import Paced
 from pathcontrol.control.projection import Projection
+from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.control.wrapper import unwrap
 from pathcontrol.errors import InputError, TaskError, UnknownNameError
 from pathcontrol.robot.model import RobotModel
@@ -134,9 +135,7 @@ def recover_gains(law: Controller) -> Gains:
     law = unwrap(law)
     if isinstance(law, ExtendedMotionPlan):
         gains = Gains(law.K_p, law.K_v, float(law.k) if law.k.size == 1 else None)
-    elif isinstance(law, Projection):
-        gains = Gains(law.k_p, law.K_v)
-    elif isinstance(law, ComputedTorque):
+    elif isinstance(law, ComputedTorque | StateToReferenceProjection):
         gains = Gains(law.K_p, law.K_v)
     elif isinstance(law, PDPlus):
         mass = mean_inertia(law.robot, law.task)

@@ -237,6 +237,13 @@ class Controller(ABC):
         """
         return theta
 
+    def speed_gradient(self, q: Array, qd: Array, s: Array, velocity: Array) -> tuple[Array, Array]:
+        """Return ∂q̈/∂ẇ [rad/s], (*batch, n), and ∂ṡ/∂ẇ, (*batch,), of a wrapped law at (q, q̇) and s.
+
+        They are q_d'ϑ, ``velocity`` (*batch, n), and 0 for a law whose ṡ does not depend on q̈.
+        """
+        return velocity, np.zeros(s.shape)
+
     def inside(self, s: Array, sdot: Array) -> Array:
         """Return ṡ without the part that would leave an open path."""
         if self.task.closed:

@@ -47,9 +47,7 @@ class BranchPolicy:
 
     def sigma_bar(self, task: PathTask, q: Array, last: Array) -> Array:
         """Return σ̄ (*batch,) for the arm at q (*batch, n), before a push to another branch is considered."""
-        return (
-            _shift_to_lap(task, task.sigma_bar(q), last) if self.branch == "nearest" else task.sigma_bar(q, near=last)
-        )
+        return shift_to_lap(task, task.sigma_bar(q), last) if self.branch == "nearest" else task.sigma_bar(q, near=last)
 
     def captured(self, task: PathTask, q: Array, s: Array, q_d: Array) -> Array:
         """Return σ̄ on the branch that the arm was pushed to, or ``s``, with q_d = q_d(s), where there is none."""
@@ -65,10 +63,10 @@ class BranchPolicy:
         other = there.sigma_bar(q[away])
         jumps = np.linalg.norm(there.q_d(other) - q[away], axis=-1) < _NEARER * distance[away]
         s = np.array(s)
-        s[away] = np.where(jumps, _shift_to_lap(there, other, s[away]), s[away])
+        s[away] = np.where(jumps, shift_to_lap(there, other, s[away]), s[away])
         return s
 
 
-def _shift_to_lap(task: PathTask, s: Array, near: Array) -> Array:
+def shift_to_lap(task: PathTask, s: Array, near: Array) -> Array:
     """Return ``s`` in the lap in which it is nearest to ``near``."""
     return s if task.period is None else s + task.period * np.round((near - s) / task.period)

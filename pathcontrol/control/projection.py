@@ -9,19 +9,15 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain, scalar_gain
+from pathcontrol.control.base import FrictionCompensation, Start, scalar_gain
 from pathcontrol.control.branch import Branch, BranchPolicy
+from pathcontrol.control.state_to_reference import STEEPEST, Reference, StateToReferenceProjection
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.task import PathTask
 
-# σ̄ is called irregular where dσ̄/dq exceeds this many times its value on the path
-_STEEPEST = 1e6
-# in continuous time: time constant [s] with which the state converges to σ̄ after it jumped
-_CATCH_UP = 1e-2
 
-
-class Projection(Controller):
+class Projection(StateToReferenceProjection):
     """Path control by projection, eq. (39): a path controller for any path.
 
         (q_d(σ̄) − q)ᵀq_d'(σ̄) = 0,    dσ̄/dt = q_d'ᵀq̇ / (‖q_d'‖² + e_pᵀq_d'')
@@ -48,8 +44,9 @@ class Projection(Controller):
         branch: ``"follow"`` the branch of the path that the arm is on, until it is pushed away to another; always the
             ``"nearest"`` one; or ``"local"``, never another. See :class:`BranchPolicy`.
         capture: distance from its branch [rad] from which an arm counts as pushed away.
-        options: ``friction`` and ``start`` of :class:`Controller`; unless given, ``start`` is ``"s0"`` on a path that
-            ends, and ``"nearest"`` on others.
+        friction: as of :class:`Controller`.
+        start: as of :class:`Controller`; unless given, ``"s0"`` on a path that ends, and ``"nearest"`` on others.
+        observer_hz: as of :class:`Controller`.
     """
 
     gains = ("k_p", "K_v")
@@ -62,57 +59,43 @@ class Projection(Controller):
         K_v: Annotated[ArrayLike, Form.GAIN, Unit("1/s")],
         branch: Branch = "follow",
         capture: Annotated[float, Form.POSITIVE, Unit("rad")] = 0.1,
-        **options: Any,
+        friction: FrictionCompensation = "viscous",
+        start: Start | None = None,
+        observer_hz: Annotated[ArrayLike, Form.GAIN, Unit("Hz")] | None = None,
     ) -> None:
+        self.k_p = scalar_gain("k_p", k_p)
+        given = {"friction": friction, "start": "s0" if start is None else start, "observer_hz": observer_hz}
+        super().__init__(robot, task, self.k_p, K_v, **given)
         # an open path may end close to where it begins, and an arm at its begin be nearer to the end
-        super().__init__(robot, task, **options)
-        if "start" not in options:
-            self.start_at = "s0" if np.all(np.isfinite(task.s_end)) else "nearest"
+        if start is None and not np.all(np.isfinite(task.s_end)):
+            self.start_at = "nearest"
         self.branches = BranchPolicy(branch, capture)
-        self.k_p, self.K_v = scalar_gain("k_p", k_p), diagonal_gain("K_v", K_v, robot.n, robot.joint_names)
 
-    def first_parameter(self, q: Array, qd: Array) -> Array:
-        """Return σ̄, (*batch,), of an arm that starts at (q, q̇), on the branch that ``start`` names."""
-        return self._project(q, qd, super().first_parameter(q, qd))[0]
+    def reference(self, q: Array, qd: Array, near: Array) -> Array:
+        return self.project(q, qd, near).s
 
-    def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
-        last, none = z[..., 0], np.zeros(z.shape[:-1])
-        s, point, sdot, regular = self._project(q, qd, last)
-        slope = none
-        if (self.ending is not None or self.speed is not None) and (timed := self.timed(last)).any():
-            s = np.where(timed, last, s)
-            point = self.point(s)
-            sdot, slope = np.where(timed, point.theta, sdot), np.where(timed, point.dtheta, 0.0)
-            regular = regular | timed
-        e_p, e_v = point.q_d - q, point.velocity - qd
-        qdd = point.velocity_slope * sdot[..., None] + self.K_v * e_v + self.k_p * e_p
-        tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd, point.velocity)
-        # in continuous time the state integrates dσ̄/dt; its offset, as after a change of branch, decays exponentially
-        zdot = sdot + np.where(regular, (s - last) / _CATCH_UP, 0.0)
-        out = ControlOutput(tau, zdot[..., None], s, sdot, slope, none, e_p, e_v, regular)
-        return self.compensate(t, q, qd, z, out)
-
-    def speed_response(self, s: Array, theta: Array) -> Array:
-        return np.where(self.timed(s), theta, 0.0)
-
-    def describe(self) -> dict[str, Any]:
-        return super().describe() | {"branch": self.branches.branch, "capture": self.branches.capture}
-
-    def _project(self, q: Array, qd: Array, last: Array) -> tuple[Array, PathPoint, Array, Array]:
-        """Return σ̄, the task there, dσ̄/dt, and where these are defined."""
-        s = self.branches.sigma_bar(self.task, q, last)
+    def project(self, q: Array, qd: Array, near: Array) -> Reference:
+        """Return σ̄ with its gradient q_d'ᵀ/(‖q_d'‖² + e_pᵀq_d'')."""
+        s = self.branches.sigma_bar(self.task, q, near)
         point = self.point(s)
         if (elsewhere := self.branches.captured(self.task, q, s, point.q_d)) is not s:
             s, point = elsewhere, self.point(elsewhere)
-        gradient = np.vecdot(point.dq_d, point.dq_d)
-        denominator = gradient + np.vecdot(point.q_d - q, point.ddq_d)
-        regular = denominator * _STEEPEST > gradient
+        squared = np.vecdot(point.dq_d, point.dq_d)
+        denominator = squared + np.vecdot(point.q_d - q, point.ddq_d)
+        regular = denominator * STEEPEST > squared
         if not regular.all():
-            s = np.where(regular, s, last)
+            s = np.where(regular, s, near)
             point = self.point(s)
-        along = np.vecdot(point.dq_d, qd)
-        sdot = np.divide(along, denominator, out=np.zeros_like(along), where=regular & ~self._held_by_end(s, q, point))
-        return s, point, sdot, regular
+        moves = (regular & ~self._held_by_end(s, q, point))[..., None]
+        gradient = np.divide(point.dq_d, denominator[..., None], out=np.zeros_like(point.dq_d), where=moves)
+        return Reference(s, point, gradient, None, regular)
+
+    @property
+    def metric(self) -> Array:
+        return self.k_p
+
+    def describe(self) -> dict[str, Any]:
+        return super().describe() | {"branch": self.branches.branch, "capture": self.branches.capture}
 
     def _held_by_end(self, s: Array, q: Array, point: PathPoint) -> Array:
         """Return where the nearest point is an end of the open path and stays there as the arm moves."""

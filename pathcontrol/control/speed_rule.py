@@ -28,7 +28,9 @@ class Moment(NamedTuple):
         law: the law that is wrapped, at the factor w in use.
         out: its output with ẇ = 0.
         theta: ϑ(s) [1/s], (*batch,), where the plan goes at wϑ; 0 where it is braked at an end of its path.
-        gradient: ∂τ/∂ẇ = M(q)q_d'ϑ [N m s], (*batch, n): the torque demand is ``out.tau`` + ẇ ``gradient``.
+        gradient: ∂τ/∂ẇ [N m s], (*batch, n), M(q)q_d'ϑ but for laws that say otherwise
+            (:meth:`Controller.speed_gradient`): the torque demand is ``out.tau`` + ẇ ``gradient``.
+        response: ∂ṡ/∂ẇ, (*batch,).
     """
 
     t: float
@@ -38,6 +40,7 @@ class Moment(NamedTuple):
     out: ControlOutput
     theta: Array
     gradient: Array
+    response: Array
 
 
 class SpeedRule(ABC):

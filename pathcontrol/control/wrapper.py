@@ -106,11 +106,12 @@ class LawWrapper(Controller):
             asked.append(Speed(x[..., 0], rule.rate(moment, asked[-1], x)))
         out, taken = moment.out, asked[-1].rate
         tau = out.tau + taken[..., None] * moment.gradient
-        zdot = [out.zdot]
+        zdot = [out.zdot[..., :1] + (taken * moment.response)[..., None], out.zdot[..., 1:]]
         for rule, x, before, after in zip(self.rules, states, asked[:-1], asked[1:], strict=True):
             zdot += [after.rate[..., None], rule.memory_rate(moment, before, tau, x)]
         drift = out.drift + taken * moment.law.speed_response(own[..., 0], moment.theta)
-        return out._replace(tau=tau, zdot=np.concatenate(zdot, axis=-1), drift=drift)
+        sdot = out.sdot + taken * moment.response
+        return out._replace(tau=tau, zdot=np.concatenate(zdot, axis=-1), sdot=sdot, drift=drift)
 
     def rate(self, out: ControlOutput) -> Array:
         own, *rates = self.split(out.zdot)
@@ -137,8 +138,9 @@ class LawWrapper(Controller):
         law = self.inner.at_speed(factor)
         out = law.law(t, q, qd, own)
         velocity, theta = law.full_speed(out.s)
-        gradient = self.robot.inverse_dynamics(q, np.zeros_like(qd), velocity) - self.robot.gravity(q)
-        return Moment(t, q, qd, law, out, theta, gradient)
+        change, response = law.speed_gradient(q, qd, out.s, velocity)
+        gradient = self.robot.inverse_dynamics(q, np.zeros_like(qd), change) - self.robot.gravity(q)
+        return Moment(t, q, qd, law, out, theta, gradient, response)
 
     # --- for the record -------------------------------------------------------------------------------------
 

@@ -13,14 +13,14 @@ from pathcontrol.control.base import Controller
 from pathcontrol.control.override_rule import Override
 from pathcontrol.control.wrapper import LawWrapper
 from pathcontrol.engine.library import load_library
-from pathcontrol.engine.run_settings import add_law
+from pathcontrol.engine.run_settings import GAINS, add_law
 from pathcontrol.engine.structs import Memory, Setup
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 
 
 class ControlTick:
-    """A law of the library for one arm, with the state of its plan, as one call without allocation.
+    """A control law for one arm, with the state of its plan, as one call without allocation.
 
     >>> tick = ControlTick(law, period=2.5e-3)
     >>> tick.start(q, qd)
@@ -29,21 +29,22 @@ class ControlTick:
     It computes what ``law.law`` and ``law.advance`` do, without torque limits. The next call writes the returned array
     anew; copy it to keep it.
 
-    A law that is wrapped, by :class:`SpeedOverride` or another :class:`LawWrapper`, is run in Python, and has the
-    methods of its speed input: :meth:`hold`, :meth:`resume`, :meth:`override` and :meth:`reverse` act at the next call.
-    So is one with ``friction="observed"``, whose observer takes the returned torques to act up to the next call, within
-    the effort limits of its robot.
+    The five laws of the library are compiled; others are run in Python. A law that is wrapped, by
+    :class:`SpeedOverride` or another :class:`LawWrapper`, has the methods of its speed input: :meth:`hold`,
+    :meth:`resume`, :meth:`override` and :meth:`reverse` act at the next call. The observer of a law with
+    ``friction="observed"`` takes the returned torques to act up to the next call, within the effort limits of its
+    robot.
 
     Args:
-        law: one of the five laws of the library, with one task and gains for one arm, or any law that is wrapped or
-            has an observer.
+        law: any law with one task, and gains for one arm.
         period: control period [s].
 
     Attributes:
         s: path parameter of the plan.
 
     Raises:
-        EngineError: the law, its arm or task is beyond the compiled engine, or that is not installed.
+        EngineError: the arm or the task of a law of the library is beyond the compiled engine, or that is not
+            installed.
         InputError: the law is for several rollouts.
     """
 
@@ -52,7 +53,7 @@ class ControlTick:
         if isinstance(law.task, TaskBatch) or any(np.ndim(gain) > 1 for gain in gains):
             raise InputError("the law is for several rollouts, expected one task and one set of gains")
         self.law, self._period = law, as_scalar("period", period, positive=True)
-        make = _PythonTick if isinstance(law, LawWrapper) or law.observer is not None else _CompiledTick
+        make = _CompiledTick if type(law) in GAINS and law.observer is None else _PythonTick
         self._tick: _PythonTick | _CompiledTick = make(law, self._period)
         self.start(np.zeros(law.robot.n) if law.start_at == "s0" else law.task.q_d(np.array(law.task.s0)))
 

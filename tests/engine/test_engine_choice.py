@@ -144,8 +144,10 @@ def test_a_control_tick_is_the_law_and_a_step_of_its_plan():
             q = q + 2.5e-3 * qd
     with pytest.raises(pc.InputError, match="several rollouts"):
         pc.ControlTick(pc.ComputedTorque(ROBOT, TASK, np.ones((3, 1)), 1.0), 1e-3)
-    with pytest.raises(pc.EngineError, match="the law Own"):
-        pc.ControlTick(Own(ROBOT, TASK, 800.0, [45.0, 100.0], k=20.0), 1e-3)
+    own = Own(ROBOT, TASK, 800.0, [45.0, 100.0], k=20.0)
+    tick = pc.ControlTick(own, 1e-3)  # in Python
+    tick.start(q, qd)
+    np.testing.assert_array_equal(tick(q, qd), own.law(0.0, q, qd, own.start(q, qd)).tau)
 
 
 EXPERIMENT = """

@@ -12,7 +12,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
-from pathcontrol.control.projection import Projection
+from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.control.wrapper import unwrap
 from pathcontrol.robot.friction import viscous_of
 from pathcontrol.robot.model import RobotModel
@@ -47,9 +47,8 @@ def linearize_law(controller: Controller, q: Array, rollouts: Sequence[int] = ()
     if isinstance(controller, PDPlus):
         pairs = _select_extremes(controller.K_p, controller.K_v, controller.robot.n, rollouts)
         return [Feedback(_repeat_diagonal(K_p, M), _repeat_diagonal(K_v, M), row) for K_p, K_v, row in pairs]
-    if isinstance(controller, ComputedTorque | ExtendedMotionPlan | Projection):
-        position = controller.k_p if isinstance(controller, Projection) else controller.K_p
-        pairs = _select_extremes(position, controller.K_v, controller.robot.n, rollouts)
+    if isinstance(controller, ComputedTorque | ExtendedMotionPlan | StateToReferenceProjection):
+        pairs = _select_extremes(controller.K_p, controller.K_v, controller.robot.n, rollouts)
         return [Feedback(M * K_p, M * K_v, row) for K_p, K_v, row in pairs]
     return []
 
