@@ -81,6 +81,10 @@ from .hardware.envelope import Envelope as Envelope
 from .hardware.franka import Franka as Franka
 from .hardware.loop_log import LoopLog as LoopLog
 from .hardware.position_command import PositionCommand as PositionCommand
+from .hardware.sil.machine_arm import MachineArm as MachineArm
+from .hardware.sil.machine_arm import MachineProcess as MachineProcess
+from .hardware.sil.session import SilReport as SilReport
+from .hardware.sil.session import run_sil as run_sil
 from .profiles.jerk.start_stop import SmoothStartStop as SmoothStartStop
 from .profiles.limited.limited import limited as limited
 from .profiles.limited.motion_limit import MotionLimit as MotionLimit

@@ -12,6 +12,7 @@ from pathcontrol.cli import (
     report_command,
     reproduce_command,
     run_command,
+    sil_command,
     sweep_command,
     toolpath_command,
     tune_command,
@@ -38,5 +39,6 @@ for _part in (
     toolpath_command,
     export_command,
     identify_command,
+    sil_command,
 ):
     main.add_command(_part.command)

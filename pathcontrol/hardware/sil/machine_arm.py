@@ -1,0 +1,243 @@
+"""The line from a control loop to a machine, as an arm that :func:`drive` takes."""
+
+from __future__ import annotations
+
+import json
+import secrets
+import socket
+import subprocess
+import sys
+import time
+from ipaddress import ip_address
+from typing import Any
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.errors import ArmError, InputError
+from pathcontrol.hardware.arm import Measurement
+from pathcontrol.hardware.sil.machine import MachineSettings, load_mujoco
+from pathcontrol.hardware.sil.mjcf import friction_bias, write_mjcf
+from pathcontrol.hardware.sil.packets import LONGEST, Kind, Packet, read_packet, write_packet
+from pathcontrol.robot.model import RobotModel
+
+_STEP = 2e-4  # s, longest step of MuJoCo
+_HELLO = 0.05  # s between two hellos
+_MEET = 20.0  # s in which the machine must answer the first time
+_GONE = 2.0  # s without a state after which the machine counts as gone
+_WAIT = 1.5  # periods in which a state must come
+_SHORTEST_KEY = 16  # bytes
+
+
+class MachineArm:
+    """An arm that is a machine at an address; a :class:`Machine` in its own process, or whatever speaks its language.
+
+    Packets that are not of the machine, not of this session, or older than one that has come are counted and ignored.
+
+    Args:
+        robot: the arm.
+        host: address of the machine; one that is not of this computer needs a ``key``.
+        port: its port.
+        key: the shared key.
+        period: time between its states [s].
+
+    Attributes:
+        count: how many packets were ``taken``, ``repeated``, ``foreign``, and states ``lost``.
+        arrivals: times at which states were taken [s], for the first ``room`` of them.
+
+    Raises:
+        InputError: the address is not of this computer and there is no key, or it is too short.
+    """
+
+    carries_weight = False
+
+    def __init__(
+        self, robot: RobotModel, host: str, port: int, key: bytes, period: float = 1e-3, room: int = 1_000_000
+    ) -> None:
+        check_key(host, key)
+        self._n, self._key, self._period = robot.n, key, period
+        self._line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._line.connect((host, port))  # the system drops what comes from elsewhere
+        self._session, self._number = b"", -1
+        self._heard = time.monotonic()
+        self.count = {"taken": 0, "repeated": 0, "foreign": 0, "lost": 0}
+        self.arrivals = np.zeros(room)
+
+    def read(self) -> Measurement | None:
+        """Return the newest state, or None where none comes within one and a half periods.
+
+        Raises:
+            ArmError: the machine has not been heard for 2 s, or never answers.
+        """
+        if not self._session:
+            self._meet()
+        newest = self._wait(_WAIT * self._period)
+        if newest is None:
+            if time.monotonic() - self._heard > _GONE:
+                raise ArmError(f"the machine has not been heard for {_GONE:g} s; does it still run?")
+            return None
+        self._heard = time.monotonic()
+        return Measurement(newest[1 : 1 + self._n], newest[1 + self._n :], float(newest[0]))
+
+    def write(self, tau: Array) -> None:
+        """Send torques [N m], (n,), as the answer to the last state."""
+        self._send(Packet(Kind.TORQUE, self._session, self._number, tau))
+
+    def finish(self) -> None:
+        """Let the machine put its brakes on."""
+        for _ in range(5):  # one of them comes
+            self._send(Packet(Kind.BYE, self._session or bytes(8), 0, np.zeros(0)))
+        self._line.close()
+
+    def _meet(self) -> None:
+        """Say hello until the machine answers."""
+        until = time.monotonic() + _MEET
+        while not self._session:
+            if time.monotonic() > until:
+                raise ArmError(f"no machine answers within {_MEET:g} s; is it there, and has it the same key?")
+            self._send(Packet(Kind.HELLO, bytes(8), 0, np.zeros(0)))
+            self._line.settimeout(_HELLO)
+            packet = self._receive()
+            if packet is not None and self._is_state(packet):
+                self._session = packet.session
+        self._heard = time.monotonic()
+
+    def _wait(self, longest: float) -> Array | None:
+        """Return the numbers of the newest state that comes within a time [s], or None."""
+        newest, until = None, time.perf_counter() + longest
+        while True:
+            left = until - time.perf_counter()
+            if newest is None and left <= 0:
+                return None
+            self._line.settimeout(0.0 if newest is not None else left)
+            data = self._receive_bytes()
+            if data is None:
+                if newest is not None or until <= time.perf_counter():
+                    return newest
+                continue
+            packet = read_packet(data, self._key)
+            if packet is None or not self._is_state(packet) or packet.session != self._session:
+                self.count["foreign"] += 1
+            elif packet.number <= self._number:
+                self.count["repeated"] += 1
+            else:
+                self._keep(packet)
+                newest = packet.numbers
+
+    def _is_state(self, packet: Packet) -> bool:
+        """Return whether a packet is the state of such an arm."""
+        return packet.kind == Kind.STATE and len(packet.numbers) == 1 + 2 * self._n
+
+    def _keep(self, packet: Packet) -> None:
+        """Count a state."""
+        taken = self.count["taken"]
+        if taken < len(self.arrivals):
+            self.arrivals[taken] = time.perf_counter()
+        self.count["taken"] = taken + 1
+        self.count["lost"] += packet.number - self._number - 1 if taken else 0
+        self._number = packet.number
+
+    def _receive(self) -> Packet | None:
+        """Return a packet, or None where none comes in time."""
+        data = self._receive_bytes()
+        return None if data is None else read_packet(data, self._key)
+
+    def _receive_bytes(self) -> bytes | None:
+        """Return what has come, or None where nothing comes in time."""
+        try:
+            return self._line.recv(LONGEST + 1)
+        except (TimeoutError, BlockingIOError, ConnectionRefusedError):
+            return None
+
+    def _send(self, packet: Packet) -> None:
+        """Send a packet; one that cannot be sent is a lost one."""
+        try:
+            self._line.send(write_packet(packet, self._key))
+        except OSError:
+            self.count["unsent"] = self.count.get("unsent", 0) + 1
+
+
+class MachineProcess:
+    """A machine on this computer, in a process of its own.
+
+    Args:
+        robot: the arm, with its friction.
+        q: where it starts [rad], (n,).
+        period: time between its states [s].
+        host: address at which it listens; one that is not of this computer needs a ``key``.
+        port: its port, 0 for a free one.
+        key: the shared key; a random one by default.
+
+    Raises:
+        InputError: the address is not of this computer and there is no key.
+        MissingExtraError: MuJoCo is not installed.
+        ArmError: the process does not start.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        q: Array,
+        period: float = 1e-3,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        key: bytes | None = None,
+    ) -> None:
+        load_mujoco()
+        self.key = secrets.token_bytes(32) if key is None else key
+        check_key(host, key)
+        steps = max(1, int(np.ceil(period / _STEP - 1e-9)))
+        effort = np.where(robot.limits.effort > 0, robot.limits.effort, np.inf)
+        settings = MachineSettings(
+            write_mjcf(robot, period / steps),
+            steps,
+            friction_bias(robot).tolist(),
+            np.minimum(effort, 1e9).tolist(),
+            np.asarray(q, dtype=np.float64).tolist(),
+            period,
+            host,
+            port,
+            self.key.hex(),
+        )
+        command = [sys.executable, "-m", "pathcontrol.hardware.sil.machine"]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(json.dumps(settings._asdict()) + "\n")
+        self._process.stdin.flush()
+        said = self._process.stdout.readline()
+        if not said.strip().isdigit():
+            self._process.kill()
+            raise ArmError("the process of the machine did not start; its reason is above")
+        self.port = int(said)
+
+    @property
+    def running(self) -> bool:
+        """Whether the machine has not ended yet."""
+        return self._process.poll() is None
+
+    def wait(self, longest: float = 10.0) -> dict[str, Any]:
+        """Return what the machine counted, when it has ended; one that does not end within a time [s] is killed."""
+        try:
+            said, _ = self._process.communicate(timeout=longest)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            said, _ = self._process.communicate()
+        lines = said.strip().splitlines()
+        return dict(json.loads(lines[-1])) if lines else {}
+
+
+def check_key(host: str, key: bytes | None) -> None:
+    """Check that an address is of this computer, or that there is a key.
+
+    Raises:
+        InputError: it is not.
+    """
+    try:
+        here = ip_address("127.0.0.1" if host == "localhost" else host).is_loopback
+    except ValueError:  # the name of a computer
+        here = False
+    if not here and key is None:
+        raise InputError(f"{host} is not this computer: a key is needed, so that nobody else moves the arm")
+    if key is not None and len(key) < _SHORTEST_KEY:
+        raise InputError(f"the key has {len(key)} bytes, expected {_SHORTEST_KEY} or more", argument="key")

@@ -1,0 +1,290 @@
+"""Software in the loop: a machine of another maker's mechanics, and a line that loses, delays and falsifies packets."""
+
+from __future__ import annotations
+
+import contextlib
+import heapq
+import json
+import socket
+import threading
+import time
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import pathcontrol as pc
+from pathcontrol.cli import main
+from pathcontrol.errors import ArmError, InputError
+from pathcontrol.hardware.sil.machine_arm import MachineArm, MachineProcess, check_key
+from pathcontrol.hardware.sil.mjcf import friction_bias, write_mjcf
+from pathcontrol.hardware.sil.packets import LONGEST, Kind, Packet, read_packet, write_packet
+from pathcontrol.hardware.sil.session import finish_session, run_sil
+
+KEY = b"a key of a test, 24 byte"
+H = 2e-3
+
+
+def law_of(kind=pc.ExtendedMotionPlan):
+    robot = pc.load_robot("cicese_2dof")
+    task = pc.Lissajous([0.3, 0.3], [1, 2], 0.5, center=[0.2, 0.4])
+    gains = {"k_p": 400.0} if kind is pc.Projection else {"K_p": 400.0, "k": 5.0}
+    return kind(robot, task, K_v=40.0, **gains)
+
+
+def start_of(law):
+    return np.asarray(law.task.q_d(np.array(law.task.s0)), dtype=float)
+
+
+# --- packets ---------------------------------------------------------------------------------------------------------
+
+
+@given(
+    st.sampled_from(Kind),
+    st.binary(min_size=8, max_size=8),
+    st.integers(0, 2**64 - 1),
+    st.lists(st.floats(), max_size=20),
+)
+@settings(max_examples=60, deadline=None)
+def test_packets_come_back_exactly_and_only_with_their_key(kind, session, number, numbers):
+    packet = Packet(kind, session, number, np.array(numbers, dtype=float))
+    data = write_packet(packet, KEY)
+    found = read_packet(data, KEY)
+    assert found[:3] == packet[:3]
+    np.testing.assert_array_equal(found.numbers, packet.numbers)
+    assert read_packet(data, b"another key, of 25 bytes.") is None
+    assert read_packet(data + b"\0", KEY) is None
+    assert read_packet(data[:-1], KEY) is None
+
+
+@given(st.binary(max_size=LONGEST + 10), st.data())
+@settings(max_examples=60, deadline=None)
+def test_what_was_changed_or_made_up_is_no_packet(noise, data):
+    assert read_packet(noise, KEY) is None
+    whole = bytearray(write_packet(Packet(Kind.TORQUE, bytes(8), 7, np.array([1.0, 2.0])), KEY))
+    at = data.draw(st.integers(0, len(whole) - 1))
+    whole[at] ^= 1 << data.draw(st.integers(0, 7))
+    assert read_packet(bytes(whole), KEY) is None
+
+
+@pytest.mark.parametrize("host", ["192.168.1.5", "0.0.0.0", "robot.example", "::"])
+def test_beyond_this_computer_a_key_is_needed(host):
+    with pytest.raises(InputError, match="key"):
+        check_key(host, None)
+    check_key(host, KEY)
+    check_key("127.0.0.1", None)
+    check_key("localhost", None)
+    with pytest.raises(InputError, match="16"):
+        check_key(host, b"short")
+
+
+# --- the machine -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["cicese_2dof", "ur5", "panda"])
+def test_the_machine_has_the_dynamics_of_the_arm(name):
+    """MuJoCo's own recursion gives the mass matrix and the bias torques of Pinocchio."""
+    mujoco = pytest.importorskip("mujoco")
+    if name != "cicese_2dof":
+        pytest.importorskip("example_robot_data")
+    fingers = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0} if name == "panda" else None
+    robot = pc.load_robot(name, lock=fingers)
+    model = mujoco.MjModel.from_xml_string(write_mjcf(robot, 1e-3))
+    data, M = mujoco.MjData(model), np.zeros((robot.n, robot.n))
+    for q, qd in np.random.default_rng(0).normal(size=(10, 2, robot.n)):
+        data.qpos[:], data.qvel[:] = q, qd
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, M)
+        scale = np.abs(robot.mass_matrix(q)).max()
+        np.testing.assert_allclose(M, robot.mass_matrix(q), atol=1e-6 * scale)
+        bias = robot.nonlinear_effects(q, qd)
+        np.testing.assert_allclose(data.qfrc_bias, bias, atol=1e-6 * np.abs(bias).max())
+
+
+def test_dry_friction_of_the_machine_is_that_of_both_directions():
+    robot = pc.load_robot("cicese_2dof")
+    assert friction_bias(robot) == pytest.approx([(7.17 - 8.049) / 2, 0.0])
+    text = write_mjcf(robot, 1e-3)
+    assert f'frictionloss="{(7.17 + 8.049) / 2!r}"' in text
+    assert 'damping="2.288"' in text
+
+
+@pytest.mark.parametrize("kind", [pc.ExtendedMotionPlan, pc.Projection])
+def test_a_session_ends_on_the_path_and_says_what_happened(kind):
+    pytest.importorskip("mujoco")
+    law = law_of(kind)
+    envelope = pc.Envelope(velocity=20.0, lower=-9.0, upper=9.0, patience=50, lost=100.0)
+    report = run_sil(law, start_of(law), 1.0, H, envelope=envelope)
+    assert json.loads(json.dumps(report.to_dict())) == report.to_dict()
+    assert report.ticks > 100
+    assert set(report.jitter) == {"p50", "p90", "p99", "p99.9", "max"}
+    assert list(report.jitter.values()) == sorted(report.jitter.values())
+    assert report.events["stopped"] == ""
+    assert is_safe(report)
+    assert report.packets["machine"]["taken"] > 100
+
+
+def is_safe(report):
+    """On the path or at rest."""
+    return report.end["distance"] < 0.1 or report.end["speed"] < 0.1
+
+
+# --- a line that does all that lines do ----------------------------------------------------------------------------
+
+
+class Line:
+    """A relay between loop and machine; a ``fault`` makes of each packet those that go on, with their delays [s]."""
+
+    def __init__(self, port, fault):
+        self.front, self.back = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+        self.front.bind(("127.0.0.1", 0))
+        self.back.connect(("127.0.0.1", port))
+        self.port, self.fault, self.loop = self.front.getsockname()[1], fault, None
+        self.waiting, self.count, self.ended = [], 0, False
+        for one in (self.front, self.back):
+            one.settimeout(2e-4)
+        self.thread = threading.Thread(target=self.relay, daemon=True)
+        self.thread.start()
+
+    def relay(self):
+        while not self.ended:
+            for line, forward in ((self.front, True), (self.back, False)):
+                try:
+                    data, sender = line.recvfrom(LONGEST + 1)
+                except (TimeoutError, ConnectionRefusedError, OSError):
+                    continue
+                self.loop = sender if forward else self.loop
+                for delay, changed in self.fault(self.count, data):
+                    heapq.heappush(self.waiting, (time.monotonic() + delay, self.count, forward, changed))
+                self.count += 1
+            while self.waiting and self.waiting[0][0] <= time.monotonic():
+                _, _, forward, data = heapq.heappop(self.waiting)
+                with contextlib.suppress(OSError):
+                    self.back.send(data) if forward else self.front.sendto(data, self.loop)
+
+    def close(self):
+        self.ended = True
+        self.thread.join()
+        self.front.close()
+        self.back.close()
+
+
+RNG = np.random.default_rng(5)
+OLD = []
+
+
+def replay(count, data):
+    """Each packet, and one of long ago."""
+    OLD.append(data)
+    return [(0.0, data), (0.0, OLD[len(OLD) // 2])]
+
+
+def garble(count, data):
+    changed = bytearray(data)
+    changed[int(RNG.integers(len(data)))] ^= 0xFF
+    return [(0.0, bytes(changed) if RNG.random() < 0.5 else data), (0.0, RNG.bytes(int(RNG.integers(1, 200))))]
+
+
+FAULTS = {
+    "half of them lost": lambda count, data: [(0.0, data)] if RNG.random() < 0.5 else [],
+    "all lost but the goodbye": lambda count, data: [(0.0, data)] if count < 300 or data[4] == Kind.BYE else [],
+    "late": lambda count, data: [(0.01, data)],
+    "very late": lambda count, data: [(0.0 if count < 300 else 0.2, data)],
+    "doubled": lambda count, data: [(0.0, data), (0.0, data)],
+    "out of order": lambda count, data: [(float(RNG.uniform(0, 0.006)), data)],
+    "garbage": garble,
+    "replayed": replay,
+}
+
+
+@pytest.mark.parametrize("what", FAULTS)
+def test_whatever_the_line_does_the_arm_ends_on_its_path_or_at_rest(what):
+    pytest.importorskip("mujoco")
+    law = law_of()
+    OLD.clear()
+    machine = MachineProcess(law.robot, start_of(law), H)
+    line = Line(machine.port, FAULTS[what])
+    arm = MachineArm(law.robot, "127.0.0.1", line.port, machine.key, H)
+    loop = pc.ControlLoop(law, H, pc.Envelope(velocity=20.0, lower=-9.0, upper=9.0, patience=10, lost=25.0))
+    report = finish_session(loop, arm, 0.6)
+    told = machine.wait()
+    line.close()
+    assert is_safe(report), report
+    counted = told["packets"]
+    assert counted["taken"] > 0
+    assert np.abs(told["qd"]).max() < 5.0  # the machine's own word
+    if what == "garbage":
+        assert counted["foreign"] > 0
+        assert report.packets["loop"]["foreign"] > 0
+    if what in ("doubled", "replayed"):
+        assert counted["repeated"] > 0
+        assert report.packets["loop"]["repeated"] > 0
+    if what == "all lost but the goodbye":
+        assert report.events["mode"] == "GRAVITY"
+        assert counted["braked"] > 0
+        assert np.abs(told["qd"]).max() < 1e-2
+
+
+def test_packets_from_elsewhere_move_nothing():
+    """A stranger without the key, and one with the key but at another address."""
+    pytest.importorskip("mujoco")
+    law = law_of()
+    machine = MachineProcess(law.robot, start_of(law), H)
+    arm = MachineArm(law.robot, "127.0.0.1", machine.port, machine.key, H)
+    assert arm.read() is not None
+    stranger = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    for number in range(200):
+        wild = Packet(Kind.TORQUE, arm._session, number, np.array([150.0, -15.0]))
+        for key in (machine.key, KEY):
+            stranger.sendto(write_packet(wild, key), ("127.0.0.1", machine.port))
+        time.sleep(5e-4)
+    arm.finish()
+    told = machine.wait()
+    assert told["packets"]["foreign"] > 100
+    assert told["packets"].get("taken", 0) == 0
+    np.testing.assert_allclose(told["q"], start_of(law), atol=1e-4)  # the brakes held it
+
+
+def test_no_machine_is_told(monkeypatch):
+    monkeypatch.setattr("pathcontrol.hardware.sil.machine_arm._MEET", 0.3)
+    arm = MachineArm(law_of().robot, "127.0.0.1", 9, KEY)
+    with pytest.raises(ArmError, match="no machine answers"):
+        arm.read()
+    arm.finish()
+
+
+# --- the command -----------------------------------------------------------------------------------------------------
+
+
+def invoke(*words):
+    return CliRunner().invoke(main, ["sil", *words])
+
+
+def test_the_command_drives_the_papers_experiment_and_says_the_numbers():
+    pytest.importorskip("mujoco")
+    done = invoke("--duration", "1.5", "--json")
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    assert {"ticks", "missed", "jitter", "peaks", "events", "packets", "end", "real_time"} <= set(told)
+    assert {"e_p", "contour_error", "qd", "tau", "tau_ratio"} <= set(told["peaks"]) or not told["peaks"]
+    assert told["ticks"] > 100
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--serve", "0.0.0.0:9700"), "a key is needed"),
+        (("--connect", "10.0.0.1:9700"), "a key is needed"),
+        (("--connect", "here"), "HOST:PORT"),
+        (("--serve", "127.0.0.1:1", "--connect", "127.0.0.1:1"), "--serve"),
+        (("--task", "missing.toml"), "experiment file"),
+        (("--key", "missing.key"), "there is no file"),
+        (("--duration", "-1"), "duration"),
+    ],
+)
+def test_what_cannot_be_driven_is_told(words, said):
+    done = invoke(*words)
+    assert done.exit_code == 2
+    assert said in done.output
