@@ -88,6 +88,7 @@ class ControlLoop:
         self._plan = HeldPlan(law, self.period)
         self._damping = self._find_damping()
         self._ring: SampleRing | None = None
+        self.recording = True  # False for steps that are not to be in the log
         n = law.robot.n
         posture = law.task.q_d(np.array(law.task.s0, dtype=np.float64))
         self.start(np.asarray(posture, dtype=np.float64).reshape(n))
@@ -106,6 +107,8 @@ class ControlLoop:
         position = check_finite("q", as_joint_array("q", q, n))
         velocity = np.zeros(n) if qd is None else check_finite("qd", as_joint_array("qd", qd, n))
         acting = self.law.robot.gravity(position) if tau is None else check_finite("tau", as_joint_array("tau", tau, n))
+        if self._ring is not None:
+            self._ring.restart(as_scalar("t", t), self.period)
         self._plan.start(position, velocity)
         self._screen = Screen(self.envelope, position, velocity, as_scalar("t", t) - self.period)
         self._tau = np.minimum(np.maximum(acting, -self.envelope.torque), self.envelope.torque)
@@ -137,7 +140,7 @@ class ControlLoop:
         limited = self.envelope.clip(wanted, self._tau, self.period)
         self._saturated = bool((limited != wanted).any())
         self._tau = limited
-        if self._ring is not None:
+        if self._ring is not None and self.recording:
             t = self._screen.t + self._bad * self.period
             self._ring.put(t, *plan, self._mode, self._screen.q, self._screen.qd, wanted, limited)
         return limited.copy()

@@ -83,10 +83,12 @@ def _warm_up(loop: ControlLoop) -> None:
     task = loop.law.task
     q = np.asarray(task.q_d(np.array(task.s0)), dtype=np.float64).reshape(-1)
     loop.start(q)
+    loop.recording = False
     for k in range(2 * _WARM):
         if k == _WARM:
             loop.hold()
         loop.step(q, np.zeros_like(q), k * loop.period)
+    loop.recording = True
 
 
 class _Driver:

@@ -31,7 +31,13 @@ class SampleRing:
         self._n, self._capacity = n, capacity
         self._rows = np.zeros((capacity, _HEAD + 4 * n))
         self._written = self._taken = 0  # each is changed by one side only
+        self._last, self._shift = -np.inf, 0.0
         self.lost, self.closed = 0, False
+
+    def restart(self, time: float, period: float) -> None:
+        """Let times go on after the last sample where those of a loop begin anew at ``time`` [s]."""
+        if time + self._shift <= self._last:
+            self._shift = self._last + period - time
 
     def put(
         self, time: float, s: float, factor: float, mode: int, q: Array, qd: Array, wanted: Array, acting: Array
@@ -43,7 +49,8 @@ class SampleRing:
             self.lost += 1
             return
         row, n = self._rows[self._written % self._capacity], self._n
-        row[0], row[1], row[2], row[3] = time, s, factor, mode
+        self._last = time + self._shift
+        row[0], row[1], row[2], row[3] = self._last, s, factor, mode
         row[_HEAD : _HEAD + n], row[_HEAD + n : _HEAD + 2 * n] = q, qd
         row[_HEAD + 2 * n : _HEAD + 3 * n], row[_HEAD + 3 * n :] = wanted, acting
         self._written += 1  # last: the reader takes what is counted

@@ -108,6 +108,46 @@ def test_a_clock_that_is_set_back_ends_in_no_sample_twice():
     assert (np.diff(log.run().time) > 0).all()
 
 
+def test_a_loop_that_starts_again_goes_on_in_its_log():
+    loop, q = loop_of(), np.asarray(EIGHT.q_d(np.array(0.0)))
+    with loop.record() as log:
+        for _ in range(3):
+            loop.start(q)
+            for k in range(10):
+                loop.step(q, np.zeros(2), k * H)
+    np.testing.assert_allclose(log.run().time, np.arange(30) * H, atol=1e-12)
+
+
+def test_the_log_of_a_drive_has_its_ticks_and_not_those_before():
+    law = pc.ExtendedMotionPlan(ROBOT, EIGHT, 400.0, 40.0, k=20.0)
+    plant, loop = pc.Plant(ROBOT, H), loop_of(law)
+
+    class Simulated:
+        carries_weight = False
+        q, qd, reads = np.asarray(EIGHT.q_d(np.array(0.0)))[None], np.zeros((1, 2)), 0
+
+        def locate(self):
+            return pc.Measurement(self.q[0], self.qd[0], 0.0)
+
+        def read(self):
+            self.reads += 1
+            return pc.Measurement(self.q[0], self.qd[0], 3.0 + H * self.reads)
+
+        def write(self, tau):
+            self.q, self.qd = plant.advance(self.q, self.qd, tau[None])
+
+        def finish(self):
+            pass
+
+    with loop.record() as log:
+        record = pc.drive(loop, Simulated(), 0.5, settle=0.2)
+    run = log.run()
+    assert (run.array("q")[0] == record.q).all()
+    assert (run.array("tau")[0] == record.tau).all()
+    assert (run.array("mode")[0] == record.mode).all()
+    np.testing.assert_allclose(run.time, record.t, atol=1e-9)
+
+
 _WRITES = """
 import sys, time
 import numpy as np

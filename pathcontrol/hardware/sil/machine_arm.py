@@ -25,6 +25,7 @@ _STEP = 2e-4  # s, longest step of MuJoCo
 _HELLO = 0.05  # s between two hellos
 _MEET = 20.0  # s in which the machine must answer the first time
 _GONE = 2.0  # s without a state after which the machine counts as gone
+_TRIES = 1000  # periods in which a first state must come
 _WAIT = 1.5  # periods in which a state must come
 _SHORTEST_KEY = 16  # bytes
 
@@ -62,6 +63,19 @@ class MachineArm:
         self._heard = time.monotonic()
         self.count = {"taken": 0, "repeated": 0, "foreign": 0, "lost": 0}
         self.arrivals = np.zeros(room)
+
+    def locate(self) -> Measurement:
+        """Return the state of the arm, whose brakes are on; the machine begins to tell its states.
+
+        Raises:
+            ArmError: the machine does not answer.
+        """
+        if not self._session:
+            self._meet()
+        for _ in range(_TRIES):
+            if (found := self.read()) is not None:
+                return found
+        raise ArmError(f"the machine answers, but no state of it comes in {_TRIES} periods")
 
     def read(self) -> Measurement | None:
         """Return the newest state, or None where none comes within one and a half periods.

@@ -126,6 +126,9 @@ class _Patient:
         self._loop, self._line, self._calm = loop, line, 0
         self.resumed = 0
 
+    def locate(self) -> Measurement:
+        return self._line.locate()
+
     def read(self) -> Measurement | None:
         return self._line.read()
 
