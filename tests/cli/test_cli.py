@@ -148,5 +148,6 @@ def test_the_console_script_is_the_same_command():
         "toolpath",
         "export",
         "identify",
+        "sil",
     }
     assert set(main.commands) == known

@@ -24,7 +24,7 @@ class Recipe(NamedTuple):
 
     Attributes:
         name: the run.
-        kind: ``"experiment"``, ``"python"``, or ``"none"`` where the run does not know enough of itself.
+        kind: ``"experiment"``, ``"python"``, ``"log"`` of a real arm, or ``"none"`` where the run does not know enough.
         text: the experiment file or the script.
         file: it as a file.
     """
@@ -40,6 +40,8 @@ def recipe(name: str, run: Run) -> Recipe:
     experiment = run.config.get("experiment")
     if isinstance(experiment, str):
         return Recipe(name, "experiment", experiment, text_file(f"{file_name(name)}.toml", experiment))
+    if table(run.config, "loop").get("loop") in ("log", "hardware"):
+        return Recipe(name, "log")
     text = script(name, run)
     return Recipe(name, "python", text, text_file(f"{file_name(name)}.py", text)) if text else Recipe(name, "none")
 
