@@ -18,6 +18,7 @@ Override = ArrayLike | Callable[[float], ArrayLike]
 
 MOST = 2.0  # largest |u|
 _SMOOTHING = 0.02  # s, time constant T of the rate of w
+_ARRIVED = 1e-9  # distance of w from u, and from there in a time T, at which w is u
 
 
 class FixedSpeed:
@@ -114,12 +115,18 @@ class OverrideRule(SpeedRule):
         return ((wanted - x[..., 1]) / _SMOOTHING)[..., None]
 
     def advance(self, x: Array, xdot: Array, period: float) -> Array:
-        """Return the state one ``period`` [s] after x: exact where u stays, and never beyond u for long periods."""
+        """Return the state one ``period`` [s] after x: exact where u stays, and never beyond u for long periods.
+
+        Within 1e-9 of u at rest w is u, so that a plan that is held has a state that no longer changes.
+        """
         v = x[..., 1]
         wanted = v + _SMOOTHING * xdot[..., 1]
         bounded = np.abs(wanted) >= self.acceleration * (1 - 1e-12)
         ramp, approach = _advance_ramp(v, wanted, period), _advance_approach(v, wanted, period)
+        gap = 4 * _SMOOTHING * wanted
+        arrived = ~bounded & (np.maximum(np.abs(gap), _SMOOTHING * np.abs(v)) < _ARRIVED)
         step, v = (np.where(bounded, one, other) for one, other in zip(ramp, approach, strict=True))
+        step, v = np.where(arrived, gap, step), np.where(arrived, 0.0, v)
         return np.stack([x[..., 0] + step, v], axis=-1)
 
     def describe(self) -> dict[str, Any]:

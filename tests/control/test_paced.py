@@ -73,34 +73,6 @@ def test_the_pace_is_the_speed_that_is_asked_for_or_the_fastest_one(arm):
     assert (np.abs(paced.array("tau_demand")[0]) <= LIMITS * (1 + 1e-9)).all()
 
 
-def arms():
-    fingers = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}
-    return {
-        "ur5": (pc.load_robot("ur5"), [0.0, -1.2, 1.4, -0.4, 0.5, 0.2]),
-        "panda": (pc.load_robot("panda", lock=fingers), [0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.8]),
-    }
-
-
-@pytest.mark.parametrize("name", ["ur5", "panda"])
-def test_arms_with_half_of_their_torque_stay_on_a_contour(name):
-    robot, home = arms()[name]
-    inertia = robot.mass_matrix(home).diagonal()
-    robot = robot.with_friction(pc.Viscous(np.full(robot.n, 0.2)) + pc.Coulomb(2.0 * inertia))
-    half = 0.5 * robot.limits.effort
-    points = np.array(home) + np.random.default_rng(3).normal(size=(6, robot.n)) * 0.3
-    path = pc.WaypointPath(points, speed=1.0, closed=True)
-
-    def follow(lap, duration, pace):
-        task = path.with_profile(pc.ConstantRate(path.period / lap))
-        law = pc.ExtendedMotionPlan(robot, task, 400.0, 40.0, 20.0)
-        law = pc.Paced(law, torque_limits=half) if pace else law
-        return late_contour(run(law, duration=duration, loop=pc.SampledLoop(2e-3, torque_limits=half)))
-
-    slow = follow(8.0, 16.0, pace=False)
-    assert follow(0.8, 2.4, pace=True) < 1.5 * slow
-    assert follow(0.8, 2.4, pace=False) > 3 * slow
-
-
 @pytest.mark.parametrize("name", LAWS)
 def test_v_falls_as_the_theorem_says_along_a_paced_run(ideal_arm, name):
     law = pc.Paced(make_law(name, ideal_arm, pc.Circle(1.0, 11.0)))

@@ -1,0 +1,88 @@
+"""Holding: nothing winds up, whatever the length, and what a hold adds on the contour is what dry friction does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pathcontrol as pc
+
+START = np.deg2rad([40.0, 70.0])
+PERIOD = 2.5e-3
+LAWS = ("extended_motion_plan", "projection")
+
+
+def make(arm, name, **options):
+    task = pc.Circle(1.0, 2.0)
+    if name == "projection":
+        return pc.Projection(arm, task, 800.0, [45.0, 100.0], **options)
+    return pc.ExtendedMotionPlan(arm, task, 800.0, [45.0, 100.0], 20.0, **options)
+
+
+@pytest.mark.parametrize("wrapped", ["plain", "observed", "event plan", "paced"])
+@pytest.mark.parametrize("name", LAWS)
+def test_a_hold_is_a_fixed_point_of_loop_and_arm(arm, name, wrapped):
+    """Some seconds into a hold no bit of posture, velocity, torque and state changes any more, but for a clock.
+
+    Each tick is a function of these alone, so they are the same after an hour, and so is all that follows the hold.
+    """
+    law = make(arm, name, friction="observed" if wrapped == "observed" else "viscous")
+    law = pc.SpeedOverride(pc.EventPlan(law) if wrapped == "event plan" else law)
+    law = pc.Paced(law) if wrapped == "paced" else law
+    tick, plant = pc.ControlTick(law, PERIOD), pc.Plant(arm, PERIOD)
+    q, qd = START[None], np.zeros((1, 2))
+    tick.start(q[0], qd[0])
+    limit, seen = arm.limits.effort, []
+    for i in range(1900):
+        if i == 400:
+            tick.hold()
+        tau = np.clip(tick(q[0], qd[0]), -limit, limit)
+        q, qd = plant.advance(q, qd, tau[None])
+        seen.append(np.concatenate([q[0], qd[0], tau, tick.state]))
+    clock = {6 + 1 + law.observer.size - 1} if law.observer is not None else set()
+    pace = {len(seen[0]) - 1} if wrapped == "paced" else set()  # falls towards 0 by a share of itself
+    kept = [i for i in range(len(seen[0])) if i not in clock | pace]
+    held = np.array(seen[1750:])[:, kept]
+    assert (held == held[0]).all()
+    assert np.abs(qd).max() < 1e-12
+    if pace:
+        assert 0 <= seen[-1][-1] < seen[1750][-1] < 1e-12
+
+
+def hold_everywhere(law, arm, **settings):
+    """A run without and a batch of ten with a hold of a second, begun at moments all round the circle."""
+    begin = 3.0 + np.pi * np.arange(10) / 10
+    loop = pc.SampledLoop(PERIOD, torque_limits=True)
+    held = pc.SpeedOverride(law, lambda t: np.where((t >= begin) & (t < begin + 1.0), 0.0, 1.0))
+    settings = {"duration": 8.0, "loop": loop, "progress": False} | settings
+    return pc.simulate(law, START, **settings), pc.simulate(held, np.tile(START, (10, 1)), **settings)
+
+
+def late_contour(run):
+    return pc.contour_error(run)[:, run.time > 2.0].max()
+
+
+@pytest.mark.parametrize("known", ["no dry friction", "compensated"])
+@pytest.mark.parametrize("name", LAWS)
+def test_a_hold_adds_nothing_where_no_friction_is_left(arm, name, known):
+    law = make(arm, name, friction="full" if known == "compensated" else "viscous")
+    plant = arm if known == "compensated" else arm.with_friction(pc.Viscous(arm.friction.viscous))
+    plain, held = hold_everywhere(law, arm, plant=plant)
+    assert late_contour(held) < 1.005 * late_contour(plain) + 1e-5
+
+
+def static_error(arm, task):
+    """The largest contour error that dry friction makes at an infinitely slow pace: |nᵀM⁻¹F|/k_p."""
+    s = np.linspace(0, 2 * np.pi, 721)
+    point = task.at(s)
+    level = np.array([np.maximum(*arm.friction.levels(qd)) for qd in point.velocity])
+    push = np.linalg.solve(arm.mass_matrix(point.q_d), (level * np.sign(point.velocity))[..., None])[..., 0]
+    return np.abs(np.vecdot(point.q_d, push)).max() / 800.0
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_with_dry_friction_a_hold_adds_no_more_than_a_slow_pace_would(arm, name):
+    law = make(arm, name)
+    plain, held = hold_everywhere(law, arm)
+    assert late_contour(held) < static_error(arm, law.task)
+    assert late_contour(held) < 1.1 * late_contour(plain)

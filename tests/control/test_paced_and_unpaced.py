@@ -1,0 +1,108 @@
+"""Paced laws beside the same laws without a pace, on the paper's arm and on others with half of their torque."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pathcontrol as pc
+
+LOOPS = {
+    "exact": {},
+    "encoders": {"encoders": True, "velocity": "difference"},
+}
+LAWS = ("extended_motion_plan", "projection")
+every_law = pytest.mark.parametrize("name", LAWS)
+every_loop = pytest.mark.parametrize("loop", list(LOOPS))
+
+
+def make_law(name, arm, task, K_p=800.0, K_v=(45.0, 100.0)):
+    if name == "projection":
+        return pc.Projection(arm, task, K_p, K_v)
+    return pc.ExtendedMotionPlan(arm, task, K_p, K_v, k=20.0)
+
+
+def contour(law, loop, duration=2.4, **settings):
+    """The contour error [deg] of a run that begins on the path at rest, and the run."""
+    begin = law.task.q_d(np.array(law.task.s0))
+    run = pc.simulate(law, begin, duration=duration, loop=loop, progress=False, **settings)
+    return np.rad2deg(pc.contour_error(run)[0]), run
+
+
+def mean_rate(run):
+    """The mean rate of s in the second half [1/s]."""
+    s, half = run.array("s")[0], len(run.time) // 2
+    return (s[-1] - s[half]) / (run.time[-1] - run.time[half])
+
+
+def late(error):
+    """The largest one of the second half."""
+    return error[len(error) // 2 :].max()
+
+
+@pytest.mark.parametrize("speed", [6.0, 9.0])
+@every_loop
+@every_law
+def test_from_a_start_at_rest_a_paced_law_leaves_its_path_no_farther(arm, name, loop, speed):
+    loop, law = pc.SampledLoop(torque_limits=True, **LOOPS[loop]), make_law(name, arm, pc.Circle(1.0, speed))
+    plain, paced = contour(law, loop)[0], contour(pc.Paced(law), loop)[0]
+    assert paced.max() < 1.002 * plain.max()
+
+
+@pytest.mark.parametrize("speed", [6.0, 9.0])
+@every_loop
+@every_law
+def test_the_pace_costs_no_more_than_the_friction_of_a_slower_lap(arm, name, loop, speed):
+    """Motors without limits go the circle as the law asks: at the speed of the profile, and at that of the pace.
+
+    A slower lap has a larger error, since dry friction that the law does not compensate has more time to displace the
+    arm; the pace adds nothing to that.
+    """
+    limited, free = (pc.SampledLoop(torque_limits=on, **LOOPS[loop]) for on in (True, False))
+    paced, run = contour(pc.Paced(make_law(name, arm, pc.Circle(1.0, speed))), limited)
+    fast, free_run = contour(make_law(name, arm, pc.Circle(1.0, speed)), free)
+    share = mean_rate(run) / mean_rate(free_run)
+    slow, _ = contour(make_law(name, arm, pc.Circle(1.0, share * speed)), free)
+    assert late(paced) < 1.005 * max(late(fast), late(slow))
+
+
+@pytest.mark.parametrize("speed", [9.0, 11.0])
+@every_law
+def test_without_dry_friction_nothing_is_left_but_a_twentieth(arm, name, speed):
+    """At 9 rad/s the unpaced law saturates too; only there its error may be opposite to that of friction."""
+    loop, law = pc.SampledLoop(torque_limits=True), make_law(name, arm, pc.Circle(1.0, speed))
+    plant = arm.with_friction(pc.Viscous(arm.friction.viscous))
+    plain, paced = (late(contour(one, loop, plant=plant)[0]) for one in (law, pc.Paced(law)))
+    assert paced < 0.08
+    assert paced < 0.1 * plain
+
+
+def arms():
+    fingers = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}
+    return {
+        "ur5": (pc.load_robot("ur5"), [0.0, -1.2, 1.4, -0.4, 0.5, 0.2]),
+        "panda": (pc.load_robot("panda", lock=fingers), [0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.8]),
+    }
+
+
+@every_law
+@pytest.mark.parametrize("which", ["ur5", "panda"])
+def test_arms_with_half_of_their_torque_stay_on_a_contour(which, name):
+    """Peaks over a lap and more, from a start at rest."""
+    robot, home = arms()[which]
+    inertia = robot.mass_matrix(home).diagonal()
+    robot = robot.with_friction(pc.Viscous(np.full(robot.n, 0.2)) + pc.Coulomb(2.0 * inertia))
+    half = 0.5 * robot.limits.effort
+    points = np.array(home) + np.random.default_rng(3).normal(size=(6, robot.n)) * 0.3
+    path = pc.WaypointPath(points, speed=1.0, closed=True)
+
+    def follow(lap, duration, pace):
+        law = make_law(name, robot, path.with_profile(pc.ConstantRate(path.period / lap)), 400.0, 40.0)
+        law = pc.Paced(law, torque_limits=half) if pace else law
+        error, run = contour(law, pc.SampledLoop(2e-3, torque_limits=half), duration)
+        assert np.ptp(run.array("s")) > path.period
+        return error.max()
+
+    slow = follow(3.0, 8.0, pace=False)
+    assert follow(0.8, 2.4, pace=True) < 1.5 * slow
+    assert follow(0.8, 2.4, pace=False) > 3 * slow
