@@ -82,7 +82,7 @@ from .hardware.franka import Franka as Franka
 from .hardware.loop_log import LoopLog as LoopLog
 from .hardware.position_command import PositionCommand as PositionCommand
 from .hardware.sil.machine_arm import MachineArm as MachineArm
-from .hardware.sil.machine_arm import MachineProcess as MachineProcess
+from .hardware.sil.machine_process import MachineProcess as MachineProcess
 from .hardware.sil.session import SilReport as SilReport
 from .hardware.sil.session import run_sil as run_sil
 from .profiles.jerk.start_stop import SmoothStartStop as SmoothStartStop

@@ -61,7 +61,7 @@ def command(
 def _drive(driven: SilTask, duration: float, address: str | None, key: bytes | None) -> SilReport:
     """Return the numbers of a session with a machine here, or at an address."""
     from pathcontrol.hardware.control_loop import ControlLoop
-    from pathcontrol.hardware.sil.machine_arm import check_key
+    from pathcontrol.hardware.sil.packets import check_key
     from pathcontrol.hardware.sil.session import connect, finish_session, run_sil
 
     if address is None:
@@ -75,7 +75,8 @@ def _drive(driven: SilTask, duration: float, address: str | None, key: bytes | N
 
 def _serve(driven: SilTask, address: str, key: bytes | None) -> None:
     """Be the machine until a loop has driven it."""
-    from pathcontrol.hardware.sil.machine_arm import MachineProcess, check_key
+    from pathcontrol.hardware.sil.machine_process import MachineProcess
+    from pathcontrol.hardware.sil.packets import check_key
 
     host, port = _split_address(address)
     check_key(host, key)

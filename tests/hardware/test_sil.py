@@ -18,9 +18,10 @@ from hypothesis import strategies as st
 import pathcontrol as pc
 from pathcontrol.cli import main
 from pathcontrol.errors import ArmError, InputError
-from pathcontrol.hardware.sil.machine_arm import MachineArm, MachineProcess, check_key
+from pathcontrol.hardware.sil.machine_arm import MachineArm
+from pathcontrol.hardware.sil.machine_process import MachineProcess
 from pathcontrol.hardware.sil.mjcf import friction_bias, write_mjcf
-from pathcontrol.hardware.sil.packets import LONGEST, Kind, Packet, read_packet, write_packet
+from pathcontrol.hardware.sil.packets import LONGEST, Kind, Packet, check_key, read_packet, write_packet
 from pathcontrol.hardware.sil.session import finish_session, run_sil
 
 KEY = b"a key of a test, 24 byte"

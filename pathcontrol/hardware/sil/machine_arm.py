@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-import json
-import secrets
 import socket
-import subprocess
-import sys
 import time
-from ipaddress import ip_address
-from typing import Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import ArmError, InputError
+from pathcontrol.errors import ArmError
 from pathcontrol.hardware.arm import Measurement
-from pathcontrol.hardware.sil.machine import MachineSettings, load_mujoco
-from pathcontrol.hardware.sil.mjcf import friction_bias, write_mjcf
-from pathcontrol.hardware.sil.packets import LONGEST, Kind, Packet, read_packet, write_packet
+from pathcontrol.hardware.sil.packets import LONGEST, Kind, Packet, check_key, read_packet, write_packet
 from pathcontrol.robot.model import RobotModel
 
-_STEP = 2e-4  # s, longest step of MuJoCo
 _HELLO = 0.05  # s between two hellos
 _MEET = 20.0  # s in which the machine must answer the first time
 _GONE = 2.0  # s without a state after which the machine counts as gone
 _TRIES = 1000  # periods in which a first state must come
 _WAIT = 1.5  # periods in which a state must come
-_SHORTEST_KEY = 16  # bytes
 
 
 class MachineArm:
@@ -114,6 +104,8 @@ class MachineArm:
             packet = self._receive()
             if packet is not None and self._is_state(packet):
                 self._session = packet.session
+            elif packet is None:
+                time.sleep(_HELLO)  # the system may say at once that nobody listens
         self._heard = time.monotonic()
 
     def _wait(self, longest: float) -> Array | None:
@@ -169,89 +161,3 @@ class MachineArm:
             self._line.send(write_packet(packet, self._key))
         except OSError:
             self.count["unsent"] = self.count.get("unsent", 0) + 1
-
-
-class MachineProcess:
-    """A machine on this computer, in a process of its own.
-
-    Args:
-        robot: the arm, with its friction.
-        q: where it starts [rad], (n,).
-        period: time between its states [s].
-        host: address at which it listens; one that is not of this computer needs a ``key``.
-        port: its port, 0 for a free one.
-        key: the shared key; a random one by default.
-
-    Raises:
-        InputError: the address is not of this computer and there is no key.
-        MissingExtraError: MuJoCo is not installed.
-        ArmError: the process does not start.
-    """
-
-    def __init__(
-        self,
-        robot: RobotModel,
-        q: Array,
-        period: float = 1e-3,
-        host: str = "127.0.0.1",
-        port: int = 0,
-        key: bytes | None = None,
-    ) -> None:
-        load_mujoco()
-        self.key = secrets.token_bytes(32) if key is None else key
-        check_key(host, key)
-        steps = max(1, int(np.ceil(period / _STEP - 1e-9)))
-        effort = np.where(robot.limits.effort > 0, robot.limits.effort, np.inf)
-        settings = MachineSettings(
-            write_mjcf(robot, period / steps),
-            steps,
-            friction_bias(robot).tolist(),
-            np.minimum(effort, 1e9).tolist(),
-            np.asarray(q, dtype=np.float64).tolist(),
-            period,
-            host,
-            port,
-            self.key.hex(),
-        )
-        command = [sys.executable, "-m", "pathcontrol.hardware.sil.machine"]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(json.dumps(settings._asdict()) + "\n")
-        self._process.stdin.flush()
-        said = self._process.stdout.readline()
-        if not said.strip().isdigit():
-            self._process.kill()
-            raise ArmError("the process of the machine did not start; its reason is above")
-        self.port = int(said)
-
-    @property
-    def running(self) -> bool:
-        """Whether the machine has not ended yet."""
-        return self._process.poll() is None
-
-    def wait(self, longest: float = 10.0) -> dict[str, Any]:
-        """Return what the machine counted, when it has ended; one that does not end within a time [s] is killed."""
-        try:
-            said, _ = self._process.communicate(timeout=longest)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            said, _ = self._process.communicate()
-        lines = said.strip().splitlines()
-        return dict(json.loads(lines[-1])) if lines else {}
-
-
-def check_key(host: str, key: bytes | None) -> None:
-    """Check that an address is of this computer, or that there is a key.
-
-    Raises:
-        InputError: it is not.
-    """
-    try:
-        here = ip_address("127.0.0.1" if host == "localhost" else host).is_loopback
-    except ValueError:  # the name of a computer
-        here = False
-    if not here and key is None:
-        raise InputError(f"{host} is not this computer: a key is needed, so that nobody else moves the arm")
-    if key is not None and len(key) < _SHORTEST_KEY:
-        raise InputError(f"the key has {len(key)} bytes, expected {_SHORTEST_KEY} or more", argument="key")

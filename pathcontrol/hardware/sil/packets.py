@@ -10,15 +10,18 @@ import hashlib
 import hmac
 import struct
 from enum import IntEnum
+from ipaddress import ip_address
 from typing import NamedTuple
 
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.errors import InputError
 
 _MAGIC = b"pcS1"
 _HEAD = struct.Struct("<4sBB8sQ")  # magic, kind, count of numbers, session, number
 _CODE = 16  # bytes
+_SHORTEST_KEY = 16  # bytes
 LONGEST = _HEAD.size + 8 * 255 + _CODE
 
 
@@ -65,6 +68,22 @@ def read_packet(data: bytes, key: bytes) -> Packet | None:
     if not hmac.compare_digest(code, _authenticate(body, key)) or kind not in Kind.__members__.values():
         return None
     return Packet(Kind(kind), session, number, np.frombuffer(body, dtype="<f8", offset=_HEAD.size).astype(np.float64))
+
+
+def check_key(host: str, key: bytes | None) -> None:
+    """Check that an address is of this computer, or that there is a key.
+
+    Raises:
+        InputError: it is not.
+    """
+    try:
+        here = ip_address("127.0.0.1" if host == "localhost" else host).is_loopback
+    except ValueError:  # the name of a computer
+        here = False
+    if not here and key is None:
+        raise InputError(f"{host} is not this computer: a key is needed, so that nobody else moves the arm")
+    if key is not None and len(key) < _SHORTEST_KEY:
+        raise InputError(f"the key has {len(key)} bytes, expected {_SHORTEST_KEY} or more", argument="key")
 
 
 def _authenticate(body: bytes, key: bytes) -> bytes:

@@ -14,7 +14,8 @@ from pathcontrol.hardware.arm import Measurement
 from pathcontrol.hardware.control_loop import ControlLoop, Mode
 from pathcontrol.hardware.drive import DriveRecord, drive
 from pathcontrol.hardware.envelope import Envelope
-from pathcontrol.hardware.sil.machine_arm import MachineArm, MachineProcess
+from pathcontrol.hardware.sil.machine_arm import MachineArm
+from pathcontrol.hardware.sil.machine_process import MachineProcess
 from pathcontrol.robot.model import RobotModel
 
 _SHARES = {"p50": 50.0, "p90": 90.0, "p99": 99.0, "p99.9": 99.9, "max": 100.0}
