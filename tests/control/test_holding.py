@@ -86,3 +86,20 @@ def test_with_dry_friction_a_hold_adds_no_more_than_a_slow_pace_would(arm, name)
     plain, held = hold_everywhere(law, arm)
     assert late_contour(held) < static_error(arm, law.task)
     assert late_contour(held) < 1.1 * late_contour(plain)
+
+
+def test_in_a_sequence_each_law_counts_the_time_from_the_begin_of_its_path(arm):
+    """Held at 0.5 s of both paths; the buttons act on whichever law runs."""
+    laws = [
+        pc.SpeedOverride(
+            pc.ExtendedMotionPlan(arm, pc.Line(a, b, 1.0), 800.0, [45.0, 100.0], 20.0), [[0.5, 0.0], [1.5, 1.0]], 10.0
+        )
+        for a, b in (([0.0, 0.0], [1.0, 1.0]), ([1.0, 1.0], [0.2, 1.6]))
+    ]
+    run = pc.simulate_sequence(laws, [0.0, 0.0], duration=6.0, progress=False)
+    assert run.status[0] == "finished"
+    for path in range(2):
+        one = run.path(path)
+        since, sdot = one.time - one.time[0], one.array("sdot")[0]
+        assert (sdot[(since > 1.3) & (since < 1.45)] == 0.0).all()
+        assert sdot[(since > 0.2) & (since < 0.5)].min() > 0.3
