@@ -85,6 +85,7 @@ from .hardware.sil.machine_arm import MachineArm as MachineArm
 from .hardware.sil.machine_process import MachineProcess as MachineProcess
 from .hardware.sil.session import SilReport as SilReport
 from .hardware.sil.session import run_sil as run_sil
+from .hardware.ur import UR as UR
 from .profiles.jerk.start_stop import SmoothStartStop as SmoothStartStop
 from .profiles.limited.limited import limited as limited
 from .profiles.limited.motion_limit import MotionLimit as MotionLimit

@@ -80,7 +80,7 @@ def requirements(*extras: str) -> set[str]:
 def test_whatever_is_imported_is_asked_for():
     # their wheels install beside the packages, where Python does not see of which one they are
     providers = {"pinocchio": ["pin"], "example_robot_data": ["example-robot-data-loaders"]} | packages_distributions()
-    declared = requirements("robots", "mujoco", "cluster", "video", "sweep", "tune", "franka", "mcap")
+    declared = requirements("robots", "mujoco", "cluster", "video", "sweep", "tune", "franka", "ur", "mcap")
     used = set.union(*(imported(path) for path in (ROOT / "pathcontrol").rglob("*.py")))
     assert {"numpy", "pinocchio", "umsgpack", "cloudpickle"} <= used
     by = {name: {one.lower().replace("_", "-") for one in providers.get(name, [name])} for name in used}
