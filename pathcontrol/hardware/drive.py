@@ -101,6 +101,7 @@ class _Driver:
         self._none = Measurement(np.full(n, np.nan), np.full(n, np.nan), np.nan)
         joints = [(name, np.float64, (n,)) for name in ("q", "qd", "tau")]
         self._rows = np.zeros(self._ticks(longest), [("t", np.float64), *joints, ("s", np.float64), ("mode", np.int8)])
+        self._rows.view(np.uint8).fill(0)  # or the system would give memory tick by tick, and make some late
 
     def drive(self, span: float, rest: float) -> str:
         """Drive for both times [s], and return why the arm stopped, or ""."""

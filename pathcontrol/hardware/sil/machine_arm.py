@@ -52,7 +52,7 @@ class MachineArm:
         self._session, self._number = b"", -1
         self._heard = time.monotonic()
         self.count = {"taken": 0, "repeated": 0, "foreign": 0, "lost": 0}
-        self.arrivals = np.zeros(room)
+        self.arrivals = np.full(room, np.nan)  # memory that the system has given before the first tick
 
     def locate(self) -> Measurement:
         """Return the state of the arm, whose brakes are on; the machine begins to tell its states.
