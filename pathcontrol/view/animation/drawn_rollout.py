@@ -13,6 +13,7 @@ from pathcontrol.view.animation.path_error import PathError, in_fitting_units, p
 from pathcontrol.view.animation.rollout import Recording
 from pathcontrol.view.animation.scene.desired_path import Line, desired_lines
 from pathcontrol.view.animation.scene.scene_builder import swept
+from pathcontrol.view.animation.walls import Plate, find_plates
 
 LINE_WIDTH = 0.002  # radius of the line the tool has drawn, of the diagonal of what is seen of its arm …
 FINE_LINE_WIDTH = 0.012  # … or of that of the line, if that is less: a small drawing stays legible
@@ -25,16 +26,18 @@ class DrawnRollout:
     """A rollout with its drawing, in the base frame of its arm.
 
     Attributes:
-        take: what happened.
+        recording: what happened.
         lines: where the tool should go.
         error: how far it was from there, or None where that cannot be measured.
         body: where the arm gets to [m], (k, 3).
+        plates: the walls before the arm.
     """
 
     recording: Recording
     lines: list[Line]
     error: PathError | None
     body: Array
+    plates: list[Plate]
 
     @property
     def sight(self) -> Array:
@@ -55,7 +58,7 @@ class DrawnRollout:
     @cached_property
     def seen(self) -> Array:
         """The points of everything visible [m], (k, 3)."""
-        return np.concatenate([self.body, self.drawn])
+        return np.concatenate([self.body, self.drawn, *(plate.corners for plate in self.plates)])
 
     @property
     def line_width(self) -> float:
@@ -67,7 +70,10 @@ class DrawnRollout:
 def draw_rollouts(recordings: Sequence[Recording]) -> list[DrawnRollout]:
     """Return the drawing of each rollout, lengths of all errors in one unit."""
     errors = in_fitting_units([path_error(recording) for recording in recordings])
-    return [
-        DrawnRollout(recording, desired_lines(recording), error, swept(recording))
-        for recording, error in zip(recordings, errors, strict=True)
-    ]
+    return [_draw(recording, error) for recording, error in zip(recordings, errors, strict=True)]
+
+
+def _draw(recording: Recording, error: PathError | None) -> DrawnRollout:
+    """Return the drawing of a rollout."""
+    body = swept(recording)
+    return DrawnRollout(recording, desired_lines(recording), error, body, find_plates(recording, body))

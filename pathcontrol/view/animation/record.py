@@ -21,6 +21,7 @@ from pathcontrol.view.animation.scene.camera import Camera, view_direction
 from pathcontrol.view.animation.scene.legend import labels, legend
 from pathcontrol.view.animation.scene.scene_builder import Stage
 from pathcontrol.view.animation.scene.tool_lines import add_lines, add_markers
+from pathcontrol.view.animation.scene.wall_plates import add_plates
 
 if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel
@@ -92,6 +93,7 @@ def _picture(film: Film, drawn_rollouts: Sequence[DrawnRollout], layout: Layout,
         stage.add_arm(i, drawn_rollout.recording, shift, ghost=ghosted and i > 0)
     add_lines(stage, drawn_rollouts, moved, width, ghosted)
     add_markers(stage, drawn_rollouts, moved, width)
+    add_plates(stage, drawn_rollouts, moved, ghosted)
     labelled = 1 < len(drawn_rollouts) <= (MOST_GHOSTS if ghosted else len(drawn_rollouts))
     names = labels(drawn_rollouts, ghosted) if labelled else []
     above = [shift + name["offset"] for shift, name in zip(moved, names, strict=False)]

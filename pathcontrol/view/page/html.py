@@ -25,6 +25,7 @@ PARTS = (
     "scene.js",
     "tracks.js",
     "growing.js",
+    "timed.js",
     "thickness.js",
     "labels.js",
     "picture.js",

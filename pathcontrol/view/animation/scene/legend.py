@@ -10,7 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.view.animation.drawn_rollout import DrawnRollout
 from pathcontrol.view.animation.path_error import PathError
-from pathcontrol.view.animation.scene.palette import DESIRED, DESIRED_POINT, PLAIN, RAPID, scale_colors
+from pathcontrol.view.animation.scene.palette import DESIRED, DESIRED_POINT, PLAIN, RAPID, WALL, scale_colors
 from pathcontrol.view.bodies.body_shapes import Color
 
 _STEPS = 9  # colours of a scale, between which the page blends
@@ -24,6 +24,7 @@ def legend(drawn_rollouts: Sequence[DrawnRollout], ghosted: bool) -> list[dict[s
     entries += [_entry("rapid", "dashed", RAPID)] if any(line.rapid for line in drawn) else []
     if any(drawn_rollout.recording.task is not None for drawn_rollout in drawn_rollouts):
         entries.append(_entry("desired point", "dot", DESIRED_POINT))
+    entries += [_entry("wall", "square", WALL)] if any(one.plates for one in drawn_rollouts) else []
     if len(drawn_rollouts) == 1:
         entries.append(_entry("tool", "dot", drawn_rollouts[0].recording.color))
     else:

@@ -22,6 +22,8 @@ RAPID: Color = (0.6, 0.63, 0.67, 0.6)
 DESIRED_POINT: Color = (0.45, 0.48, 0.53, 0.6)
 #: the colour without a known error
 PLAIN: Color = (0.6, 0.63, 0.67, 1.0)
+#: see-through: what is behind it is to be seen
+WALL: Color = (0.45, 0.58, 0.7, 0.35)
 GRID: Color = (0.76, 0.79, 0.82, 1.0)
 
 # From violet over magenta to red. Viridis and its kin begin near black and end near white, so that half a line is lost

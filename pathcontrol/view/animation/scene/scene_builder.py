@@ -12,11 +12,12 @@ from pathcontrol.view.animation.payload import Film
 from pathcontrol.view.animation.rollout import Recording
 from pathcontrol.view.animation.scene.desired_path import Line
 from pathcontrol.view.animation.scene.meshcat_commands import Scene, absolute, path
-from pathcontrol.view.animation.scene.palette import DESIRED, GRID, RAPID
+from pathcontrol.view.animation.scene.palette import DESIRED, GRID, RAPID, WALL
 from pathcontrol.view.animation.scene.trace import Trace
 from pathcontrol.view.animation.scene.tracks import Track
 from pathcontrol.view.animation.scene.tube import SIDES, dashes, join_meshes, simplify, tube
-from pathcontrol.view.bodies.body_shapes import Color, Mesh, Sphere
+from pathcontrol.view.animation.walls import THICKNESS, Plate
+from pathcontrol.view.bodies.body_shapes import Box, Color, Mesh, Sphere
 
 GHOST = 0.35  # opacity of an arm that stands in another
 _FRAMED_POSES = 50
@@ -33,7 +34,7 @@ class Stage:
     Attributes:
         film: keeps the numbers.
         scene: the objects.
-        tracks, growing, on_top, tubes: as the header of a film has them.
+        tracks, growing, on_top, tubes, timed: as the header of a film has them.
     """
 
     def __init__(self, film: Film) -> None:
@@ -42,6 +43,7 @@ class Stage:
         self.growing: list[dict[str, Any]] = []
         self.on_top: list[str] = []
         self.tubes: list[dict[str, Any]] = []
+        self.timed: list[dict[str, Any]] = []
 
     def add_arm(self, index: int, recording: Recording, shift: Array, *, ghost: bool = False) -> None:
         """Add the links of an arm, moved by ``shift`` [m], (3,), or its ghost in the colour of its run."""
@@ -90,6 +92,14 @@ class Stage:
         self._move(name, Track.from_positions(times, positions))
         self.on_top.append(absolute(name))
 
+    def add_plate(self, name: str, plate: Plate, shift: Array) -> None:
+        """Add a see-through plate that is there while its wall is."""
+        size = plate.edge * np.array([THICKNESS, 1.0, 1.0])
+        self.scene.place(name, _translation(shift) @ plate.pose)
+        self.scene.add(f"{name}/plate", Box(size), WALL, _translation(np.array([-0.5 * size[0], 0.0, 0.0])))
+        times = {"from": plate.begin, "to": plate.end if np.isfinite(plate.end) else None}
+        self.timed.append({"path": absolute(name), **times})
+
     def add_ground(self, points: Array) -> None:
         """Draw the ground under points [m], (k, 3)."""
         self.scene.add_segments("ground", ground_grid(points), GRID)
@@ -97,7 +107,7 @@ class Stage:
     def header(self) -> dict[str, Any]:
         """Return the scene and its motion for the header of a film."""
         scene = [self.film.block(c, "u1") if isinstance(c, bytes) else c for c in self.scene.commands]
-        lines = {"growing": self.growing, "tubes": self.tubes}
+        lines = {"growing": self.growing, "tubes": self.tubes, "timed": self.timed}
         return {"scene": scene, "tracks": self.tracks, "on_top": self.on_top, **lines}
 
     def _move(self, name: str, whole: Track) -> None:

@@ -12,7 +12,7 @@ class Picture {
     this.view = 0;
     buildScene(this.viewer, film);
     this.growing = growingLines(this.viewer, film);
-    this.moving = [...tracks(this.viewer, film), ...this.growing.values()];
+    this.moving = [...tracks(this.viewer, film), ...timedParts(this.viewer, film), ...this.growing.values()];
     this.thickness = new Thickness(this.viewer, film);
     this.labels = labels(this.viewer, film);
     paint(this.viewer);
