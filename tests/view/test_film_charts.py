@@ -14,7 +14,7 @@ from pathcontrol import Circle, ContinuousTime, ExtendedMotionPlan, Projection, 
 from pathcontrol.analysis.readable import readable_number
 from pathcontrol.analysis.run_metrics import contour_error, metrics
 from pathcontrol.view.animation.charts.chart import MOST_POINTS, Chart, Curve, extremes
-from pathcontrol.view.animation.charts.quantities import short_names
+from pathcontrol.view.animation.charts.joint_curves import short_names
 from pathcontrol.view.animation.payload import Film
 from pathcontrol.view.animation.record import record
 

@@ -7,9 +7,10 @@ import io
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
+from pathcontrol.analysis.observing_laws import compensates_observed, halts_at_contacts
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
-from pathcontrol.simulation.config import laws, table
+from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
 
 if TYPE_CHECKING:
@@ -74,9 +75,9 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
     if "tau" in recorded:
         yield "Torques", torque_figure(shown)
     if {"q", "qd", "tau"} <= recorded and all(run.model.has_mass for run in runs.values()):
-        if any(law.get("friction") == "observed" for run in runs.values() for law in laws(run.config)):
+        if any(map(compensates_observed, runs.values())):
             yield "Torques beside those of motors, as the law compensates them", observer_figure(shown)
-        if any(table(run.config, "disturbance") for run in runs.values()):
+        if any(table(run.config, "disturbance") or halts_at_contacts(run) for run in runs.values()):
             yield "Torques beside those of motors and friction", observer_figure(shown, friction="full")
     if any(largest_shares(run) for run in runs.values()):
         yield "Shares of limits", limits_figure(shown)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -44,6 +44,10 @@ class Curve:
     def at(self, times: Array) -> Array:
         """Return values at other times (m,), linear between its own; NaN before the first and after the last."""
         return np.interp(times, self.times, self.values, left=np.nan, right=np.nan)
+
+
+#: title, unit and lines of one run
+Entry: TypeAlias = tuple[str, str, list[Curve]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
 
 import numpy as np
 
-from pathcontrol._arrays import Array
 from pathcontrol.analysis.limit_shares import RATIOS, limit_shares
 from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.analysis.tool_following import feed_along, find_tool, tool_speed
 from pathcontrol.analysis.torque_limits import torque_limits
 from pathcontrol.tasks.task import PathTask
-from pathcontrol.view.animation.charts.chart import Chart, Curve
+from pathcontrol.view.animation.charts.chart import Chart, Curve, Entry
+from pathcontrol.view.animation.charts.joint_curves import joint_curves
+from pathcontrol.view.animation.charts.observed_torques import observed_torques
 from pathcontrol.view.animation.drawn_rollout import DrawnRollout
 from pathcontrol.view.animation.path_error import MILLIMETRE
 from pathcontrol.view.animation.rollout import Recording
-
-#: title, unit and lines of one run
-_Entry: TypeAlias = tuple[str, str, list[Curve]]
 
 
 def charts(drawn_rollouts: Sequence[DrawnRollout]) -> list[Chart]:
     """Return the charts of some runs; lines of the same quantity in the same unit share one."""
     found: dict[tuple[str, str], list[Curve]] = {}
     several = len(drawn_rollouts) > 1
-    makers: tuple[Callable[[DrawnRollout, int, bool], list[_Entry]], ...] = (_norms, _error, _rates, _torques, _shares)
+    makers: tuple[Callable[[DrawnRollout, int, bool], list[Entry]], ...] = (
+        _norms,
+        _error,
+        _rates,
+        _torques,
+        observed_torques,
+        _shares,
+    )
     for maker in makers:
         for i, drawn_rollout in enumerate(drawn_rollouts):
             for title, unit, curves in maker(drawn_rollout, i, several):
@@ -35,7 +39,7 @@ def charts(drawn_rollouts: Sequence[DrawnRollout]) -> list[Chart]:
     return [Chart(title, unit, curves) for (title, unit), curves in found.items()]
 
 
-def _norms(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[_Entry]:
+def _norms(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[Entry]:
     """Return the norms of the errors of joints."""
     recording, entries = drawn_rollout.recording, []
     for name, symbol, words in (("e_p", "‖e_p‖", "position error"), ("e_v", "‖e_v‖", "velocity error")):
@@ -46,7 +50,7 @@ def _norms(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[_Entr
     return entries
 
 
-def _error(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[_Entry]:
+def _error(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[Entry]:
     """Return the error by which the run is coloured."""
     if drawn_rollout.error is None:
         return []
@@ -60,7 +64,7 @@ def _error(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[_Entr
     ]
 
 
-def _rates(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[_Entry]:
+def _rates(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[Entry]:
     """Return the rate of the path parameter, beside the planned one."""
     recording = drawn_rollout.recording
     if "sdot" not in recording.run:
@@ -74,7 +78,7 @@ def _rates(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[_Entr
     return [("rate along the path σ̇", "1/s", curves)]
 
 
-def _feeds(recording: Recording, task: PathTask, index: int, several: bool) -> list[_Entry]:
+def _feeds(recording: Recording, task: PathTask, index: int, several: bool) -> list[Entry]:
     """Return the speed of the tool on a path that was made for it, beside the planned one."""
     speed = tool_speed(recording.run, recording.robot, task)[0]
     wanted = feed_along(task, recording.robot, recording.s)
@@ -85,7 +89,7 @@ def _feeds(recording: Recording, task: PathTask, index: int, several: bool) -> l
     return [("speed of the tool", "mm/s", curves)]
 
 
-def _torques(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[_Entry]:
+def _torques(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[Entry]:
     """Return torques in percent of their limits, of each joint or of several runs the largest; else in N m."""
     recording = drawn_rollout.recording
     if "tau" not in recording.run:
@@ -95,16 +99,16 @@ def _torques(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[_En
     limited = np.flatnonzero(np.isfinite(limits))
     if not len(limited):
         lines = np.abs(tau).max(-1)[:, None] if several else tau
-        return [("torque", recording.run.unit("tau"), _curves(recording, index, several, lines, joints))]
+        return [("torque", recording.run.unit("tau"), joint_curves(recording, index, several, lines, joints))]
     share = 100 * tau[:, limited] / limits[limited]
     share = np.abs(share).max(-1)[:, None] if several else share
-    curves = _curves(recording, index, several, share, [joints[j] for j in limited])
+    curves = joint_curves(recording, index, several, share, [joints[j] for j in limited])
     ends, signs = recording.time[[0, -1]], (1.0,) if several else (1.0, -1.0)
     curves += [Curve("limit", ends, np.full(2, 100.0 * sign), index, "limit") for sign in signs]
     return [("largest torque / limit" if several else "torque / limit", "%", curves)]
 
 
-def _shares(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[_Entry]:
+def _shares(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[Entry]:
     """Return the largest shares [%] of limits of position and velocity; torques have a chart of their own."""
     recording = drawn_rollout.recording
     curves: list[Curve] = []
@@ -120,27 +124,3 @@ def _shares(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[_Ent
         return []
     limit = Curve("limit", recording.time[[0, -1]], np.full(2, 100.0), index, "limit")
     return [("position and velocity / limit, largest", "%", [*curves, limit])]
-
-
-def _curves(recording: Recording, index: int, several: bool, values: Array, joints: Sequence[str]) -> list[Curve]:
-    """Return a line for each column (k, m), named after the joints, or after the run if there is only one."""
-    if several:
-        return [Curve(recording.name, recording.time, values[:, 0], index)]
-    names = short_names(joints)
-    return [Curve(name, recording.time, values[:, j], index, shade=j) for j, name in enumerate(names)]
-
-
-def short_names(names: Sequence[str]) -> list[str]:
-    """Return names without the words that all of them begin or end with: panda_joint1 is joint1; joint_1 is not 1."""
-    words = [name.split("_") for name in names]
-    if len(names) < 2:
-        return list(names)
-    for drop, tested in ((slice(1, None), 0), (slice(-1), -1)):
-        while len({word[tested] for word in words}) == 1 and all(_says_enough(word[drop]) for word in words):
-            words = [word[drop] for word in words]
-    return ["_".join(word) for word in words]
-
-
-def _says_enough(words: Sequence[str]) -> bool:
-    """Return whether shortened names are still names."""
-    return any(word and not word.isdigit() for word in words)
