@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
+from pathcontrol.analysis.asked_speed import asked_factor
 from pathcontrol.analysis.gamma import planned_rate
 from pathcontrol.analysis.metric_helpers import apply_where_finite, split_by_task
 from pathcontrol.analysis.window import samples_of
@@ -22,7 +23,8 @@ def progress(run: Run, task: PathTask) -> Array:
 
     On an open path it is the share of its parameter; on a closed one that of the requested laps. Where no
     laps were requested, it is 1 if the arm went on in the second half of the time: once round, or for half of ∫ϑ dt
-    where that is less. NaN where s is no number.
+    where that is less. Where an operator holds the plan, slows it down or turns it back, what it went both ways counts,
+    and ϑ is as much smaller. NaN where s is no number.
     """
     share = _share_of_end(run, task) if _ends(run, task) else _share_of_motion(run, task)
     return np.where(run.status == "finished", 1.0, np.clip(share, 0.0, 1.0))
@@ -68,9 +70,13 @@ def _share_of_motion(run: Run, task: PathTask) -> Array:
     late, time, s = samples_of(run), run.time, run.array("s")
     rows, last = np.arange(run.rollouts), late.stop - 1
     passed, once = s[rows, last] - s[rows, late.first], np.inf if task.period is None else task.period
+    factor = asked_factor(run)
     if (passed >= once).all():
         return np.ones(run.rollouts)
     theta = apply_where_finite(lambda s: planned_rate(task, s), late.within(s))
+    if factor is not None:
+        theta = theta * np.minimum(factor, 1.0)
+        passed = late.reduce(lambda s: np.abs(np.diff(s)).sum(), s)
     asked = late.reduce(np.mean, theta) * (time[last] - time[late.first])
     wanted = np.minimum(once, _HALF_SPEED * asked)
     with np.errstate(invalid="ignore", divide="ignore"):
