@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pathcontrol.errors import ExperimentError
+import numpy as np
+
+from pathcontrol.errors import ExperimentError, warn
 from pathcontrol.experiments.builders.setup import Setup, build
 from pathcontrol.experiments.load import load_experiment, make_file_error, read_text
 from pathcontrol.experiments.outputs import check_folder, measure_run, write_outputs
@@ -60,9 +62,20 @@ def _simulated(setup: Setup, progress: bool) -> Run:
     options |= {"engine": setup.engine, "progress": progress}
     if isinstance(setup.task, PathSequence):
         options["task"] = setup.task
+        _warn_of_timed_override(setup)
         return simulate_sequence(setup.controllers, setup.q, setup.qd, duration=setup.duration, **options)
     options |= {"laps": setup.laps, "until": setup.until}
     return simulate(setup.controller, setup.q, setup.qd, duration=float(setup.duration), **options)
+
+
+def _warn_of_timed_override(setup: Setup) -> None:
+    """Warn of steps of an override in time where several paths are followed, each with a time of its own."""
+    steps, paths = np.asarray(setup.controller.describe().get("override", 1.0)), len(setup.controllers)
+    if paths > 1 and steps.ndim == 2 and (steps[:, 0] > 0).any():
+        warn(
+            f"override = {steps.tolist()}: its times count from the begin of each of the {paths} paths, so that each "
+            "is held, slowed down or turned back; in Python simulate_sequence takes an override for each path"
+        )
 
 
 def load_setup(path: str | Path) -> Setup:

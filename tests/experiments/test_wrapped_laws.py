@@ -118,3 +118,34 @@ def test_a_threshold_that_is_none_is_told_by_its_key(tmp_path):
     path.write_text(EVENTS.replace("threshold = 8.0", "threshold = -8.0") + PLAN, encoding="utf-8")
     with pytest.raises(pc.ExperimentError, match="threshold"):
         pc.run_experiment(path, tmp_path / "out", progress=False)
+
+
+TWO_STROKES = """
+duration = 5.0
+robot = { source = "cicese_2dof", tool = { frame = "tool", position = [0.0, 0.0, -0.05], name = "pen" } }
+[task]
+type = "toolpath"
+file = "two.svg"
+frame = "pen"
+workpiece = { position = [0.30, -0.05, 0.65], rpy = [1.5707963267948966, 0.0, 0.0] }
+feed = 0.1
+clearance = 0.0
+[controller]
+type = "speed_override"
+override = 1.0
+[controller.law]
+friction = "full"
+"""
+SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="40mm" viewBox="0 0 60 40">
+<path d="M 10 10 L 30 10"/><path d="M 10 30 L 30 30"/></svg>"""
+
+
+@pytest.mark.parametrize(("override", "told"), [("1.0", False), ("[[0.0, 0.9]]", False), ("[[0.1, 0.5]]", True)])
+def test_steps_of_an_override_that_each_contour_takes_anew_are_told(tmp_path, recwarn, override, told):
+    (tmp_path / "two.svg").write_text(SVG, encoding="utf-8")
+    path = tmp_path / "two.toml"
+    path.write_text(TWO_STROKES.replace("override = 1.0", f"override = {override}") + PLAN, encoding="utf-8")
+    run, _, _ = pc.run_experiment(path, tmp_path / "out", progress=False)
+    assert len(run.array("path_status")) > 1
+    found = [str(w.message) for w in recwarn if issubclass(w.category, pc.PathControlWarning)]
+    assert any("count from the begin of each of the" in message for message in found) == told
