@@ -87,7 +87,7 @@ class ControlLoop:
         self.envelope = (Envelope() if envelope is None else envelope).complete(law.robot)
         self._plan = HeldPlan(law, self.period)
         self._damping = self._find_damping()
-        self._ring: SampleRing | None = None
+        self._rings: tuple[SampleRing, ...] = ()
         self.recording = True  # False for steps that are not to be in the log
         n = law.robot.n
         posture = law.task.q_d(np.array(law.task.s0, dtype=np.float64))
@@ -107,10 +107,11 @@ class ControlLoop:
         position = check_finite("q", as_joint_array("q", q, n))
         velocity = np.zeros(n) if qd is None else check_finite("qd", as_joint_array("qd", qd, n))
         acting = self.law.robot.gravity(position) if tau is None else check_finite("tau", as_joint_array("tau", tau, n))
-        if self._ring is not None:
-            self._ring.restart(as_scalar("t", t), self.period)
+        begin = as_scalar("t", t)
         self._plan.start(position, velocity)
-        self._screen = Screen(self.envelope, position, velocity, as_scalar("t", t) - self.period)
+        for ring in self._rings:
+            ring.restart(begin, self.period)
+        self._screen = Screen(self.envelope, position, velocity, begin - self.period)
         self._tau = np.minimum(np.maximum(acting, -self.envelope.torque), self.envelope.torque)
         self._mode, self._reason, self._faults = Mode.RUN, "", Counter[str]()
         self._bad, self._ticks, self._saturated, self._inside = 0, 0, False, False
@@ -131,7 +132,7 @@ class ControlLoop:
         The array is a new one each time.
         """
         self._ticks += 1
-        plan = (0.0, 1.0) if self._ring is None else (self._plan.s, self._plan.factor)
+        plan = (self._plan.s, self._plan.factor) if self._rings else (0.0, 1.0)
         try:
             wanted = self._decide(q, qd, t)
         except Exception as error:  # whatever a law of one's own raises, the arm must not fall
@@ -140,16 +141,17 @@ class ControlLoop:
         limited = self.envelope.clip(wanted, self._tau, self.period)
         self._saturated = bool((limited != wanted).any())
         self._tau = limited
-        if self._ring is not None and self.recording:
+        if self._rings and self.recording:
             t = self._screen.t + self._bad * self.period
-            self._ring.put(t, *plan, self._mode, self._screen.q, self._screen.qd, wanted, limited)
+            for ring in self._rings:
+                ring.put(t, *plan, self._mode, self._screen.q, self._screen.qd, wanted, limited)
         return limited.copy()
 
     def record(self, path: str | Path | None = None) -> LoopLog:
         """Return a log of all steps from now on, as an MCAP file ``NAME.mcap`` or in memory.
 
         >>> with loop.record("arm.mcap") as log:
-        ...     drive(loop)
+        ...     drive(loop, arm, duration=10.0)
         >>> run = log.run()
 
         Raises:
@@ -158,8 +160,12 @@ class ControlLoop:
             StorageError: the file cannot be written.
         """
         log = LoopLog(self.law, self.period, path)
-        self._ring = log.ring
+        self.fill(log.ring)
         return log
+
+    def fill(self, ring: SampleRing) -> None:
+        """Put a sample of all steps from now on into a ``ring``, until it is closed."""
+        self._rings = (*(one for one in self._rings if not one.closed), ring)
 
     # --- the operator ---------------------------------------------------------------------------------------
 
@@ -172,10 +178,19 @@ class ControlLoop:
         self._react(Mode.GRAVITY, "arm", reason)
 
     def resume(self) -> None:
-        """Go on along the path from where the arm is, from rest, after any reaction."""
-        if self._mode >= Mode.DAMP:
-            self._plan.restart(self._screen.q, self._screen.qd)
-        self._plan.resume()
+        """Go on along the path from where the arm is, from rest, after any reaction; it never raises.
+
+        Where the law cannot start there the arm is damped, or stays so, and :attr:`status` says why.
+        """
+        try:
+            if self._mode >= Mode.DAMP:
+                self._plan.restart(self._screen.q, self._screen.qd)
+            self._plan.resume()
+        except Exception as error:  # a loop that resumes on its own must not end, and the arm must not fall
+            self._faults["law"] += 1
+            self._mode = max(self._mode, Mode.DAMP)
+            self._reason = f"the law cannot go on: {type(error).__name__}: {error}"
+            return
         self._mode, self._reason, self._bad, self._inside = Mode.RUN, "", 0, False
 
     # --- decisions ------------------------------------------------------------------------------------------

@@ -12,7 +12,10 @@ from pathcontrol.control.wrapper import LawWrapper
 from pathcontrol.errors import ArmError
 from pathcontrol.hardware.arm import Arm, Measurement
 from pathcontrol.hardware.control_loop import ControlLoop, Status
+from pathcontrol.hardware.loop_context import LoopContext
 from pathcontrol.hardware.real_time import real_time
+from pathcontrol.hardware.sample_ring import Moments, SampleRing
+from pathcontrol.simulation.run import Run
 
 _WARM = 10
 _FIRST = 100  # periods in which the first measurement must come
@@ -32,6 +35,8 @@ class DriveRecord:
         status: that of the loop at the end.
         stopped: why the arm stopped by itself, a sentence; empty where it did not.
         real_time: whether the loop had real-time priority.
+        samples: what a log of the loop has, of which :meth:`run` is made.
+        context: the law of the loop and its period.
     """
 
     t: Array
@@ -43,6 +48,15 @@ class DriveRecord:
     status: Status
     stopped: str
     real_time: bool
+    samples: Moments
+    context: LoopContext
+
+    def run(self) -> Run:
+        """Return the drive as a run, for metrics, figures and reports, as :meth:`LoopLog.run` does.
+
+        Of a tick without a good measurement it has the last good one.
+        """
+        return self.context.make_run_of_moments(self.samples)
 
 
 def drive(loop: ControlLoop, arm: Arm, duration: float, settle: float = 0.7) -> DriveRecord:
@@ -67,12 +81,13 @@ def drive(loop: ControlLoop, arm: Arm, duration: float, settle: float = 0.7) -> 
     span = as_scalar("duration", duration, positive=True)
     rest = as_scalar("settle", settle, least=0.0)
     _warm_up(loop)
+    driver = _Driver(loop, arm, span + rest)
     try:
         with real_time() as allowed:
-            driver = _Driver(loop, arm, span + rest)
             stopped = driver.drive(span, rest)
     finally:
         arm.finish()
+        driver.close()
         if isinstance(loop.law, LawWrapper):
             loop.law.resume()  # it is the caller's law that was held
     return driver.record(stopped, allowed)
@@ -83,12 +98,12 @@ def _warm_up(loop: ControlLoop) -> None:
     task = loop.law.task
     q = np.asarray(task.q_d(np.array(task.s0)), dtype=np.float64).reshape(-1)
     loop.start(q)
-    loop.recording = False
+    recording, loop.recording = loop.recording, False
     for k in range(2 * _WARM):
         if k == _WARM:
             loop.hold()
         loop.step(q, np.zeros_like(q), k * loop.period)
-    loop.recording = True
+    loop.recording = recording
 
 
 class _Driver:
@@ -100,6 +115,7 @@ class _Driver:
         n = loop.law.robot.n
         self._none = Measurement(np.full(n, np.nan), np.full(n, np.nan), np.nan)
         joints = [(name, np.float64, (n,)) for name in ("q", "qd", "tau")]
+        self._ring = SampleRing(n, self._ticks(longest))
         self._rows = np.zeros(self._ticks(longest), [("t", np.float64), *joints, ("s", np.float64), ("mode", np.int8)])
         self._rows.view(np.uint8).fill(0)  # or the system would give memory tick by tick, and make some late
 
@@ -107,6 +123,7 @@ class _Driver:
         """Drive for both times [s], and return why the arm stopped, or ""."""
         here = self._arm.locate()
         self._loop.start(here.q, here.qd)
+        self._loop.fill(self._ring)
         first = self._read_first()
         self._start = first.t
         try:
@@ -126,7 +143,19 @@ class _Driver:
         """Return what was driven."""
         rows = self._rows[: self._k]
         arrays = {name: rows[name].copy() for name in ("t", "q", "qd", "tau", "s", "mode")}
-        return DriveRecord(**arrays, status=self._loop.status, stopped=stopped, real_time=allowed)
+        context = LoopContext(self._loop.law, self._loop.period)
+        return DriveRecord(
+            **arrays,
+            status=self._loop.status,
+            stopped=stopped,
+            real_time=allowed,
+            samples=self._ring.take(),
+            context=context,
+        )
+
+    def close(self) -> None:
+        """Let the loop keep no more samples."""
+        self._ring.closed = True
 
     def _read_first(self) -> Measurement:
         """Return the first measurement."""

@@ -9,7 +9,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.control.speed_override import SpeedOverride
 from pathcontrol.control.wrapper import LawWrapper
 from pathcontrol.engine.control_tick import ControlTick
-from pathcontrol.errors import EngineError
+from pathcontrol.errors import EngineError, TaskError
 
 _FULL = 1e-9  # of the speed that may be missing when the law goes on without the speed input
 
@@ -66,9 +66,15 @@ class HeldPlan:
         self._held.resume()
 
     def restart(self, q: Array, qd: Array) -> None:
-        """Begin at the point of the path that is nearest to the arm, at rest."""
+        """Begin at the point of the path that is nearest to the arm, at rest.
+
+        Raises:
+            TaskError: the path does not say which point is nearest.
+        """
         own, *speeds = self._wrapper.split(self._wrapper.start(q, qd))
         own[0] = self._law.task.sigma_bar(q)
+        if not np.isfinite(own[0]):
+            raise TaskError(f"sigma_bar({q.tolist()}) = {own[0]}, expected the path parameter of the nearest point")
         for speed in speeds:
             speed[0] = 0.0
         self._held.start_from(np.concatenate([own, *speeds]))

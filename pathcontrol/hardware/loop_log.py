@@ -14,25 +14,20 @@ from pathcontrol._arrays import Array
 from pathcontrol._files import writing
 from pathcontrol._suffixes import check_suffix
 from pathcontrol.control.base import Controller
-from pathcontrol.control.wrapper import unwrap
 from pathcontrol.errors import InputError, StorageError, warn
+from pathcontrol.hardware.loop_context import DIMS, LoopContext, find_rates, only_later
 from pathcontrol.hardware.sample_ring import Moments, SampleRing
-from pathcontrol.simulation.context import RunContext
 from pathcontrol.simulation.run import Run
-from pathcontrol.simulation.run_arguments import map_position_units, name_versions
-from pathcontrol.simulation.samples import Labelled, Samples, complete_outcome, label_outcome
+from pathcontrol.simulation.samples import complete_outcome, label_outcome
 from pathcontrol.simulation.storage.mcap_messages import Variable
 from pathcontrol.simulation.storage.mcap_records import load_mcap
 from pathcontrol.simulation.storage.mcap_run import McapRunWriter
-from pathcontrol.simulation.summaries import summarize
 
 _DRAIN = 0.05  # s between two looks at the ring
 _FLUSH = 0.25  # s after which what was written is handed to the operating system
 _PIECE = 4  # samples put into words at a time: the loop waits no longer for Python's lock
 _PAUSE = 2e-5  # s in which the loop can take the lock
 _SECONDS = 5.0  # of samples for which there is room
-_MODE = {"units": "1", "long_name": "what the loop did: 0 follow the path, 1 hold, 2 damp, 3 carry the weight"}
-_DIMS = ("rollout", "time", "joint")
 
 
 class LoopLog:
@@ -61,13 +56,10 @@ class LoopLog:
     """
 
     def __init__(self, law: Controller, period: float, path: str | Path | None = None) -> None:
-        self._law, self._period, self._path = (
-            law,
-            period,
-            None if path is None else check_suffix(path, "a log", ".mcap"),
-        )
+        self._context = LoopContext(law, period)
+        self._path = None if path is None else check_suffix(path, "a log", ".mcap")
         self.ring = SampleRing(law.robot.n, max(16, round(_SECONDS / period)))
-        self._first: float | None = None
+        self._begin = 0.0  # s, time of the first sample
         self._last: Moments | None = None  # the sample that waits for the one after it
         self._sdot = np.zeros(1)
         self._error: Exception | None = None
@@ -125,14 +117,7 @@ class LoopLog:
             return Run.load(self._path)
         if not self._kept:
             raise InputError("the log is empty: the loop has taken no step")
-        import xarray as xr  # it takes a third of a second to load
-
-        arrays = {name: np.concatenate([part[name] for part in self._kept])[None] for name in self._kept[0]}
-        moment = arrays.pop("time")[0]
-        mode: Labelled = (_DIMS[:2], arrays.pop("mode"), _MODE)
-        outcome = complete_outcome(1, {})
-        variables, axes = Samples(moment, self._joints, arrays, outcome, np.arange(1)).label_all()
-        return Run(xr.Dataset(variables | {"mode": mode}, axes), self._config(), self._context)
+        return self._context.make_run(self._kept, self._begin, self.lost)
 
     # --- the thread -----------------------------------------------------------------------------------------
 
@@ -155,18 +140,18 @@ class LoopLog:
         """Add samples to the log; the last one waits for that after it, which gives its ṡ."""
         if self._last is not None:
             found = Moments({name: np.concatenate([self._last[name], found[name]]) for name in found})
-        found = _only_later(found)
-        step = np.diff(found["time"])
-        if len(step):
-            rate = np.diff(found["s"]) / step
+        found = only_later(found)
+        rate = find_rates(found)
+        if len(rate):
             self._keep(Moments({name: array[:-1] for name, array in found.items()}), rate)
             self._sdot = rate[-1:]
         self._last = Moments({name: array[-1:] for name, array in found.items()})
 
     def _keep(self, found: Moments, sdot: Array) -> None:
         """Keep whole samples."""
-        self._first = float(found["time"][0]) if self._first is None else self._first
-        arrays = self._complete(found, sdot)
+        if self._writer is None and not self._kept:
+            self._begin = float(found["time"][0])
+        arrays = self._context.complete(found, sdot, self._begin)
         if self._path is None:
             self._kept.append(arrays)
             return
@@ -181,41 +166,19 @@ class LoopLog:
             self._writer.flush()
             self._flushed = time.monotonic()
 
-    def _complete(self, found: Moments, sdot: Array) -> dict[str, Array]:
-        """Return all variables of samples, with times from that of the first one on."""
-        point = unwrap(self._law).at_speed(found["factor"]).point(found["s"])
-        q, qd = found["q"], found["qd"]
-        return {
-            "time": found["time"] - self._first,
-            "q": q,
-            "qd": qd,
-            "q_measured": q,
-            "qd_measured": qd,
-            "tau_demand": found["tau_demand"],
-            "tau": found["tau"],
-            "s": found["s"],
-            "sdot": sdot,
-            "e_p": point.q_d - q,
-            "e_v": point.velocity - qd,
-            "regular": np.ones(len(q), dtype=bool),
-            "mode": found["mode"].astype(np.int8),
-        }
-
     # --- the file -------------------------------------------------------------------------------------------
 
     def _begin_file(self, arrays: dict[str, Array]) -> McapRunWriter:
         """Return the writer of the file, with all in it that is known before the first sample."""
-        several = {name: array[None] for name, array in arrays.items() if name not in ("time", "mode")}
-        labels, _ = Samples(arrays["time"], self._joints, several, {}, np.arange(1)).label_all()
-        labels["mode"] = (_DIMS[:2], arrays["mode"][None], _MODE)
-        variables = [Variable(name, dims == _DIMS, x.dtype.str, about) for name, (dims, x, about) in labels.items()]
+        labels, _ = self._context.label(arrays, {})
+        variables = [Variable(name, dims == DIMS, x.dtype.str, about) for name, (dims, x, about) in labels.items()]
         axes = {
             "rollout": [0],
-            "joint": list(self._joints),
+            "joint": list(self._context.joints),
             "axes": {"rollout": {}, "time": {"units": "s"}, "joint": {}},
         }
-        stored = self._context.stored(float(arrays["s"][0]) + 1.0)  # what is known so far of an endless path
-        return McapRunWriter(self._stream, variables, axes, self._config(), stored, begin=time.time_ns())
+        stored = self._context.origin.stored(float(arrays["s"][0]) + 1.0)  # what is known so far of an endless path
+        return McapRunWriter(self._stream, variables, axes, self._describe(), stored, begin=time.time_ns())
 
     def _end_file(self) -> None:
         """Write the end of the file."""
@@ -224,34 +187,11 @@ class LoopLog:
                 if self._writer is not None and self._error is None:
                     outcome = label_outcome(complete_outcome(1, {}))
                     upto = float(self._last["s"][0]) if self._last is not None else 0.0
-                    self._writer.attach_context(self._config(), self._context.stored(upto))
+                    self._writer.attach_context(self._describe(), self._context.origin.stored(upto))
                     self._writer.finish(outcome, list(outcome))
         except OSError as error:
             self._error = error
 
-    @property
-    def _context(self) -> RunContext:
-        """The arm and the task."""
-        return RunContext.of(self._law.robot, self._law.task, model=self._law.robot)
-
-    @property
-    def _joints(self) -> dict[str, str]:
-        """The units of the joints by their names."""
-        return map_position_units(self._law.robot)
-
-    def _config(self) -> dict[str, Any]:
+    def _describe(self) -> dict[str, Any]:
         """Return the configuration, as far as it is known."""
-        law = {name: value if name == "task" else summarize(value) for name, value in self._law.describe().items()}
-        return {
-            "controller": law,
-            "plant": {"robot": self._law.robot.name},
-            "loop": {"loop": "hardware", "period": self._period, "begin": self._first, "lost": self.lost},
-            "versions": name_versions(),
-        }
-
-
-def _only_later(found: Moments) -> Moments:
-    """Return the samples that are later than all before them: a clock may have been set back."""
-    before = np.maximum.accumulate(np.concatenate([[-np.inf], found["time"][:-1]]))
-    later = found["time"] > before
-    return found if later.all() else Moments({name: array[later] for name, array in found.items()})
+        return self._context.describe(self._begin, self.lost)

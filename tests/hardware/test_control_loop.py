@@ -246,16 +246,96 @@ def test_after_damping_the_loop_goes_on_from_where_the_arm_is_without_a_jump(n):
     assert loop._plan.distance(arm.q[0]) < 0.05
 
 
+class Lost(pc.Lissajous):
+    """A path that cannot say any more which point is nearest."""
+
+    lost = ""
+
+    def sigma_bar(self, q, near=None):
+        if Lost.lost == "raises":
+            raise RuntimeError("no nearest point")
+        return super().sigma_bar(q, near) * (np.nan if Lost.lost else 1.0)
+
+
+@pytest.mark.parametrize("lost", ["raises", "no number"])
+def test_a_law_that_cannot_go_on_leaves_the_arm_damped_and_resume_does_not_raise(lost, monkeypatch):
+    plain = law_of(2)
+    law = pc.ExtendedMotionPlan(plain.robot, Lost([0.3, 0.3], [1, 2], 0.5, center=[0.2, 0.4]), 400.0, 40.0, k=5.0)
+    arm, loop = Simulated(law), ControlLoop(law, H)
+    loop.start(arm.q[0], arm.qd[0])
+    arm.drive(loop, 50)
+    arm.drive(loop, 20, lambda k, *measured: BAD["not a number"](*measured))
+    arm.drive(loop, 50)
+    monkeypatch.setattr(Lost, "lost", lost)
+    loop.resume()
+    assert loop.status.mode == Mode.DAMP
+    assert "cannot go on" in loop.status.reason
+    assert loop.status.faults["law"] == 1
+    assert np.isfinite(arm.drive(loop, 50)["tau"]).all()
+    monkeypatch.setattr(Lost, "lost", "")
+    loop.resume()
+    arm.drive(loop, 50)
+    assert loop.status.mode == Mode.RUN
+
+
+def wrapped_laws(n):
+    plan = law_of(n, pc.ExtendedMotionPlan)
+    observed = pc.ExtendedMotionPlan(plan.robot, plan.task, K_p=400.0, K_v=40.0, k=5.0, friction="observed")
+    return {
+        "override": pc.SpeedOverride(plan, 0.5),
+        "paced": pc.Paced(law_of(n)),
+        "both": pc.SpeedOverride(pc.Paced(plan), 0.7),
+        "event": pc.EventPlan(law_of(n, pc.ComputedTorque)),
+        "observed": observed,
+        "observed override": pc.SpeedOverride(observed),
+    }
+
+
+@pytest.mark.parametrize("name", wrapped_laws(2))
+def test_wrapped_and_observing_laws_run_hold_and_go_on_without_a_jump(name):
+    law = wrapped_laws(2)[name]
+    arm, loop = Simulated(law), ControlLoop(law, H)
+    loop.start(arm.q[0], arm.qd[0])
+    gone = [arm.drive(loop, 150)]
+    assert loop.status.mode == Mode.RUN
+    loop.hold()
+    gone += [arm.drive(loop, 500)]
+    assert np.abs(arm.qd).max() < 1e-2
+    loop.resume()
+    gone += [arm.drive(loop, 100), arm.drive(loop, 20, lambda k, *m: BAD["not a number"](*m)), arm.drive(loop, 300)]
+    assert loop.status.mode == Mode.DAMP
+    s = loop.status.s
+    loop.resume()
+    gone += [arm.drive(loop, 300)]
+    assert (loop.status.mode, loop.status.reason) == (Mode.RUN, "")
+    assert loop.status.s > s
+    assert "law" not in loop.status.faults
+    assert loop._plan.distance(arm.q[0]) < 0.1
+    change = np.abs(np.diff(np.concatenate([part["tau"] for part in gone]), axis=0))
+    assert (change <= loop.envelope.torque_rate * H * (1 + 1e-9)).all()
+
+
 # --- any sequence of faults ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("n", [2, 6, 7])
 def test_no_torque_is_beyond_its_limit_or_its_rate_whatever_happens(n):
-    law, rng = law_of(n), np.random.default_rng(n)
+    try_faults(law_of(n), np.random.default_rng(n), sequences=60)
+
+
+@pytest.mark.parametrize("name", wrapped_laws(2))
+@pytest.mark.parametrize("n", [2, 6])
+def test_the_same_of_wrapped_and_observing_laws(n, name):
+    try_faults(wrapped_laws(n)[name], np.random.default_rng(n), sequences=6)
+
+
+def try_faults(law, rng, sequences):
+    """Give a loop random sequences of faults, and hold its torques to their limits and rates."""
+    n = law.robot.n
     loop = ControlLoop(law, H, Envelope(patience=2, frozen=5))
     limit, change = loop.envelope.torque, loop.envelope.torque_rate * H
     center = np.asarray(law.task.q_d(np.array(0.0)))
-    for _ in range(60):
+    for _ in range(sequences):
         q, qd, t = center + rng.normal(0, 0.3, n), rng.normal(0, 0.5, n), rng.uniform(0, 9)
         loop.start(q, qd, t)
         last = np.clip(law.robot.gravity(q), -limit, limit)

@@ -71,6 +71,38 @@ def test_a_drive_is_the_simulation_of_its_law(kind):
     np.testing.assert_allclose(record.t, H * np.arange(ticks), atol=1e-12)
 
 
+def test_the_run_of_a_drive_is_that_of_its_log():
+    law = law_of(pc.ExtendedMotionPlan)
+    arm = SimulatedArm(law, tick30=lambda arm: "lost")
+    loop = ControlLoop(law, H, WIDE)
+    with loop.record() as log:
+        record = drive(loop, arm, 0.3, settle=0.2)
+    run, logged = record.run(), log.run()
+    assert len(run.time) == len(record.t)
+    assert set(run.data) == set(logged.data)
+    for name in run.data:
+        np.testing.assert_array_equal(run.data[name], logged.data[name], err_msg=name)
+    assert {**run.config, "loop": 0} == {**logged.config, "loop": 0}
+    measured = np.isfinite(record.t)
+    for name in ("q", "qd", "tau"):
+        np.testing.assert_array_equal(run.array(name)[0][measured], getattr(record, name)[measured])
+    np.testing.assert_array_equal(run.array("s")[0, 1:], record.s[:-1])  # the record has it after the tick
+    np.testing.assert_array_equal(run.array("mode")[0], record.mode)
+    assert pc.metrics(run)["contour_error_peak"][0] < 0.05
+
+
+def test_a_drive_goes_on_in_a_log_and_leaves_the_loop_as_it_was():
+    law = law_of()
+    loop = ControlLoop(law, H, WIDE)
+    first, second = (drive(loop, SimulatedArm(law), 0.1, settle=0.0) for _ in range(2))
+    for record in (first, second):
+        assert len(record.run().time) == len(record.t) == 51
+    loop.recording = False
+    with pytest.raises(InputError, match="recording"):
+        drive(loop, SimulatedArm(law), 0.1, settle=0.0).run()
+    assert not loop.recording
+
+
 def test_torques_go_without_weight_to_an_arm_that_carries_its_own():
     law = law_of()
     arm = SimulatedArm(law, carries_weight=True)
