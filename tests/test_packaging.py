@@ -79,7 +79,8 @@ def requirements(*extras: str) -> set[str]:
 
 def test_whatever_is_imported_is_asked_for():
     # their wheels install beside the packages, where Python does not see of which one they are
-    providers = {"pinocchio": ["pin"], "example_robot_data": ["example-robot-data-loaders"]} | packages_distributions()
+    providers = {"pinocchio": ["pin"], "example_robot_data": ["example-robot-data-loaders"]}
+    providers |= {"rtde_control": ["ur-rtde"], "rtde_receive": ["ur-rtde"]} | packages_distributions()
     declared = requirements("robots", "mujoco", "cluster", "video", "sweep", "tune", "franka", "ur", "mcap")
     used = set.union(*(imported(path) for path in (ROOT / "pathcontrol").rglob("*.py")))
     assert {"numpy", "pinocchio", "umsgpack", "cloudpickle"} <= used

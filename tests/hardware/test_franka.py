@@ -4,7 +4,6 @@ It needs real-time priority: without it, a busy computer loses packets whatever 
 """
 
 import os
-import threading
 
 import numpy as np
 import pytest
@@ -48,6 +47,21 @@ class WatchedFranka(pc.Franka):
         return measured
 
 
+class UnpluggedFranka(pc.Franka):
+    """Its robot vanishes at a time on the robot's own clock: a timer of this computer may be late by seconds."""
+
+    def __init__(self, server, after):
+        super().__init__("127.0.0.1", enforce_real_time=False)
+        self.server, self.after, self.begin = server, after, None
+
+    def read(self):
+        measured = super().read()
+        self.begin = measured.t if self.begin is None else self.begin
+        if measured.t - self.begin > self.after:
+            self.server.kill()
+        return measured
+
+
 def law_of(kind, urdf):
     robot = pc.load_robot(urdf).with_armature(ROTORS)
     task = pc.Lissajous(np.full(7, 0.2), [1, 2, 1, 2, 1, 2, 1], 0.5, center=HOME)
@@ -88,12 +102,10 @@ def test_a_connection_that_is_lost_ends_in_the_fallback_of_the_loop(simulator):
     law = law_of("projection", urdf_of(simulator))
     loop = ControlLoop(law, H, pc.Franka.envelope)
     with serve(simulator) as server:
-        arm = pc.Franka("127.0.0.1", enforce_real_time=False)
-        threading.Timer(1.0, server.kill).start()
-        record = drive(loop, arm, 30.0)
+        record = drive(loop, UnpluggedFranka(server, after=1.0), 30.0)
     assert "libfranka" in record.stopped
     assert loop.status.mode == Mode.GRAVITY
-    assert 0.1 < record.t[-1] < 5.0
+    assert 1.0 < record.t[-1] < 1.2  # a few states may be on their way
 
 
 def test_a_robot_that_is_not_there_is_an_error_and_priorities_stay_as_they_were():
