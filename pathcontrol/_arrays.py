@@ -78,6 +78,14 @@ def check_physical(name: str, array: Array) -> Array:
     return array
 
 
+def as_joint_vector(name: str, value: Any, n: int) -> Array:
+    """Convert ``value`` to finite numbers of one arm's joints, (n,)."""
+    array = check_finite(name, as_joint_array(name, value, n))
+    if array.size != n:
+        raise InputError(f"{name} has the shape {array.shape}, expected ({n},): one arm", argument=name)
+    return array.reshape(n)
+
+
 def as_scalar(name: str, value: Any, *, positive: bool = False, least: float | None = None) -> float:
     """Convert ``value`` to a finite float, optionally positive or not below ``least``."""
     array = as_array(name, value)

@@ -48,8 +48,10 @@ def command(
     if serve is not None and connect is not None:
         raise click.UsageError("give --serve on one computer and --connect on the other")
     import_all()
+    from pathcontrol._arrays import as_scalar
     from pathcontrol.experiments.sil_tasks import make_sil_task
 
+    as_scalar("--duration", duration, positive=True)
     driven, secret = make_sil_task(robot, task), None if key is None else _read_key(key)
     if serve is not None:
         _serve(driven, serve, secret)
@@ -91,7 +93,7 @@ def _split_address(address: str) -> tuple[str, int]:
     """Return host and port of an address."""
     host, _, port = address.rpartition(":")
     if not host or not port.isdigit() or int(port) > 65535:
-        raise InputError(f"{address!r}, expected HOST:PORT, as 127.0.0.1:9700")
+        raise InputError(f"{address!r}, expected HOST:PORT with a port up to 65535, as 127.0.0.1:9700")
     return host, int(port)
 
 

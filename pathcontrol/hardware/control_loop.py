@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_joint_array, as_scalar, check_finite
+from pathcontrol._arrays import Array, as_joint_vector, as_scalar
 from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
 from pathcontrol.hardware.envelope import Envelope
@@ -104,9 +104,9 @@ class ControlLoop:
                 carry the weight of the arm.
         """
         n = self.law.robot.n
-        position = check_finite("q", as_joint_array("q", q, n))
-        velocity = np.zeros(n) if qd is None else check_finite("qd", as_joint_array("qd", qd, n))
-        acting = self.law.robot.gravity(position) if tau is None else check_finite("tau", as_joint_array("tau", tau, n))
+        position = as_joint_vector("q", q, n)
+        velocity = np.zeros(n) if qd is None else as_joint_vector("qd", qd, n)
+        acting = self.law.robot.gravity(position) if tau is None else as_joint_vector("tau", tau, n)
         begin = as_scalar("t", t)
         self._plan.start(position, velocity)
         for ring in self._rings:

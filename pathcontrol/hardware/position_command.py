@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, as_joint_array, as_scalar, check_finite, freeze
+from pathcontrol._arrays import Array, as_array, as_joint_vector, as_scalar, freeze
 from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
 from pathcontrol.control.override_rule import Override
@@ -120,8 +120,8 @@ class PositionCommand:
     def start(self, q: ArrayLike, qd: ArrayLike | None = None) -> None:
         """Start with an arm at q [rad] and q̇ [rad/s], each (n,); at rest by default."""
         n = self.robot.n
-        self.q = check_finite("q", as_joint_array("q", q, n)).reshape(n).copy()
-        self.qd = np.zeros(n) if qd is None else check_finite("qd", as_joint_array("qd", qd, n)).reshape(n).copy()
+        self.q = as_joint_vector("q", q, n).copy()
+        self.qd = np.zeros(n) if qd is None else as_joint_vector("qd", qd, n).copy()
         self._z = np.atleast_2d(self.law.start(self.q, self.qd))
         self._before = self._now = self.q.copy(), self.qd.copy()  # of the virtual arm, a period apart
         self._passed, self._pace, self._ticks = 1.0, 1.0, 0  # share of that period, λ, periods of the virtual arm

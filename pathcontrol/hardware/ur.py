@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from types import ModuleType
 
 import numpy as np
@@ -70,7 +71,9 @@ class UR:
             ArmError: the robot has stopped, or is not there any more.
         """
         self._check()
-        if not self.control.isProgramRunning() and not self.control.reuploadScript():
+        with self._explaining():
+            runs = self.control.isProgramRunning() or self.control.reuploadScript()
+        if not runs:
             raise ArmError("the robot does not run the control script; is it switched on and in remote control?")
         deadline = time.perf_counter() + _PATIENCE * self._period
         while self.receive.getTimestamp() == self._last:
@@ -81,10 +84,8 @@ class UR:
 
     def write(self, tau: Array) -> None:
         """Send torques without g(q) [N m], (6,)."""
-        try:
+        with self._explaining():
             taken = self.control.directTorque(tau.tolist(), _NO_FRICTION, _NO_FRICTION)
-        except RuntimeError as error:
-            raise ArmError(str(error)) from error
         if not taken:
             self._check()
             raise ArmError("the robot does not take torques: its control script has ended")
@@ -104,6 +105,14 @@ class UR:
             raise ArmError("emergency stop of the robot")
         if self.receive.isProtectiveStopped():
             raise ArmError("protective stop of the robot; it is unlocked at its pendant or by its dashboard server")
+
+    @contextmanager
+    def _explaining(self) -> Iterator[None]:
+        """Raise what ur_rtde raises in the block as an ArmError: it does so where it cannot connect again."""
+        try:
+            yield
+        except RuntimeError as error:
+            raise ArmError(f"the connection to the robot at {self._address!r} is lost: {error}") from error
 
     def _measured(self) -> Measurement:
         """Return what one state measured: the thread of ur_rtde may bring another while it is read."""

@@ -373,3 +373,8 @@ def test_limits_that_are_missing_or_wrong_are_told():
         ControlLoop(law, 0.0)
     with pytest.raises(InputError, match="q has"):
         ControlLoop(law, H).start([0.0])
+    for start in (ControlLoop(law, H).start, pc.PositionCommand(law, H).start):
+        with pytest.raises(InputError, match=r"q has the shape \(3, 2\), expected \(2,\)"):
+            start(np.zeros((3, 2)))
+        with pytest.raises(InputError, match="qd"):
+            start(np.zeros(2), [np.nan, 0.0])

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 import pathcontrol as pc
 from pathcontrol.cli import main
 from pathcontrol.errors import ArmError, InputError
+from pathcontrol.hardware.sil import session
 from pathcontrol.hardware.sil.machine_arm import MachineArm
 from pathcontrol.hardware.sil.machine_process import MachineProcess
 from pathcontrol.hardware.sil.mjcf import friction_bias, write_mjcf
@@ -289,3 +290,46 @@ def test_what_cannot_be_driven_is_told(words, said):
     done = invoke(*words)
     assert done.exit_code == 2
     assert said in done.output
+
+
+def test_wrong_arguments_are_told_before_a_machine_starts(monkeypatch):
+    pytest.importorskip("mujoco")
+    law = law_of()
+    monkeypatch.setattr(session, "MachineProcess", None)  # calling it would be another error
+    for duration in (-1.0, 0.0, np.nan, np.inf, "long"):
+        with pytest.raises(InputError, match="duration"):
+            run_sil(law, start_of(law), duration)
+    for q in ([0.0], [np.nan, 0.0], [[0.0, 0.0]] * 2):
+        with pytest.raises(InputError, match=r"^q"):
+            run_sil(law, q, 1.0)
+    for duration in ("-1", "nan", "inf"):
+        told = CliRunner().invoke(main, ["sil", "--duration", duration])
+        assert told.exit_code == 2
+        assert "--duration" in told.output
+
+
+def test_an_address_that_is_taken_or_not_there_is_told_in_a_sentence():
+    pytest.importorskip("mujoco")
+    law = law_of()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        with pytest.raises(ArmError, match=rf"127\.0\.0\.1:{port} did not start: Address already in use"):
+            MachineProcess(law.robot, start_of(law), H, port=port)
+    with pytest.raises(ArmError, match=r"no\.such\.host\.invalid:9700"):
+        MachineArm(law.robot, "no.such.host.invalid", 9700, bytes(32), H)
+
+
+def test_a_session_that_breaks_leaves_no_machine_behind(monkeypatch):
+    pytest.importorskip("mujoco")
+    law, started = law_of(), []
+
+    def start(*arguments):
+        started.append(MachineProcess(*arguments))
+        return started[0]
+
+    monkeypatch.setattr(session, "MachineProcess", start)
+    monkeypatch.setattr(session, "drive", lambda *arguments: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        run_sil(law, start_of(law), 1.0, H)
+    assert not started[0].running

@@ -3,7 +3,6 @@
 import fcntl
 import re
 import tempfile
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +37,23 @@ def law_of():
     return pc.Projection(pc.load_robot("ur5"), task, k_p=400.0, K_v=40.0)
 
 
+class StoppedUR(pc.UR):
+    """Something happens to it at a time on its own clock: a timer of this computer may be late by seconds."""
+
+    def __init__(self, event, after):
+        super().__init__("127.0.0.1")
+        self.event, self.after, self.begin = event, after, None
+
+    def read(self):
+        measured = super().read()
+        if measured is not None:
+            self.begin = measured.t if self.begin is None else self.begin
+            if self.event is not None and measured.t - self.begin > self.after:
+                self.event()
+                self.event = None
+        return measured
+
+
 def registers(command, first):
     """Six input registers of a package from ``first``."""
     return [command[f"input_double_register_{k}"] for k in range(first, first + 6)]
@@ -51,7 +67,7 @@ def test_the_torques_in_the_packages_are_those_of_the_law_without_gravity(peer):
     assert record.stopped == ""
     sent = [command for command in commands if command["input_int_register_0"] == ur_peer.TORQUE]
     measured = np.isfinite(record.t)
-    assert measured.sum() > 10
+    assert measured.sum() > 0.5 * len(record.t) > 50  # nearly all, on a computer that has time
     expected = record.tau[measured] - [law.robot.gravity(q) for q in record.q[measured]]
     got = np.array([registers(command, 0) for command in sent])
     np.testing.assert_array_equal(got[measured], expected)
@@ -83,15 +99,12 @@ def test_the_loop_reads_positions_velocities_and_time_of_one_state(peer):
     ids=["protective stop", "emergency stop", "lost connection"],
 )
 def test_a_robot_that_stops_leaves_the_loop_in_its_fallback(peer, event, reason):
-    loop, arm = ControlLoop(law_of(), H), pc.UR("127.0.0.1")
-    timer = threading.Timer(0.3, event, [peer])
-    timer.start()
-    record = drive(loop, arm, 5.0)
-    timer.join()
+    loop = ControlLoop(law_of(), H)
+    record = drive(loop, StoppedUR(lambda: event(peer), after=0.1), 5.0)
     assert re.search(reason, record.stopped)
     assert loop.status.mode == Mode.GRAVITY
     assert loop.status.reason == record.stopped
-    assert np.nanmax(record.t) < 4.0
+    assert 0.1 < np.nanmax(record.t) < 4.0
     np.testing.assert_array_equal(loop.step(record.q[-1], record.qd[-1], np.nan), loop.gravity)
 
 

@@ -7,6 +7,7 @@ it, reports states that a test gives it, and keeps the input registers of every 
 """
 
 import multiprocessing
+import os
 import socket
 import struct
 import threading
@@ -173,7 +174,12 @@ class Peer:
 
 
 def _serve(motion, pipe):
-    """Serve until the pipe says so, in a process of its own: ur_rtde holds the interpreter while it waits."""
+    """Serve until the pipe says so, in a process of its own: ur_rtde holds the interpreter while it waits.
+
+    It has real-time priority where that is allowed, as a controller has a computer of its own.
+    """
+    with suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(70))
     peer = Peer(motion)
     pipe.send("ready")
     while (asked := pipe.recv()) is not None:

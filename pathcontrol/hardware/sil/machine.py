@@ -12,6 +12,7 @@ import socket
 import sys
 import time
 from collections import Counter
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -196,11 +197,16 @@ class Machine:
 
 def main() -> None:
     """Run a machine with the settings from standard input."""
-    machine = Machine(MachineSettings(**json.loads(sys.stdin.readline())))
+    try:
+        machine = Machine(MachineSettings(**json.loads(sys.stdin.readline())))
+    except OSError as error:  # the address is in use, or of another computer
+        print(error.strerror, flush=True)
+        return
     print(machine.port, flush=True)
     with real_time():
         machine.run()
-    print(json.dumps(machine.summary()), flush=True)
+    with suppress(BrokenPipeError):  # who has started it may have gone
+        print(json.dumps(machine.summary()), flush=True)
 
 
 if __name__ == "__main__":

@@ -38,6 +38,7 @@ class MachineArm:
 
     Raises:
         InputError: the address is not of this computer and there is no key, or it is too short.
+        ArmError: the address is unknown or cannot be reached.
     """
 
     carries_weight = False
@@ -48,7 +49,11 @@ class MachineArm:
         check_key(host, key)
         self._n, self._key, self._period = robot.n, key, period
         self._line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._line.connect((host, port))  # the system drops what comes from elsewhere
+        try:
+            self._line.connect((host, port))  # the system drops what comes from elsewhere
+        except OSError as error:
+            self._line.close()
+            raise ArmError(f"there is no way to a machine at {host}:{port}: {error.strerror}") from error
         self._session, self._number = b"", -1
         self._heard = time.monotonic()
         self.count = {"taken": 0, "repeated": 0, "foreign": 0, "lost": 0}

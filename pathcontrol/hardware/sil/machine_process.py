@@ -74,16 +74,22 @@ class MachineProcess:
         with contextlib.suppress(BrokenPipeError):  # a process that ends at once says why by itself
             self._process.stdin.write(json.dumps(settings._asdict()) + "\n")
             self._process.stdin.flush()
-        said = self._process.stdout.readline()
-        if not said.strip().isdigit():
-            self._process.kill()
-            raise ArmError("the process of the machine did not start; its reason is above")
+        said = self._process.stdout.readline().strip()
+        if not said.isdigit():
+            self.kill()
+            reason = said or "its reason is above"
+            raise ArmError(f"the machine at {host}:{port} did not start: {reason}; port 0 takes a free one")
         self.port = int(said)
 
     @property
     def running(self) -> bool:
         """Whether the machine has not ended yet."""
         return self._process.poll() is None
+
+    def kill(self) -> None:
+        """End the process, if it still runs."""
+        self._process.kill()
+        self._process.wait()
 
     def wait(self, longest: float = 10.0) -> dict[str, Any]:
         """Return what the machine counted, when it has ended; one that does not end within a time [s] is killed."""

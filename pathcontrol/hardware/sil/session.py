@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array, as_scalar
+from pathcontrol._arrays import Array, as_joint_vector, as_scalar
 from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
 from pathcontrol.hardware.arm import Measurement
@@ -83,9 +83,14 @@ def run_sil(
     expect("law", law, Controller)
     arm = law.robot if plant is None else plant
     loop = ControlLoop(law, period, Envelope(patience=20, lost=50.0) if envelope is None else envelope)
-    machine = MachineProcess(arm, np.asarray(q, dtype=np.float64), period)
-    line = connect(law, "127.0.0.1", machine.port, machine.key, duration, period)
-    return finish_session(loop, line, duration, machine)
+    span = as_scalar("duration", duration, positive=True)
+    posture = as_joint_vector("q", q, arm.n)
+    machine = MachineProcess(arm, posture, period)
+    try:
+        line = connect(law, "127.0.0.1", machine.port, machine.key, span, period)
+        return finish_session(loop, line, span, machine)
+    finally:
+        machine.kill()
 
 
 def connect(law: Controller, host: str, port: int, key: bytes, duration: float, period: float) -> MachineArm:
