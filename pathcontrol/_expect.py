@@ -17,6 +17,8 @@ _SOURCES = {
     "PathTask": "Circle(radius, speed) and the other tasks, or a subclass of your own, are some",
     "VelocityProfile": "ConstantSpeed(speed), ConstantRate(rate) and the other profiles are some",
     "Controller": "Projection(robot, task, k_p, K_v) and the other control laws are some",
+    "ControlLoop": "ControlLoop(law, period) makes one",
+    "Envelope": "Envelope(torque=…, velocity=…) makes one",
     "Run": "simulate(controller, q, duration=…) gives one, and Run.load(FILE)",
     "Figure": "path_figure(run), error_figure(run) and the other figures are some",
     "Animation": "record(run) gives one",
@@ -57,7 +59,7 @@ def expect(name: str, value: Any, *kinds: type, error: type[PathControlError] = 
     if isinstance(value, type):
         advice = f"make an instance: {value.__name__}(…)" if issubclass(value, kinds) else advice
     if given in _SOURCES and given != wanted:
-        advice += "; are arguments swapped?"
+        advice += "; are arguments swapped?" if advice else "are arguments swapped?"
     raise error(
         f"{name} {describe(value)}, expected {_article(wanted)} {wanted}{also}" + (f": {advice}" if advice else ""),
         argument=name,

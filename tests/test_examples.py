@@ -25,6 +25,7 @@ EXAMPLES = {
     "jammed_joint": 3,
     "operators_override": 3,
     "weak_motors": 3,
+    "control_loop": 4,
 }
 OF_THE_EXTRA = {"six_joints", "mill_pocket", "deburr_bracket"}
 ALONG_FILES = {"lettering", "mill_pocket", "deburr_bracket"}

@@ -84,7 +84,9 @@ class ControlLoop:
     def __init__(self, law: Controller, period: float, envelope: Envelope | None = None) -> None:
         expect("law", law, Controller)
         self.law, self.period = law, as_scalar("period", period, positive=True)
-        self.envelope = (Envelope() if envelope is None else envelope).complete(law.robot)
+        limits = Envelope() if envelope is None else envelope
+        expect("envelope", limits, Envelope)
+        self.envelope = limits.complete(law.robot)
         self._plan = HeldPlan(law, self.period)
         self._damping = self._find_damping()
         self._rings: tuple[SampleRing, ...] = ()

@@ -9,7 +9,7 @@ import numpy as np
 from pathcontrol._arrays import Array, as_scalar
 from pathcontrol._expect import expect
 from pathcontrol.control.wrapper import LawWrapper
-from pathcontrol.errors import ArmError
+from pathcontrol.errors import ArmError, InputError
 from pathcontrol.hardware.arm import Arm, Measurement
 from pathcontrol.hardware.control_loop import ControlLoop, Status
 from pathcontrol.hardware.loop_context import LoopContext
@@ -17,6 +17,7 @@ from pathcontrol.hardware.real_time import real_time
 from pathcontrol.hardware.sample_ring import Moments, SampleRing
 from pathcontrol.simulation.run import Run
 
+_OF_AN_ARM = ("carries_weight", "locate", "read", "write", "finish")
 _WARM = 10
 _FIRST = 100  # periods in which the first measurement must come
 
@@ -75,9 +76,10 @@ def drive(loop: ControlLoop, arm: Arm, duration: float, settle: float = 0.7) -> 
 
     Raises:
         ArmError: the arm gives no measurement to start with.
-        InputError: a time is not positive.
+        InputError: a time is not positive, or ``arm`` lacks a method of :class:`Arm`.
     """
     expect("loop", loop, ControlLoop)
+    _expect_arm(arm)
     span = as_scalar("duration", duration, positive=True)
     rest = as_scalar("settle", settle, least=0.0)
     _warm_up(loop)
@@ -91,6 +93,17 @@ def drive(loop: ControlLoop, arm: Arm, duration: float, settle: float = 0.7) -> 
         if isinstance(loop.law, LawWrapper):
             loop.law.resume()  # it is the caller's law that was held
     return driver.record(stopped, allowed)
+
+
+def _expect_arm(arm: Arm) -> None:
+    """Check that an arm has all that a drive asks of it, before anything moves."""
+    missing = [name for name in _OF_AN_ARM if not hasattr(arm, name)]
+    if missing:
+        raise InputError(
+            f"arm is a {type(arm).__name__} without {', '.join(missing)}; expected a Franka, a UR, a MachineArm, or an "
+            f"object of your own with {', '.join(_OF_AN_ARM)}: see Arm",
+            argument="arm",
+        )
 
 
 def _warm_up(loop: ControlLoop) -> None:

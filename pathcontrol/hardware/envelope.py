@@ -60,12 +60,15 @@ class Envelope:
                 raise InputError(
                     f"{name} = {np.asarray(value).tolist()}, expected limits greater than 0", argument=name
                 )
-        if not self.tube > 0:
+        for name in ("lower", "upper"):
+            if (value := getattr(self, name)) is not None:
+                as_array(name, value)
+        if not self._as_number("tube") > 0:
             raise InputError(f"tube = {self.tube!r}, expected a distance greater than 0 [rad], inf for none")
         as_scalar("jump", self.jump, least=0.0)
         as_whole("patience", self.patience, 0, _MOST)
         as_whole("frozen", self.frozen, 2, _MOST)
-        if not self.lost >= self.late >= 1:
+        if not self._as_number("lost") >= self._as_number("late") >= 1:
             raise InputError(f"late = {self.late!r} and lost = {self.lost!r} periods, expected 1 ≤ late ≤ lost")
 
     def complete(self, robot: RobotModel) -> CompleteEnvelope:
@@ -84,6 +87,13 @@ class Envelope:
             raise InputError(f"lower = {lower.tolist()} is not below upper = {upper.tolist()}")
         patient = (self.tube, self.jump, self.patience, self.frozen, self.late, self.lost)
         return CompleteEnvelope(torque, rate, velocity, lower, upper, braking, *patient)
+
+    def _as_number(self, name: str) -> float:
+        """Return an argument that is one number or inf."""
+        value = as_array(name, getattr(self, name))
+        if value.ndim:
+            raise InputError(f"{name} = {value.tolist()}, expected one number", argument=name)
+        return float(value)
 
     def _limit(self, name: str, own: Array, robot: RobotModel) -> Array:
         """Return a limit of torque or velocity, which every joint must have."""

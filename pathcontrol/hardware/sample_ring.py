@@ -29,7 +29,8 @@ class SampleRing:
 
     def __init__(self, n: int, capacity: int) -> None:
         self._n, self._capacity = n, capacity
-        self._rows = np.zeros((capacity, _HEAD + 4 * n))
+        self._rows = np.empty((capacity, _HEAD + 4 * n))
+        self._rows.fill(0.0)  # or the system would give memory tick by tick, and make some late
         self._written = self._taken = 0  # each is changed by one side only
         self._last, self._shift = -np.inf, 0.0
         self.lost, self.closed = 0, False

@@ -363,6 +363,11 @@ def test_limits_that_are_missing_or_wrong_are_told():
     for bad in ({"torque": -1.0}, {"torque_rate": [1.0, 0.0]}, {"velocity": np.nan}, {"tube": 0.0}, {"patience": 0.5}):
         with pytest.raises(InputError, match=next(iter(bad))):
             Envelope(**bad)
+    for bad in ({"tube": "wide"}, {"late": None}, {"lost": "x"}, {"lower": "a"}, {"tube": [1.0, 2.0]}):
+        with pytest.raises(InputError, match=next(iter(bad))):
+            Envelope(**bad)
+    with pytest.raises(InputError, match="expected an Envelope"):
+        ControlLoop(law, H, {"torque": 1.0})
     with pytest.raises(InputError, match="late"):
         Envelope(late=3.0, lost=2.0)
     with pytest.raises(InputError, match="not below"):

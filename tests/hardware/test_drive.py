@@ -184,3 +184,10 @@ def test_garbage_is_collected_again_after_a_drive():
     drive(ControlLoop(law_of(), H), arm, 0.1)
     assert collecting == [False]
     assert gc.isenabled()
+
+
+def test_what_is_no_arm_is_told_before_anything_moves():
+    with pytest.raises(InputError, match="arm is a NoneType without carries_weight, locate"):
+        drive(ControlLoop(law_of(), H), None, 1.0)
+    with pytest.raises(InputError, match="expected a ControlLoop: ControlLoop"):
+        drive(law_of(), SimulatedArm(law_of()), 1.0)

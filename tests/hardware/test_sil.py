@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 import pathcontrol as pc
 from pathcontrol.cli import main
 from pathcontrol.errors import ArmError, InputError
+from pathcontrol.hardware.real_time import real_time
 from pathcontrol.hardware.sil import session
 from pathcontrol.hardware.sil.machine_arm import MachineArm
 from pathcontrol.hardware.sil.machine_process import MachineProcess
@@ -151,20 +152,24 @@ class Line:
         self.thread.start()
 
     def relay(self):
-        while not self.ended:
-            for line, forward in ((self.front, True), (self.back, False)):
-                try:
-                    data, sender = line.recvfrom(LONGEST + 1)
-                except (TimeoutError, ConnectionRefusedError, OSError):
-                    continue
-                self.loop = sender if forward else self.loop
-                for delay, changed in self.fault(self.count, data):
-                    heapq.heappush(self.waiting, (time.monotonic() + delay, self.count, forward, changed))
-                self.count += 1
-            while self.waiting and self.waiting[0][0] <= time.monotonic():
-                _, _, forward, data = heapq.heappop(self.waiting)
-                with contextlib.suppress(OSError):
-                    self.back.send(data) if forward else self.front.sendto(data, self.loop)
+        with real_time():  # where that is allowed, or a busy computer adds delays that no test asked for
+            while not self.ended:
+                self.pass_on()
+
+    def pass_on(self):
+        for line, forward in ((self.front, True), (self.back, False)):
+            try:
+                data, sender = line.recvfrom(LONGEST + 1)
+            except (TimeoutError, ConnectionRefusedError, OSError):
+                continue
+            self.loop = sender if forward else self.loop
+            for delay, changed in self.fault(self.count, data):
+                heapq.heappush(self.waiting, (time.monotonic() + delay, self.count, forward, changed))
+            self.count += 1
+        while self.waiting and self.waiting[0][0] <= time.monotonic():
+            _, _, forward, data = heapq.heappop(self.waiting)
+            with contextlib.suppress(OSError):
+                self.back.send(data) if forward else self.front.sendto(data, self.loop)
 
     def close(self):
         self.ended = True
@@ -215,7 +220,7 @@ def test_whatever_the_line_does_the_arm_ends_on_its_path_or_at_rest(what):
     line.close()
     assert is_safe(report), report
     counted = told["packets"]
-    assert counted["taken"] > 0
+    assert counted.get("taken", 0) > 0, told
     assert np.abs(told["qd"]).max() < 5.0  # the machine's own word
     if what == "garbage":
         assert counted["foreign"] > 0
@@ -316,6 +321,11 @@ def test_an_address_that_is_taken_or_not_there_is_told_in_a_sentence():
         port = taken.getsockname()[1]
         with pytest.raises(ArmError, match=rf"127\.0\.0\.1:{port} did not start: Address already in use"):
             MachineProcess(law.robot, start_of(law), H, port=port)
+    for port in (-5, 99999, "ssh"):
+        with pytest.raises(InputError, match="port"):
+            MachineArm(law.robot, "127.0.0.1", port, bytes(32), H)
+    with pytest.raises(InputError, match="expected bytes"):
+        MachineArm(law.robot, "127.0.0.1", 9700, "a key that is a text", H)
     with pytest.raises(ArmError, match=r"no\.such\.host\.invalid:9700"):
         MachineArm(law.robot, "no.such.host.invalid", 9700, bytes(32), H)
 

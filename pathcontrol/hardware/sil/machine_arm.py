@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, as_whole
 from pathcontrol.errors import ArmError
 from pathcontrol.hardware.arm import Measurement
 from pathcontrol.hardware.sil.packets import LONGEST, Kind, Packet, check_key, read_packet, write_packet
@@ -47,6 +47,7 @@ class MachineArm:
         self, robot: RobotModel, host: str, port: int, key: bytes, period: float = 1e-3, room: int = 1_000_000
     ) -> None:
         check_key(host, key)
+        as_whole("port", port, 0, 65535)
         self._n, self._key, self._period = robot.n, key, period
         self._line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, as_whole
 from pathcontrol.errors import ArmError
 from pathcontrol.hardware.sil.machine import MachineSettings, load_mujoco
 from pathcontrol.hardware.sil.mjcf import friction_bias, write_mjcf
@@ -52,6 +52,7 @@ class MachineProcess:
         load_mujoco()
         self.key = secrets.token_bytes(32) if key is None else key
         check_key(host, key)
+        as_whole("port", port, 0, 65535)
         steps = max(1, int(np.ceil(period / _STEP - 1e-9)))
         effort = np.where(robot.limits.effort > 0, robot.limits.effort, np.inf)
         settings = MachineSettings(

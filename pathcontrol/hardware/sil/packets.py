@@ -82,6 +82,8 @@ def check_key(host: str, key: bytes | None) -> None:
         here = False
     if not here and key is None:
         raise InputError(f"{host} is not this computer: a key is needed, so that nobody else moves the arm")
+    if not isinstance(key, bytes | None):
+        raise InputError(f"the key is a {type(key).__name__}, expected bytes: secrets.token_bytes(32)", argument="key")
     if key is not None and len(key) < _SHORTEST_KEY:
         raise InputError(f"the key has {len(key)} bytes, expected {_SHORTEST_KEY} or more", argument="key")
 
