@@ -5,6 +5,8 @@ from .analysis.ballbar import ballbar as ballbar
 from .analysis.deviation import tool_deviation as tool_deviation
 from .analysis.deviation import toolpath_metrics as toolpath_metrics
 from .analysis.disturbance_estimate import momentum_observer as momentum_observer
+from .analysis.floquet import Floquet as Floquet
+from .analysis.floquet import floquet as floquet
 from .analysis.friction_identification import FrictionEstimate as FrictionEstimate
 from .analysis.friction_identification import identify_friction as identify_friction
 from .analysis.gamma import distance_to_gamma as distance_to_gamma

@@ -3,6 +3,8 @@ from .ballbar import ballbar as ballbar
 from .deviation import tool_deviation as tool_deviation
 from .deviation import toolpath_metrics as toolpath_metrics
 from .disturbance_estimate import momentum_observer as momentum_observer
+from .floquet import Floquet as Floquet
+from .floquet import floquet as floquet
 from .friction_identification import FrictionEstimate as FrictionEstimate
 from .friction_identification import identify_friction as identify_friction
 from .gamma import distance_to_gamma as distance_to_gamma

@@ -1,0 +1,99 @@
+"""The closed loop as a map of its whole state, smooth enough to be differentiated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.control.base import Controller
+from pathcontrol.errors import InputError
+from pathcontrol.robot.friction import viscous_of
+from pathcontrol.simulation.arm.plant import Plant
+from pathcontrol.simulation.arm.sensors import Reading
+from pathcontrol.simulation.loops import SampledLoop
+from pathcontrol.simulation.sampled import split_delay
+
+
+class ContinuousMap:
+    """The rate of the state (q, q̇, z) in continuous time.
+
+    Raises:
+        InputError: the law leaves viscous friction of its arm, so that the path is no orbit.
+    """
+
+    def __init__(self, law: Controller) -> None:
+        self._law, self._robot, self._n = law, law.robot, law.robot.n
+        self._viscous = np.atleast_2d(viscous_of(law.robot.friction))[0]
+        if not np.array_equal(np.broadcast_to(law.compensated, self._viscous.shape), self._viscous):
+            raise InputError("the law leaves friction of its arm, so the path is no orbit of it; give a sampled loop")
+
+    def on_path(self, s: Array) -> Array:
+        """Return the states on the path, (k, D), at s (k,)."""
+        point = self._law.task.at(s)
+        z = np.array(self._law.start(point.q_d, point.velocity), dtype=np.float64)
+        z[:, 0] = s
+        return np.concatenate([point.q_d, point.velocity, z], axis=-1)
+
+    def __call__(self, x: Array) -> Array:
+        """Return ẋ at states x, (k, D)."""
+        q, qd, z = x[:, : self._n], x[:, self._n : 2 * self._n], x[:, 2 * self._n :]
+        out = self._law.law(0.0, q, qd, z)
+        qdd = self._robot.forward_dynamics(q, qd, out.tau - self._viscous * qd)
+        return np.concatenate([qd, qdd, self._law.rate(out)], axis=-1)
+
+
+class TickMap:
+    """The state one period later in a sampled loop: (q, q̇, z, the last reading, the torques that wait).
+
+    Raises:
+        InputError: something of the loop has no derivative.
+    """
+
+    def __init__(self, law: Controller, loop: SampledLoop) -> None:
+        for name, what in (("encoders", loop.encoders), ("noise", loop.noise), ("torque_limits", loop.torque_limits)):
+            if what is not False and what is not None:
+                raise InputError(f"{name} of the loop have no derivative; leave them out")
+        self.period, self._law, self._n = loop.period, law, law.robot.n
+        self._sensors, self._substeps = loop.sensors(law.robot), loop.substeps
+        whole, late = split_delay(loop.delay, loop.period)
+        self._waiting = whole + (late > 0)
+        self._parts = [late, loop.period - late] if late else [loop.period]
+        self._plants = [Plant(law.robot, part / loop.substeps) for part in self._parts]
+        self._reads = loop.velocity == "difference" or loop.filter_hz is not None
+
+    def parameter(self, x: Array) -> Array:
+        """Return s of states x, (k,)."""
+        return x[:, 2 * self._n]
+
+    def position(self, x: Array) -> Array:
+        """Return q of states x, (k, n)."""
+        return x[:, : self._n]
+
+    def on_path(self, s: Array) -> Array:
+        """Return states on the path at s (k,), (k, D), with torques that hold the arm against its weight."""
+        point = self._law.task.at(s)
+        q, qd = point.q_d, point.velocity
+        z = np.array(self._law.start(q, qd), dtype=np.float64)
+        z[:, 0] = s
+        waiting = [self._law.robot.gravity(q)] * self._waiting
+        reading = [q, qd] if self._reads else []
+        return np.concatenate([q, qd, z, *reading, *waiting], axis=-1)
+
+    def __call__(self, x: Array) -> Array:
+        """Return the states after a period, (k, D)."""
+        n = self._n
+        after = x.shape[1] - n * (self._waiting + 2 * self._reads)
+        q, qd, z, rest = x[:, :n], x[:, n : 2 * n], x[:, 2 * n : after], x[:, after:]
+        seen = Reading(rest[:, :n], rest[:, n : 2 * n]) if self._reads else Reading(q, qd)
+        queue = [rest[:, i : i + n] for i in range(2 * n * self._reads, rest.shape[1], n)]
+        out = self._law.law(0.0, seen.q, seen.qd, z)
+        queue.append(out.tau)
+        acting = queue[: len(self._parts)]
+        share = np.array(self._parts) / self.period
+        mean = sum(part * tau for part, tau in zip(share, acting, strict=True))
+        z = self._law.advance(z, out._replace(tau=mean), self.period)
+        for plant, tau in zip(self._plants, acting, strict=True):
+            for _ in range(self._substeps):
+                q, qd = plant.advance(q, qd, tau)
+        reading = list(self._sensors.read(q, qd, seen)) if self._reads else []
+        return np.concatenate([q, qd, z, *reading, *queue[1:]], axis=-1)
