@@ -22,6 +22,7 @@ from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import levels_of
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
 from pathcontrol.simulation.run_arguments import check_controller
+from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.task import PathTask
 
 _STEP = 6e-6  # of central differences: the cube root of the precision of numbers
@@ -97,14 +98,17 @@ def floquet(law: Controller, loop: SampledLoop | ContinuousTime | None = None, s
 
 
 def _check_path(law: Controller) -> PathTask:
-    """Return the closed path of a law whose arm has no dry friction."""
-    if law.task.period is None or not hasattr(law.task, "s0") or np.ndim(law.task.period):
-        raise InputError(f"{type(law.task).__name__} is no single closed path; multipliers are of laps")
-    if any(np.any(level) for level in levels_of(law.robot.friction, np.zeros(law.robot.n))):
+    """Return the closed path of a law with one set of gains, whose arm has no dry friction."""
+    task, arm = law.task, law.robot
+    if isinstance(task, TaskBatch) or task.period is None:
+        raise InputError(f"{type(task).__name__} is no single closed path, and multipliers are those of its laps")
+    if several := [name for name in law.gains if np.size(getattr(law, name)) > arm.n]:
+        raise InputError(f"{several[0]} has the gains of several rollouts, expected those of one, ({arm.n},)")
+    if any(np.any(level) for level in levels_of(arm.friction, np.zeros(arm.n))):
         raise InputError(
             "the arm has dry friction, which has no derivative; give the law the arm with Viscous friction only"
         )
-    return law.task
+    return task
 
 
 def _follow_path(field: ContinuousMap, task: PathTask) -> _Lap:

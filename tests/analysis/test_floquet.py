@@ -133,6 +133,8 @@ def test_what_has_no_derivative_is_refused():
         pc.floquet(smooth, pc.SampledLoop(encoders=True))
     with pytest.raises(InputError, match="closed"):
         pc.floquet(pc.Projection(ARM, pc.Line([0.0, 0.0], [1.0, 1.0], speed=0.5), 800.0, 60.0))
+    with pytest.raises(InputError, match="several rollouts"):
+        pc.floquet(pc.ComputedTorque(ARM, CIRCLE, [[800.0, 800.0], [400.0, 400.0]], 60.0))
     viscous = ARM.with_friction(pc.Viscous([1.0, 1.0]))
     with pytest.raises(InputError, match="no orbit"):
         pc.floquet(pc.Projection(viscous, CIRCLE, 800.0, 60.0, friction="none"))
