@@ -14,7 +14,7 @@ from pathcontrol.simulation.run import Run
 def find_accuracy(run: Run) -> PathAccuracy | None:
     """Return the accuracy of a run after its first lap; ``None`` where it has no cycle, or lacks what is compared."""
     try:
-        return accuracy(run) if {"q", "qd", "s"} <= set(run.data.data_vars) else None
+        return accuracy(run) if all(name in run for name in ("q", "qd", "s")) else None
     except InputError:
         return None
 

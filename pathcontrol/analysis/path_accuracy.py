@@ -222,8 +222,16 @@ def choose_path(task: PathTask, rollout: int) -> PathTask:
 
 
 def count_along(one: Run, path: PathTask) -> Array:
-    """Return s of a rollout, its own samples only, counting laps."""
+    """Return s of a rollout, its own samples only until it diverged, counting laps.
+
+    Raises:
+        InputError: it has none.
+    """
     s = one.array("s")[0, : own_samples(one)[0]]
+    known = np.isfinite(s)
+    s = s if known.all() else s[: known.argmin()]
+    if not len(s):
+        raise InputError("the rollout has no sample with an s, so it has no cycles")
     return s if path.period is None else np.unwrap(s, period=path.period)
 
 

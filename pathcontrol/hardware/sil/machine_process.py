@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array, as_whole
+from pathcontrol._expect import expect
 from pathcontrol.errors import ArmError
 from pathcontrol.hardware.sil.machine import MachineSettings, load_mujoco
 from pathcontrol.hardware.sil.mjcf import friction_bias, write_mjcf
@@ -49,6 +50,7 @@ class MachineProcess:
         port: int = 0,
         key: bytes | None = None,
     ) -> None:
+        expect("robot", robot, RobotModel)
         load_mujoco()
         self.key = secrets.token_bytes(32) if key is None else key
         check_key(host, key)

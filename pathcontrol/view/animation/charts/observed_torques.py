@@ -23,7 +23,7 @@ def observed_torques(drawn_rollout: DrawnRollout, index: int, several: bool) -> 
     """
     recording = drawn_rollout.recording
     run = recording.run.with_robot(recording.robot)
-    if not {"q", "qd", "tau"} <= set(run.data.data_vars) or not run.model.has_mass:
+    if not all(name in run for name in ("q", "qd", "tau")) or not run.model.has_mass:
         return []
     entries = []
     for title, friction in _list_estimates(run):
