@@ -37,7 +37,7 @@ class Reference(NamedTuple):
     point: PathPoint
     position_gradient: Array
     velocity_gradient: Array | None
-    regular: NDArray[np.bool_]
+    regular: Array
 
     def rate(self, qd: Array, free: Array) -> Array:
         """Return σ̇ [1/s], (*batch,), of an arm with q̇ and q̈ = r'σ̇ + ``free``, (*batch, n); 0 where not regular."""
