@@ -26,8 +26,10 @@ from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.task import PathTask
 
 _STEP = 6e-6  # of central differences: the cube root of the precision of numbers
+_ORBIT = 1e-6  # of the largest rate, by which an orbit may differ from the path
+_SLOWEST = 0.05  # of ϑ, of a plan that goes round in the mean
 _AWAY = 0.2  # of the extent of the path, beyond which a loop has left it
-_MOST_LAPS = 3  # of which as many are linearised as come nearest to a whole number of ticks
+_MORE = 1.1  # laps that are recorded, for the nearest tick to the end of one
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +67,7 @@ class Floquet:
 
 
 class _Lap(NamedTuple):
-    """A lap, or several: the linear steps (K, D, D), the direction of the orbit, and time of one lap and of all [s]."""
+    """The linear steps of a lap (K, D, D), the direction of the orbit, times of the lap and of the steps [s]."""
 
     steps: Array
     direction: Array
@@ -78,8 +80,8 @@ def floquet(law: Controller, loop: SampledLoop | ContinuousTime | None = None, s
 
     In continuous time, the default, the orbit is the path at its velocity, which asks for friction that the law
     compensates exactly. In a sampled loop the orbit is that of the loop as it is simulated, with its hold, velocities
-    by differences, filter and delay, after some laps to settle; ticks seldom fit into a lap, and as many laps are
-    linearised as nearly do.
+    by differences, filter and delay, after some laps to settle. Ticks seldom fit into a lap: the lap ends at the
+    nearest one, and exponents are those per time of these ticks.
 
     Args:
         law: the law, with one closed path and one set of gains; its own model is the arm.
@@ -87,7 +89,8 @@ def floquet(law: Controller, loop: SampledLoop | ContinuousTime | None = None, s
         settle: laps of a sampled loop before it is linearised.
 
     Raises:
-        InputError: the path is not closed, there is dry friction, or the loop has no derivative.
+        InputError: the path is not closed or is no orbit of the law, the plan does not go round it, there is dry
+            friction, or the loop has no derivative.
     """
     check_controller("law", law)
     settle, task = check_whole("settle", settle, 1), _check_path(law)
@@ -119,8 +122,9 @@ def _follow_path(field: ContinuousMap, task: PathTask) -> _Lap:
     assert task.period is not None
     cells = 2000
     s = task.s0 + task.period * np.arange(2 * cells + 1) / (2 * cells)
-    x = field.on_path(s)
-    theta = task.at(s).theta
+    x, point = field.on_path(s), task.at(s)
+    theta = point.theta
+    _check_orbit(field(x), np.column_stack([point.velocity, point.velocity_slope * theta[:, None], theta]))
     slopes = _differentiate(field, x) / theta[:, None, None]
     h, one = task.period / cells, np.eye(x.shape[1])
     first, middle, last = slopes[:-2:2], slopes[1::2], slopes[2::2]
@@ -132,34 +136,45 @@ def _follow_path(field: ContinuousMap, task: PathTask) -> _Lap:
     return _Lap(steps, field(x[:1])[0], lap, lap)
 
 
-def _follow_loop(tick: TickMap, task: PathTask, settle: int) -> _Lap:
-    """Return laps of a sampled loop, as many as are nearest to a whole number of ticks.
+def _check_orbit(rates: Array, wanted: Array) -> None:
+    """Check that a law moves along its path with the arm on it: the first rates of the state (q, q̇, s) are those."""
+    apart = np.abs(rates[:, : wanted.shape[1]] - wanted)
+    if (apart > _ORBIT * np.abs(wanted).max()).any():
+        raise InputError(
+            "the path at its velocity is no orbit of the law: friction is left, or the speed is another; give a "
+            "SampledLoop, of which the orbit is found"
+        )
 
-    Where the loop is unstable, so that it leaves the path before it settles, they are along the path itself.
+
+def _follow_loop(tick: TickMap, task: PathTask, settle: int) -> _Lap:
+    """Return a lap of a sampled loop, to the nearest whole number of ticks.
+
+    Where the loop is unstable, so that it leaves the path before it settles, it is along the path itself.
     """
     assert task.period is not None
     states = _record_orbit(tick, task, settle)
     if states is None:
         states = tick.on_path(_record_plan(task, tick.period))
     way = (tick.parameter(states) - tick.parameter(states[:1])) / task.period
-    ends = [int(np.abs(way - laps).argmin()) for laps in range(1, _MOST_LAPS + 1)]
-    apart = np.abs(way[ends] - np.arange(1, _MOST_LAPS + 1))
-    count = ends[int((apart > apart.min() + 1e-9).argmin())]
+    count = int(np.abs(way - 1).argmin())
     duration = tick.period * count
     return _Lap(_differentiate(tick, states[:count]), states[1] - states[0], duration / way[count], duration)
 
 
 def _record_orbit(tick: TickMap, task: PathTask, settle: int) -> Array | None:
-    """Return the states of some laps after those to settle, (k, D); ``None`` where the loop leaves its path."""
+    """Return the states of a lap after those to settle, (k, D); ``None`` where the loop leaves its path."""
     assert task.period is not None
     x, states = tick.on_path(np.array([task.s0])), []
     begin = float(tick.parameter(x)[0])
     extent = np.ptp(task.q_d(np.linspace(*task.sampled_interval, 65)), axis=0).max()
-    laps = 0.0
-    while laps < settle + _MOST_LAPS + 0.1:
+    laps, wanted, ticks = 0.0, settle + _MORE, 0
+    most = wanted * _plan_ticks(task, tick.period) / _SLOWEST
+    while laps < wanted:
         if laps >= settle:
             states.append(x[0])
-        x = tick(x)
+        x, ticks = tick(x), ticks + 1
+        if ticks > most:
+            raise InputError("the plan does not go round its path, so it has no laps; is it held?")
         laps = (float(tick.parameter(x)[0]) - begin) / task.period
         away = np.abs(tick.position(x) - task.q_d(tick.parameter(x))).max()
         if not away < _AWAY * extent:
@@ -167,11 +182,18 @@ def _record_orbit(tick: TickMap, task: PathTask, settle: int) -> Array | None:
     return np.array(states)
 
 
+def _plan_ticks(task: PathTask, period: float) -> float:
+    """Return how many ticks a plan at ϑ takes for a lap."""
+    assert task.period is not None
+    s = task.s0 + task.period * np.arange(256) / 256
+    return float(task.period * np.mean(1 / task.theta(s)) / period)
+
+
 def _record_plan(task: PathTask, period: float) -> Array:
-    """Return the parameters of some laps at ticks of a plan that goes at ϑ, (k,), by the midpoint rule."""
+    """Return the parameters of a lap at ticks of a plan that goes at ϑ, (k,), by the midpoint rule."""
     assert task.period is not None
     s = [float(task.s0)]
-    while s[-1] < task.s0 + (_MOST_LAPS + 0.1) * task.period:
+    while s[-1] < task.s0 + _MORE * task.period:
         middle = s[-1] + 0.5 * period * float(task.theta(np.array(s[-1])))
         s.append(s[-1] + period * float(task.theta(np.array(middle))))
     return np.array(s)

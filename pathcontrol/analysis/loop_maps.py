@@ -15,17 +15,11 @@ from pathcontrol.simulation.sampled import split_delay
 
 
 class ContinuousMap:
-    """The rate of the state (q, q̇, z) in continuous time.
-
-    Raises:
-        InputError: the law leaves viscous friction of its arm, so that the path is no orbit.
-    """
+    """The rate of the state (q, q̇, z) in continuous time."""
 
     def __init__(self, law: Controller) -> None:
         self._law, self._robot, self._n = law, law.robot, law.robot.n
         self._viscous = np.atleast_2d(viscous_of(law.robot.friction))[0]
-        if not np.array_equal(np.broadcast_to(law.compensated, self._viscous.shape), self._viscous):
-            raise InputError("the law leaves friction of its arm, so the path is no orbit of it; give a sampled loop")
 
     def on_path(self, s: Array) -> Array:
         """Return the states on the path, (k, D), at s (k,)."""

@@ -2,8 +2,8 @@
 
 The eigenvalues of a lap may be as small as 1e-60 beside 1, and in the product itself they would be rounding. Orthogonal
 iteration finds the nested invariant subspaces instead: A_k Q_k = Q_{k+1} R_k with R_k upper triangular, lap after lap
-until Q comes back to itself. In that basis the product is block triangular, with a block for eigenvalues of the same
-size, and its rows are kept apart from their sizes (Dieci and Van Vleck, Applied Numerical Mathematics 17, 1995).
+until they come back to themselves. In that basis the product is block triangular, with a block for eigenvalues of the
+same size, and its rows are kept apart from their sizes (Dieci and Van Vleck, Applied Numerical Mathematics 17, 1995).
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 
-_MOST_SWEEPS, _SETTLED = 200, 1e-12  # at most so many, until sizes change by less than that share
-_SAME = 0.5  # difference of logarithms of sizes that make one block
+_SWEEPS = 40
+_SETTLED = 1e-8  # turn of a subspace in the last sweep below which it is invariant
 _APART = 1e4  # how far apart sizes may come in factors that are multiplied before they are orthogonalised
 
 
@@ -33,15 +33,11 @@ def find_eigen(factors: Sequence[Array] | Array) -> ProductEigen:
     parts = _multiply(np.asarray(factors))
     # a basis in general position: one with an invariant subspace in it would never find what is outside
     Q = np.linalg.qr(np.random.default_rng(0).standard_normal(parts.shape[1:]))[0]
-    before = np.zeros(len(Q))
-    for _ in range(_MOST_SWEEPS):
+    for _ in range(_SWEEPS):
         begin = Q
         Q, sizes, U = _sweep(parts, begin)
-        if np.allclose(sizes, before, rtol=_SETTLED, atol=_SETTLED):
-            break
-        before = sizes
     turn = begin.T @ Q
-    found = [_solve_block(turn, sizes, U, rows) for rows in _find_blocks(sizes)]
+    found = [_solve_block(turn, sizes, U, rows) for rows in _find_blocks(turn)]
     logarithms = np.concatenate([one for one, _ in found])
     vectors = begin @ np.concatenate([one for _, one in found], axis=1)
     vectors = vectors / np.linalg.norm(vectors, axis=0)
@@ -75,10 +71,14 @@ def _sweep(parts: Array, Q: Array) -> tuple[Array, Array, Array]:
     return Q, sizes, U
 
 
-def _find_blocks(sizes: Array) -> list[slice]:
-    """Return the rows of blocks of eigenvalues of about the same size."""
-    ends = [0, *(np.flatnonzero(-np.diff(sizes) > _SAME) + 1).tolist(), len(sizes)]
-    return [slice(begin, end) for begin, end in pairwise(ends)]
+def _find_blocks(turn: Array) -> list[slice]:
+    """Return the rows of blocks, between subspaces that the last sweep has not turned.
+
+    Directions of eigenvalues of the same size go on turning, or settle slowly, and stay in one block.
+    """
+    size = len(turn)
+    settled = [p for p in range(1, size) if np.abs(turn[p:, :p]).max() < _SETTLED]
+    return [slice(begin, end) for begin, end in pairwise([0, *settled, size])]
 
 
 def _solve_block(turn: Array, sizes: Array, U: Array, rows: slice) -> tuple[Array, Array]:

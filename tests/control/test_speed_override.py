@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+from given_speed import Given
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from strategies import floats, gains, tasks, vectors
@@ -16,22 +17,6 @@ from pathcontrol.analysis.lyapunov_functions import extended_motion_plan_lyapuno
 START = np.deg2rad([40.0, 70.0])
 GAINS = {"K_p": 800.0, "K_v": [45.0, 100.0]}
 states = st.tuples(vectors(2, 2.0), vectors(2, 4.0), floats(0, 6))
-
-
-class Given(pc.SpeedRule):
-    """A factor w whose rate ẇ is given."""
-
-    def __init__(self, w, wdot):
-        self.w, self.wdot = np.asarray(w), np.asarray(wdot)
-
-    def start(self, law, q, qd, s):
-        return np.broadcast_to(self.w, s.shape)[..., None]
-
-    def rate(self, moment, asked, x):
-        return np.broadcast_to(self.wdot, x.shape[:-1])
-
-    def describe(self):
-        return {}
 
 
 def error_rates(law, out, q, qd, w, wdot):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from given_speed import Given
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
@@ -58,22 +59,6 @@ class Master(pc.StateToReferenceProjection):
 
     def reference(self, q, qd, near):
         return q[..., 0]
-
-
-class Given(pc.SpeedRule):
-    """A factor w whose rate ẇ is given."""
-
-    def __init__(self, w, wdot):
-        self.w, self.wdot = np.asarray(w), np.asarray(wdot)
-
-    def start(self, law, q, qd, s):
-        return np.broadcast_to(self.w, s.shape)[..., None]
-
-    def rate(self, moment, asked, x):
-        return np.broadcast_to(self.wdot, x.shape[:-1])
-
-    def describe(self):
-        return {}
 
 
 def run(law, q=(0.9, 0.3), duration=2.0, **settings):
