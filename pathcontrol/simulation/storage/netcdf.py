@@ -97,8 +97,14 @@ def _read_data(path: Path) -> xr.Dataset:
     import xarray as xr  # takes half a second to load
 
     with h5netcdf.File(path, "r", decode_vlen_strings=True, phony_dims="access") as file:
-        found = {name: (item.dimensions, item[...], dict(item.attrs)) for name, item in file.variables.items()}
+        found = {name: (item.dimensions, _read_array(item), dict(item.attrs)) for name, item in file.variables.items()}
         return xr.decode_cf(xr.Dataset(found, attrs=dict(file.attrs)), decode_times=False)
+
+
+def _read_array(variable: h5netcdf.Variable) -> Any:
+    """Read an array, and words as NumPy's text: as objects not every version of xarray can write them again."""
+    array = variable[...]
+    return array.astype(str) if h5py.check_string_dtype(variable.dtype) else array
 
 
 def _remedy(path: Path) -> str:
