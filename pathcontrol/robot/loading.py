@@ -38,8 +38,8 @@ def load_robot(
     """Load the model of an arm.
 
     Args:
-        source: the name of a bundled robot (``"cicese_2dof"``) or of one of example-robot-data (extra ``robots``), the
-            path of a URDF file, or the URDF itself as a string.
+        source: the name of a bundled robot (``"cicese_2dof"``, ``"two_link"``) or of one of example-robot-data (extra
+            ``robots``), the path of a URDF file, or the URDF itself as a string.
         lock: joints to lock, ``{"joint name": angle [rad]}``, such as the fingers of a gripper. A joint that mimics one
             of them is locked with it, at multiplier × angle + offset.
         keep: names of joints that stay free: all others are locked, where ``lock`` does not say at 0, or at the limit

@@ -152,6 +152,14 @@ LIMITED = {
         {"type": "time_optimal", "torque": False, "velocity": [2.0, 1.0], "acceleration": [9.0, 9.0]},
         lambda arm: pc.time_optimal(arm, LINE, torque=None, velocity=[2.0, 1.0], acceleration=[9.0, 9.0]),
     ),
+    "free ends": (
+        {"type": "time_optimal", "start_rate": "free", "end_rate": "free", "points": 200},
+        lambda arm: pc.time_optimal(arm, LINE, start_rate="free", end_rate="free", points=200),
+    ),
+    "a given start and a free end": (
+        {"type": "time_optimal", "start_rate": "0.5 1/s", "end_rate": "free", "points": 200},
+        lambda arm: pc.time_optimal(arm, LINE, start_rate=0.5, end_rate="free", points=200),
+    ),
     "a smooth stop": (
         {"type": "smooth_start_stop", "profile": {"type": "constant_speed", "speed": 0.4}, "acceleration": 2.0}
         | {"jerk": 20.0},
@@ -318,6 +326,10 @@ BAD = {
     "torque limits": (
         {"task.profile": {"type": "time_optimal", "torque": [1.0, -1.0]}},
         "task.profile.torque = [1.0, -1.0], expected true, false or a list with one number above 0",
+    ),
+    "a free end": (
+        {"task.profile": {"type": "time_optimal", "end_rate": "fre"}},
+        "task.profile.end_rate = 'fre', expected one of 'free', or a number greater than 0; did you mean 'free'?",
     ),
     "acceleration of a URDF": (
         {"task.profile": {"type": "time_optimal", "acceleration": True}},

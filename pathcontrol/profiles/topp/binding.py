@@ -57,13 +57,13 @@ def check_static_load(limits: JointLimits, samples: Samples, torques: Torques) -
 
 
 def check_rate(limits: JointLimits, samples: Samples, cells: Cells, name: str, rate: float | None, x: Array) -> None:
-    """Check that the ``rate`` [1/s] at an end of the path is not above that of the profile x, (N + 1,).
+    """Check that the ``rate`` [1/s] at an end of the path, ∞ for any, is not above that of the profile x, (N + 1,).
 
     Raises:
         TaskError: it is larger.
     """
     knot = 0 if name == "start_rate" else -1
-    if rate is None or rate**2 <= x[knot] * (1 + 1e-9):
+    if rate is None or np.isinf(rate) or rate**2 <= x[knot] * (1 + 1e-9):
         return
     used = find_binding(limits, samples, cells, x)
     limit = limits.text(str(used.kinds[knot]), int(used.joints[knot]))

@@ -40,10 +40,11 @@ def fastest_pair(cells: Cells, top: Array) -> tuple[Array, Array]:
         slower = most.slope < -np.sqrt(np.maximum(most.x, 0.0) / x_next)
         good = (gap >= 0) & ~slower
         low[left], high[left] = np.where(good, x_next, low[left]), np.where(good, high[left], x_next)
-        newton = _FURTHER * (x_next - gap / (most.slope - least.slope))
+        narrowing = least.slope - most.slope
+        newton = _FURTHER * (x_next + gap / narrowing)
         usable = ((gap < 0) | ~slower) & (newton > low[left]) & (newton < high[left])
         trial[left] = np.where(usable, newton, 0.5 * (low[left] + high[left]))
-        found = good & ((gap < _CLOSE * most.x) | (x_next == top[left]))
+        found = good & ((gap < _CLOSE * narrowing * x_next) | (x_next == top[left]))
         left = left[~found & (high[left] - low[left] > _CLOSE * high[left])]
         if not left.size:
             break

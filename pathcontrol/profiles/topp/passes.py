@@ -36,8 +36,8 @@ class Allowed(NamedTuple):
 def traverse_open(allowed: Allowed, widths: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
     """Return the largest ṡ² at the knots of an open path from which its end can be reached, and the fastest, (N + 1,).
 
-    ``start`` and ``end`` are the rates ṡ [1/s] at the ends; ``None`` for what the arm reaches from rest in a first
-    instant, 2.5 ms, of the acceleration it is then capable of.
+    ``start`` and ``end`` are the rates ṡ [1/s] at the ends; ∞ for the fastest, ``None`` for what the arm reaches from
+    rest in a first instant, 2.5 ms, of the acceleration it is then capable of.
     """
     cells = allowed.cells
     last = _rate_from_rest(cells.some(-1), widths[-1]) if end is None else end

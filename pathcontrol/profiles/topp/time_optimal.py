@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from pathcontrol._arrays import Array, as_scalar, as_whole, freeze
-from pathcontrol._expect import expect
+from pathcontrol._expect import did_you_mean, expect
 from pathcontrol.arguments import Form, Rate, Unit
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.profiles.tabulated import MOST_POINTS, TabulatedProfile
@@ -19,6 +19,7 @@ from pathcontrol.tasks.profile import Path
 from pathcontrol.tasks.task import PathTask
 
 _BINDING = 0.999
+_FREE = "free"
 
 
 class TimeOptimal(TabulatedProfile):
@@ -60,8 +61,8 @@ def time_optimal(
     torque: Annotated[LimitChoice, Form.LIMITS, Unit("N m", "N")] = True,
     margin: Annotated[float, Form.NOT_NEGATIVE] = 0.05,
     points: int = 1000,
-    start_rate: Rate | None = None,
-    end_rate: Rate | None = None,
+    start_rate: Rate | Literal["free"] | None = None,
+    end_rate: Rate | Literal["free"] | None = None,
     end_time: Annotated[float, Form.POSITIVE, Unit("s")] | None = None,
 ) -> TimeOptimal:
     """Return the profile ϑ(s) that takes an arm along a path in the least time within the limits of its joints.
@@ -80,8 +81,9 @@ def time_optimal(
     An open path begins and ends slowly, but not with ϑ = 0, where the motion plan ṡ = ϑ(s) would stop for ever: by
     default with the rate that the arm reaches from rest if it accelerates for 2.5 ms as fast as it can. The controllers
     bring what is left to rest with ϑ ≤ (s_end − s)/T, T = 0.1 s, which for some 10 ms brakes harder than the limits
-    allow; ``end_time = 0.1`` makes the profile approach the end like that, within the limits to the last. The profile
-    of a closed path is periodic.
+    allow; ``end_time = 0.1`` makes the profile approach the end like that, within the limits to the last. A rate that
+    is ``"free"`` is the one with which the path takes the least time: at the end whatever the arm has there, at the
+    start the largest from which the rest of the path can be passed. The profile of a closed path is periodic.
 
     Every posture must be one that the arm can pass slowly: a controller of the path may slow down anywhere.
 
@@ -93,8 +95,9 @@ def time_optimal(
         torque: |τ| ≤ ``torque`` [N m], (n,); ``True`` for the limits of the URDF, ``None`` for none.
         margin: share of each torque limit left for feedback, 0 ≤ margin < 1.
         points: knots of the grid, 10 or more.
-        start_rate: ϑ at the start of an open path [1/s].
-        end_rate: ϑ at its end [1/s].
+        start_rate: ϑ at the start of an open path [1/s], or ``"free"``. For a tool that begins with v [m/s] along a
+            curve p(s) it is v/‖p'‖: v itself where s is the length of the curve.
+        end_rate: ϑ at its end [1/s], or ``"free"``.
         end_time: time constant [s] of the approach to its end, instead of ``end_rate``.
 
     Raises:
@@ -123,11 +126,24 @@ def _knots(path: Path, points: int) -> Array:
     return np.linspace(path.s0, end, as_whole("points", points, 10, MOST_POINTS))
 
 
-def _ends(path: Path, **ends: float | None) -> list[float | None]:
-    """Check the rates and the time asked for at the ends of a path."""
-    given = {name: as_scalar(name, value, positive=True) for name, value in ends.items() if value is not None}
+def _ends(path: Path, **ends: float | str | None) -> list[float | None]:
+    """Check the rates and the time asked for at the ends of a path, and return them, ∞ for a free rate."""
+    given = {name: _end(name, value) for name, value in ends.items() if value is not None}
     if given and path.period is not None:
         raise InputError(f"{' and '.join(given)} for a closed path, which begins as fast as it ends; leave them out")
     if given.keys() >= {"end_rate", "end_time"}:
         raise InputError("both end_rate and end_time are given; one of them says how an open path ends")
     return [given.get(name) for name in ends]
+
+
+def _end(name: str, value: float | str) -> float:
+    """Return one rate [1/s], ∞ for a free one, or the time [s] at an end of a path."""
+    if not isinstance(value, str) or name == "end_time":
+        return as_scalar(name, value, positive=True)
+    if value != _FREE:
+        raise InputError(
+            f"{name} = {value!r}, expected a number greater than 0 [1/s], or {_FREE!r}{did_you_mean(value, [_FREE])}",
+            argument=name,
+            value=value,
+        )
+    return np.inf

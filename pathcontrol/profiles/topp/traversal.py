@@ -21,11 +21,11 @@ _ENDLESS = 1e6  # times the ṡ² that the arm's strength builds up over the pat
 
 
 class Demand(NamedTuple):
-    """A path to be passed within limits, and the rates at the ends of an open one, ``None`` for free ones.
+    """A path to be passed within limits, and the rates at the ends of an open one, ``None`` for an arm at rest.
 
     Attributes:
-        start_rate: ṡ at the start [1/s].
-        end_rate: ṡ at the end [1/s].
+        start_rate: ṡ at the start [1/s], ∞ for any.
+        end_rate: ṡ at the end [1/s], ∞ for any.
         end_time: time constant of the approach to the end [s].
     """
 
