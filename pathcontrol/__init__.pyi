@@ -33,6 +33,7 @@ from .comparison.compare import compare as compare
 from .comparison.scenarios import Scenario as Scenario
 from .comparison.scenarios import known_scenarios as known_scenarios
 from .comparison.scenarios import make_scenario as make_scenario
+from .control.adaptive_slotine_li import AdaptiveSlotineLi as AdaptiveSlotineLi
 from .control.base import Controller as Controller
 from .control.base import ControlOutput as ControlOutput
 from .control.base import diagonal_gain as diagonal_gain

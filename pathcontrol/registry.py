@@ -52,6 +52,7 @@ LAWS = Kind(
         "computed_torque": "control.motion_control:ComputedTorque",
         "pd_plus": "control.motion_control:PDPlus",
         "slotine_li": "control.motion_control:SlotineLi",
+        "adaptive_slotine_li": "control.adaptive_slotine_li:AdaptiveSlotineLi",
         "speed_override": "control.speed_override:SpeedOverride",
         "paced": "control.paced:Paced",
         "event_plan": "control.event_plan:EventPlan",

@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 @click.option("--scenario", metavar="NAME", help="One of the scenarios that --list names, or a FILE.toml.")
 @click.option("--list", "listed", is_flag=True, help="List the scenarios and stop.")
 @click.option(
-    "--law", "laws", multiple=True, metavar="NAME", help="Compare this law; repeat for more. Default: all five."
+    "--law",
+    "laws",
+    multiple=True,
+    metavar="NAME",
+    help="Compare this law; repeat for more. Default: the five that are compiled; 'all' for the whole family.",
 )
 @click.option(
     "--rollouts", type=click.IntRange(1), default=16, show_default=True, metavar="N", help="How many initial postures."
@@ -70,7 +74,7 @@ def command(
         out = refuse_suffix(out, "a folder")
         import_all()
     found = _load(source)
-    compared = compare(laws or None, found, rollouts=rollouts, seed=seed, engine=engine)
+    compared = compare("all" if laws == ("all",) else laws or None, found, rollouts=rollouts, seed=seed, engine=engine)
     written = {} if out is None else _write(compared, out)
     _tell(compared, written, as_json)
     if opened and out is not None:

@@ -100,6 +100,9 @@ def compare(
     K_d = diag M(q̄)D, or Λ = D = √K_p where K_v² < 4K_p, as it cannot damp less than critically. On a closed path all of
     them begin at the point nearest to the arm. The same numbers come out for a rollout alone and among others.
 
+    ``"all"`` adds the laws of other sources, which may be named too: ``"adaptive_slotine_li"`` has the gains of Slotine
+    and Li's law, the plan of the extended motion plan, and an adaptation of 0.001 1/J.
+
     The measures, of the event and the time after it (without one of the second half of a closed path, or of a whole
     open one), in SI units:
 
@@ -116,7 +119,8 @@ def compare(
 
     Args:
         laws: names of known laws, laws for ``scenario.robot`` and ``scenario.task``, or functions (robot, task) that
-            make one; one, several, or by names of your own. By default all known ones and those of the scenario.
+            make one; one, several, or by names of your own. By default the five known ones and those of the scenario,
+            ``"all"`` for those of other sources too.
         scenario: a name of :func:`known_scenarios`, or a :class:`Scenario`.
         rollouts: how many starts: that of the scenario, and others near the path, see :meth:`Scenario.starts`.
         seed: of these starts.

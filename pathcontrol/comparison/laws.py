@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array
 from pathcontrol._expect import did_you_mean
+from pathcontrol.comparison.family import FAMILY
+from pathcontrol.comparison.shared_gains import Gains, mean_inertia, mean_plan_gain, sample_task, split_damping
+from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
 from pathcontrol.control.base import Controller, Start, diagonal_gain
 from pathcontrol.control.event_plan import EventPlan
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
@@ -19,58 +19,17 @@ from pathcontrol.control.paced import Paced
 from pathcontrol.control.projection import Projection
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.control.wrapper import unwrap
-from pathcontrol.errors import InputError, TaskError, UnknownNameError
+from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run_arguments import check_controller
 from pathcontrol.tasks.task import PathTask
 
-_RATE = 20.0  # 1/s, of the paper's plan towards the nearest point, k‖q_d'‖²
-_POINTS = 256  # along the path, of means
 _SAME = 1e-9  # share of the size of a path up to which two are the same
 
 Maker = Callable[[RobotModel, PathTask], Controller]
 Law = str | Controller | Maker
 Laws = Law | Iterable[Law] | Mapping[str, Law]
 _NONE: Mapping[str, Law] = MappingProxyType({})
-
-
-class Gains(NamedTuple):
-    """The gains that all laws of a comparison share.
-
-    Attributes:
-        K_p: position gain [1/s²], a number or (n,).
-        K_v: velocity gain [1/s], a number or (n,).
-        k: gain of the extended motion plan [1/(rad² s)]; ``None`` for k‖q_d'‖² = 20 1/s on average, as in the paper.
-    """
-
-    K_p: ArrayLike = 800.0
-    K_v: ArrayLike = 57.0
-    k: float | None = None
-
-
-def sample_task(task: PathTask) -> Array:
-    """Return path parameters s evenly over one traverse of a path, (k,)."""
-    try:
-        lower, upper = task.one_traverse
-    except TaskError:  # neither ends nor repeats
-        lower, upper = task.sampled_interval
-    return np.linspace(lower, upper, _POINTS, endpoint=not task.closed)
-
-
-def mean_inertia(robot: RobotModel, task: PathTask) -> Array:
-    """Return the diagonal of M(q̄) [kg m²], (n,), at the mean posture q̄ of a path."""
-    return np.array(robot.mass_matrix(task.q_d(sample_task(task)).mean(0)).diagonal())
-
-
-def split_damping(K_p: Array, K_v: Array) -> tuple[Array, Array]:
-    """Return Λ and D = K_d/m [1/s] of Slotine and Li's law on a mass m, with ΛD = K_p and Λ + D = K_v, (n,) each.
-
-    On that mass the law gives ë + (Λ + D)ė + ΛDe = 0. Λ is the smaller root. Where K_v² < 4K_p the roots are complex,
-    as the law cannot damp less than critically: there Λ = D = √K_p, with the same stiffness and the least damping.
-    """
-    root = np.sqrt(np.maximum(K_v**2 - 4 * K_p, 0.0))
-    fast = np.where(root > 0, 0.5 * (K_v + root), np.sqrt(K_p))
-    return K_p / fast, fast
 
 
 def _computed_torque(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
@@ -101,12 +60,6 @@ def _projection(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -
     return Projection(robot, task, float(np.asarray(gains.K_p).mean()), gains.K_v, start=start)
 
 
-def mean_plan_gain(task: PathTask) -> float:
-    """Return k [1/(rad² s)] with k‖q_d'‖² = 20 1/s, the mean over a path."""
-    slopes = task.dq_d(sample_task(task))
-    return float(_RATE / np.vecdot(slopes, slopes).mean())
-
-
 _MAKERS = {
     "computed_torque": _computed_torque,
     "pd_plus": _pd_plus,
@@ -118,6 +71,8 @@ _MAKERS = {
 KNOWN_LAWS = tuple(_MAKERS)
 #: the path laws with a plan that knows the torque limits
 PACED_LAWS = ("paced_extended_motion_plan", "paced_projection")
+#: the name of all of these and of :data:`FAMILY` together
+ALL_LAWS = "all"
 #: laws around these, compared where they are named
 _WRAPPED = {
     "event_plan": lambda *scenario: EventPlan(_extended_motion_plan(*scenario)),
@@ -140,7 +95,7 @@ def recover_gains(law: Controller) -> Gains:
     elif isinstance(law, PDPlus):
         mass = mean_inertia(law.robot, law.task)
         gains = Gains(law.K_p / mass, law.K_v / mass)
-    elif isinstance(law, SlotineLi):
+    elif isinstance(law, SlotineLi | AdaptiveSlotineLi):
         damping = law.K_d / mean_inertia(law.robot, law.task)
         gains = Gains(law.Lambda * damping, law.Lambda + damping)
     else:
@@ -166,16 +121,17 @@ def make_laws(
     for name in ("K_p", "K_v"):
         diagonal_gain(name, getattr(gains, name), robot.n, robot.joint_names)
     made: dict[str, Controller] = {}
-    for name, law in _list_laws([*KNOWN_LAWS, *more] if laws is None else laws):
+    if laws is None or laws == ALL_LAWS:
+        laws = [*KNOWN_LAWS, *(FAMILY if laws == ALL_LAWS else ()), *more]
+    for name, law in _list_laws(laws):
         one = _make_law(law, robot, task, gains, more)
         key = name or (law if isinstance(law, str) else type(one).__name__)
         if key in made:
             raise InputError(f"two laws are called {key!r}; give them names: {{'first': …, 'second': …}}")
         made[key] = one
     if not made:
-        raise InputError(
-            f"there is no law to compare; expected some of {', '.join(_MAKERS | _WRAPPED)}, or laws of your own"
-        )
+        known = ", ".join(_MAKERS | FAMILY | _WRAPPED)
+        raise InputError(f"there is no law to compare; expected some of {known}, or laws of your own")
     return made
 
 
@@ -196,9 +152,9 @@ def _make_law(law: Law, robot: RobotModel, task: PathTask, gains: Gains, more: M
     if isinstance(law, str) and law in more:
         law = more[law]
     if isinstance(law, str):
-        makers = _MAKERS | _WRAPPED
+        makers = _MAKERS | FAMILY | _WRAPPED
         if law not in makers:
-            known = list(dict.fromkeys([*makers, *more]))
+            known = list(dict.fromkeys([*makers, *more, ALL_LAWS]))
             choices = ", ".join(known)
             raise UnknownNameError(f"there is no law {law!r}, expected one of {choices}{did_you_mean(law, known)}")
         return makers[law](robot, task, gains, "nearest" if task.closed else "s0")

@@ -9,8 +9,9 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import did_you_mean
-from pathcontrol.comparison.laws import PACED_LAWS, Gains, Law
+from pathcontrol.comparison.laws import PACED_LAWS, Law
 from pathcontrol.comparison.paper import DURATION, K_P, K_V, PERIOD, START_DEG, K, paper_task
+from pathcontrol.comparison.shared_gains import Gains
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.override_rule import Override

@@ -353,6 +353,18 @@ def scalar_gain(name: str, value: ArrayLike) -> Array:
     return _check_positive(name, array)
 
 
+def rollout_gain(name: str, value: ArrayLike) -> Array:
+    """Return a gain that is one number, (), or has one for each rollout, (N,), given as (N,) or (N, 1); read-only.
+
+    Raises:
+        InputError: it is no finite number, or has other axes.
+    """
+    array = check_finite(name, as_array(name, value))
+    if array.ndim > 2 or (array.ndim == 2 and array.shape[1] != 1):
+        raise InputError(f"{name} has shape {array.shape}, expected a number, or one for each rollout, (N,) or (N, 1)")
+    return freeze(array[..., 0] if array.ndim > 1 else array)
+
+
 def _diagonal_of_matrix(name: str, array: Array, n: int) -> Array:
     """Return ``array`` with its diagonal in place of a matrix (n, n), and (N, n) in place of (N, 1, n)."""
     if array.ndim == 3 and array.shape[1:] == (1, n):

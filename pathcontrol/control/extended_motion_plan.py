@@ -7,15 +7,15 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_array, check_finite, freeze
+from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
-from pathcontrol.errors import InputError
+from pathcontrol.control.base import ControlOutput, diagonal_gain
+from pathcontrol.control.plan_feedback import PlanFeedback
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask
 
 
-class ExtendedMotionPlan(Controller):
+class ExtendedMotionPlan(PlanFeedback):
     """The extended motion plan, eqs. (22) and (25): a path controller for any path.
 
         σ̇ = ϑ(σ) − k e_pᵀq_d'(σ)
@@ -49,35 +49,16 @@ class ExtendedMotionPlan(Controller):
         k: Annotated[ArrayLike, Form.GAIN_OR_ZERO, Unit("1/rad^2/s")],
         **options: Any,
     ) -> None:
-        super().__init__(robot, task, **options)
+        super().__init__(robot, task, k, **options)
         self.K_p, self.K_v = (
             diagonal_gain("K_p", K_p, robot.n, robot.joint_names),
             diagonal_gain("K_v", K_v, robot.n, robot.joint_names),
         )
-        plan_gain = check_finite("k", as_array("k", k))
-        self.k = freeze(plan_gain[..., 0] if plan_gain.ndim > 1 else plan_gain)
-        if (self.k < 0).any():
-            raise InputError(
-                f"k = {self.k.tolist()}, expected k ≥ 0: a negative gain drives the path away from the arm"
-            )
 
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         s = z[..., 0]
-        point = self.point(s)
-        velocity, k = point.velocity, self.plan_gain(s)
-        e_p, e_v = point.q_d - q, velocity - qd
-        free = point.theta - k * np.vecdot(e_p, point.dq_d)
-        sdot = self.inside(s, free)
-        curvature = np.vecdot(point.dq_d, point.dq_d) + np.vecdot(e_p, point.ddq_d)
+        point, e_p, e_v, sdot, slope, drift = self.plan(s, q, qd)
         qdd = point.velocity_slope * sdot[..., None] + self.K_v * e_v + self.K_p * e_p
-        tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd, velocity)
-        held = sdot != free  # at an end of an open path
-        slope = np.where(held, 0.0, point.dtheta - k * curvature)
-        drift = np.where(held, 0.0, k * np.vecdot(qd, point.dq_d))
-        regular = np.isfinite(s)
-        out = ControlOutput(tau, sdot[..., None], s, sdot, slope, drift, e_p, e_v, regular)
+        tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd, point.velocity)
+        out = ControlOutput(tau, sdot[..., None], s, sdot, slope, drift, e_p, e_v, np.isfinite(s))
         return self.compensate(t, q, qd, z, out)
-
-    def plan_gain(self, s: Array) -> Array:
-        """Return k(σ) [1/(rad² s)], (*batch,): ``k``, and 0 where the plan is timed."""
-        return self.k if self.ending is None and self.speed is None else np.where(self.timed(s), 0.0, self.k)

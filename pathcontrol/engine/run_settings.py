@@ -38,11 +38,12 @@ def add_law(setup: Setup, controller: Controller, memory: Memory) -> None:
     """Set the law of a run: its kind, gains, model of the arm, friction and paths.
 
     Raises:
-        EngineError: the law is not one of the library, or its arm, friction or task is beyond the engine.
+        EngineError: the law is none of those that are compiled, or its arm, friction or task is beyond the engine.
     """
     kind = type(controller)
     if kind not in GAINS:
-        raise EngineError(f"the law {kind.__name__} is not one of the library")
+        known = ", ".join(law.__name__ for law in GAINS)
+        raise EngineError(f"the law {kind.__name__} is in Python; compiled are {known}")
     if controller.observer is not None:
         raise EngineError("the law has a momentum observer, friction='observed'")
     n = controller.robot.n

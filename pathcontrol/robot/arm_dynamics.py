@@ -190,6 +190,27 @@ class ArmDynamics:
         data = self._body.data
         return self._each(q, (), lambda qi: pin.computePotentialEnergy(self.pinocchio_model, data, qi))
 
+    @cached_property
+    def inertial_parameters(self) -> Array:
+        """The parameters θ of the bodies that the joints move, ten each after one another, (10n,).
+
+        For each body m [kg], m c (3) [kg m] and Ixx, Ixy, Iyy, Ixz, Iyz, Izz [kg m²], about the joint's frame and in
+        its axes. What is fixed to a body, as a payload is, belongs to it.
+        """
+        return np.concatenate([body.toDynamicParameters() for body in list(self.pinocchio_model.inertias)[1:]])
+
+    def torque_regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, velocity: ArrayLike | None = None) -> Array:
+        """Return Y, (*batch, n, 10n), with Yθ the torque of :meth:`inverse_dynamics` for any inertial parameters θ.
+
+        Rotor inertia is no part of it. (C. G. Atkeson, C. H. An and J. M. Hollerbach, Int. J. Robotics Research 5,
+        1986, have the linearity; the Coriolis term with ``velocity`` is split as in :meth:`coriolis`.)
+        """
+        if velocity is None:
+            return self._regress(self.pinocchio_model, q, qd, qdd)
+        qd, v = self._array("qd", qd), self._array("velocity", velocity)
+        surplus = self._regress(self._weightless.model, q, 0.5 * (qd - v), np.zeros(self.n))
+        return self._regress(self.pinocchio_model, q, 0.5 * (qd + v), qdd) - surplus
+
     # --- kinematics -----------------------------------------------------------------------------------------
 
     def frame_pose(self, q: ArrayLike, frame: str) -> Array:
@@ -261,6 +282,15 @@ class ArmDynamics:
     def _centripetal(self, q: ArrayLike, x: Array) -> Array:
         """Return c(q,x) = C(q,x)x [N m], (*batch, n)."""
         return self._weightless.inverse_dynamics(q, x, np.zeros_like(x))
+
+    def _regress(self, model: Any, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """Return the torque regressor of a ``pin.Model``, (*batch, n, 10n)."""
+        shape = (self.n, 10 * self.n)
+
+        def regressor(qi: Array, qdi: Array, qddi: Array) -> Array:
+            return pin.computeJointTorqueRegressor(model, self._data, qi, qdi, qddi).reshape(shape)
+
+        return self._each(q, shape, regressor, qd=qd, qdd=qdd)
 
     def _each(self, q: ArrayLike, shape: tuple[int, ...], function: Callable[..., Any], **more: ArrayLike) -> Array:
         """Apply a ``function`` without a batched call to each configuration, with a row of each of ``more``."""

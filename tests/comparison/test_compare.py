@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import pathcontrol as pc
+from pathcontrol.comparison.family import FAMILY
 from pathcontrol.comparison.laws import KNOWN_LAWS, Gains, make_laws, recover_gains, split_damping
 from pathcontrol.comparison.measures import MEASURES
 
@@ -61,7 +62,7 @@ def test_tracking_laws_are_one_law_on_an_arm_of_one_joint(arm):
         assert_allclose(other, runs[0], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", KNOWN_LAWS)
+@pytest.mark.parametrize("name", [*KNOWN_LAWS, *FAMILY])
 def test_gains_come_back_from_a_law(arm, circle, name):
     law = make_laws(name, arm, circle, Gains(300.0, [45.0, 100.0], 7.0))[name]
     gains = recover_gains(law)
@@ -160,6 +161,13 @@ def test_without_measurements_path_laws_wait_or_stay_and_motion_control_is_carri
     assert contour["computed_torque"] > 2 * contour["extended_motion_plan"]
     assert contour["extended_motion_plan"] > contour["projection"]
     assert lost.mean("projection", "speed_peak") < 0.5 * lost.mean("extended_motion_plan", "speed_peak")
+
+
+def test_all_laws_are_compared_where_all_are_asked_for():
+    every = pc.compare("all", shortened("undisturbed"), rollouts=1, progress=False)
+    assert list(every.measures) == [*KNOWN_LAWS, *FAMILY]
+    for law in every.measures:
+        assert every.mean(law, "contour_peak") < np.deg2rad(3)
 
 
 # --- laws and scenarios of one's own ------------------------------------------------------------------------------

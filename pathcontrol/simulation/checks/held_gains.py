@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
+from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
@@ -38,7 +39,7 @@ def linearize_law(controller: Controller, q: Array, rollouts: Sequence[int] = ()
     """
     controller = unwrap(controller)
     M = controller.robot.mass_matrix(q)
-    if isinstance(controller, SlotineLi):
+    if isinstance(controller, SlotineLi | AdaptiveSlotineLi):
         pairs = _select_extremes(controller.Lambda, controller.K_d, controller.robot.n, rollouts)
         return [
             Feedback(_repeat_diagonal(K_d * Lambda, M), _repeat_diagonal(K_d, M) + M * Lambda, row)

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
 from pathcontrol.control.base import Controller
-from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import PDPlus, SlotineLi
+from pathcontrol.control.plan_feedback import PlanFeedback
 from pathcontrol.control.wrapper import unwrap
 from pathcontrol.errors import PathControlWarning, warn
 from pathcontrol.robot.batch import RobotBatch
@@ -32,6 +33,7 @@ from pathcontrol.tasks.task import PathTask
 
 _SAMPLES, _FINE = 9, 65  # samples of a path for the arm and for the plan
 _MOST, _FEWEST = 1 << 16, 3  # samples of all tasks of a batch together, and of each at least
+_NO_FEEDBACK = ("k", "adaptation")  # gains that are no part of the linearised feedback
 _SLOW = 1.0  # h times a rate of growth or decay up to which a step resolves it
 _OSCILLATION = 0.3  # h ω up to which the midpoint rule resolves an oscillation, to 1.5 % of ω
 _SPRING = 0.05  # h ω advised for a spring that is held over a step: holding it adds energy at the rate hω²/4
@@ -144,8 +146,10 @@ def _check_gains(law: Controller, period: float, robot: Arm, rows: list[int], q:
         return
     several = any(np.ndim(getattr(law, name)) > 1 and len(getattr(law, name)) > 1 for name in law.gains)
     where = f" (rollout {worst})" if several or isinstance(robot, RobotBatch) else ""
-    gains = " and ".join(f"{name} up to {np.max(getattr(law, name)):g}" for name in law.gains if name != "k")
-    torques = isinstance(law, PDPlus | SlotineLi)
+    gains = " and ".join(
+        f"{name} up to {np.max(getattr(law, name)):g}" for name in law.gains if name not in _NO_FEEDBACK
+    )
+    torques = isinstance(law, PDPlus | SlotineLi | AdaptiveSlotineLi)
     remedy = "K over inertia times h is below 2" if torques else "K_v h < 2 and K_p h < 2 K_v"
     yield (
         f"gains {gains} of {type(law).__name__} need a period below {longest:.3g} s{where}, the loop has {period:g} s "
@@ -156,7 +160,7 @@ def _check_gains(law: Controller, period: float, robot: Arm, rows: list[int], q:
 
 def _check_plan(law: Controller, period: float) -> Iterator[str]:
     """Yield the warning of a period that is too long for the gain k of the plan."""
-    if not isinstance(law, ExtendedMotionPlan):
+    if not isinstance(law, PlanFeedback):
         return
     task = law.task
     s = _sample_paths(task, _FINE) if isinstance(task, TaskBatch) else np.linspace(*task.sampled_interval, _FINE)

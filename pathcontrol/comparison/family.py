@@ -1,0 +1,28 @@
+"""The laws of other sources with gains that mean the same as those of the known laws, compared where they are named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pathcontrol.comparison.shared_gains import Gains, mean_inertia, mean_plan_gain, split_damping
+from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
+from pathcontrol.control.base import Controller, Start
+from pathcontrol.robot.model import RobotModel
+from pathcontrol.tasks.task import PathTask
+
+_ADAPTATION = 1e-3  # 1/J: more takes what a wall or a jam does to the arm for mass
+
+
+def _adaptive_slotine_li(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+    """Return the adaptive law with the gains of Slotine and Li's, and the plan of the extended motion plan."""
+    Lambda, damping = split_damping(*(np.broadcast_to(gain, robot.n) for gain in gains[:2]))
+    k = mean_plan_gain(task) if gains.k is None else gains.k
+    return AdaptiveSlotineLi(robot, task, Lambda, mean_inertia(robot, task) * damping, _ADAPTATION, k, start=start)
+
+
+#: how each law is made, by its name
+FAMILY: dict[str, Callable[[RobotModel, PathTask, Gains, Start], Controller]] = {
+    "adaptive_slotine_li": _adaptive_slotine_li,
+}

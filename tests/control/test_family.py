@@ -1,0 +1,106 @@
+"""The laws of other sources, each as any law: batches, both engines, files, saved runs, reports and control loops."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import pathcontrol as pc
+from pathcontrol.engine.run_settings import GAINS
+from pathcontrol.experiments.runner import load_setup
+from pathcontrol.hardware.control_loop import ControlLoop
+from pathcontrol.hardware.envelope import Envelope
+from pathcontrol.registry import LAWS
+from pathcontrol.view.report.reproduction import recipe
+
+#: gains of each law, by its name in files
+FAMILY = {
+    "adaptive_slotine_li": {"Lambda": 10.0, "K_d": [40.0, 4.0], "adaptation": 0.1, "k": 20.0},
+}
+WIDE = {"torque": 1e6, "torque_rate": 1e12, "velocity": 1e3, "lower": -1e3, "upper": 1e3, "tube": np.inf}
+START = np.array([0.8, 0.3])
+
+
+def law_of(name, arm, task, **options):
+    return LAWS.find(name)(arm, task, **FAMILY[name], **options)
+
+
+def run_of(law, q=START, duration=0.25, **options):
+    return pc.simulate(law, q, duration=duration, progress=False, **options)
+
+
+@pytest.mark.parametrize("name", FAMILY)
+def test_a_rollout_is_the_same_alone_and_in_a_batch(arm, circle, name):
+    law, q = law_of(name, arm, circle), np.array([[0.8, 0.3], [0.9, -0.1], [1.1, 0.1]])
+    many = run_of(law, q, duration=0.1)
+    for i in range(3):
+        assert_array_equal(run_of(law, q[i], duration=0.1).array("q")[0], many.array("q")[i])
+
+
+@pytest.mark.parametrize("name", FAMILY)
+def test_each_rollout_has_its_own_gains_and_its_own_task(arm, circle, name):
+    law, q = law_of(name, arm, circle), np.array([[0.8, 0.3], [0.9, -0.1]])
+    kind, small = type(law), pc.Ellipse((1.0, 0.8), 1.5)
+    rows = {key: np.stack([np.multiply(value, 1.1), value]) for key, value in FAMILY[name].items()}
+    rows = {key: value[:, None] if value.ndim == 1 else value for key, value in rows.items()}
+    both = run_of(kind(arm, pc.TaskBatch([small, circle]), **rows), q, duration=0.1)
+    assert_array_equal(run_of(law, q[1], duration=0.1).array("q")[0], both.array("q")[1])
+    one = kind(arm, small, **{key: value[0] if value.shape[1] > 1 else value[0, 0] for key, value in rows.items()})
+    assert_array_equal(run_of(one, q[0], duration=0.1).array("q")[0], both.array("q")[0])
+
+
+@pytest.mark.parametrize("name", FAMILY)
+def test_the_plant_is_compiled_and_the_run_says_why_the_law_is_not(arm, circle, name):
+    law = law_of(name, arm, circle)
+    fast, slow = run_of(law), run_of(law, engine="pinocchio")
+    assert fast.config["engine"] == "compiled"
+    reason = f"only the plant is compiled: the law {type(law).__name__} is in Python; compiled are "
+    assert fast.config["engine_reason"] == reason + ", ".join(one.__name__ for one in GAINS)
+    np.testing.assert_allclose(fast.array("q"), slow.array("q"), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", FAMILY)
+def test_files_saved_runs_and_scripts_of_reports_know_it(arm, name, tmp_path, write_experiment, monkeypatch):
+    setup = load_setup(write_experiment({"controller": {"type": name, **FAMILY[name]}}))
+    known = law_of(name, arm, pc.Circle(1.0, 2.0)).describe()
+    assert setup.controllers[0].describe() == known | {"task": setup.task.describe()}
+    run = run_of(setup.controllers[0], duration=0.05)
+    monkeypatch.chdir(tmp_path)
+    run.save("mine.nc")
+    loaded = pc.Run.load("mine.nc")
+    assert loaded.config["controller"] == run.config["controller"]
+    namespace = {}
+    exec(recipe("mine", loaded).text, namespace)
+    assert_array_equal(namespace["run"].array("q"), run.array("q"))
+
+
+@pytest.mark.parametrize("name", FAMILY)
+def test_measurements_of_a_run_give_its_torques_in_a_control_loop(arm, circle, name):
+    law = law_of(name, arm, circle)
+    run = run_of(law, duration=0.1, loop=pc.SampledLoop(2e-3))
+    loop = ControlLoop(law, 2e-3, Envelope(**WIDE))
+    loop.start(START, np.zeros(2))
+    q, qd, tau = (run.array(key)[0] for key in ("q_measured", "qd_measured", "tau_demand"))
+    for k, t in enumerate(run.time):
+        assert_array_equal(loop.step(q[k], qd[k], t), tau[k])
+
+
+@pytest.mark.parametrize("name", FAMILY)
+def test_an_open_path_is_finished_at_its_end(ideal_arm, name):
+    line = pc.Line([0.2, 0.3], [0.5, 0.1], 0.8)
+    run = run_of(law_of(name, ideal_arm, line), line.q_d(np.array(0.0)) + 0.01, duration=4.0)
+    assert run.status[0] == "finished"
+    np.testing.assert_allclose(run.array("q")[0, -1], [0.5, 0.1], atol=2e-3)
+
+
+@pytest.mark.parametrize("name", FAMILY)
+def test_an_operator_overrides_its_speed(ideal_arm, circle, name):
+    law = pc.SpeedOverride(law_of(name, ideal_arm, circle, start="nearest"), 0.5)
+    run = run_of(law, [1.0, 0.0], duration=1.5)
+    assert run.array("sdot")[0, -1] == pytest.approx(0.5 * circle.theta(np.array(0.0)), rel=0.02)
+
+
+@pytest.mark.parametrize("name", FAMILY.keys() - {"adaptive_slotine_li"})  # whose 25 multipliers take seconds
+def test_its_multipliers_on_the_circle_are_those_of_a_stable_orbit(ideal_arm, circle, name):
+    found = pc.floquet(law_of(name, ideal_arm, circle))
+    assert abs(found.multipliers[found.along] - 1) < 1e-4
+    assert (np.abs(found.multipliers) < 1 + 1e-4).all()
