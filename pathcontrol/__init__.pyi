@@ -10,6 +10,7 @@ from .analysis.floquet import floquet as floquet
 from .analysis.friction_identification import FrictionEstimate as FrictionEstimate
 from .analysis.friction_identification import identify_friction as identify_friction
 from .analysis.gamma import distance_to_gamma as distance_to_gamma
+from .analysis.largest_gain import largest_gain as largest_gain
 from .analysis.lyapunov_functions import lyapunov as lyapunov
 from .analysis.pareto import non_dominated as non_dominated
 from .analysis.path_accuracy import PathAccuracy as PathAccuracy
@@ -23,6 +24,8 @@ from .analysis.run_metrics import rms as rms
 from .analysis.run_metrics import settling_time as settling_time
 from .analysis.run_metrics import steady_state as steady_state
 from .analysis.speed_factor import speed_factor as speed_factor
+from .analysis.stability_map import StabilityMap as StabilityMap
+from .analysis.stability_map import stability_map as stability_map
 from .cartesian.cartesian_path import CartesianPath as CartesianPath
 from .cartesian.orientation import FixedOrientation as FixedOrientation
 from .cartesian.orientation import NormalOrientation as NormalOrientation

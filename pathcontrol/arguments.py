@@ -41,6 +41,9 @@ class Form(Enum):
     COLUMNS = "names of columns in their order, or a table with the number or the name of each"
 
 
+_MAY_BE_ZERO = {Form.GAIN: False, Form.GAIN_OR_ZERO: True}
+
+
 @dataclass(frozen=True)
 class Unit:
     """The SI unit of an argument, in an annotation: ``Annotated[float, Unit("rad")]``.
@@ -120,6 +123,13 @@ def parameters_of(target: Callable[..., Any]) -> dict[str, Parameter]:
         if not more:
             break
     return found
+
+
+@lru_cache(maxsize=64)
+def gains_of(law: Callable[..., Any]) -> dict[str, bool]:
+    """Return the gains among the arguments of a law, and which of them may be 0."""
+    forms = {name: one.form for name, one in parameters_of(law).items()}
+    return {name: _MAY_BE_ZERO[form] for name, form in forms.items() if form in _MAY_BE_ZERO}
 
 
 def _functions(target: Callable[..., Any]) -> Iterator[Callable[..., Any]]:

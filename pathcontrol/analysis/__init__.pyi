@@ -8,6 +8,7 @@ from .floquet import floquet as floquet
 from .friction_identification import FrictionEstimate as FrictionEstimate
 from .friction_identification import identify_friction as identify_friction
 from .gamma import distance_to_gamma as distance_to_gamma
+from .largest_gain import largest_gain as largest_gain
 from .lyapunov_functions import lyapunov as lyapunov
 from .pareto import non_dominated as non_dominated
 from .path_accuracy import PathAccuracy as PathAccuracy
@@ -21,3 +22,5 @@ from .run_metrics import rms as rms
 from .run_metrics import settling_time as settling_time
 from .run_metrics import steady_state as steady_state
 from .speed_factor import speed_factor as speed_factor
+from .stability_map import StabilityMap as StabilityMap
+from .stability_map import stability_map as stability_map

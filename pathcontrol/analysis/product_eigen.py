@@ -16,7 +16,9 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 
-_SWEEPS = 40
+_SWEEPS, _FEW_SWEEPS = 40, 8
+_TURNING = 0.1  # turn of a subspace in a sweep that goes on turning, as of a complex pair
+_ZERO = 1e-9  # of the largest singular value
 _SETTLED = 1e-8  # turn of a subspace in the last sweep below which it is invariant
 _APART = 1e4  # how far apart sizes may come in factors that are multiplied before they are orthogonalised
 
@@ -30,13 +32,74 @@ class ProductEigen(NamedTuple):
 
 def find_eigen(factors: Sequence[Array] | Array) -> ProductEigen:
     """Return the eigenvalues of A_K … A_2 A_1 for real ``factors`` A_1, A_2, …, (K, D, D)."""
-    parts = _multiply(np.asarray(factors))
+    return find_eigen_of_many(np.asarray(factors)[None])[0]
+
+
+def find_eigen_of_many(factors: Array, leading: bool = False) -> list[ProductEigen]:
+    """Return the eigenvalues of many products at once, of ``factors`` (N, K, D, D).
+
+    With ``leading`` only the largest ones are sought: fewer sweeps, and eigenvalues that are 0 may come out as rounding
+    beside the others.
+    """
+    parts = _multiply(factors, _ZERO if leading else 0.0)
     # a basis in general position: one with an invariant subspace in it would never find what is outside
-    Q = np.linalg.qr(np.random.default_rng(0).standard_normal(parts.shape[1:]))[0]
-    for _ in range(_SWEEPS):
-        begin = Q
-        Q, sizes, U = _sweep(parts, begin)
-    turn = begin.T @ Q
+    size = factors.shape[-1]
+    Q = np.tile(np.linalg.qr(np.random.default_rng(0).standard_normal((size, size)))[0], (len(factors), 1, 1))
+    for count in range(_FEW_SWEEPS if leading else _SWEEPS):
+        begin, Q = Q, _turn_round(parts, Q)
+        turn = begin.swapaxes(-1, -2) @ Q
+        if all(_is_done(_measure_turns(one), count) for one in turn):
+            break
+    return [_solve(*one) for one in zip(begin, turn, *_multiply_triangles(parts, begin), strict=True)]
+
+
+def _multiply(factors: Array, zero: float) -> Array:
+    """Return products of some factors each, (parts, N, D, D), as many as leave the smallest sizes beside the largest.
+
+    Singular values up to the share ``zero`` of the largest do not count.
+    """
+    singular = np.linalg.svd(factors, compute_uv=False)
+    largest = singular[..., 0]
+    smallest = np.where(singular >= zero * largest[..., None], singular, np.inf).min(-1)
+    with np.errstate(divide="ignore"):
+        spread = np.log(largest / smallest).mean(-1).max()
+    count = factors.shape[1]
+    together = int(np.clip(np.log(_APART) / max(spread, 1e-3), 1, count))
+    parts = []
+    for group in np.array_split(factors, -(-count // together), axis=1):
+        product = group[:, 0]
+        for i in range(1, group.shape[1]):
+            product = group[:, i] @ product
+        parts.append(product)
+    return np.array(parts)
+
+
+def _turn_round(parts: Array, Q: Array) -> Array:
+    """Return the orthogonal matrices Q (N, D, D) after all parts."""
+    for part in parts:
+        Q, R = np.linalg.qr(part @ Q)
+        Q = Q * np.where(np.diagonal(R, axis1=-2, axis2=-1) < 0, -1.0, 1.0)[:, None]
+    return Q
+
+
+def _multiply_triangles(parts: Array, Q: Array) -> tuple[Array, Array]:
+    """Return the product of the triangular R of all parts, as logarithms of sizes of rows, (N, D), and rows U."""
+    sizes, U = np.zeros(Q.shape[:2]), np.tile(np.eye(Q.shape[-1]), (len(Q), 1, 1))
+    upper = np.triu(np.ones(Q.shape[1:]))
+    for part in parts:
+        Q, R = np.linalg.qr(part @ Q)
+        diagonal = np.diagonal(R, axis1=-2, axis2=-1)
+        sign = np.where(diagonal < 0, -1.0, 1.0)
+        Q, R = Q * sign[:, None], R * sign[..., None]
+        # of the size of row j in that of row i
+        shares = upper * np.exp(np.minimum(sizes[:, None] - sizes[..., None], 700.0))
+        diagonal = np.maximum(np.abs(diagonal), np.finfo(float).tiny)
+        sizes, U = sizes + np.log(diagonal), (R * shares) @ U / diagonal[..., None]
+    return sizes, U
+
+
+def _solve(begin: Array, turn: Array, sizes: Array, U: Array) -> ProductEigen:
+    """Return the eigenvalues of one product from its last sweep."""
     found = [_solve_block(turn, sizes, U, rows) for rows in _find_blocks(turn)]
     logarithms = np.concatenate([one for one, _ in found])
     vectors = begin @ np.concatenate([one for _, one in found], axis=1)
@@ -45,40 +108,24 @@ def find_eigen(factors: Sequence[Array] | Array) -> ProductEigen:
     return ProductEigen(logarithms[order], vectors[:, order])
 
 
-def _multiply(factors: Array) -> Array:
-    """Return products of some factors each, as many as leave the smallest sizes beside the largest."""
-    spread = np.log(np.linalg.cond(factors)).mean()
-    together = int(np.clip(np.log(_APART) / max(spread, 1e-3), 1, len(factors)))
-    parts = []
-    for group in np.array_split(factors, -(-len(factors) // together)):
-        product = group[0]
-        for one in group[1:]:
-            product = one @ product
-        parts.append(product)
-    return np.array(parts)
-
-
-def _sweep(parts: Array, Q: Array) -> tuple[Array, Array, Array]:
-    """Return Q after all parts, and the triangular product as logarithms of sizes of its rows, (D,), and rows U."""
-    sizes, U = np.zeros(len(Q)), np.eye(len(Q))
-    for part in parts:
-        Q, R = np.linalg.qr(part @ Q)
-        sign = np.where(np.diagonal(R) < 0, -1.0, 1.0)
-        Q, R = Q * sign, R * sign[:, None]
-        shares = np.exp(np.minimum(sizes - sizes[:, None], 700.0))  # of the size of row j in that of row i
-        diagonal = np.maximum(np.diagonal(R), np.finfo(float).tiny)
-        sizes, U = sizes + np.log(diagonal), (R * np.triu(shares)) @ U / diagonal[:, None]
-    return Q, sizes, U
-
-
 def _find_blocks(turn: Array) -> list[slice]:
     """Return the rows of blocks, between subspaces that the last sweep has not turned.
 
     Directions of eigenvalues of the same size go on turning, or settle slowly, and stay in one block.
     """
-    size = len(turn)
-    settled = [p for p in range(1, size) if np.abs(turn[p:, :p]).max() < _SETTLED]
-    return [slice(begin, end) for begin, end in pairwise([0, *settled, size])]
+    settled = np.flatnonzero(_measure_turns(turn) < _SETTLED) + 1
+    return [slice(begin, end) for begin, end in pairwise([0, *settled.tolist(), len(turn)])]
+
+
+def _measure_turns(turn: Array) -> Array:
+    """Return how far the last sweep has turned the subspaces of the first 1, 2, … directions, (D − 1,)."""
+    return np.array([np.abs(turn[p:, :p]).max() for p in range(1, len(turn))])
+
+
+def _is_done(turns: Array, count: int) -> bool:
+    """Return whether more sweeps change nothing: subspaces are invariant, or after some still turn round as fast."""
+    settled = turns < _SETTLED
+    return bool(settled.all() or (count >= _FEW_SWEEPS and (settled | (turns > _TURNING)).all()))
 
 
 def _solve_block(turn: Array, sizes: Array, U: Array, rows: slice) -> tuple[Array, Array]:
@@ -86,7 +133,8 @@ def _solve_block(turn: Array, sizes: Array, U: Array, rows: slice) -> tuple[Arra
     base = sizes[rows].max()
     block = turn[rows, rows] @ (np.exp(sizes[rows] - base)[:, None] * U[rows, rows])
     values, inside = np.linalg.eig(block)
-    logarithms = base + np.log(values.astype(complex))
+    with np.errstate(divide="ignore"):
+        logarithms = base + np.log(values.astype(complex))  # −∞ for 0
     vectors = np.zeros((len(sizes), len(values)), dtype=complex)
     vectors[rows] = inside
     before = slice(0, rows.start)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Self
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol.arguments import Form, Unit
@@ -55,5 +56,15 @@ class EventPlan(LawWrapper):
         observer_hz: Annotated[ArrayLike, Form.GAIN, Unit("Hz")] = CUTOFF,
     ) -> None:
         super().__init__(law, ContactRule(unwrap(law).robot, threshold, acceleration, pause))
+        self._watch(observer_hz)
+
+    def around(self, law: Controller) -> Self:
+        wrapper = super().around(law)
+        if self.observer is not None:
+            wrapper._watch(self.observer.gain / (2 * np.pi))
+        return wrapper
+
+    def _watch(self, observer_hz: ArrayLike) -> None:
+        """Let the law inside have an observer."""
         self.inner = self.inner.watching(observer_hz)
         self.observer = self.inner.observer

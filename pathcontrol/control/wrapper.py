@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from copy import copy
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,6 +56,12 @@ class LawWrapper(Controller):
         self.observer, self.observer_hz = inner.observer, inner.observer_hz
         for name in inner.gains:
             setattr(self, name, getattr(inner, name))
+
+    def around(self, law: Controller) -> Self:
+        """Return this wrapper, with its rule, around another ``law`` for the same arm and task."""
+        wrapper = copy(self)
+        LawWrapper.__init__(wrapper, law, self.rule)
+        return wrapper
 
     # --- the operator ---------------------------------------------------------------------------------------
 

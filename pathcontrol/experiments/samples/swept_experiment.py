@@ -8,7 +8,7 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from pathcontrol._arrays import Array
-from pathcontrol.arguments import Form, parameters_of
+from pathcontrol.arguments import gains_of
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.builders.arms import build_models, build_plant
@@ -39,7 +39,6 @@ from pathcontrol.sweeps.cluster.user_code import PackedBuilder
 from pathcontrol.tasks.task import PathTask
 
 _GAIN = re.compile(r"controller\.(?:parameters\.)?(\w+)(\[\d+\])*")
-_MAY_BE_ZERO = {Form.GAIN: False, Form.GAIN_OR_ZERO: True}
 _TOGETHER = ("start", "plant", "task")  # what may differ from rollout to rollout of a batch, as gains may
 _REMEMBERED = 16  # groups whose task and arm are kept from chunk to chunk
 
@@ -161,7 +160,7 @@ class SweptExperiment:
     def _gains(self, experiment: Experiment) -> dict[str, bool]:
         """Return the gains of the law, of which a batch may have a row for each rollout, and whether each may be 0."""
         place = Place(self._base_dir, experiment.to_radians)
-        return _gains_of(target_of("controller", experiment.controller, LAWS, place))
+        return gains_of(target_of("controller", experiment.controller, LAWS, place))
 
     def _check_gains(self, experiment: Experiment, sample: int) -> None:
         zero, arguments = self._gains(experiment), self._law_arguments(experiment)
@@ -197,13 +196,6 @@ class SweptExperiment:
 
 def _unpacked(data: dict[str, Any], moved: Mapping[str, str], inside: Path, folder: Path) -> SweptExperiment:
     return SweptExperiment(data, folder / inside, moved=moved)
-
-
-@lru_cache(maxsize=64)
-def _gains_of(law: Callable[..., Any]) -> dict[str, bool]:
-    """Return the gains among the arguments of a law, and which of them may be 0."""
-    forms = {name: one.form for name, one in parameters_of(law).items()}
-    return {name: _MAY_BE_ZERO[form] for name, form in forms.items() if form in _MAY_BE_ZERO}
 
 
 def _named(key: str) -> str:

@@ -1,0 +1,85 @@
+"""The gains of a law by the names of its arguments, and the law with others in their place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pathcontrol._expect import did_you_mean
+from pathcontrol.arguments import gains_of, parameters_of
+from pathcontrol.control.base import Controller
+from pathcontrol.control.wrapper import LawWrapper, unwrap
+from pathcontrol.errors import InputError, UnknownNameError
+
+
+def gains_of_law(law: Controller) -> dict[str, Any]:
+    """Return the gains of a law by the names of its arguments; of a wrapper those of the law inside.
+
+    ``observer_hz`` is one where the law has an observer whose estimate it compensates.
+    """
+    inner = unwrap(law)
+    names = dict.fromkeys([*gains_of(type(inner)), *inner.gains])
+    found = {name: getattr(inner, name, None) for name in names}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def single_gain(law: Controller, name: str) -> float | None:
+    """Return the gain of a law as one number, or ``None`` where it differs between joints.
+
+    Raises:
+        UnknownNameError: the law has no such gain.
+    """
+    value = np.unique(_find(law, name))
+    return float(value[0]) if len(value) == 1 else None
+
+
+def largest_entry(law: Controller, name: str) -> float:
+    """Return the largest number of a gain of a law."""
+    return float(np.max(_find(law, name)))
+
+
+def with_gains(law: Controller, gains: Mapping[str, ArrayLike]) -> Controller:
+    """Return the law with other ``gains``, made anew by its constructor from what :meth:`Controller.describe` says.
+
+    An argument that is not described is taken from the attribute of the same name. A wrapper is put around the law
+    inside with its new gains.
+
+    Args:
+        law: the law.
+        gains: the gains to change, in any form that the constructor takes, also with rows for several rollouts.
+
+    Raises:
+        UnknownNameError: the law has no such gain.
+        InputError: a gain has a value that the law refuses, or an argument of the law is kept nowhere.
+    """
+    for name in gains:
+        _find(law, name)
+    if isinstance(law, LawWrapper):
+        return law.around(with_gains(law.wrapped, gains))
+    kept = {**law.describe(), "robot": law.robot, "task": law.task} | gains
+    arguments = {name: kept.get(name, getattr(law, name, None)) for name in parameters_of(type(law))}
+    needed = {name for name, one in parameters_of(type(law)).items() if one.required}
+    if lost := [name for name in needed if arguments[name] is None]:
+        raise InputError(
+            f"{type(law).__name__} does not keep its argument {lost[0]!r}, so it cannot be made with other gains; store "
+            f"it as self.{lost[0]}"
+        )
+    return type(law)(**{name: value for name, value in arguments.items() if name in needed or value is not None})
+
+
+def _find(law: Controller, name: str) -> Any:
+    """Return a gain of a law."""
+    known = gains_of_law(law)
+    if name not in known:
+        of = type(unwrap(law)).__name__
+        if not known:
+            raise UnknownNameError(f"{of} has no gain {name!r}, as it names none: set {of}.gains")
+        raise UnknownNameError(
+            f"{of} has no gain {name!r}, expected one of {', '.join(known)}{did_you_mean(name, known)}",
+            argument=name,
+            choices=tuple(known),
+        )
+    return known[name]
