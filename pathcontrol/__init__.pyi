@@ -178,6 +178,7 @@ from .view.figures.path_figures import path_figure as path_figure
 from .view.figures.path_figures import phase_figure as phase_figure
 from .view.figures.scenario_figure import scenario_figure as scenario_figure
 from .view.figures.speed_figure import speed_figure as speed_figure
+from .view.figures.stability_figure import stability_figure as stability_figure
 from .view.figures.style import save_figure as save_figure
 from .view.figures.sweep_figures import basin_figure as basin_figure
 from .view.figures.sweep_figures import robustness_figure as robustness_figure

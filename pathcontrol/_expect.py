@@ -28,6 +28,7 @@ _SOURCES = {
     "MotionLimit": "MotionLimit(ToolMotion(robot, frame), speed) makes one",
     "Space": "Space.grid(…) and Space.random(…) make one",
     "SweepResult": "sweep(…) gives one, and SweepResult(FOLDER)",
+    "StabilityMap": "stability_map(law, gains) gives one",
 }
 #: what to write instead, by what was given and what was expected
 _INSTEAD = {

@@ -13,6 +13,7 @@ from pathcontrol.view.figures.path_figures import path_figure as path_figure
 from pathcontrol.view.figures.path_figures import phase_figure as phase_figure
 from pathcontrol.view.figures.scenario_figure import scenario_figure as scenario_figure
 from pathcontrol.view.figures.speed_figure import speed_figure as speed_figure
+from pathcontrol.view.figures.stability_figure import stability_figure as stability_figure
 from pathcontrol.view.figures.style import save_figure as save_figure
 from pathcontrol.view.figures.sweep_figures import basin_figure as basin_figure
 from pathcontrol.view.figures.sweep_figures import robustness_figure as robustness_figure

@@ -16,7 +16,7 @@ _TOGETHER, _MOST = 8, 40  # gains that are tried at once, and at most in either 
 
 
 def largest_gain(law: Controller, gain: str, loop: Loop = None, *, settle: int = 3) -> float:
-    """Return the largest value of a gain for which a law on its closed path is stable, with its other gains as they are.
+    """Return the largest value of a gain with which a law on its closed path is stable, its other gains as they are.
 
     From the law's own value upwards, where that is stable, and else downwards, gains are tried that double; the
     boundary max |μ| = 1 between two of them is found as by :func:`stability_map`, to 1e-6. It is that of the linearised

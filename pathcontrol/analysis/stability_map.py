@@ -13,7 +13,7 @@ from pathcontrol._arrays import Array, as_array, check_finite, check_whole
 from pathcontrol._progress import progress_bar
 from pathcontrol.analysis.gain_growth import GainGrowth, Loop
 from pathcontrol.control.base import Controller
-from pathcontrol.control.law_gains import single_gain, with_gains
+from pathcontrol.control.law_gains import single_gain, unit_of_gain, with_gains
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run_arguments import check_controller
 
@@ -30,6 +30,7 @@ class StabilityMap:
         boundary: gains at which it neither grows nor decays, found between neighbours of which one is stable, (b, 1) or
             (b, 2), to 1e-6.
         segments: pairs of rows of ``boundary`` that are ends of a piece of its line, (p, 2); none for one gain.
+        units: the unit of each gain.
         own: the law's own gains, ``None`` where one differs between joints.
         law: name of the law.
         loop: how the loop is closed; ``None`` for continuous time.
@@ -41,6 +42,7 @@ class StabilityMap:
     multiplier: Array
     boundary: Array
     segments: NDArray[np.intp]
+    units: tuple[str, ...]
     own: tuple[float | None, ...]
     law: str
     loop: Loop
@@ -95,7 +97,8 @@ def stability_map(
     low, high = (points[tuple(end.T)] for end in ends)
     boundary = grow.find_roots(low, high)
     segments = _link(*ends)
-    return StabilityMap(names, grids, growth, multiplier, boundary, segments, own, type(law).__name__, loop)
+    units, name = tuple(unit_of_gain(law, name) for name in names), type(law).__name__
+    return StabilityMap(names, grids, growth, multiplier, boundary, segments, units, own, name, loop)
 
 
 def _check_gains(gains: Any) -> tuple[tuple[str, ...], tuple[Array, ...]]:

@@ -41,6 +41,12 @@ def largest_entry(law: Controller, name: str) -> float:
     return float(np.max(_find(law, name)))
 
 
+def unit_of_gain(law: Controller, name: str) -> str:
+    """Return the unit of a gain, for joints that turn; empty where the law does not say it."""
+    unit = parameters_of(type(unwrap(law)))[name].unit if name in parameters_of(type(unwrap(law))) else None
+    return unit.names[0] if unit is not None else ""
+
+
 def with_gains(law: Controller, gains: Mapping[str, ArrayLike]) -> Controller:
     """Return the law with other ``gains``, made anew by its constructor from what :meth:`Controller.describe` says.
 
@@ -59,13 +65,13 @@ def with_gains(law: Controller, gains: Mapping[str, ArrayLike]) -> Controller:
         _find(law, name)
     if isinstance(law, LawWrapper):
         return law.around(with_gains(law.wrapped, gains))
-    kept = {**law.describe(), "robot": law.robot, "task": law.task} | gains
-    arguments = {name: kept.get(name, getattr(law, name, None)) for name in parameters_of(type(law))}
+    kept: dict[str, Any] = {**law.describe(), "robot": law.robot, "task": law.task, **gains}
+    arguments: dict[str, Any] = {name: kept.get(name, getattr(law, name, None)) for name in parameters_of(type(law))}
     needed = {name for name, one in parameters_of(type(law)).items() if one.required}
     if lost := [name for name in needed if arguments[name] is None]:
         raise InputError(
-            f"{type(law).__name__} does not keep its argument {lost[0]!r}, so it cannot be made with other gains; store "
-            f"it as self.{lost[0]}"
+            f"{type(law).__name__} does not keep its argument {lost[0]!r}, so it cannot be made with other gains; "
+            f"store it as self.{lost[0]}"
         )
     return type(law)(**{name: value for name, value in arguments.items() if name in needed or value is not None})
 
