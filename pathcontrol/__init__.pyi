@@ -15,6 +15,8 @@ from .analysis.lyapunov_functions import lyapunov as lyapunov
 from .analysis.pareto import non_dominated as non_dominated
 from .analysis.path_accuracy import PathAccuracy as PathAccuracy
 from .analysis.path_accuracy import accuracy as accuracy
+from .analysis.power_balance import PowerBalance as PowerBalance
+from .analysis.power_balance import power_balance as power_balance
 from .analysis.run_metrics import contour_error as contour_error
 from .analysis.run_metrics import end_error as end_error
 from .analysis.run_metrics import lag_error as lag_error
@@ -176,6 +178,7 @@ from .view.figures.observer_figure import observer_figure as observer_figure
 from .view.figures.pareto_figure import pareto_figure as pareto_figure
 from .view.figures.path_figures import path_figure as path_figure
 from .view.figures.path_figures import phase_figure as phase_figure
+from .view.figures.power_balance_figure import power_balance_figure as power_balance_figure
 from .view.figures.scenario_figure import scenario_figure as scenario_figure
 from .view.figures.speed_figure import speed_figure as speed_figure
 from .view.figures.stability_figure import stability_figure as stability_figure

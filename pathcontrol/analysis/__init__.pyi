@@ -13,6 +13,8 @@ from .lyapunov_functions import lyapunov as lyapunov
 from .pareto import non_dominated as non_dominated
 from .path_accuracy import PathAccuracy as PathAccuracy
 from .path_accuracy import accuracy as accuracy
+from .power_balance import PowerBalance as PowerBalance
+from .power_balance import power_balance as power_balance
 from .run_metrics import contour_error as contour_error
 from .run_metrics import end_error as end_error
 from .run_metrics import lag_error as lag_error

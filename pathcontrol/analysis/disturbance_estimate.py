@@ -11,6 +11,7 @@ from pathcontrol._arrays import Array, as_array
 from pathcontrol._expect import expect, expect_choice
 from pathcontrol.control.base import KnownFriction
 from pathcontrol.errors import InputError
+from pathcontrol.robot.batch import select_friction
 from pathcontrol.robot.friction import FrictionLaw, levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.config import table
@@ -63,8 +64,8 @@ def momentum_observer(
     expect_choice("friction", friction, get_args(KnownFriction))
     rate = 2 * np.pi * _check_cutoff(cutoff_hz, arm)
     time, q, qd = motion_of(run, measured)
-    known = zip(q, qd, _mean_torque(run, time), strict=True)
-    means = [_mean_disturbance(arm, friction, np.diff(time)[:, None], *rollout) for rollout in known]
+    known, dt = enumerate(zip(q, qd, _mean_torque(run, time), strict=True)), np.diff(time)[:, None]
+    means = [_mean_disturbance(select_friction(arm, i), friction, dt, *rollout) for i, rollout in known]
     return _low_pass(np.stack(means), np.diff(time), rate, np.where(np.isfinite(q[:, 0]), 0.0, np.nan))
 
 
@@ -90,7 +91,7 @@ def _check_cutoff(cutoff_hz: ArrayLike, arm: RobotModel) -> Array:
     return np.broadcast_to(cutoff, (arm.n,))
 
 
-def _loop_number(run: Run, name: str) -> float:
+def loop_number(run: Run, name: str) -> float:
     """Return a number of the loop's settings that is not negative; 0 where there is none."""
     try:
         number = float(table(run.config, "loop").get(name, 0.0))
@@ -102,7 +103,7 @@ def _loop_number(run: Run, name: str) -> float:
 def _velocity_age(run: Run) -> float:
     """Return how long ago [s] the arm had the velocity of a sample: half a period for a difference of positions."""
     by_difference = table(run.config, "loop").get("velocity") == "difference"
-    return 0.5 * _loop_number(run, "period") if by_difference else 0.0
+    return 0.5 * loop_number(run, "period") if by_difference else 0.0
 
 
 def motion_of(run: Run, measured: bool) -> tuple[Array, Array, Array]:
@@ -118,7 +119,7 @@ def motion_of(run: Run, measured: bool) -> tuple[Array, Array, Array]:
 def _unfiltered(run: Run) -> Array:
     """Return the measured velocities before the low-pass filter of the loop, (rollout, time, n)."""
     qd = run.array("qd_measured")
-    new = -np.expm1(-2 * np.pi * _loop_number(run, "filter_hz") * _loop_number(run, "period"))
+    new = -np.expm1(-2 * np.pi * loop_number(run, "filter_hz") * loop_number(run, "period"))
     if not new:
         return qd
     return np.concatenate([qd[:, :1], qd[:, :-1] + np.diff(qd, axis=1) / new], axis=1)
@@ -166,19 +167,34 @@ def _torque_lead(run: Run) -> float:
     change on the way, it is half a period: the trapezoidal rule.
     """
     if table(run.config, "loop").get("loop") == "continuous":
-        return 0.5 * _loop_number(run, "output_period")
-    period = _loop_number(run, "period")
-    late = split_delay(_loop_number(run, "delay"), period)[1] if period else 0.0
+        return 0.5 * loop_number(run, "output_period")
+    period = loop_number(run, "period")
+    late = split_delay(loop_number(run, "delay"), period)[1] if period else 0.0
     return period - late if late else 0.0
 
 
 def _mean_disturbance(arm: RobotModel, friction: KnownFriction, dt: Array, q: Array, qd: Array, tau: Array) -> Array:
-    """Return the mean of d between the samples of one rollout, (time − 1, n): what τ does not explain of Δp."""
+    """Return the mean of d between the samples of one rollout, (time − 1, n)."""
+    if friction == "full":
+        return split_unexplained(arm, dt, q, qd, tau)[1]
+    unexplained = _unexplained(arm, dt, q, qd, tau)
+    return unexplained if friction == "none" else unexplained + viscous_of(arm.friction) * _between(qd)
+
+
+def split_unexplained(arm: RobotModel, dt: Array, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
+    """Return the mean dry friction and the mean of d between the samples of one rollout [N m], (time − 1, n) each.
+
+    The motion is q [rad] and q̇ [rad/s], (time, n), under mean torques τ [N m], (time − 1, n), over dt [s].
+    """
+    smooth = _unexplained(arm, dt, q, qd, tau) + viscous_of(arm.friction) * _between(qd)
+    dry = _dry_friction(arm.friction, qd, -smooth)
+    return dry, smooth + dry
+
+
+def _unexplained(arm: RobotModel, dt: Array, q: Array, qd: Array, tau: Array) -> Array:
+    """Return what τ does not explain of Δp, over dt, (time − 1, n)."""
     rate = arm.momentum_rate(q, qd, np.zeros(arm.n))
-    unexplained = np.diff(arm.momentum(q, qd), axis=0) / dt - tau - _between(rate)
-    if friction != "none":
-        unexplained += viscous_of(arm.friction) * _between(qd)
-    return unexplained + _dry_friction(arm.friction, qd, -unexplained) if friction == "full" else unexplained
+    return np.diff(arm.momentum(q, qd), axis=0) / dt - tau - _between(rate)
 
 
 def _dry_friction(law: FrictionLaw, qd: Array, wanted: Array) -> Array:

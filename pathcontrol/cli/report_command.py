@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,14 +61,16 @@ def command(
         words += [option, str(value)] if value is not None else []
     told = {"title": title, "command": shlex.join(words), "sweep": sweep_of(runs)}
     page = report(one_or_all(loaded), out, layout=layout, **told)  # type: ignore[arg-type]
-    tell(loaded, {"report": page}, as_json, {"accuracy": _measure_accuracy(loaded)} if as_json else {})
+    tell(loaded, {"report": page}, as_json, _analyse(loaded) if as_json else {})
     if opened:
         open_page(page)
 
 
-def _measure_accuracy(runs: Mapping[str, Run]) -> dict[str, Any]:
-    """Return the accuracy of each run that has cycles to compare, as JSON takes it."""
+def _analyse(runs: Mapping[str, Run]) -> dict[str, Any]:
+    """Return accuracy and power balance of each run that has them, as JSON takes them."""
     from pathcontrol.analysis.accuracy_table import find_accuracy
+    from pathcontrol.analysis.power_balance_table import find_power_balance
 
-    found = {name: find_accuracy(run) for name, run in runs.items()}
-    return {name: one.to_dict() for name, one in found.items() if one is not None}
+    kinds: dict[str, Callable[[Run], Any]] = {"accuracy": find_accuracy, "power_balance": find_power_balance}
+    found = {kind: {name: find(run) for name, run in runs.items()} for kind, find in kinds.items()}
+    return {kind: {n: one.to_dict() for n, one in each.items() if one is not None} for kind, each in found.items()}

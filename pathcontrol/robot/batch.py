@@ -14,7 +14,7 @@ from pathcontrol._arrays import Array, merge_rows
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.robot.actuation import Actuation, Limits
-from pathcontrol.robot.friction import FrictionLaw, friction_of_each
+from pathcontrol.robot.friction import FrictionLaw, friction_of_each, levels_of, select_rollout, viscous_of
 from pathcontrol.robot.model import RobotModel
 
 
@@ -90,6 +90,14 @@ class RobotBatch:
         """Return M(q) [kg m²], (k, n, n), of the arms of the ``rows`` (k,), at q (k, n)."""
         each = [self.bodies[body].mass_matrix(one) for body, one in zip(self.body[rows].tolist(), q, strict=True)]
         return np.reshape(each, (len(rows), self.n, self.n))
+
+
+def select_friction(robot: RobotModel, row: int) -> RobotModel:
+    """Return an arm with the friction of one rollout, from one with a row of coefficients for each."""
+    law = robot.friction
+    if all(part.ndim < 2 for part in (viscous_of(law), *levels_of(law, np.zeros(robot.n)))):
+        return robot
+    return robot.with_friction(select_rollout(law, row))
 
 
 def _distinct_bodies(robots: Sequence[RobotModel]) -> tuple[list[RobotModel], NDArray[np.intp]]:

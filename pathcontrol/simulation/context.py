@@ -11,7 +11,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError, warn
-from pathcontrol.robot.batch import RobotBatch
+from pathcontrol.robot.batch import RobotBatch, select_friction
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.storage.array_store import ArrayStore
 from pathcontrol.tasks.batch.task_batch import TaskBatch
@@ -125,9 +125,14 @@ class RunContext:
 
     def rollout(self, number: int) -> RunContext:
         """Return the context of one rollout."""
-        if self._stored is not None or (self._robots is None and not isinstance(self.task, TaskBatch)):
+        arm = self.robot if self._robots is None else self._robots[number]
+        first = self._first() if self._robots is not None else 0
+        robot = None if arm is None else select_friction(arm, number - first)
+        if robot is arm and (
+            self._stored is not None or (self._robots is None and not isinstance(self.task, TaskBatch))
+        ):
             return self
-        robot, task = self.robot if self._robots is None else self._robots[number], self.task_of(np.array([number]))
+        task = self.task_of(np.array([number]))
         return RunContext(lambda: robot, lambda: task, model=self._model)
 
     def with_robot(self, robot: RobotModel) -> RunContext:

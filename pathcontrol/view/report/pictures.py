@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from pathcontrol.analysis.observing_laws import compensates_observed, halts_at_contacts
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
-from pathcontrol.errors import InputError
+from pathcontrol.errors import InputError, PathControlError
 from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
 
@@ -79,6 +79,8 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
             yield "Torques beside those of motors, as the law compensates them", observer_figure(shown)
         if any(table(run.config, "disturbance") or halts_at_contacts(run) for run in runs.values()):
             yield "Torques beside those of motors and friction", observer_figure(shown, friction="full")
+    if (balance := _draw_power_balance(shown)) is not None:
+        yield "Lyapunov function, and the causes of its rate", balance
     if any(largest_shares(run) for run in runs.values()):
         yield "Shares of limits", limits_figure(shown)
     if "qd" in recorded:
@@ -96,6 +98,16 @@ def _draw_ballbar(runs: Run | Mapping[str, Run]) -> Figure | None:
     try:
         return ballbar_figure(runs)
     except (InputError, KeyError):
+        return None
+
+
+def _draw_power_balance(runs: Run | Mapping[str, Run]) -> Figure | None:
+    """Return the figure of the power balance, where all runs have one."""
+    from pathcontrol.view.figures.power_balance_figure import power_balance_figure
+
+    try:
+        return power_balance_figure(runs)
+    except PathControlError:
         return None
 
 

@@ -16,6 +16,7 @@ from markupsafe import Markup, escape
 from pathcontrol.analysis.accuracy_table import accuracy_table
 from pathcontrol.analysis.contours import contour_table
 from pathcontrol.analysis.lap_table import lap_table
+from pathcontrol.analysis.power_balance_table import power_balance_table
 from pathcontrol.analysis.readable import describe_outcomes
 from pathcontrol.analysis.run_metrics import LABELS, UNITS
 from pathcontrol.analysis.run_remarks import remarks
@@ -55,6 +56,7 @@ def sections(runs: Mapping[str, Run], made_by: str, sweep: SweepResult | None = 
             remarks=[(name, sentence) for name, run in runs.items() for sentence in remarks(run)],
             contours=[(name, table) for name, run in runs.items() if (table := contour_table(run))],
             accuracy=[(name, table) for name, run in runs.items() if (table := accuracy_table(run))],
+            power=[(name, table) for name, run in runs.items() if (table := power_balance_table(run))],
             laps=[(name, table) for name, run in runs.items() if (table := lap_table(run))],
             window=describe_window(),
             files=[_metrics_file(numbers), json_file("configuration.json", configuration), *_signals(runs)],

@@ -14,6 +14,7 @@ from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.animation.charts.chart import Chart, Curve, Entry
 from pathcontrol.view.animation.charts.joint_curves import joint_curves
 from pathcontrol.view.animation.charts.observed_torques import observed_torques
+from pathcontrol.view.animation.charts.power_curves import power_balance_curves
 from pathcontrol.view.animation.drawn_rollout import DrawnRollout
 from pathcontrol.view.animation.path_error import MILLIMETRE
 from pathcontrol.view.animation.rollout import Recording
@@ -29,6 +30,7 @@ def charts(drawn_rollouts: Sequence[DrawnRollout]) -> list[Chart]:
         _rates,
         _torques,
         observed_torques,
+        power_balance_curves,
         _shares,
     )
     for maker in makers:

@@ -1,0 +1,28 @@
+"""The chart of the power balance: how fast the Lyapunov function of a law decays, and by which causes."""
+
+from __future__ import annotations
+
+from pathcontrol.analysis.power_balance_table import find_power_balance, list_causes, relative_rates
+from pathcontrol.view.animation.charts.chart import Curve, Entry
+from pathcontrol.view.animation.drawn_rollout import DrawnRollout
+
+_WINDOWS = 200
+
+
+def power_balance_curves(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[Entry]:
+    """Return the relative rates of V [1/s] over windows of time, of several runs the measured one.
+
+    There is none for a law without a theorem.
+    """
+    recording = drawn_rollout.recording
+    balance = find_power_balance(recording.run.with_robot(recording.robot))
+    if balance is None:
+        return []
+    times, rates = relative_rates(balance, windows=_WINDOWS)
+    times = times - balance.time[0]
+    if several:
+        return [("rate of V over V", "1/s", [Curve(recording.name, times, rates["measured"], index)])]
+    curves = [Curve("predicted", times, rates["predicted"], index, "reference")]
+    names = ["measured", *list_causes(rates)]
+    curves += [Curve(name, times, rates[name], index, shade=i) for i, name in enumerate(names)]
+    return [("rate of V over V, by cause", "1/s", curves)]
