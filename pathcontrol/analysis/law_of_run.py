@@ -57,7 +57,7 @@ def find_law(run: Run, controller: Controller | None) -> Controller:
     if make is None:
         raise InputError(f"the law of the run is {name or 'not known'!r}, which cannot be made again; {_GIVE}")
     try:
-        law = make(run.model, resolve_task(run, None), **_select_arguments(make, described))
+        law = make(run.model, resolve_task(run, None), **_select_rows(run, _select_arguments(make, described)))
     except TypeError as error:  # a law of one's own, which keeps its arguments under other names
         raise InputError(f"the law of the run, {name}, cannot be made again: {error}; {_GIVE}") from error
     expect("controller", law, Controller)
@@ -87,6 +87,19 @@ def replay(run: Run, controller: Controller) -> LawRecord:
         if np.isfinite(period):
             z = controller.advance(z, out._replace(tau=torque), float(period))
     return LawRecord(*(np.stack(parts) for parts in zip(*found, strict=True)))
+
+
+def _select_rows(run: Run, arguments: dict[str, Any]) -> dict[str, Any]:
+    """Return arguments with the gains of the rollouts that a run still has, where each has a row."""
+    rows = run.array("rollout") - int(run.config.get("first_rollout") or 0)
+    found = {}
+    for name, value in arguments.items():
+        array = np.asarray(value)
+        own = array.ndim == 2 or (name == "k" and array.ndim == 1)
+        if own and array.shape[0] != 1 and rows.max() >= len(array):
+            raise InputError(f"{name} of the run has {len(array)} rows, it has a rollout {rows.max()}; {_GIVE}")
+        found[name] = array[rows, None] if own and array.ndim == 1 else array[rows] if own and len(array) > 1 else value
+    return found
 
 
 def _select_arguments(make: Any, described: Mapping[str, Any]) -> dict[str, Any]:
