@@ -51,10 +51,11 @@ from .control.motion_control import PDPlus as PDPlus
 from .control.motion_control import SlotineLi as SlotineLi
 from .control.motion_control import Tracking as Tracking
 from .control.paced import Paced as Paced
+from .control.passive_velocity_field import PassiveVelocityField as PassiveVelocityField
 from .control.projection import Projection as Projection
+from .control.reference_law import Reference as Reference
 from .control.speed_override import SpeedOverride as SpeedOverride
 from .control.speed_rule import SpeedRule as SpeedRule
-from .control.state_to_reference import Reference as Reference
 from .control.state_to_reference import StateToReferenceProjection as StateToReferenceProjection
 from .control.wrapper import LawWrapper as LawWrapper
 from .engine.control_tick import ControlTick as ControlTick

@@ -53,6 +53,7 @@ LAWS = Kind(
         "pd_plus": "control.motion_control:PDPlus",
         "slotine_li": "control.motion_control:SlotineLi",
         "adaptive_slotine_li": "control.adaptive_slotine_li:AdaptiveSlotineLi",
+        "passive_velocity_field": "control.passive_velocity_field:PassiveVelocityField",
         "speed_override": "control.speed_override:SpeedOverride",
         "paced": "control.paced:Paced",
         "event_plan": "control.event_plan:EventPlan",

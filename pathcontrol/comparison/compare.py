@@ -101,7 +101,9 @@ def compare(
     them begin at the point nearest to the arm. The same numbers come out for a rollout alone and among others.
 
     ``"all"`` adds the laws of other sources, which may be named too: ``"adaptive_slotine_li"`` has the gains of Slotine
-    and Li's law, the plan of the extended motion plan, and an adaptation of 0.001 1/J.
+    and Li's law, the plan of the extended motion plan, and an adaptation of 0.001 1/J;
+    ``"passive_velocity_field"`` has ΛK_v = K_p and Λ + K_v = K_v of these, or Λ = K_v = √K_p, means of all joints,
+    and a recharge of 10 1/s.
 
     The measures, of the event and the time after it (without one of the second half of a closed path, or of a whole
     open one), in SI units:

@@ -9,10 +9,12 @@ import numpy as np
 from pathcontrol.comparison.shared_gains import Gains, mean_inertia, mean_plan_gain, split_damping
 from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
 from pathcontrol.control.base import Controller, Start
+from pathcontrol.control.passive_velocity_field import PassiveVelocityField
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask
 
 _ADAPTATION = 1e-3  # 1/J: more takes what a wall or a jam does to the arm for mass
+_RECHARGE = 10.0  # 1/s: without it the dry friction of the arm would bring it to rest
 
 
 def _adaptive_slotine_li(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
@@ -22,7 +24,14 @@ def _adaptive_slotine_li(robot: RobotModel, task: PathTask, gains: Gains, start:
     return AdaptiveSlotineLi(robot, task, Lambda, mean_inertia(robot, task) * damping, _ADAPTATION, k, start=start)
 
 
+def _passive_velocity_field(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+    """Return passive velocity field control with the poles Λ and K_v beside the path, where it can have them."""
+    Lambda, K_v = split_damping(*(np.asarray(gain, dtype=np.float64).mean(keepdims=True) for gain in gains[:2]))
+    return PassiveVelocityField(robot, task, Lambda.item(), K_v.item(), recharge=_RECHARGE, start=start)
+
+
 #: how each law is made, by its name
 FAMILY: dict[str, Callable[[RobotModel, PathTask, Gains, Start], Controller]] = {
     "adaptive_slotine_li": _adaptive_slotine_li,
+    "passive_velocity_field": _passive_velocity_field,
 }

@@ -16,6 +16,7 @@ from pathcontrol.control.event_plan import EventPlan
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.paced import Paced
+from pathcontrol.control.passive_velocity_field import PassiveVelocityField
 from pathcontrol.control.projection import Projection
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.control.wrapper import unwrap
@@ -98,6 +99,8 @@ def recover_gains(law: Controller) -> Gains:
     elif isinstance(law, SlotineLi | AdaptiveSlotineLi):
         damping = law.K_d / mean_inertia(law.robot, law.task)
         gains = Gains(law.Lambda * damping, law.Lambda + damping)
+    elif isinstance(law, PassiveVelocityField):
+        gains = Gains(law.Lambda * law.K_v, law.Lambda + law.K_v)
     else:
         name = type(law).__name__
         raise InputError(f"the gains of {name} mean nothing to other laws; expected one of {', '.join(KNOWN_LAWS)}")

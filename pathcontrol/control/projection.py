@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import FrictionCompensation, Start, scalar_gain
-from pathcontrol.control.branch import Branch, BranchPolicy
-from pathcontrol.control.state_to_reference import STEEPEST, Reference, StateToReferenceProjection
+from pathcontrol.control.branch import Branch
+from pathcontrol.control.nearest_point import NearestPoint
+from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.task import PathTask
 
 
-class Projection(StateToReferenceProjection):
+class Projection(NearestPoint, StateToReferenceProjection):
     """Path control by projection, eq. (39): a path controller for any path.
 
         (q_d(σ̄) − q)ᵀq_d'(σ̄) = 0,    dσ̄/dt = q_d'ᵀq̇ / (‖q_d'‖² + e_pᵀq_d'')
@@ -64,42 +63,12 @@ class Projection(StateToReferenceProjection):
         observer_hz: Annotated[ArrayLike, Form.GAIN, Unit("Hz")] | None = None,
     ) -> None:
         self.k_p = scalar_gain("k_p", k_p)
-        given = {"friction": friction, "start": "s0" if start is None else start, "observer_hz": observer_hz}
-        super().__init__(robot, task, self.k_p, K_v, **given)
-        # an open path may end close to where it begins, and an arm at its begin be nearer to the end
-        if start is None and not np.all(np.isfinite(task.s_end)):
-            self.start_at = "nearest"
-        self.branches = BranchPolicy(branch, capture)
+        given: dict[str, Any] = {"friction": friction, "start": start, "observer_hz": observer_hz}
+        super().__init__(robot, task, branch, capture, K_p=self.k_p, K_v=K_v, **given)
 
     def reference(self, q: Array, qd: Array, near: Array) -> Array:
         return self.project(q, qd, near).s
 
-    def project(self, q: Array, qd: Array, near: Array) -> Reference:
-        """Return σ̄ with its gradient q_d'ᵀ/(‖q_d'‖² + e_pᵀq_d'')."""
-        s = self.branches.sigma_bar(self.task, q, near)
-        point = self.point(s)
-        if (elsewhere := self.branches.captured(self.task, q, s, point.q_d)) is not s:
-            s, point = elsewhere, self.point(elsewhere)
-        squared = np.vecdot(point.dq_d, point.dq_d)
-        denominator = squared + np.vecdot(point.q_d - q, point.ddq_d)
-        regular = denominator * STEEPEST > squared
-        if not regular.all():
-            s = np.where(regular, s, near)
-            point = self.point(s)
-        moves = (regular & ~self._held_by_end(s, q, point))[..., None]
-        gradient = np.divide(point.dq_d, denominator[..., None], out=np.zeros_like(point.dq_d), where=moves)
-        return Reference(s, point, gradient, None, regular)
-
     @property
     def metric(self) -> Array:
         return self.k_p
-
-    def describe(self) -> dict[str, Any]:
-        return super().describe() | {"branch": self.branches.branch, "capture": self.branches.capture}
-
-    def _held_by_end(self, s: Array, q: Array, point: PathPoint) -> Array:
-        """Return where the nearest point is an end of the open path and stays there as the arm moves."""
-        if self.task.closed:
-            return np.zeros(s.shape, dtype=bool)
-        along = ((q - point.q_d) * point.dq_d).sum(-1)
-        return (s <= self.task.s0) & (along < 0) | (s >= self.task.s_end) & (along > 0)

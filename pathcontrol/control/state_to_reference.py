@@ -3,53 +3,23 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
+from pathcontrol.control.base import ControlOutput, diagonal_gain
 from pathcontrol.control.branch import shift_to_lap
+from pathcontrol.control.reference_law import STEEPEST, Reference, ReferenceLaw
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.task import PathTask
 
-#: σ is called irregular where it changes this many times as fast with q as on the path
-STEEPEST = 1e6
-_CATCH_UP = 1e-2  # s, time constant with which the state of continuous time converges to σ after it jumped
 _STEP = 6e-6  # rad and rad/s, of central differences: the cube root of the precision of numbers
 
 
-class Reference(NamedTuple):
-    """A motion reference σ and its gradients in the state of the arm.
-
-    Attributes:
-        s: σ = Π(q, q̇), (*batch,).
-        point: the task at σ.
-        position_gradient: Π_q = ∂Π/∂q [1/rad], (*batch, n).
-        velocity_gradient: Π_q̇ = ∂Π/∂q̇ [s/rad], (*batch, n); ``None`` where Π is of the posture alone.
-        regular: False where Π, or σ̇ with it, is not defined, and the last σ was kept, (*batch,).
-    """
-
-    s: Array
-    point: PathPoint
-    position_gradient: Array
-    velocity_gradient: Array | None
-    regular: Array
-
-    def rate(self, qd: Array, free: Array) -> Array:
-        """Return σ̇ [1/s], (*batch,), of an arm with q̇ and q̈ = r'σ̇ + ``free``, (*batch, n); 0 where not regular."""
-        along = np.vecdot(self.position_gradient, qd)
-        if self.velocity_gradient is None:
-            return np.where(self.regular, along, 0.0)
-        along = along + np.vecdot(self.velocity_gradient, free)
-        left = 1 - np.vecdot(self.velocity_gradient, self.point.velocity_slope)
-        return np.divide(along, left, out=np.zeros_like(along), where=self.regular)
-
-
-class StateToReferenceProjection(Controller):
+class StateToReferenceProjection(ReferenceLaw):
     """Path control whose motion reference is a function of the state of the arm, σ = Π(q, q̇).
 
     In this law a *state-to-reference projection* Π stands in place of time (reference [3] of the paper). The torque is
@@ -125,44 +95,19 @@ class StateToReferenceProjection(Controller):
         regular = known & (steepness < STEEPEST) & ((1 - np.vecdot(by_qd, point.velocity_slope)) * STEEPEST > 1)
         return Reference(s, point, by_q, by_qd, regular)
 
-    def first_parameter(self, q: Array, qd: Array) -> Array:
-        """Return σ, (*batch,), of an arm that starts at (q, q̇)."""
-        return self.project(q, qd, super().first_parameter(q, qd)).s
-
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
-        last, none = z[..., 0], np.zeros(z.shape[:-1])
-        found, slope = self.project(q, qd, last), none
-        s, point, regular = found.s, found.point, found.regular
-        timed = self._is_timed(last)
-        if timed.any():
-            s = np.where(timed, last, s)
-            point = self.point(s)
-            slope, regular = np.where(timed, point.dtheta, 0.0), regular | timed
-        e_p, e_v = point.q_d - q, point.velocity - qd
-        feedback = self.K_v * e_v + self.K_p * e_p
-        sdot = np.where(timed, point.theta, found.rate(qd, feedback))
-        qdd = point.velocity_slope * sdot[..., None] + feedback
-        tau = self.robot.inverse_dynamics(q, qd, qdd) + self.friction_torque(qd, point.velocity)
-        # in continuous time the state integrates σ̇; its offset, as after a change of branch, decays exponentially
-        zdot = sdot + np.where(regular, (s - last) / _CATCH_UP, 0.0)
-        out = ControlOutput(tau, zdot[..., None], s, sdot, slope, none, e_p, e_v, regular)
-        return self.compensate(t, q, qd, z, out)
-
-    def speed_response(self, s: Array, theta: Array) -> Array:
-        return np.where(self.timed(s), theta, 0.0)
+        here = self.locate(q, qd, z[..., 0])
+        feedback = self.K_v * here.e_v + self.K_p * here.e_p
+        sdot = np.where(here.timed, here.point.theta, here.found.rate(qd, feedback))
+        qdd = here.point.velocity_slope * sdot[..., None] + feedback
+        return self.conclude(t, q, qd, z, here, self.robot.inverse_dynamics(q, qd, qdd), sdot)
 
     def speed_gradient(self, q: Array, qd: Array, s: Array, velocity: Array) -> tuple[Array, Array]:
         found = self.project(q, qd, s)
         if found.velocity_gradient is None:
             return super().speed_gradient(q, qd, s, velocity)
-        change = np.where(self._is_timed(s), 0.0, found.rate(np.zeros_like(qd), velocity))
+        change = np.where(self.is_timed(s), 0.0, found.rate(np.zeros_like(qd), velocity))
         return velocity + found.point.velocity_slope * change[..., None], change
-
-    def _is_timed(self, s: Array) -> NDArray[np.bool_]:
-        """Return where the plan is timed, (*batch,), without a look where it never is."""
-        if self.ending is None and self.speed is None:
-            return np.zeros(s.shape, dtype=bool)
-        return self.timed(s)
 
     def _find(self, q: Array, qd: Array, near: Array) -> Array:
         """Return σ, (*batch,), in the lap of ``near``, or within the ends of an open path."""

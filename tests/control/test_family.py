@@ -15,6 +15,7 @@ from pathcontrol.view.report.reproduction import recipe
 #: gains of each law, by its name in files
 FAMILY = {
     "adaptive_slotine_li": {"Lambda": 10.0, "K_d": [40.0, 4.0], "adaptation": 0.1, "k": 20.0},
+    "passive_velocity_field": {"Lambda": 10.0, "K_v": 30.0, "recharge": 5.0},
 }
 WIDE = {"torque": 1e6, "torque_rate": 1e12, "velocity": 1e3, "lower": -1e3, "upper": 1e3, "tube": np.inf}
 START = np.array([0.8, 0.3])
