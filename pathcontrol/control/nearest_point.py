@@ -69,6 +69,9 @@ class NearestPoint(ReferenceLaw):
         gradient = np.divide(point.dq_d, denominator[..., None], out=np.zeros_like(point.dq_d), where=moves)
         return Reference(s, point, gradient, None, regular)
 
+    def speed_gradient(self, q: Array, qd: Array, s: Array, velocity: Array) -> tuple[Array, Array]:
+        return velocity, np.zeros(s.shape)  # the nearest point does not depend on q̇
+
     def describe(self) -> dict[str, Any]:
         return super().describe() | {"branch": self.branches.branch, "capture": self.branches.capture}
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import cumulative_simpson
 from scipy.optimize import brentq
 from strategies import floats, gains, tasks, vectors
 
@@ -68,12 +69,12 @@ def test_what_any_motion_reference_does_to_v(ideal_arm, task, state, k_p, K_v, l
 def test_v_falls_as_the_theorem_says_from_where_the_arm_is_let_go(ideal_arm, kind):
     """A push halts the plan; from its end on, held, waiting and speeding up again, V follows the V̇ of the theorem."""
     controller = pc.EventPlan(law(kind, ideal_arm), threshold=[5.0, 1.0], acceleration=8.0, pause=0.1)
-    loop = pc.ContinuousTime(output_period=2.5e-4)
+    loop = pc.ContinuousTime(output_period=1e-3)
     pushed = run(controller, duration=1.2, loop=loop, disturbance=pc.Push([40.0, 6.0], 0.3, 0.3))
-    free, w = pushed.time > 0.6005, pc.speed_factor(pushed)[0]
+    free, w = pushed.time > 0.602, pc.speed_factor(pushed)[0]
     V, Vdot = (part[0, free] for part in pc.lyapunov(controller, pushed))
-    change = np.concatenate([[0.0], np.cumsum(1.25e-4 * (Vdot[1:] + Vdot[:-1]))])
-    assert_allclose(V, V[0] + change, rtol=0, atol=5e-4 * V[0])  # the trapezoidal rule: h²(2K_v)²/12
+    change = cumulative_simpson(Vdot, dx=1e-3, initial=0)
+    assert_allclose(V, V[0] + change, rtol=0, atol=5e-4 * V[0])  # Simpson's rule: h⁴(2K_v)⁴/180
     assert (Vdot <= 0).all()
     assert w[free].min() < 0.01
     assert w[-1] > 0.99
@@ -104,17 +105,17 @@ def test_nothing_changes_where_nothing_is_met(kind):
 @every_law
 def test_in_a_jam_it_does_not_push_on_and_leaves_its_path_less(kind):
     """The torque of the jammed joint is at its limit for less of the time; the arm goes on when it is let go."""
-    jam = pc.JammedJoint(1, 4.0, 0.6)  # when the errors that friction leaves are those of every lap
-    plain, event = (run(one, duration=7.0, disturbance=jam) for one in (law(kind), pc.EventPlan(law(kind))))
-    jammed, after = (plain.time > 4.0) & (plain.time < 4.6), plain.time > 4.0
+    jam = pc.JammedJoint(1, 2.0, 0.6)  # when the errors that friction leaves are those of every lap
+    plain, event = (run(one, duration=4.5, disturbance=jam) for one in (law(kind), pc.EventPlan(law(kind))))
+    jammed, after = (plain.time > 2.0) & (plain.time < 2.6), plain.time > 2.0
     peaks = [np.abs(pc.contour_error(one)[0, after]).max() for one in (plain, event)]
     pushes = [np.abs(one.array("tau")[0, jammed, 1]).mean() for one in (plain, event)]
     assert peaks[1] < 0.5 * peaks[0]
     assert pushes[1] < (0.5 if kind is not pc.ComputedTorque else 1.0) * pushes[0]
     w = pc.speed_factor(event)[0]
     assert w[jammed].min() < 0.01
-    assert w[event.time > 5.5].min() > 0.99
-    assert np.ptp(event.array("s")[0, event.time > 5.5]) > 0.8 * 2.0 * 1.5
+    assert w[event.time > 3.5].min() > 0.99
+    assert np.ptp(event.array("s")[0, event.time > 3.5]) > 0.8 * 2.0 * 1.0
 
 
 @pytest.mark.parametrize("kind", KINDS[:2])

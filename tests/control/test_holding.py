@@ -54,7 +54,7 @@ def hold_everywhere(law, arm, **settings):
     begin = 3.0 + np.pi * np.arange(10) / 10
     loop = pc.SampledLoop(PERIOD, torque_limits=True)
     held = pc.SpeedOverride(law, lambda t: np.where((t >= begin) & (t < begin + 1.0), 0.0, 1.0))
-    settings = {"duration": 8.0, "loop": loop, "progress": False} | settings
+    settings = {"duration": 7.5, "loop": loop, "progress": False} | settings
     return pc.simulate(law, START, **settings), pc.simulate(held, np.tile(START, (10, 1)), **settings)
 
 

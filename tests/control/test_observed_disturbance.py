@@ -189,7 +189,7 @@ def test_an_arm_that_has_arrived_rests_and_its_torque_does_not_grow(kind, loop):
     gains = {name: 800.0 if "p" in name else 60.0 for name in LAWS[kind]}
     controller = kind(CICESE, Line([0.3, 0.2], [1.0, 0.6], 0.5), **gains, friction="observed")
     run = simulate(
-        controller, [0.3, 0.2], duration=8.0, plant=STICKY, loop=loop, until="duration", progress=False
+        controller, [0.3, 0.2], duration=6.0, plant=STICKY, loop=loop, until="duration", progress=False
     ).rollout(0)
     late = run.time > 4.0
     assert np.ptp(run.array("q")[0, late], axis=0).max() < 1e-6

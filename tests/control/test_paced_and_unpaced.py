@@ -103,6 +103,6 @@ def test_arms_with_half_of_their_torque_stay_on_a_contour(which, name):
         assert np.ptp(run.array("s")) > path.period
         return error.max()
 
-    slow = follow(3.0, 8.0, pace=False)
+    slow = follow(3.0, 4.0, pace=False)
     assert follow(0.8, 2.4, pace=True) < 1.5 * slow
     assert follow(0.8, 2.4, pace=False) > 3 * slow

@@ -9,6 +9,7 @@ import pytest
 from given_speed import Given
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from scipy.integrate import cumulative_simpson
 from strategies import floats, gains, tasks, vectors
 
 import pathcontrol as pc
@@ -86,7 +87,7 @@ def test_the_full_speed_is_the_law_itself(arm, engine):
         *path_laws(arm, pc.Circle(1.0, 2.0)),
         pc.ComputedTorque(arm, pc.Line([0.1, 0], [1.0, 1.2], 1.0), **GAINS),
     ):
-        plain, wrapped = run(law, duration=2.0, engine=engine), run(pc.SpeedOverride(law), duration=2.0, engine=engine)
+        plain, wrapped = run(law, duration=1.0, engine=engine), run(pc.SpeedOverride(law), duration=1.0, engine=engine)
         for name in ("q", "s", "sdot", "e_v"):
             np.testing.assert_allclose(wrapped.array(name), plain.array(name), rtol=0, atol=1e-9)
 
@@ -124,9 +125,9 @@ def test_v_falls_as_the_theorem_says_while_an_operator_plays(ideal_arm, which):
         return 1.2 * np.cos(3.0 * t)
 
     law = pc.SpeedOverride(path_laws(ideal_arm, pc.Ellipse([1.0, 0.6], 1.5))[which], u, acceleration=3.0)
-    played = run(law, duration=1.5, loop=pc.ContinuousTime(output_period=1e-3))
+    played = run(law, duration=1.5, loop=pc.ContinuousTime(output_period=2e-3))
     V, Vdot = (part[0] for part in pc.lyapunov(law, played))
-    change = np.concatenate([[0.0], np.cumsum(5e-4 * (Vdot[1:] + Vdot[:-1]))])
+    change = cumulative_simpson(Vdot, dx=2e-3, initial=0)
     np.testing.assert_allclose(V, V[0] + change, rtol=0, atol=2e-4 * V[0])
     assert (Vdot <= 0).all()
     assert pc.speed_factor(played).min() < -0.9
@@ -153,7 +154,7 @@ def test_a_held_plan_stays_whatever_pushes_the_arm(arm, which):
     heavy = arm.with_masses({arm.joint_names[1]: 1.5})
     push = pc.Push([6.0, 0.5], 2.0, 1e9)
     ends = []
-    for hold in (4.0, 12.0):
+    for hold in (4.0, 8.0):
         override = pc.SpeedOverride(law, [[1.0, 0.0], [1.0 + hold, 1.0]])
         held = run(override, duration=3.0 + hold, plant=heavy, disturbance=push)
         s = held.array("s")[0]
