@@ -17,9 +17,9 @@ from hypothesis import HealthCheck, settings
 
 from pathcontrol import Circle, RobotModel, Viscous, load_robot
 
-settings.register_profile(
-    "default", deadline=None, max_examples=50, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
-)
+slow = [HealthCheck.too_slow]
+settings.register_profile("default", deadline=None, max_examples=25, derandomize=True, suppress_health_check=slow)
+settings.register_profile("thorough", deadline=None, max_examples=500, suppress_health_check=slow)
 settings.load_profile("default")
 
 
