@@ -195,13 +195,3 @@ def test_products_of_random_matrices_that_are_similar_to_blocks(seed):
     turned = np.mod(np.repeat(count * angles, 2) * [1, -1, 1, -1], 2 * np.pi)
     difference = np.exp(1j * found.imag[1:5])[:, None] - np.exp(1j * turned)
     assert (np.abs(difference).min(0) < 1e-5).all()
-
-
-def test_what_is_forgotten_at_once_has_a_finite_logarithm():
-    """A nilpotent part, as of a torque that waits for a tick: both sizes are as good as 0."""
-    A = np.zeros((3, 3))
-    A[0, 0], A[1, 2] = 0.5, 1.0
-    found = find_eigen([A] * 20).logarithms.real
-    assert found[0] == pytest.approx(20 * np.log(0.5))
-    assert np.isfinite(found).all()
-    assert found[1:].max() < -300
