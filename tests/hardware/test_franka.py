@@ -20,7 +20,7 @@ from pathcontrol.hardware.real_time import real_time
 
 H = 1e-3
 HOME = np.array([0.0, 0.0, 0.0, -1.57, 0.0, 1.57, 0.785])
-DURATION = float(os.environ.get("PATHCONTROL_FRANKA_SECONDS", "10"))
+DURATION = float(os.environ.get("PATHCONTROL_FRANKA_SECONDS", "4"))
 MEASURES = "PATHCONTROL_FRANKA_SECONDS" in os.environ
 
 
