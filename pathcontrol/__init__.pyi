@@ -45,6 +45,7 @@ from .control.base import diagonal_gain as diagonal_gain
 from .control.branch import BranchPolicy as BranchPolicy
 from .control.event_plan import EventPlan as EventPlan
 from .control.extended_motion_plan import ExtendedMotionPlan as ExtendedMotionPlan
+from .control.maneuver_regulation import ManeuverRegulation as ManeuverRegulation
 from .control.motion_control import ComputedTorque as ComputedTorque
 from .control.motion_control import MotionController as MotionController
 from .control.motion_control import PDPlus as PDPlus
@@ -57,6 +58,7 @@ from .control.reference_law import Reference as Reference
 from .control.speed_override import SpeedOverride as SpeedOverride
 from .control.speed_rule import SpeedRule as SpeedRule
 from .control.state_to_reference import StateToReferenceProjection as StateToReferenceProjection
+from .control.transverse_linearization import TransverseLinearization as TransverseLinearization
 from .control.wrapper import LawWrapper as LawWrapper
 from .engine.control_tick import ControlTick as ControlTick
 from .errors import ArmError as ArmError

@@ -54,6 +54,8 @@ LAWS = Kind(
         "slotine_li": "control.motion_control:SlotineLi",
         "adaptive_slotine_li": "control.adaptive_slotine_li:AdaptiveSlotineLi",
         "passive_velocity_field": "control.passive_velocity_field:PassiveVelocityField",
+        "transverse_linearization": "control.transverse_linearization:TransverseLinearization",
+        "maneuver_regulation": "control.maneuver_regulation:ManeuverRegulation",
         "speed_override": "control.speed_override:SpeedOverride",
         "paced": "control.paced:Paced",
         "event_plan": "control.event_plan:EventPlan",

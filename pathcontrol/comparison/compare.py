@@ -103,7 +103,8 @@ def compare(
     ``"all"`` adds the laws of other sources, which may be named too: ``"adaptive_slotine_li"`` has the gains of Slotine
     and Li's law, the plan of the extended motion plan, and an adaptation of 0.001 1/J;
     ``"passive_velocity_field"`` has ΛK_v = K_p and Λ + K_v = K_v of these, or Λ = K_v = √K_p, means of all joints,
-    and a recharge of 10 1/s.
+    and a recharge of 10 1/s; ``"transverse_linearization"`` has the means of K_p and K_v, and k_s = k_v;
+    ``"maneuver_regulation"`` has K_p and K_v.
 
     The measures, of the event and the time after it (without one of the second half of a closed path, or of a whole
     open one), in SI units:

@@ -9,7 +9,9 @@ import numpy as np
 from pathcontrol.comparison.shared_gains import Gains, mean_inertia, mean_plan_gain, split_damping
 from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
 from pathcontrol.control.base import Controller, Start
+from pathcontrol.control.maneuver_regulation import ManeuverRegulation
 from pathcontrol.control.passive_velocity_field import PassiveVelocityField
+from pathcontrol.control.transverse_linearization import TransverseLinearization
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask
 
@@ -30,8 +32,21 @@ def _passive_velocity_field(robot: RobotModel, task: PathTask, gains: Gains, sta
     return PassiveVelocityField(robot, task, Lambda.item(), K_v.item(), recharge=_RECHARGE, start=start)
 
 
+def _transverse_linearization(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+    """Return transverse feedback linearisation with the poles of the others, of the mean gains of all joints."""
+    k_p, k_v = (float(np.asarray(gain, dtype=np.float64).mean()) for gain in gains[:2])
+    return TransverseLinearization(robot, task, k_p, k_v, k_s=k_v, start=start)
+
+
+def _maneuver_regulation(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+    """Return maneuver regulation with the gains of computed torque."""
+    return ManeuverRegulation(robot, task, gains.K_p, gains.K_v, start=start)
+
+
 #: how each law is made, by its name
 FAMILY: dict[str, Callable[[RobotModel, PathTask, Gains, Start], Controller]] = {
     "adaptive_slotine_li": _adaptive_slotine_li,
     "passive_velocity_field": _passive_velocity_field,
+    "transverse_linearization": _transverse_linearization,
+    "maneuver_regulation": _maneuver_regulation,
 }

@@ -14,11 +14,13 @@ from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
 from pathcontrol.control.base import Controller, Start, diagonal_gain
 from pathcontrol.control.event_plan import EventPlan
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
+from pathcontrol.control.maneuver_regulation import ManeuverRegulation
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.paced import Paced
 from pathcontrol.control.passive_velocity_field import PassiveVelocityField
 from pathcontrol.control.projection import Projection
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
+from pathcontrol.control.transverse_linearization import TransverseLinearization
 from pathcontrol.control.wrapper import unwrap
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.model import RobotModel
@@ -91,7 +93,7 @@ def recover_gains(law: Controller) -> Gains:
     law = unwrap(law)
     if isinstance(law, ExtendedMotionPlan):
         gains = Gains(law.K_p, law.K_v, float(law.k) if law.k.size == 1 else None)
-    elif isinstance(law, ComputedTorque | StateToReferenceProjection):
+    elif isinstance(law, ComputedTorque | StateToReferenceProjection | ManeuverRegulation):
         gains = Gains(law.K_p, law.K_v)
     elif isinstance(law, PDPlus):
         mass = mean_inertia(law.robot, law.task)
@@ -99,6 +101,8 @@ def recover_gains(law: Controller) -> Gains:
     elif isinstance(law, SlotineLi | AdaptiveSlotineLi):
         damping = law.K_d / mean_inertia(law.robot, law.task)
         gains = Gains(law.Lambda * damping, law.Lambda + damping)
+    elif isinstance(law, TransverseLinearization):
+        gains = Gains(law.k_p, law.k_v)
     elif isinstance(law, PassiveVelocityField):
         gains = Gains(law.Lambda * law.K_v, law.Lambda + law.K_v)
     else:

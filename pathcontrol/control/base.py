@@ -365,6 +365,15 @@ def rollout_gain(name: str, value: ArrayLike) -> Array:
     return freeze(array[..., 0] if array.ndim > 1 else array)
 
 
+def positive_rollout_gain(name: str, value: ArrayLike) -> Array:
+    """Return a gain greater than 0 that is one number, (), or has one for each rollout, (N,); read-only.
+
+    Raises:
+        InputError: it is no finite number, is not positive, or has other axes.
+    """
+    return _check_positive(name, rollout_gain(name, value))
+
+
 def _diagonal_of_matrix(name: str, array: Array, n: int) -> Array:
     """Return ``array`` with its diagonal in place of a matrix (n, n), and (N, n) in place of (N, 1, n)."""
     if array.ndim == 3 and array.shape[1:] == (1, n):

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import ControlOutput, rollout_gain
+from pathcontrol.control.base import ControlOutput, positive_rollout_gain, rollout_gain
 from pathcontrol.control.nearest_point import NearestPoint
 from pathcontrol.control.reference_law import Located
 from pathcontrol.errors import InputError
@@ -82,12 +82,10 @@ class PassiveVelocityField(NearestPoint):
         **options: Any,
     ) -> None:
         super().__init__(robot, task, **options)
-        self.Lambda, self.K_v = rollout_gain("Lambda", Lambda), rollout_gain("K_v", K_v)
+        self.Lambda, self.K_v = positive_rollout_gain("Lambda", Lambda), positive_rollout_gain("K_v", K_v)
         self.recharge = rollout_gain("recharge", recharge)
-        for name, least in (("Lambda", "> 0"), ("K_v", "> 0"), ("recharge", "≥ 0")):
-            value = getattr(self, name)
-            if (value < 0).any() or (least == "> 0" and (value == 0).any()):
-                raise InputError(f"{name} = {value.tolist()}, expected {name} {least}")
+        if (self.recharge < 0).any():
+            raise InputError(f"recharge = {self.recharge.tolist()}, expected 0 or more: a negative one wastes energy")
         fastest, inertia = np.moveaxis(np.asarray(map_tasks(task, self._survey)), -1, 0)
         self.approach = fastest if approach is None else as_scalar("approach", approach, positive=True)
         self.energy = 2 * inertia * self.approach**2 if energy is None else as_scalar("energy", energy, positive=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -11,9 +12,11 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.tasks.base import PathPoint
+from pathcontrol.tasks.task import PathTask
 
 #: σ is called irregular where it changes this many times as fast with q as on the path
 STEEPEST = 1e6
+_STEP = 1e-5  # of a path of length 2π in s, for central differences along it
 _CATCH_UP = 1e-2  # s, time constant with which the state of continuous time converges to σ after it jumped
 
 
@@ -109,3 +112,15 @@ class ReferenceLaw(Controller):
         if self.ending is None and self.speed is None:
             return np.zeros(s.shape, dtype=bool)
         return self.timed(s)
+
+
+def differentiate_along(function: Callable[[Array], Array], task: PathTask, s: Array) -> Array:
+    """Return the derivative of a ``function`` of s along a task, (*batch, n), by differences within its ends."""
+    if not s.ndim:  # tasks take arrays
+        return np.asarray(differentiate_along(function, task, s[None])[0])
+    lower, upper = task.sampled_interval
+    h = _STEP * (upper - lower) / (2 * np.pi)
+    ahead, behind = s + h, s - h
+    if not task.closed:
+        ahead, behind = np.minimum(ahead, task.s_end), np.maximum(behind, task.s0)
+    return (function(ahead) - function(behind)) / (ahead - behind)[..., None]

@@ -16,6 +16,8 @@ from pathcontrol.view.report.reproduction import recipe
 FAMILY = {
     "adaptive_slotine_li": {"Lambda": 10.0, "K_d": [40.0, 4.0], "adaptation": 0.1, "k": 20.0},
     "passive_velocity_field": {"Lambda": 10.0, "K_v": 30.0, "recharge": 5.0},
+    "transverse_linearization": {"k_p": 300.0, "k_v": 40.0, "k_s": 30.0},
+    "maneuver_regulation": {"K_p": 300.0, "K_v": [40.0, 50.0]},
 }
 WIDE = {"torque": 1e6, "torque_rate": 1e12, "velocity": 1e3, "lower": -1e3, "upper": 1e3, "tube": np.inf}
 START = np.array([0.8, 0.3])
@@ -88,7 +90,7 @@ def test_measurements_of_a_run_give_its_torques_in_a_control_loop(arm, circle, n
 @pytest.mark.parametrize("name", FAMILY)
 def test_an_open_path_is_finished_at_its_end(ideal_arm, name):
     line = pc.Line([0.2, 0.3], [0.5, 0.1], 0.8)
-    run = run_of(law_of(name, ideal_arm, line), line.q_d(np.array(0.0)) + 0.01, duration=4.0)
+    run = run_of(law_of(name, ideal_arm, line), line.q_d(np.array(0.0)) + 0.01, duration=2.0)
     assert run.status[0] == "finished"
     np.testing.assert_allclose(run.array("q")[0, -1], [0.5, 0.1], atol=2e-3)
 
@@ -96,11 +98,11 @@ def test_an_open_path_is_finished_at_its_end(ideal_arm, name):
 @pytest.mark.parametrize("name", FAMILY)
 def test_an_operator_overrides_its_speed(ideal_arm, circle, name):
     law = pc.SpeedOverride(law_of(name, ideal_arm, circle, start="nearest"), 0.5)
-    run = run_of(law, [1.0, 0.0], duration=1.5)
-    assert run.array("sdot")[0, -1] == pytest.approx(0.5 * circle.theta(np.array(0.0)), rel=0.02)
+    run = run_of(law, [1.0, 0.0], duration=0.8)
+    assert run.array("sdot")[0, -1] == pytest.approx(0.5 * circle.theta(np.array(0.0)), rel=0.03)
 
 
-@pytest.mark.parametrize("name", FAMILY.keys() - {"adaptive_slotine_li"})  # whose 25 multipliers take seconds
+@pytest.mark.parametrize("name", list(FAMILY)[1:])  # the 25 multipliers of the adaptive one take seconds
 def test_its_multipliers_on_the_circle_are_those_of_a_stable_orbit(ideal_arm, circle, name):
     found = pc.floquet(law_of(name, ideal_arm, circle))
     assert abs(found.multipliers[found.along] - 1) < 1e-4

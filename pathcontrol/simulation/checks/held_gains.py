@@ -12,8 +12,11 @@ from pathcontrol._arrays import Array
 from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
+from pathcontrol.control.maneuver_regulation import ManeuverRegulation
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
+from pathcontrol.control.passive_velocity_field import PassiveVelocityField
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
+from pathcontrol.control.transverse_linearization import TransverseLinearization
 from pathcontrol.control.wrapper import unwrap
 from pathcontrol.robot.friction import viscous_of
 from pathcontrol.robot.model import RobotModel
@@ -22,6 +25,9 @@ from pathcontrol.tasks.task import PathTask
 
 _HALVINGS = 30
 _SHORTEST = 1e-6  # share of the period at which the search ends
+
+#: laws whose acceleration has the feedback K_p e_p + K_v e_v
+_ACCELERATING = (ComputedTorque, ExtendedMotionPlan, StateToReferenceProjection, ManeuverRegulation)
 
 
 class Feedback(NamedTuple):
@@ -48,7 +54,10 @@ def linearize_law(controller: Controller, q: Array, rollouts: Sequence[int] = ()
     if isinstance(controller, PDPlus):
         pairs = _select_extremes(controller.K_p, controller.K_v, controller.robot.n, rollouts)
         return [Feedback(_repeat_diagonal(K_p, M), _repeat_diagonal(K_v, M), row) for K_p, K_v, row in pairs]
-    if isinstance(controller, ComputedTorque | ExtendedMotionPlan | StateToReferenceProjection):
+    if isinstance(controller, TransverseLinearization | PassiveVelocityField):
+        pairs = _select_extremes(*_columns_beside(controller), controller.robot.n, rollouts)
+        return [Feedback(M * k_p, M * k_v, row) for k_p, k_v, row in pairs]
+    if isinstance(controller, _ACCELERATING):
         pairs = _select_extremes(controller.K_p, controller.K_v, controller.robot.n, rollouts)
         return [Feedback(M * K_p, M * K_v, row) for K_p, K_v, row in pairs]
     return []
@@ -104,6 +113,13 @@ def plan_gain_bound(task: PathTask, s: Array) -> Array:
     point = task.at(s)
     slope = np.linalg.norm(point.dq_d, axis=-1) * np.linalg.norm(point.velocity_slope, axis=-1)
     return slope.max(0)
+
+
+def _columns_beside(law: TransverseLinearization | PassiveVelocityField) -> tuple[Array, Array]:
+    """Return stiffness [1/s²] and damping [1/s] beside the path of a law with gains (N,), as (N, 1), or (1,) each."""
+    if isinstance(law, TransverseLinearization):
+        return law.k_p[..., None], law.k_v[..., None]
+    return (law.Lambda * law.K_v)[..., None], (law.Lambda + law.K_v)[..., None]
 
 
 def _select_extremes(
