@@ -26,6 +26,7 @@ EXAMPLES = {
     "operators_override": 3,
     "weak_motors": 3,
     "control_loop": 4,
+    "lost_sign": 2,
 }
 OF_THE_EXTRA = {"six_joints", "mill_pocket", "deburr_bracket"}
 ALONG_FILES = {"lettering", "mill_pocket", "deburr_bracket"}

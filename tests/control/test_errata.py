@@ -46,6 +46,32 @@ def test_the_printed_square_root_loses_the_sign_of_the_turning_rate(seed):
         assert abs(vdot_error(printed, q, qd)) < 1e-9 * K_P
 
 
+class PrintedProjection(Projection):
+    """The law with |θ̇| in place of θ̇."""
+
+    def project(self, q, qd, near):
+        found = super().project(q, qd, near)
+        turning = (q[..., 0] * qd[..., 1] - q[..., 1] * qd[..., 0])[..., None]
+        return found._replace(position_gradient=found.position_gradient * np.where(turning < 0, -1.0, 1.0))
+
+
+def test_round_a_clockwise_circle_the_printed_square_root_leaves_an_error(ideal_arm):
+    """The feedforward points outwards: v²/ρ = −v²/ρ + k_p(ρ − r), so that ρ(ρ − r) = 2v²/k_p."""
+    task, start = Circle(R_0, V_0, clockwise=True), np.array([1.0, -0.1])
+    off = 0.5 * (np.sqrt(R_0**2 + 8 * V_0**2 / K_P) - R_0)
+    loop = SampledLoop(period=1e-3)
+    for law, expected in ((PrintedProjection, off), (Projection, 0.0)):
+        run = simulate(law(ideal_arm, task, K_P, K_V), start, [0.0, -V_0], duration=1.5, loop=loop, progress=False)
+        radius = np.linalg.norm(run.array("q")[0, -200:], axis=-1)
+        assert np.allclose(radius - R_0, expected, atol=1e-4)  # torques are held for 1 ms
+    ahead = Circle(R_0, V_0)
+    runs = [
+        simulate(law(ideal_arm, ahead, K_P, K_V), [1.0, 0.1], [0.0, V_0], duration=0.1, progress=False).array("q")
+        for law in (PrintedProjection, Projection)
+    ]
+    assert np.allclose(*runs, atol=1e-12)  # the arm turns as the path does
+
+
 def test_both_turning_directions_were_tried():
     turns = [signed_turning_rate(*np.random.default_rng(seed).normal(size=(2, 2))) for seed in range(20)]
     assert min(turns) < 0 < max(turns)

@@ -21,7 +21,6 @@ from pathcontrol.control.wrapper import unwrap
 from pathcontrol.robot.friction import viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.damping import Damping
-from pathcontrol.tasks.task import PathTask
 
 _HALVINGS = 30
 _SHORTEST = 1e-6  # share of the period at which the search ends
@@ -99,20 +98,6 @@ def longest_period(feedback: Feedback, robot: RobotModel, uncompensated: Array, 
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if stable(middle) else (low, middle)
     return low
-
-
-def plan_gain_bound(task: PathTask, s: Array) -> Array:
-    """Return the largest ‖q_d'‖‖r'‖ at s (m,), a number, or at s (m, N) of N tasks, (N,).
-
-    Times k h²/2 it is the effect of one period's acceleration on the next.
-
-    A tangential acceleration a leaves the extended motion plan, which knows the velocity at a tick only, h²a/2 behind;
-    that changes σ̇ by k‖q_d'‖h²a/2, and the acceleration r'σ̇ that the law asks for by ‖r'‖ times as much. Where that
-    exceeds a the loop is unstable, unless torque limits end it; k h²‖q_d'‖‖r'‖ < 1 keeps half the distance.
-    """
-    point = task.at(s)
-    slope = np.linalg.norm(point.dq_d, axis=-1) * np.linalg.norm(point.velocity_slope, axis=-1)
-    return slope.max(0)
 
 
 def _columns_beside(law: TransverseLinearization | PassiveVelocityField) -> tuple[Array, Array]:

@@ -26,7 +26,8 @@ from pathcontrol.simulation.checks.fast_modes import (
     rate_of_friction,
     rates_of_disturbance,
 )
-from pathcontrol.simulation.checks.held_gains import linearize_law, longest_period, plan_gain_bound
+from pathcontrol.simulation.checks.held_gains import linearize_law, longest_period
+from pathcontrol.simulation.checks.plan_gain import check_plan_gain
 from pathcontrol.simulation.loops import MOST_SUBSTEPS, Arm, ContinuousTime, SampledLoop
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.task import PathTask
@@ -109,7 +110,7 @@ def _find_warnings(
     for law in map(unwrap, controllers):
         postures, speeds = _sample_states(law.task, q, qd)
         yield from _check_gains(law, loop.period, robot, rows, postures)
-        yield from _check_plan(law, loop.period)
+        yield from _check_plan(law, loop)
         yield from _select_worst(list(_check_arm(loop, arm, postures, speeds)) for arm in felt.values())
     if disturbance is not None:
         yield from _select_worst(list(_check_disturbance(disturbance, loop, a, q, qd, duration)) for a in felt.values())
@@ -158,22 +159,12 @@ def _check_gains(law: Controller, period: float, robot: Arm, rows: list[int], q:
     )
 
 
-def _check_plan(law: Controller, period: float) -> Iterator[str]:
-    """Yield the warning of a period that is too long for the gain k of the plan."""
-    if not isinstance(law, PlanFeedback):
-        return
-    task = law.task
-    s = _sample_paths(task, _FINE) if isinstance(task, TaskBatch) else np.linspace(*task.sampled_interval, _FINE)
-    slope, every = np.broadcast_arrays(np.ravel(plan_gain_bound(task, s)), np.ravel(law.k))
-    row = int((slope * every).argmax())
-    kick, k = float(slope[row] * every[row]), float(every[row])
-    if kick * period**2 >= 1:
-        where = f" (rollout {row})" if len(every) > 1 else ""
-        yield (
-            f"k = {k:g} needs a period below {kick**-0.5:.3g} s{where}, the loop has {period:g} s and is probably "
-            f"unstable without torque limits; take k below {k / (kick * period**2):.3g}, or Projection, which is "
-            "k → ∞, or shorten the period (more substeps do not help)"
-        )
+def _check_plan(law: Controller, loop: SampledLoop) -> Iterator[str]:
+    """Yield the warning of a gain k of the plan that is beyond what the loop bears."""
+    if isinstance(law, PlanFeedback):
+        task = law.task
+        s = _sample_paths(task, _FINE) if isinstance(task, TaskBatch) else np.linspace(*task.sampled_interval, _FINE)
+        yield from check_plan_gain(law, loop, s)
 
 
 def _select_worst(found: Iterable[list[_TooLong]]) -> Iterator[str]:
