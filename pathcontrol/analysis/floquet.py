@@ -24,6 +24,8 @@ from pathcontrol.simulation.run_arguments import check_controller
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.task import PathTask
 
+_LARGEST = 700.0  # logarithm of a multiplier
+
 
 @dataclass(frozen=True, eq=False)
 class Floquet:
@@ -93,8 +95,8 @@ def slowest_growth(
     """
     laps = follow_laps(laws, rows, task, loop, settle)
     found = [_solve(*each) for each in zip(laps, find_eigen_of_many(pad_steps(laps), leading=True), strict=True)]
-    rates = np.array([-one.decay_rate for one in found])
-    return rates, np.exp(np.minimum(rates * [one.period for one in found], 700.0))
+    rates, periods = np.array([(-one.decay_rate, one.period) for one in found]).T
+    return rates, _exp(rates, periods).real
 
 
 def check_path(law: Controller) -> PathTask:
@@ -119,6 +121,6 @@ def _solve(lap: Lap, found: ProductEigen) -> Floquet:
     return Floquet(lap.period, _exp(exponents, lap.period), exponents, found.vectors, along)
 
 
-def _exp(exponents: Array, period: float) -> Array:
-    """Return exp(λT), 0 for −∞."""
-    return np.exp(exponents.real * period) * np.exp(1j * exponents.imag * period)
+def _exp(exponents: Array, period: float | Array) -> Array:
+    """Return exp(λT), 0 for −∞, and at most 1e304."""
+    return np.exp(np.minimum(exponents.real * period, _LARGEST)) * np.exp(1j * exponents.imag * period)

@@ -13,6 +13,7 @@ from pathcontrol.cli import (
     reproduce_command,
     run_command,
     sil_command,
+    stability_command,
     sweep_command,
     toolpath_command,
     tune_command,
@@ -39,6 +40,7 @@ for _part in (
     toolpath_command,
     export_command,
     identify_command,
+    stability_command,
     sil_command,
 ):
     main.add_command(_part.command)

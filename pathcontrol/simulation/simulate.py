@@ -77,7 +77,8 @@ def simulate(
         progress: show a bar on standard error when it takes longer than two seconds.
 
     A start or a path outside position limits, an arm that cannot hold its own weight, and one that never moved, held by
-    its friction, are told by a :class:`PathControlWarning`; so are periods too long for the gains, and steps of the
+    its friction, are told by a :class:`PathControlWarning`; so are periods too long for the gains, with the largest
+    usable k of an extended motion plan where its own is beyond it, and steps of the
     plant too long for what is fast in it, with the number of ``substeps`` to take.
 
     Raises:

@@ -1,5 +1,7 @@
 """Gain maps and largest gains: the boundary is that of discrete maps written by hand, and of simulations beside it."""
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq, fsolve
@@ -191,6 +193,18 @@ def test_the_mode_along_the_orbit_is_never_a_transverse_one():
     assert np.ptp(np.diff(rates)) < 0.1 * np.abs(np.diff(rates)).max()
 
 
+def test_multipliers_that_are_0_are_no_numbers_that_are_none():
+    """A reading that is replaced at each tick, and the state of the projection, are forgotten at once."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = pc.floquet(pc.Projection(FLAT, CIRCLE, 100.0, 12.0), LOOPS["difference"], settle=1)
+    assert np.isfinite(found.multipliers).all()
+    assert (found.exponents.real < -100).sum() >= 3
+    assert not np.isnan(found.exponents).any()
+    assert found.stable
+    assert abs(found.multipliers[found.along] - 1) < 1e-3
+
+
 def test_continuous_time_has_no_boundary():
     law = pc.ComputedTorque(ARM, CIRCLE, 100.0, 25.0)
     found = pc.stability_map(law, {"K_p": [100.0, 400.0]}, progress=False)
@@ -235,6 +249,7 @@ def test_a_law_with_other_gains_is_otherwise_the_same():
         pc.SlotineLi(ARM, CIRCLE, 20.0, [30.0, 3.0]),
         pc.SpeedOverride(pc.ExtendedMotionPlan(ARM, CIRCLE, 800.0, 45.0, 20.0), 0.5, acceleration=3.0),
         pc.EventPlan(pc.ExtendedMotionPlan(ARM, CIRCLE, 800.0, 45.0, 20.0), observer_hz=12.0),
+        pc.AdaptiveSlotineLi(ARM, CIRCLE, 20.0, [30.0, 3.0], 0.1, k=5.0),
         OwnLaw(ARM, CIRCLE, 100.0, 20.0, 0.5),
     ]
     q, qd = np.array([[0.9, 0.1]]), np.array([[0.1, 1.8]])

@@ -148,6 +148,7 @@ def test_the_console_script_is_the_same_command():
         "toolpath",
         "export",
         "identify",
+        "stability",
         "sil",
     }
     assert set(main.commands) == known
