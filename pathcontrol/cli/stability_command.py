@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.cli.files import check_file
@@ -75,13 +75,13 @@ def command(
     written = {} if stability is None or out is None else _write(stability, out)
     if as_json:
         values: dict[str, Any] = {"decay_rate": own.decay_rate, "stable": own.stable, "lap": own.period}
-        values |= {"largest": {name: value if np.isfinite(value) else None for name, value in found.items()}}
+        values |= {"largest": {name: value if math.isfinite(value) else None for name, value in found.items()}}
         values |= {"left_out": left_out, "map": stability and _describe(stability), "written": written}
         click.echo(json.dumps(values, allow_nan=False))
         return
     _tell(own, left_out)
     for name, value in found.items():
-        click.echo(f"largest {name}: " + (f"{value:.6g}" if np.isfinite(value) else "none, however large"))
+        click.echo(f"largest {name}: " + (f"{value:.6g}" if math.isfinite(value) else "none, however large"))
     for point in [] if stability is None else _describe(stability)["boundary"]:
         click.echo("boundary at " + ", ".join(f"{name} = {value:.6g}" for name, value in point.items()))
     for name, path in written.items():
@@ -90,8 +90,10 @@ def command(
 
 def _space_values(name: str, low: float, high: float, points: int) -> Any:
     """Return values of a gain from one end to the other, spaced by factors where the ends are far apart."""
-    if not -np.inf < low < high < np.inf:
+    if not -math.inf < low < high < math.inf:
         raise InputError(f"--gain {name} {low:g} {high:g}: expected FROM below TO")
+    import numpy as np
+
     far = low > 0 and high >= _DECADES * low
     return np.geomspace(low, high, points) if far else np.linspace(low, high, points)
 
