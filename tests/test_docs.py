@@ -20,7 +20,11 @@ from pathcontrol.experiments.runner import load_setup
 from pathcontrol.simulation.run import VARIABLES
 
 DOCS = Path(__file__).parent.parent / "docs"
-PAGES = sorted(page.stem for page in DOCS.glob("*.md"))
+PAGES = sorted(
+    name
+    for page in DOCS.rglob("*.md")
+    if not (name := page.relative_to(DOCS).with_suffix("").as_posix()).startswith("_")  # not of a build
+)
 NEEDS = {"robots": "example_robot_data", "path_tool_curve": "example_robot_data"}
 
 _BLOCK = re.compile(r"^```(python|text|toml)\n(.*?)^```$", re.DOTALL | re.MULTILINE)

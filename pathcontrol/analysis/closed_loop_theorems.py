@@ -18,6 +18,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
+from pathcontrol.control.maneuver_regulation import ManeuverRegulation
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
@@ -198,7 +199,29 @@ class _SlotineLi(_KeptDynamics):
         return self._accelerate(at, torque + law.K_d * (velocity - at.qd))
 
 
+class _ManeuverRegulation:
+    """Maneuver regulation: V = eᵀPe, e = (e_p, e_v), and V̇* = −e_pᵀe_p − e_vᵀK_p⁻¹e_v (Hauser and Hindman, 1995)."""
+
+    unit = "rad^2 s"
+
+    def __init__(self, law: ManeuverRegulation) -> None:
+        self._law = law
+
+    def energy(self, at: LoopState) -> Energy:
+        by_e_p, by_e_v = self._law.metric.apply(at.e_p, at.e_v)
+        V = (by_e_p * at.e_p + by_e_v * at.e_v).sum(-1)
+        rate = -(at.e_p**2 + at.e_v**2 / self._law.K_p).sum(-1)
+        return Energy(V, rate, 2 * by_e_v, 2 * (by_e_p * at.dq_d + by_e_v * at.slope).sum(-1))
+
+    def demand(self, at: LoopState, wdot: Array) -> tuple[Array, Array]:
+        law = self._law
+        desired = at.slope * at.plan_rate[..., None] + wdot[..., None] * at.r
+        acceleration = desired + law.K_v * at.e_v + law.K_p * at.e_p
+        return law.robot.inverse_dynamics(at.q, at.qd, acceleration), acceleration
+
+
 _THEOREMS = {
+    ManeuverRegulation: _ManeuverRegulation,
     ExtendedMotionPlan: _LinearErrors,
     StateToReferenceProjection: _LinearErrors,
     ComputedTorque: _LinearErrors,

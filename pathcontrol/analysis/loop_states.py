@@ -9,6 +9,8 @@ from pathcontrol.analysis.closed_loop_theorems import LoopState
 from pathcontrol.analysis.law_of_run import LawRecord
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
+from pathcontrol.control.maneuver_regulation import ManeuverRegulation
+from pathcontrol.control.reference_law import ReferenceLaw
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.control.wrapper import unwrap
 from pathcontrol.tasks.base import PathPoint
@@ -29,7 +31,7 @@ def states_of(controller: Controller, record: LawRecord, q: Array, qd: Array) ->
     w = _factor(task.at(_inside(law, record.s)), record.velocity)
     law = law.at_speed(w)
     s, reference = record.s, None
-    if isinstance(law, StateToReferenceProjection):
+    if isinstance(law, ReferenceLaw):
         reference, timed = law.project(q, qd, record.s), law.timed(record.s)
         s = np.where(timed, record.s, reference.s)
     point = task.at(_inside(law, s))
@@ -40,6 +42,9 @@ def states_of(controller: Controller, record: LawRecord, q: Array, qd: Array) ->
         sdot = law.inside(s, rate - gain * np.vecdot(e_p, point.dq_d))
     elif isinstance(law, StateToReferenceProjection) and reference is not None:
         sdot = np.where(timed, rate, reference.rate(qd, law.K_v * e_v + law.K_p * e_p))
+    elif isinstance(law, ManeuverRegulation) and reference is not None:
+        qdd = w[..., None] * point.velocity_slope * rate[..., None] + law.K_v * e_v + law.K_p * e_p
+        sdot = np.where(timed, rate, reference.rate_at(qd, qdd))
     else:
         sdot = rate
     slope = w[..., None] * point.velocity_slope

@@ -20,8 +20,10 @@ from pathcontrol.analysis.metric_helpers import resolve_task
 from pathcontrol.analysis.speed_factor import speed_factor
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
+from pathcontrol.control.maneuver_regulation import ManeuverRegulation, StateMetric
 from pathcontrol.control.projection import Projection
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
+from pathcontrol.control.transverse_linearization import TransverseLinearization
 from pathcontrol.control.wrapper import LawWrapper
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
@@ -86,7 +88,8 @@ def projection_lyapunov(controller: Projection, e_p: Array, e_v: Array) -> Lyapu
 def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     """Return V and V̇ of the controller's theorem along a run, each (rollout, time).
 
-    V is evaluated at the errors of the run; V̇ is that of the theorem, not a difference of V.
+    V is evaluated at the errors of the run; V̇ is that of the theorem, not a difference of V. For
+    :class:`ManeuverRegulation` V = eᵀPe, and for :class:`TransverseLinearization` that of the motion beside the path.
     """
     expect("controller", controller, Controller)
     resolve_task(run, controller.task)
@@ -109,6 +112,15 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
         lead = (point.dq_d * (sdot - point.theta)[..., None]).swapaxes(0, 1)
         gains = [_add_time_axis(gain) for gain in (controller.K_p, controller.K_v, controller.metric)]
         return _referred(gains, e_p, e_v, lead)
+    if isinstance(controller, ManeuverRegulation):
+        metric = StateMetric(*map(_add_time_axis, controller.metric))
+        by_e_p, by_e_v = metric.apply(e_p, e_v)
+        V = (by_e_p * e_p + by_e_v * e_v).sum(-1)
+        return Lyapunov(V, -(e_p**2 + e_v**2 / _add_time_axis(controller.K_p)).sum(-1))
+    if isinstance(controller, TransverseLinearization):
+        s = run.array("s").T
+        tangent = controller.point(np.where(np.isfinite(s), s, controller.task.s0)).dq_d.swapaxes(0, 1)
+        return _beside(controller.k_p[..., None], controller.k_v[..., None], e_p, e_v, tangent)
     raise InputError(
         f"no Lyapunov function is given for {type(controller).__name__}; use ExtendedMotionPlan or Projection, "
         "or ExtendedMotionPlan with k = 0 for computed torque"
@@ -133,6 +145,16 @@ def _projected(k_p: Array, K_v: Array, e_p: Array, e_v: Array) -> Lyapunov:
     """Return V and V̇ of control by projection for given gains and errors."""
     V = 0.5 * (e_v**2).sum(-1) + 0.5 * (k_p * e_p**2).sum(-1)
     return Lyapunov(V, -(K_v * e_v**2).sum(-1))
+
+
+def _beside(k_p: Array, k_v: Array, e_p: Array, e_v: Array, dq_d: Array) -> Lyapunov:
+    """Return V and V̇ of what is beside the path for gains (1,) or (N, 1), errors, and q_d' [rad].
+
+    V = ½Nq̇ᵀNq̇ + ½k_p e_pᵀe_p and V̇ = −k_v Nq̇ᵀNq̇, where Nq̇ = −Ne_v is the part of q̇ that is normal to the path.
+    """
+    along = (e_v * dq_d).sum(-1, keepdims=True) / (dq_d**2).sum(-1, keepdims=True)
+    normal = ((e_v - along * dq_d) ** 2).sum(-1)
+    return Lyapunov(0.5 * normal + 0.5 * k_p * (e_p**2).sum(-1), -k_v * normal)
 
 
 def _add_time_axis(gain: Array) -> Array:

@@ -14,7 +14,7 @@ from pathcontrol.analysis.law_of_run import LawRecord, find_law, record_of
 from pathcontrol.analysis.loop_states import states_of
 from pathcontrol.analysis.torque_account import TorqueAccount, is_sampled
 from pathcontrol.control.base import Controller
-from pathcontrol.control.state_to_reference import StateToReferenceProjection
+from pathcontrol.control.reference_law import ReferenceLaw
 from pathcontrol.control.wrapper import unwrap
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
@@ -141,7 +141,7 @@ def power_balance(run: Run, controller: Controller | None = None, *, plant: Robo
     states, s, w = states_of(law, record, q, qd)
     compensated = _compensated(run, law, theorem, record, states, w)
     account = TorqueAccount.of(run, law, record, states, compensated, plant)
-    own_plan = is_sampled(run) and not isinstance(unwrap(law), StateToReferenceProjection)
+    own_plan = is_sampled(run) and not isinstance(unwrap(law), ReferenceLaw)
     balance = _balance(run, theorem, states, (s, w), account, own_plan)
     missing = ~known.T
     lost = missing[:, 1:] | missing[:, :-1]

@@ -110,9 +110,7 @@ class ManeuverRegulation(ReferenceLaw):
         here = self.locate(q, qd, z[..., 0])
         point = here.point
         qdd = point.velocity_slope * point.theta[..., None] + self.K_v * here.e_v + self.K_p * here.e_p
-        assert here.found.velocity_gradient is not None
-        found = np.vecdot(here.found.position_gradient, qd) + np.vecdot(here.found.velocity_gradient, qdd)
-        sdot = np.where(here.timed, point.theta, found)
+        sdot = np.where(here.timed, point.theta, here.found.rate_at(qd, qdd))
         return self.conclude(t, q, qd, z, here, self.robot.inverse_dynamics(q, qd, qdd), sdot)
 
     def project(self, q: Array, qd: Array, near: Array) -> Reference:
@@ -131,8 +129,7 @@ class ManeuverRegulation(ReferenceLaw):
 
     def speed_gradient(self, q: Array, qd: Array, s: Array, velocity: Array) -> tuple[Array, Array]:
         found = self.project(q, qd, s)
-        assert found.velocity_gradient is not None
-        return velocity, np.where(self.is_timed(s), 0.0, np.vecdot(found.velocity_gradient, velocity))
+        return velocity, np.where(self.is_timed(s), 0.0, found.rate_at(np.zeros_like(qd), velocity))
 
     def _descend(self, q: Array, qd: Array, near: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return σ, (*batch,), downhill from ``near``, or from the point nearest to q, and where it was found."""

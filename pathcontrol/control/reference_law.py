@@ -46,6 +46,11 @@ class Reference(NamedTuple):
         left = 1 - np.vecdot(self.velocity_gradient, self.point.velocity_slope)
         return np.divide(along, left, out=np.zeros_like(along), where=self.regular)
 
+    def rate_at(self, qd: Array, qdd: Array) -> Array:
+        """Return σ̇ = Π_q q̇ + Π_q̇ q̈ [1/s], (*batch,), of an arm with q̇ and q̈, (*batch, n)."""
+        along = np.vecdot(self.position_gradient, qd)
+        return along if self.velocity_gradient is None else along + np.vecdot(self.velocity_gradient, qdd)
+
 
 class Located(NamedTuple):
     """The place of an arm on its path.

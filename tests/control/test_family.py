@@ -107,3 +107,28 @@ def test_its_multipliers_on_the_circle_are_those_of_a_stable_orbit(ideal_arm, ci
     found = pc.floquet(law_of(name, ideal_arm, circle))
     assert abs(found.multipliers[found.along] - 1) < 1e-4
     assert (np.abs(found.multipliers) < 1 + 1e-4).all()
+
+
+# --- their Lyapunov functions ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["transverse_linearization", "maneuver_regulation"])
+def test_V_of_a_run_falls_as_its_theorem_says(ideal_arm, circle, name):
+    law, q = law_of(name, ideal_arm, circle), np.array([[1.1, 0.1], [0.9, -0.2]])
+    run = run_of(law, q, loop=pc.ContinuousTime(output_period=2e-4, rtol=1e-10, atol=1e-11), duration=0.1)
+    V, Vdot = pc.lyapunov(law, run)
+    slope = (V[:, 2:] - V[:, :-2]) / (run.time[2:] - run.time[:-2])
+    np.testing.assert_allclose(slope, Vdot[:, 1:-1], rtol=1e-3, atol=1e-4 * np.abs(Vdot).max())
+    assert (V > 0).all()
+    assert (np.diff(V) <= 0).all()
+
+
+def test_the_power_balance_of_maneuver_regulation_closes(ideal_arm, circle):
+    law = law_of("maneuver_regulation", ideal_arm, circle)
+    plant = ideal_arm.with_payload(0.5, "tool")
+    run = run_of(law, [1.05, 0.1], loop=pc.SampledLoop(1e-3), plant=plant, duration=0.2)
+    balance = pc.power_balance(run)
+    assert np.abs(balance.model).max() > 100 * np.abs(balance.residual).max()
+    free = pc.power_balance(run_of(law, [1.05, 0.1], loop=pc.SampledLoop(1e-3), duration=0.2))
+    assert np.abs(free.model).max() < 1e-9 * np.abs(free.predicted).max()
+    np.testing.assert_allclose(free.measured, free.predicted + free.sampling, atol=2e-3 * np.abs(free.predicted).max())
