@@ -15,6 +15,8 @@ from .analysis.lyapunov_functions import lyapunov as lyapunov
 from .analysis.pareto import non_dominated as non_dominated
 from .analysis.path_accuracy import PathAccuracy as PathAccuracy
 from .analysis.path_accuracy import accuracy as accuracy
+from .analysis.path_reach import Reach as Reach
+from .analysis.path_reach import reach as reach
 from .analysis.power_balance import PowerBalance as PowerBalance
 from .analysis.power_balance import power_balance as power_balance
 from .analysis.run_metrics import contour_error as contour_error
@@ -182,6 +184,7 @@ from .view.figures.pareto_figure import pareto_figure as pareto_figure
 from .view.figures.path_figures import path_figure as path_figure
 from .view.figures.path_figures import phase_figure as phase_figure
 from .view.figures.power_balance_figure import power_balance_figure as power_balance_figure
+from .view.figures.reach_figure import reach_figure as reach_figure
 from .view.figures.scenario_figure import scenario_figure as scenario_figure
 from .view.figures.speed_figure import speed_figure as speed_figure
 from .view.figures.stability_figure import stability_figure as stability_figure

@@ -12,6 +12,7 @@ from pathcontrol.view.figures.pareto_figure import pareto_figure as pareto_figur
 from pathcontrol.view.figures.path_figures import path_figure as path_figure
 from pathcontrol.view.figures.path_figures import phase_figure as phase_figure
 from pathcontrol.view.figures.power_balance_figure import power_balance_figure as power_balance_figure
+from pathcontrol.view.figures.reach_figure import reach_figure as reach_figure
 from pathcontrol.view.figures.scenario_figure import scenario_figure as scenario_figure
 from pathcontrol.view.figures.speed_figure import speed_figure as speed_figure
 from pathcontrol.view.figures.stability_figure import stability_figure as stability_figure
