@@ -136,6 +136,8 @@ from .simulation.run import Run as Run
 from .simulation.sequence import simulate_sequence as simulate_sequence
 from .simulation.simulate import simulate as simulate
 from .simulation.trajectory import Trajectory as Trajectory
+from .sweeps.basin import Basin as Basin
+from .sweeps.basin import basin as basin
 from .sweeps.histories import Keep as Keep
 from .sweeps.result import SweepResult as SweepResult
 from .sweeps.space import Space as Space
@@ -172,6 +174,7 @@ from .toolpaths.tool_curve import ToolCurve as ToolCurve
 from .tuning.tune import tune as tune
 from .tuning.tuning_result import Tuning as Tuning
 from .view.animation.record import record as record
+from .view.figures.attraction_figure import attraction_figure as attraction_figure
 from .view.figures.ballbar_figure import ballbar_figure as ballbar_figure
 from .view.figures.comparison_figure import comparison_figure as comparison_figure
 from .view.figures.deviation_figure import deviation_figure as deviation_figure

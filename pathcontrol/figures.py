@@ -1,5 +1,6 @@
 """All figures of runs, sweeps, tunings and toolpaths, and how they are saved; in :mod:`pathcontrol` as well."""
 
+from pathcontrol.view.figures.attraction_figure import attraction_figure as attraction_figure
 from pathcontrol.view.figures.ballbar_figure import ballbar_figure as ballbar_figure
 from pathcontrol.view.figures.comparison_figure import comparison_figure as comparison_figure
 from pathcontrol.view.figures.deviation_figure import deviation_figure as deviation_figure

@@ -27,6 +27,7 @@ EXAMPLES = {
     "weak_motors": 3,
     "control_loop": 4,
     "lost_sign": 2,
+    "basins": 3,
 }
 OF_THE_EXTRA = {"six_joints", "mill_pocket", "deburr_bracket"}
 ALONG_FILES = {"lettering", "mill_pocket", "deburr_bracket"}

@@ -80,7 +80,11 @@ def reach(task: PathTask, robot: RobotModel | None = None, *, frame: str | None 
         raise InputError("task is a sequence of paths, each with a reach of its own; give one of task.paths")
     interval = Interval(*task.one_traverse, task.closed)
     tool = _tool_curve(task, _find_robot(task, robot, frame), frame)
-    unit = "rad" if robot is None or set(robot.position_units) == {"rad"} else " or ".join(sorted(set(robot.position_units)))
+    unit = (
+        "rad"
+        if robot is None or set(robot.position_units) == {"rad"}
+        else " or ".join(sorted(set(robot.position_units)))
+    )
     other = None if tool is None else _reach_of(tool, interval, task.knots, "m")
     joints = Curve(task.q_d, task.dq_d, task.ddq_d)
     return _reach_of(joints, interval, task.knots, unit, other)
@@ -104,7 +108,9 @@ def _check_moving(curve: Curve, interval: Interval) -> None:
     s = np.linspace(interval.lower, interval.upper, 257)
     speed = np.linalg.norm(curve.dp(s), axis=-1)
     if not (speed > 1e-9 * speed.max()).all():
-        raise TaskError(f"the path does not move at s = {s[speed.argmin()]:.4g}, so it has no tangent, and no reach, there")
+        raise TaskError(
+            f"the path does not move at s = {s[speed.argmin()]:.4g}, so it has no tangent, and no reach, there"
+        )
 
 
 def _find_robot(task: PathTask, robot: RobotModel | None, frame: str | None) -> RobotModel | None:

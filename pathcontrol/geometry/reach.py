@@ -104,16 +104,15 @@ def _refined(curve: Curve, s: Array) -> tuple[Array, Array]:
     """Return samples and the curvature there, more where the tangent turns much or the curvature is far from linear."""
     tangent, bend = _tangent(curve, s), _curvature(curve, s)
     found, bends, largest = [s], [bend], bend.max()
-    ends = (s[:-1], s[1:], tangent[:-1], tangent[1:], bend[:-1], bend[1:])  # of the cells that may be cut
-    while len(ends[0]) and sum(map(len, found)) < _MOST_SAMPLES:
-        a, b, t_a, t_b, k_a, k_b = ends
+    a, b, t_a, t_b, k_a, k_b = s[:-1], s[1:], tangent[:-1], tangent[1:], bend[:-1], bend[1:]  # of cells to be cut
+    while len(a) and sum(map(len, found)) < _MOST_SAMPLES:
         middle = 0.5 * (a + b)
         t, k = _tangent(curve, middle), _curvature(curve, middle)
         found, bends, largest = [*found, middle], [*bends, k], max(largest, k.max())
         uneven = np.abs(k - 0.5 * (k_a + k_b)) > _UNEVEN * largest
         cut = ((np.linalg.norm(t_b - t_a, axis=1) > _TURN) | uneven) & (b - a > _SHORTEST * (s[-1] - s[0]))
         halves = ((a, middle), (middle, b), (t_a, t), (t, t_b), (k_a, k), (k, k_b))
-        ends = tuple(np.concatenate([first[cut], second[cut]]) for first, second in halves)
+        a, b, t_a, t_b, k_a, k_b = (np.concatenate([first[cut], second[cut]]) for first, second in halves)
     order = np.argsort(np.concatenate(found), kind="stable")
     return np.concatenate(found)[order], np.concatenate(bends)[order]
 

@@ -38,7 +38,7 @@ def polar(radius):
     return Curve(lambda s: (radius(s) * np.cos(s), radius(s) * np.sin(s)))
 
 
-def brute(task, count=600):
+def brute(task, count=400):
     """The infimum of Federer's F over samples, which the reach is at most, to second order."""
     s = np.linspace(*task.one_traverse, count, endpoint=False)
     points, slope = task.q_d(s), task.dq_d(s)
@@ -54,7 +54,12 @@ def brute(task, count=600):
 @pytest.mark.parametrize("radius", [0.2, 1.3])
 def test_a_circle_has_its_radius(radius):
     found = pc.reach(pc.Circle(radius, 2.0))
-    assert (found.value, found.limit, found.unit, found.tool) == (pytest.approx(radius, rel=1e-12), "curvature", "rad", None)
+    assert (found.value, found.limit, found.unit, found.tool) == (
+        pytest.approx(radius, rel=1e-12),
+        "curvature",
+        "rad",
+        None,
+    )
     assert found.radius == found.value
     assert found.bottleneck == np.inf
 
