@@ -62,7 +62,7 @@ class PowerBalance:
     @property
     def rate_unit(self) -> str:
         """The unit of all rates."""
-        return {"J": "W", "rad^2/s^2": "rad^2/s^3"}.get(self.unit, f"{self.unit}/s")
+        return {"J": "W", "rad^2/s^2": "rad^2/s^3", "rad^2 s": "rad^2"}.get(self.unit, f"{self.unit}/s")
 
     @property
     def shares(self) -> dict[str, Array]:

@@ -81,11 +81,14 @@ class Basin:
         return edges, np.divide(back, count, out=np.full(len(count), np.nan), where=count > 0), count
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the counts and the reach by their names, as JSON takes them."""
+        """Return the counts, whole and between edges of the distance, and the reach, as JSON takes them."""
         among = {"returned": self.returned, "diverged": self.diverged, "guaranteed": self.guaranteed}
         among["guaranteed_not_returned"] = self.guaranteed & ~self.returned
-        counts = {"starts": len(self.q)} | {name: int(rows.sum()) for name, rows in among.items()}
+        counts: dict[str, Any] = {"starts": len(self.q)} | {name: int(rows.sum()) for name, rows in among.items()}
         ball = self.ball if np.isfinite(self.ball) else None
+        edges, _, started = self.share_by_distance()
+        back = np.histogram(self.distance[self.returned], edges)[0]
+        counts |= {"edges": edges.tolist(), "starts_between": started.tolist(), "returned_between": back.tolist()}
         return {"law": self.law} | counts | {"ball": ball, "reach": self.reach.to_dict(), "tolerance": self.tolerance}
 
 

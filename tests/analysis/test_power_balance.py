@@ -15,6 +15,7 @@ START = np.array([0.7, 1.2])
 LAWS = {
     "plan": lambda arm, **o: pc.ExtendedMotionPlan(arm, CIRCLE, [400.0, 500.0], [30.0, 40.0], k=20.0, **o),
     "projection": lambda arm, **o: pc.Projection(arm, CIRCLE, 400.0, [30.0, 40.0], **o),
+    "maneuver": lambda arm, **o: pc.ManeuverRegulation(arm, CIRCLE, [400.0, 500.0], [30.0, 40.0], **o),
     "computed torque": lambda arm, **o: pc.ComputedTorque(arm, CIRCLE, [400.0, 500.0], [30.0, 40.0], **o),
     "pd": lambda arm, **o: pc.PDPlus(arm, CIRCLE, [400.0, 60.0], [45.0, 4.0], **o),
     "sliding": lambda arm, **o: pc.SlotineLi(arm, CIRCLE, [10.0, 12.0], [45.0, 4.0], **o),
@@ -38,6 +39,9 @@ def pull(name, run, law, arm):
         )
     if name == "sliding":
         return e_v + law.Lambda * e_p
+    if name == "maneuver":
+        weighed = 2 * law.metric.apply(e_p, e_v)[1]
+        return np.linalg.solve(arm.mass_matrix(q), weighed[..., None])[..., 0]
     weight = {"projection": 1.0}.get(name, 1 / np.asarray(getattr(law, "K_p", 1.0)))
     return np.linalg.solve(arm.mass_matrix(q), (weight * e_v)[..., None])[..., 0]
 
@@ -150,6 +154,7 @@ def test_only_a_payload(name):
     q, qd, e_p, e_v, s = (run.array(part)[0] for part in ("q", "qd", "e_p", "e_v", "s"))
     point, sdot = CIRCLE.at(s), run.array("sdot")[0][:, None]
     K_p = law.k_p if name == "projection" else law.K_p
+    sdot = point.theta[:, None] if name == "maneuver" else sdot
     acceleration = point.velocity_slope * sdot + law.K_v * e_v + K_p * e_p
     matrices = heavy.mass_matrix(q) - FREE.mass_matrix(q), heavy.coriolis_matrix(q, qd) - FREE.coriolis_matrix(q, qd)
     more = sum((m @ v[..., None])[..., 0] for m, v in zip(matrices, (acceleration, qd), strict=True))
