@@ -6,7 +6,7 @@ Along a lap of period T small deviations δ from the closed orbit obey a linear 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -54,10 +54,10 @@ def follow_laps(
         InputError: the path is no orbit of the law, the plan does not go round it, or the loop has no derivative.
     """
     if not isinstance(loop, SampledLoop):
-        return [_follow_path(ContinuousMap(laws(np.array([row]))), task) for row in range(rows)]
+        return [_follow_path(ContinuousMap(laws(np.full(2 * _CELLS + 1, row))), task) for row in range(rows)]
     every = np.arange(rows)
     tick = TickMap(laws(every), loop)
-    orbits = [_cut_lap(tick, task, states) for states in _record_orbits(tick, rows, task, settle)]
+    orbits = [_cut_lap(tick, task, states) for states in _follow_ticks(laws, tick, loop, rows, task, settle)]
     counts = [count for _, count in orbits]
     states = np.concatenate([each[:count] for each, count in orbits])
     steps = _differentiate(TickMap(laws(np.repeat(every, counts)), loop), states)
@@ -98,13 +98,8 @@ def _check_orbit(rates: Array, wanted: Array) -> None:
         )
 
 
-def _cut_lap(tick: TickMap, task: PathTask, states: Array | None) -> tuple[Array, int]:
-    """Return the states of a sampled loop from the begin of a lap on, (k, D), and the ticks that come nearest to it.
-
-    A loop that is unstable, so that it leaves the path before it settles, goes along the path itself.
-    """
-    if states is None:
-        states = tick.on_path(_record_plan(task, tick.period))
+def _cut_lap(tick: TickMap, task: PathTask, states: Array) -> tuple[Array, int]:
+    """Return the states of a sampled loop from the begin of a lap on, (k, D), and the ticks that come nearest to it."""
     return states, int(np.abs(_way(tick, task, states) - 1).argmin())
 
 
@@ -114,10 +109,24 @@ def _way(tick: TickMap, task: PathTask, states: Array) -> Array:
     return (tick.parameter(states) - tick.parameter(states[:1])) / task.period
 
 
+def _follow_ticks(
+    laws: LawOfRows, tick: TickMap, loop: SampledLoop, rows: int, task: PathTask, settle: int
+) -> Iterator[Array]:
+    """Yield the states of a sampled loop from the begin of a lap on, (k, D), with each row of gains.
+
+    A loop that is unstable, so that it leaves the path before it settles, goes along the path itself.
+    """
+    for row, states in enumerate(_record_orbits(tick, rows, task, settle)):
+        if states is None:
+            s = _record_plan(task, tick.period)
+            states = TickMap(laws(np.full(len(s), row)), loop).on_path(s)
+        yield states
+
+
 def _record_orbits(tick: TickMap, rows: int, task: PathTask, settle: int) -> list[Array | None]:
     """Return the states of a lap after those to settle, (k, D), of each row; ``None`` where it leaves its path."""
     assert task.period is not None
-    start = np.repeat(tick.on_path(np.array([task.s0])), rows, axis=0)
+    start = tick.on_path(np.full(rows, task.s0))
     extent = np.ptp(task.q_d(np.linspace(*task.sampled_interval, 65)), axis=0).max()
     x, laps, recorded, ticks = start, np.zeros(rows), [], 0
     lost, begin = np.zeros(rows, dtype=bool), np.zeros(rows, dtype=np.intp)

@@ -180,6 +180,9 @@ def test_each_point_is_what_floquet_says_of_the_law_with_these_gains():
         one = pc.floquet(pc.Projection(ARM, CIRCLE, k_p, [12.0, 15.0]), loop, settle=1)
         assert rate == pytest.approx(one.decay_rate, rel=1e-6)
     assert found.boundary.shape == (0, 1)
+    law = pc.ManeuverRegulation(ARM, CIRCLE, 100.0, 12.0)  # whose start depends on its gains
+    found = pc.stability_map(law, {"K_p": [60.0, 100.0]}, loop, **QUIET)
+    assert found.decay_rate[1] == pytest.approx(pc.floquet(law, loop, settle=1).decay_rate, rel=1e-6)
 
 
 def test_the_mode_along_the_orbit_is_never_a_transverse_one():
@@ -249,6 +252,8 @@ def test_a_law_with_other_gains_is_otherwise_the_same():
         pc.SlotineLi(ARM, CIRCLE, 20.0, [30.0, 3.0]),
         pc.SpeedOverride(pc.ExtendedMotionPlan(ARM, CIRCLE, 800.0, 45.0, 20.0), 0.5, acceleration=3.0),
         pc.EventPlan(pc.ExtendedMotionPlan(ARM, CIRCLE, 800.0, 45.0, 20.0), observer_hz=12.0),
+        pc.ManeuverRegulation(ARM, CIRCLE, 800.0, [45.0, 60.0]),
+        pc.TransverseLinearization(ARM, CIRCLE, 800.0, 60.0, 20.0),
         pc.AdaptiveSlotineLi(ARM, CIRCLE, 20.0, [30.0, 3.0], 0.1, k=5.0),
         OwnLaw(ARM, CIRCLE, 100.0, 20.0, 0.5),
     ]
