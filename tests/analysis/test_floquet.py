@@ -151,7 +151,7 @@ def test_what_has_no_derivative_is_refused():
     with pytest.raises(InputError, match="no orbit"):
         pc.floquet(held)
     with pytest.raises(InputError, match="does not go round"):
-        pc.floquet(held, pc.SampledLoop(period=0.05), settle=1)
+        pc.floquet(held, pc.SampledLoop(period=0.03), settle=1)
     viscous = ARM.with_friction(pc.Viscous([1.0, 1.0]))
     with pytest.raises(InputError, match="no orbit"):
         pc.floquet(pc.Projection(viscous, CIRCLE, 800.0, 60.0, friction="none"))
