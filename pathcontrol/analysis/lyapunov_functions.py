@@ -120,7 +120,7 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     if isinstance(controller, TransverseLinearization):
         s = run.array("s").T
         tangent = controller.point(np.where(np.isfinite(s), s, controller.task.s0)).dq_d.swapaxes(0, 1)
-        return _beside(controller.k_p[..., None], controller.k_v[..., None], e_p, e_v, tangent)
+        return _beside(controller.k_p, controller.k_v, e_p, e_v, tangent)
     raise InputError(
         f"no Lyapunov function is given for {type(controller).__name__}; use ExtendedMotionPlan or Projection, "
         "or ExtendedMotionPlan with k = 0 for computed torque"
@@ -148,7 +148,7 @@ def _projected(k_p: Array, K_v: Array, e_p: Array, e_v: Array) -> Lyapunov:
 
 
 def _beside(k_p: Array, k_v: Array, e_p: Array, e_v: Array, dq_d: Array) -> Lyapunov:
-    """Return V and V̇ of what is beside the path for gains (1,) or (N, 1), errors, and q_d' [rad].
+    """Return V and V̇ of what is beside the path for gains () or (N, 1), errors, and q_d' [rad].
 
     V = ½Nq̇ᵀNq̇ + ½k_p e_pᵀe_p and V̇ = −k_v Nq̇ᵀNq̇, where Nq̇ = −Ne_v is the part of q̇ that is normal to the path.
     """

@@ -84,7 +84,7 @@ class AdaptiveSlotineLi(PlanFeedback):
         mass = bodies[:, 0].sum()
         gyration = np.sqrt(0.5 * bodies[:, _MOMENTS].sum() / mass)
         scale = mass * np.repeat([1.0, gyration, gyration**2], [1, 3, 6])
-        return self.adaptation[..., None] * np.tile(scale**2, self.robot.n)
+        return np.asarray(self.adaptation * np.tile(scale**2, self.robot.n))
 
     def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
         z = super().start(q, qd)

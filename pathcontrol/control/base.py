@@ -354,7 +354,7 @@ def scalar_gain(name: str, value: ArrayLike) -> Array:
 
 
 def rollout_gain(name: str, value: ArrayLike) -> Array:
-    """Return a gain that is one number, (), or has one for each rollout, (N,), given as (N,) or (N, 1); read-only.
+    """Return a gain that is one number, (), or has one for each rollout, (N, 1), given as (N,) or (N, 1); read-only.
 
     Raises:
         InputError: it is no finite number, or has other axes.
@@ -362,11 +362,16 @@ def rollout_gain(name: str, value: ArrayLike) -> Array:
     array = check_finite(name, as_array(name, value))
     if array.ndim > 2 or (array.ndim == 2 and array.shape[1] != 1):
         raise InputError(f"{name} has shape {array.shape}, expected a number, or one for each rollout, (N,) or (N, 1)")
-    return freeze(array[..., 0] if array.ndim > 1 else array)
+    return freeze(array[:, None] if array.ndim == 1 else array)
+
+
+def each_rollout(gain: Array) -> Array:
+    """Return a gain of :func:`rollout_gain` as one number, (), or (N,), for numbers that have no joints."""
+    return gain[..., 0] if gain.ndim else gain
 
 
 def positive_rollout_gain(name: str, value: ArrayLike) -> Array:
-    """Return a gain greater than 0 that is one number, (), or has one for each rollout, (N,); read-only.
+    """Return a gain greater than 0 that is one number, (), or has one for each rollout, (N, 1); read-only.
 
     Raises:
         InputError: it is no finite number, is not positive, or has other axes.

@@ -7,9 +7,9 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_scalar
+from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import ControlOutput, positive_rollout_gain, rollout_gain
+from pathcontrol.control.base import ControlOutput, each_rollout, positive_rollout_gain, rollout_gain
 from pathcontrol.control.nearest_point import NearestPoint
 from pathcontrol.control.reference_law import Located
 from pathcontrol.errors import InputError
@@ -62,13 +62,14 @@ class PassiveVelocityField(NearestPoint):
         task: path and velocity profile.
         Lambda: Λ [1/s], the rate at which the field leads to the path, a scalar or one for each rollout, (N,).
         K_v: rate at which the velocity comes to the field [1/s], a scalar or one for each rollout, (N,).
-        energy: Ē [J]; by default twice that of the arm at v√2, where the path has the largest inertia.
-        approach: v [rad/s]; by default the largest speed ‖r‖ of the task.
+        energy: Ē [J], a scalar or one for each rollout, (N,); by default twice that of the arm at v√2, where the path
+            has the largest inertia.
+        approach: v [rad/s], a scalar or one for each rollout, (N,); by default the largest speed ‖r‖ of the task.
         recharge: ρ [1/s], 0 or more; a scalar or one for each rollout, (N,).
         options: ``branch``, ``capture``, ``friction`` and ``start`` as of :class:`Projection`.
     """
 
-    gains = ("Lambda", "K_v", "recharge")
+    gains = ("Lambda", "K_v", "recharge", "energy", "approach")
 
     def __init__(
         self,
@@ -76,8 +77,8 @@ class PassiveVelocityField(NearestPoint):
         task: PathTask,
         Lambda: Annotated[ArrayLike, Form.GAIN, Unit("1/s")],
         K_v: Annotated[ArrayLike, Form.GAIN, Unit("1/s")],
-        energy: Annotated[float, Form.POSITIVE, Unit("J")] | None = None,
-        approach: Annotated[float, Form.POSITIVE, Unit("rad/s")] | None = None,
+        energy: Annotated[ArrayLike, Form.GAIN, Unit("J")] | None = None,
+        approach: Annotated[ArrayLike, Form.GAIN, Unit("rad/s")] | None = None,
         recharge: Annotated[ArrayLike, Form.GAIN_OR_ZERO, Unit("1/s")] = 0.0,
         **options: Any,
     ) -> None:
@@ -87,11 +88,14 @@ class PassiveVelocityField(NearestPoint):
         if (self.recharge < 0).any():
             raise InputError(f"recharge = {self.recharge.tolist()}, expected 0 or more: a negative one wastes energy")
         fastest, inertia = np.moveaxis(np.asarray(map_tasks(task, self._survey)), -1, 0)
-        self.approach = fastest if approach is None else as_scalar("approach", approach, positive=True)
-        self.energy = 2 * inertia * self.approach**2 if energy is None else as_scalar("energy", energy, positive=True)
-        if (short := 0.5 * inertia * fastest**2 > _MOST * np.asarray(self.energy)).any():
-            need = float(np.max(np.where(short, 0.5 * inertia * fastest**2 / _MOST, 0.0)))
-            raise InputError(f"energy = {energy} J, but the arm may need {need:.3g} J at the speed of the task")
+        self.approach = positive_rollout_gain("approach", fastest if approach is None else approach)
+        enough = 2 * inertia * each_rollout(self.approach) ** 2
+        self.energy = positive_rollout_gain("energy", enough if energy is None else energy)
+        need = np.broadcast_to(0.5 * inertia * fastest**2 / _MOST, np.shape(enough))
+        if (need > each_rollout(self.energy)).any():
+            raise InputError(
+                f"energy = {self.energy.tolist()} J, but the arm may need {need.max():.3g} J at the speed of the task"
+            )
 
     def _survey(self, task: PathTask) -> Array:
         """Return the largest speed ‖r‖ [rad/s] of one task, and the largest eigenvalue of M on its path, (2,)."""
@@ -101,8 +105,10 @@ class PassiveVelocityField(NearestPoint):
 
     def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
         z = super().start(q, qd)
-        left = np.maximum(self.energy - self.robot.kinetic_energy(q, qd), 0.0)
-        return np.concatenate([z, np.broadcast_to(np.sqrt(2 * left), z.shape[:-1])[..., None]], axis=-1)
+        left = np.maximum(each_rollout(self.energy) - self.robot.kinetic_energy(q, qd), 0.0)
+        batch = np.broadcast_shapes(z.shape[:-1], left.shape)  # one start may serve rollouts of several energies
+        z, left = np.broadcast_to(z, (*batch, z.shape[-1])), np.broadcast_to(left, batch)
+        return np.concatenate([z, np.sqrt(2 * left)[..., None]], axis=-1)
 
     def augmented_energy(self, q: Array, qd: Array, z: Array) -> Array:
         """Return k̄ = ½q̇ᵀM(q)q̇ + ½f² [J], (*batch,), of arm and flywheel, for the state z of the law."""
@@ -115,9 +121,10 @@ class PassiveVelocityField(NearestPoint):
         along = (field.momentum * qd).sum(-1) + field.momentum_f * f  # P̄ᵀq̄̇
         turned = (field.derivative * qd).sum(-1) + field.derivative_f * f  # w̄ᵀq̄̇
         twice = (own * qd).sum(-1) + f**2  # 2k̄
-        gain = self.K_v / (2 * self.energy)
-        by_w = along / (2 * self.energy)
-        by_P = (self.recharge * (self.energy - 0.5 * twice) - turned) / (2 * self.energy) + gain * twice
+        energy = each_rollout(self.energy)
+        gain, lacking = each_rollout(self.K_v) / (2 * energy), energy - 0.5 * twice
+        by_w = along / (2 * energy)
+        by_P = (each_rollout(self.recharge) * lacking - turned) / (2 * energy) + gain * twice
         by_p = -gain * along
         tau = by_w[..., None] * field.derivative + by_P[..., None] * field.momentum + by_p[..., None] * own
         f_rate = by_w * field.derivative_f + by_P * field.momentum_f + by_p * f
@@ -131,22 +138,21 @@ class PassiveVelocityField(NearestPoint):
     def velocity(self, here: Located, qd: Array, sdot: Array) -> tuple[Array, Array]:
         """Return V [rad/s] and dV/dt along the motion [rad/s²], (*batch, n), before V is made shorter."""
         point, e_p, e_rate = here.point, here.e_p, here.point.dq_d * sdot[..., None] - qd
-        Lambda = np.asarray(self.Lambda)[..., None]
-        squared = (Lambda / np.asarray(self.approach)[..., None]) ** 2
+        squared = (self.Lambda / self.approach) ** 2
         share = 1 / np.sqrt(1 + squared * (e_p**2).sum(-1, keepdims=True))
         share_rate = -(share**3) * squared * (e_p * e_rate).sum(-1, keepdims=True)
-        V = point.velocity + Lambda * share * e_p
-        return V, point.velocity_slope * sdot[..., None] + Lambda * (share * e_rate + share_rate * e_p)
+        V = point.velocity + self.Lambda * share * e_p
+        return V, point.velocity_slope * sdot[..., None] + self.Lambda * (share * e_rate + share_rate * e_p)
 
     def _field(self, q: Array, qd: Array, here: Located, sdot: Array) -> _Field:
         """Return the augmented field at the arm; its energy is Ē, so that V̄ᵀw̄ = 0."""
         V, V_rate = self.velocity(here, qd, sdot)
         P = self.robot.momentum(q, V)
         w = self.robot.inverse_dynamics(q, qd, V_rate, velocity=V) - self.robot.gravity(q)
-        energy, power = 0.5 * (V * P).sum(-1), (V * w).sum(-1)
-        long = energy > _MOST * self.energy
-        share = np.where(long, np.sqrt(_MOST * self.energy / np.where(long, energy, 1.0)), 1.0)
+        whole, energy, power = each_rollout(self.energy), 0.5 * (V * P).sum(-1), (V * w).sum(-1)
+        long = energy > _MOST * whole
+        share = np.where(long, np.sqrt(_MOST * whole / np.where(long, energy, 1.0)), 1.0)
         share_rate = np.where(long, -share * power / (2 * np.where(long, energy, 1.0)), 0.0)
         w = share[..., None] * w + share_rate[..., None] * P
-        P_f = np.sqrt(2 * (self.energy - share**2 * energy))
+        P_f = np.sqrt(2 * (whole - share**2 * energy))
         return _Field(share[..., None] * P, w, P_f, np.where(long, 0.0, -power / P_f))

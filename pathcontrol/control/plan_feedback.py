@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import Controller, rollout_gain
+from pathcontrol.control.base import Controller, each_rollout, rollout_gain
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint
@@ -57,7 +57,7 @@ class PlanFeedback(Controller):
         **options: Any,
     ) -> None:
         super().__init__(robot, task, **options)
-        self.k = rollout_gain("k", k)
+        self.k = each_rollout(rollout_gain("k", k))
         if (self.k < 0).any():
             raise InputError(
                 f"k = {self.k.tolist()}, expected k ≥ 0: a negative gain drives the path away from the arm"

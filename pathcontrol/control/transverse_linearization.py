@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import ControlOutput, positive_rollout_gain
+from pathcontrol.control.base import ControlOutput, each_rollout, positive_rollout_gain
 from pathcontrol.control.nearest_point import NearestPoint
 from pathcontrol.control.reference_law import Located, differentiate_along
 from pathcontrol.robot.model import RobotModel
@@ -86,9 +86,9 @@ class TransverseLinearization(NearestPoint):
         tangent = point.dq_d / np.sqrt(squared)[..., None]
         # t'σ̄̇ tᵀq̇, but for its part along t
         turn = point.ddq_d * (sdot * np.vecdot(tangent, qd) / np.sqrt(squared))[..., None]
-        free = turn - np.asarray(self.k_v)[..., None] * qd + np.asarray(self.k_p)[..., None] * e_p
+        free = turn - self.k_v * qd + self.k_p * e_p
         beside = free - tangent * np.vecdot(tangent, free)[..., None]
-        sddot = point.dtheta * sdot - self.k_s * (sdot - point.theta)
+        sddot = point.dtheta * sdot - each_rollout(self.k_s) * (sdot - point.theta)
         third = np.vecdot(e_p, differentiate_along(self.task.ddq_d, self.task, here.s))
         stretched = (squared + np.vecdot(e_p, point.ddq_d)) * sddot
         ahead = stretched + (3 * bend + third) * sdot**2 - 2 * sdot * np.vecdot(point.ddq_d, qd)
@@ -96,5 +96,5 @@ class TransverseLinearization(NearestPoint):
 
     def _track(self, here: Located) -> Array:
         """Return the acceleration [rad/s²], (*batch, n), that tracks a timed plan."""
-        feedback = np.asarray(self.k_v)[..., None] * here.e_v + np.asarray(self.k_p)[..., None] * here.e_p
-        return here.point.velocity_slope * here.point.theta[..., None] + feedback
+        planned = here.point.velocity_slope * here.point.theta[..., None]
+        return planned + self.k_v * here.e_v + self.k_p * here.e_p

@@ -15,7 +15,7 @@ from pathcontrol.view.report.reproduction import recipe
 #: gains of each law, by its name in files
 FAMILY = {
     "adaptive_slotine_li": {"Lambda": 10.0, "K_d": [40.0, 4.0], "adaptation": 0.1, "k": 20.0},
-    "passive_velocity_field": {"Lambda": 10.0, "K_v": 30.0, "recharge": 5.0},
+    "passive_velocity_field": {"Lambda": 10.0, "K_v": 30.0, "recharge": 5.0, "energy": 30.0, "approach": 1.5},
     "transverse_linearization": {"k_p": 300.0, "k_v": 40.0, "k_s": 30.0},
     "maneuver_regulation": {"K_p": 300.0, "K_v": [40.0, 50.0]},
 }

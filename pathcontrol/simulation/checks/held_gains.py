@@ -101,10 +101,10 @@ def longest_period(feedback: Feedback, robot: RobotModel, uncompensated: Array, 
 
 
 def _columns_beside(law: TransverseLinearization | PassiveVelocityField) -> tuple[Array, Array]:
-    """Return stiffness [1/s²] and damping [1/s] beside the path of a law with gains (N,), as (N, 1), or (1,) each."""
+    """Return stiffness [1/s²] and damping [1/s] beside the path of a law with one gain for all joints."""
     if isinstance(law, TransverseLinearization):
-        return law.k_p[..., None], law.k_v[..., None]
-    return (law.Lambda * law.K_v)[..., None], (law.Lambda + law.K_v)[..., None]
+        return law.k_p, law.k_v
+    return law.Lambda * law.K_v, law.Lambda + law.K_v
 
 
 def _select_extremes(

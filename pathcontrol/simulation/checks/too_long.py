@@ -34,7 +34,14 @@ from pathcontrol.tasks.task import PathTask
 
 _SAMPLES, _FINE = 9, 65  # samples of a path for the arm and for the plan
 _MOST, _FEWEST = 1 << 16, 3  # samples of all tasks of a batch together, and of each at least
-_NO_FEEDBACK = ("k", "adaptation", "recharge", "k_s")  # gains that are no part of the linearised feedback
+_NO_FEEDBACK = (
+    "k",
+    "adaptation",
+    "recharge",
+    "energy",
+    "approach",
+    "k_s",
+)  # gains that are no part of the linearised feedback
 _SLOW = 1.0  # h times a rate of growth or decay up to which a step resolves it
 _OSCILLATION = 0.3  # h ω up to which the midpoint rule resolves an oscillation, to 1.5 % of ω
 _SPRING = 0.05  # h ω advised for a spring that is held over a step: holding it adds energy at the rate hω²/4
