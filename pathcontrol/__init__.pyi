@@ -11,6 +11,7 @@ from .analysis.friction_identification import FrictionEstimate as FrictionEstima
 from .analysis.friction_identification import identify_friction as identify_friction
 from .analysis.gamma import distance_to_gamma as distance_to_gamma
 from .analysis.largest_gain import largest_gain as largest_gain
+from .analysis.law_of_run import law_states as law_states
 from .analysis.lyapunov_functions import lyapunov as lyapunov
 from .analysis.pareto import non_dominated as non_dominated
 from .analysis.path_accuracy import PathAccuracy as PathAccuracy

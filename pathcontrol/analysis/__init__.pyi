@@ -9,6 +9,7 @@ from .friction_identification import FrictionEstimate as FrictionEstimate
 from .friction_identification import identify_friction as identify_friction
 from .gamma import distance_to_gamma as distance_to_gamma
 from .largest_gain import largest_gain as largest_gain
+from .law_of_run import law_states as law_states
 from .lyapunov_functions import lyapunov as lyapunov
 from .pareto import non_dominated as non_dominated
 from .path_accuracy import PathAccuracy as PathAccuracy

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.analysis.metric_helpers import resolve_task
-from pathcontrol.control.base import Controller
+from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.errors import InputError
 from pathcontrol.registry import LAWS
 from pathcontrol.simulation.config import table
@@ -79,14 +79,44 @@ def has_demand(run: Run) -> bool:
 
 def replay(run: Run, controller: Controller) -> LawRecord:
     """Return the law's part along the motion of a log, as if it had been in the loop from the first sample on."""
-    q, qd, tau = (run.array(name).swapaxes(0, 1) for name in ("q", "qd", "tau"))
-    z, periods, found = controller.start(q[0], qd[0]), np.diff(run.time, append=np.nan), []
+    q, qd = (run.array(name).swapaxes(0, 1) for name in ("q", "qd"))
+    walked = zip(_walk(run, controller, q, qd), qd, strict=True)
+    found = [(out.s, out.tau, out.e_v + velocity) for (out, _), velocity in walked]
+    return LawRecord(*(np.stack(parts) for parts in zip(*found, strict=True)))
+
+
+def law_states(run: Run, controller: Controller | None = None) -> Array:
+    """Return the state z of the law along a run, (rollout, time, m): σ first, and last what is the law's own.
+
+    That is what :class:`AdaptiveSlotineLi` has learnt, or the speed of the flywheel of :class:`PassiveVelocityField`.
+    A run does not keep it: the law is replayed on what it measured. It is exact for a sampled loop whose law has no
+    observer, and of first order in the period of a log or of a run in continuous time.
+
+    Args:
+        run: the run.
+        controller: the law; by default that of the run, by its configuration, if nothing wraps it.
+
+    Raises:
+        InputError: the law is not known, or was wrapped.
+    """
+    expect("run", run, Run)
+    name = str(table(run.config, "controller").get("controller", ""))
+    if controller is None and "(" in name:
+        raise InputError(f"the law of the run is {name}, a law that is wrapped; {_GIVE}")
+    law, measured = find_law(run, controller), "q_measured" in run and "qd_measured" in run
+    q, qd = (run.array(f"{part}_measured" if measured else part).swapaxes(0, 1) for part in ("q", "qd"))
+    return np.stack([z for _, z in _walk(run, law, q, qd)], axis=1)
+
+
+def _walk(run: Run, controller: Controller, q: Array, qd: Array) -> Iterator[tuple[ControlOutput, Array]]:
+    """Yield what a law gives along positions and velocities (k, N, n), and its state z there, (N, m)."""
+    tau, periods = run.array("tau").swapaxes(0, 1), np.diff(run.time, append=np.nan)
+    z = controller.start(run.array("q")[:, 0], run.array("qd")[:, 0])
     for t, period, position, velocity, torque in zip(run.time, periods, q, qd, tau, strict=True):
         out = controller.law(float(t), position, velocity, z)
-        found.append(LawRecord(out.s, out.tau, out.e_v + velocity))
+        yield out, z
         if np.isfinite(period):
             z = controller.advance(z, out._replace(tau=torque), float(period))
-    return LawRecord(*(np.stack(parts) for parts in zip(*found, strict=True)))
 
 
 def _select_rows(run: Run, arguments: dict[str, Any]) -> dict[str, Any]:

@@ -109,6 +109,31 @@ def test_its_multipliers_on_the_circle_are_those_of_a_stable_orbit(ideal_arm, ci
     assert (np.abs(found.multipliers) < 1 + 1e-4).all()
 
 
+# --- their states -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", FAMILY)
+def test_the_states_of_a_saved_run_are_those_that_the_law_had(arm, circle, name, tmp_path):
+    law, seen = law_of(name, arm, circle), []
+    inner = law.law
+    law.law = lambda t, q, qd, z: seen.append(z) or inner(t, q, qd, z)
+    loop = pc.SampledLoop(encoders=True, velocity="difference", torque_limits=True, delay=1e-3)
+    run_of(law, duration=0.1, loop=loop).save(tmp_path / "run.nc")
+    run = pc.Run.load(tmp_path / "run.nc")
+    found = pc.law_states(run)[0]
+    np.testing.assert_allclose(found, np.concatenate(seen)[-len(run.time) :], rtol=1e-9, atol=1e-12)
+
+
+def test_states_of_a_wrapped_law_ask_for_the_law(arm, circle):
+    law = pc.SpeedOverride(law_of("adaptive_slotine_li", arm, circle), 0.5)
+    run = run_of(law, duration=0.05)
+    with pytest.raises(pc.InputError, match=r"is SpeedOverride\(AdaptiveSlotineLi\), a law that is wrapped"):
+        pc.law_states(run)
+    states = pc.law_states(run, law)
+    assert states.shape[:2] == (1, len(run.time))
+    np.testing.assert_allclose(states[..., 0], run.array("s"), rtol=1e-12)
+
+
 # --- their Lyapunov functions ---------------------------------------------------------------------------------------
 
 
