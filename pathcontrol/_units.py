@@ -38,7 +38,7 @@ _UNITS = {
     "rpm": _Unit(2 * math.pi / 60, s=-1, rad=1),
     **{name: _Unit(factor, kg=1) for name, factor in {"kg": 1.0, "g": 1e-3}.items()},
     **{name: _Unit(factor, m=1, kg=1, s=-2) for name, factor in {"N": 1.0, "kN": 1e3}.items()},
-    "Nm": _Unit(1.0, m=2, kg=1, s=-2),
+    **dict.fromkeys(("Nm", "J"), _Unit(1.0, m=2, kg=1, s=-2)),
 }
 #: what to offer beside the SI unit itself
 _OTHERS = {
