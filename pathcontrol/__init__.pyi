@@ -56,6 +56,7 @@ from .control.motion_control import SlotineLi as SlotineLi
 from .control.motion_control import Tracking as Tracking
 from .control.paced import Paced as Paced
 from .control.passive_velocity_field import PassiveVelocityField as PassiveVelocityField
+from .control.path_mpc import PathMPC as PathMPC
 from .control.projection import Projection as Projection
 from .control.reference_law import Reference as Reference
 from .control.speed_override import SpeedOverride as SpeedOverride

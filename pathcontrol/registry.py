@@ -59,6 +59,7 @@ LAWS = Kind(
         "speed_override": "control.speed_override:SpeedOverride",
         "paced": "control.paced:Paced",
         "event_plan": "control.event_plan:EventPlan",
+        "path_mpc": "control.path_mpc:PathMPC",
     },
     ("robot", "task"),
 )

@@ -28,7 +28,9 @@ EXAMPLES = {
     "control_loop": 4,
     "lost_sign": 2,
     "basins": 3,
+    "predictive_control": 2,
 }
+OF_A_PACKAGE = {"tune_gains": "pymoo", "predictive_control": "casadi"}
 OF_THE_EXTRA = {"six_joints", "mill_pocket", "deburr_bracket"}
 ALONG_FILES = {"lettering", "mill_pocket", "deburr_bracket"}
 
@@ -37,8 +39,8 @@ ALONG_FILES = {"lettering", "mill_pocket", "deburr_bracket"}
 def test_example(name, tmp_path, monkeypatch, capsys):
     if name in OF_THE_EXTRA:
         pytest.importorskip("example_robot_data")
-    if name == "tune_gains":
-        pytest.importorskip("pymoo")
+    if name in OF_A_PACKAGE:
+        pytest.importorskip(OF_A_PACKAGE[name])
     monkeypatch.setattr(sys, "argv", [f"{name}.py", str(tmp_path)])
     runpy.run_path(str(ROOT / "examples" / f"{name}.py"), run_name="__main__")
     printed = capsys.readouterr().out

@@ -81,7 +81,7 @@ def test_whatever_is_imported_is_asked_for():
     # their wheels install beside the packages, where Python does not see of which one they are
     providers = {"pinocchio": ["pin"], "example_robot_data": ["example-robot-data-loaders"]}
     providers |= {"rtde_control": ["ur-rtde"], "rtde_receive": ["ur-rtde"]} | packages_distributions()
-    declared = requirements("robots", "mujoco", "cluster", "video", "sweep", "tune", "franka", "ur", "mcap")
+    declared = requirements("robots", "mujoco", "cluster", "video", "sweep", "tune", "franka", "ur", "mcap", "mpc")
     used = set.union(*(imported(path) for path in (ROOT / "pathcontrol").rglob("*.py")))
     assert {"numpy", "pinocchio", "umsgpack", "cloudpickle"} <= used
     by = {name: {one.lower().replace("_", "-") for one in providers.get(name, [name])} for name in used}
