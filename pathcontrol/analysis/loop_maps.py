@@ -15,10 +15,14 @@ from pathcontrol.simulation.sampled import split_delay
 
 
 class ContinuousMap:
-    """The rate of the state (q, q̇, z) in continuous time."""
+    """The rate of the state (q, q̇, z) in continuous time.
+
+    Of the memory of a momentum observer r₁ − Kp and r are states; the rest is of ticks, and left out.
+    """
 
     def __init__(self, law: Controller) -> None:
         self._law, self._robot, self._n = law, law.robot, law.robot.n
+        self._of_ticks = np.zeros((1, 2 * self._n + 1))
         self._viscous = np.atleast_2d(viscous_of(law.robot.friction))[0]
 
     def on_path(self, s: Array) -> Array:
@@ -26,18 +30,32 @@ class ContinuousMap:
         point = self._law.task.at(s)
         z = np.array(self._law.start(point.q_d, point.velocity), dtype=np.float64)
         z[:, 0] = s
-        return np.concatenate([point.q_d, point.velocity, z], axis=-1)
+        if (observer := self._law.observer) is not None:
+            z[:, 1 : 1 + self._n] = -observer.gain * self._robot.momentum(point.q_d, point.velocity)
+            self._of_ticks[:, -1] = z[0, observer.size]
+        return np.concatenate([point.q_d, point.velocity, self._leave_out_ticks(z)], axis=-1)
 
     def __call__(self, x: Array) -> Array:
         """Return ẋ at states x, (k, D)."""
         q, qd, z = x[:, : self._n], x[:, self._n : 2 * self._n], x[:, 2 * self._n :]
+        if self._law.observer is not None:
+            known, own = z[:, : 1 + 2 * self._n], z[:, 1 + 2 * self._n :]
+            z = np.concatenate([known, np.repeat(self._of_ticks, len(x), axis=0), own], axis=-1)
         out = self._law.law(0.0, q, qd, z)
         qdd = self._robot.forward_dynamics(q, qd, out.tau - self._viscous * qd)
-        return np.concatenate([qd, qdd, self._law.rate(out)], axis=-1)
+        return np.concatenate([qd, qdd, self._leave_out_ticks(self._law.rate(out))], axis=-1)
+
+    def _leave_out_ticks(self, z: Array) -> Array:
+        """Return states or rates of the law, (k, m), without what its observer remembers of the last tick."""
+        if (observer := self._law.observer) is None:
+            return z
+        return np.delete(z, np.arange(1 + 2 * self._n, 1 + observer.size), axis=-1)
 
 
 class TickMap:
     """The state one period later in a sampled loop: (q, q̇, z, the last reading, the torques that wait).
+
+    The time in the memory of a momentum observer counts from the tick, so that the map is the same at each.
 
     Raises:
         InputError: something of the loop has no derivative.
@@ -69,6 +87,7 @@ class TickMap:
         q, qd = point.q_d, point.velocity
         z = np.array(self._law.start(q, qd), dtype=np.float64)
         z[:, 0] = s
+        z = self._date_memory(z, -self.period)
         waiting = [self._law.robot.gravity(q)] * self._waiting
         reading = [q, qd] if self._reads else []
         return np.concatenate([q, qd, z, *reading, *waiting], axis=-1)
@@ -85,9 +104,16 @@ class TickMap:
         acting = queue[: len(self._parts)]
         share = np.array(self._parts) / self.period
         mean = sum(part * tau for part, tau in zip(share, acting, strict=True))
-        z = self._law.advance(z, out._replace(tau=mean), self.period)
+        z = self._date_memory(self._law.advance(z, out._replace(tau=mean), self.period), -self.period)
         for plant, tau in zip(self._plants, acting, strict=True):
             for _ in range(self._substeps):
                 q, qd = plant.advance(q, qd, tau)
         reading = list(self._sensors.read(q, qd, seen)) if self._reads else []
         return np.concatenate([q, qd, z, *reading, *queue[1:]], axis=-1)
+
+    def _date_memory(self, z: Array, time: float) -> Array:
+        """Return the state of the law, (k, m), with the last tick of its observer at a time [s] from the present one."""
+        if self._law.observer is not None:
+            z = z.copy()
+            z[:, self._law.observer.size] = time
+        return z

@@ -108,6 +108,12 @@ def test_a_sampled_loop_has_the_multipliers_of_its_held_torque():
     assert_same(found.transverse, np.repeat(np.log(z.astype(complex)) / h, 2), found.period, atol=1e-3)
 
 
+def test_an_observer_adds_its_own_exponents_in_continuous_time():
+    """Without a disturbance the estimate is 0, and both of its low passes decay at their corner frequency."""
+    found = pc.floquet(pc.ComputedTorque(ARM, CIRCLE, 200.0, 30.0, friction="observed", observer_hz=20.0))
+    assert_same(found.transverse, [-10.0, -10.0, -20.0, -20.0, *[-40 * np.pi] * 4], found.period, atol=0.02)
+
+
 # --- simulation ---------------------------------------------------------------------------------------------------
 
 
@@ -127,6 +133,17 @@ def test_errors_decay_in_simulation_as_the_slowest_mode(kind, loop):
     late = (run.time > 0.35) & (run.time < 0.6)
     slope = np.polyfit(run.time[late], np.log(apart[late]), 1)[0]
     assert -slope == pytest.approx(found.decay_rate, rel=0.01)
+
+
+def test_errors_of_a_law_with_an_observer_decay_as_the_slowest_mode():
+    arm, task, loop = ARM.with_friction(pc.Viscous([1.0, 0.2])), pc.Circle(0.5, 2.0), pc.SampledLoop(period=0.01)
+    law = pc.ComputedTorque(arm, task, 200.0, 30.0, friction="observed")
+    starts = np.array([0.5, 0.0]) + np.array([[0.0, 0.0], [1e-4, 5e-5]])
+    run = pc.simulate(law, starts, np.tile([0.0, 2.0], (2, 1)), duration=1.3, loop=loop, progress=False)
+    apart = np.linalg.norm(np.diff(run.array("q"), axis=0)[0], axis=-1)
+    late = (run.time > 0.6) & (run.time < 1.2)
+    slope = np.polyfit(run.time[late], np.log(apart[late]), 1)[0]
+    assert -slope == pytest.approx(pc.floquet(law, loop, settle=1).decay_rate, rel=0.01)
 
 
 def test_gains_too_large_for_the_period_are_unstable():
