@@ -112,7 +112,7 @@ class TickMap:
         return np.concatenate([q, qd, z, *reading, *queue[1:]], axis=-1)
 
     def _date_memory(self, z: Array, time: float) -> Array:
-        """Return the state of the law, (k, m), with the last tick of its observer at a time [s] from the present one."""
+        """Return the state of the law, (k, m), the last tick of its observer at a time [s] from this one."""
         if self._law.observer is not None:
             z = z.copy()
             z[:, self._law.observer.size] = time

