@@ -94,7 +94,7 @@ def test_sampling_is_of_first_order_and_the_residual_of_second(name):
 def test_in_continuous_time_nothing_parts_them(name):
     found = []
     for period in (2e-3, 1e-3):
-        balance = pc.power_balance(run_of(LAWS[name](FREE), loop=pc.ContinuousTime(output_period=period)))
+        balance = pc.power_balance(run_of(LAWS[name](FREE), 0.1, loop=pc.ContinuousTime(output_period=period)))
         for share in balance.shares.values():
             assert np.abs(share).max() < 1e-12 * np.abs(balance.measured).max()
         found.append(np.abs(balance.residual).mean())
@@ -185,6 +185,21 @@ def test_dry_friction_that_holds_explains_a_rest():
     balance = pc.power_balance(run)
     assert np.abs(balance.measured).max() < 1e-9
     np.testing.assert_allclose(balance.friction + balance.sampling, -balance.predicted, rtol=1e-6)
+
+
+def test_seven_joints_and_a_payload():
+    """An arm of 7 joints with a payload that its law does not know: the model supplies what is predicted to go."""
+    pytest.importorskip("example_robot_data")
+    arm = pc.load_robot("panda", keep=[f"panda_joint{i}" for i in range(1, 8)]).with_friction(None)
+    center = [0.0, -0.3, 0.0, -1.8, 0.0, 1.8, 0.0]
+    path = pc.Lissajous(np.full(7, 0.2), [1, 2, 1, 2, 1, 2, 1], speed=0.5, center=center)
+    law, start = pc.ExtendedMotionPlan(arm, path, 400.0, 40.0, k=5.0), path.q_d(np.array(0.0))
+    run = pc.simulate(law, start, duration=0.6, plant=arm.with_payload(1.0, "panda_hand"), progress=False)
+    balance = pc.power_balance(run)
+    late = {name: rate[0] for name, rate in balance.means(begin=0.4).items()}
+    assert only(balance, "model", "sampling")
+    assert late["model"] + late["sampling"] + late["predicted"] == pytest.approx(late["measured"], rel=1e-3)
+    assert late["model"] > 20 * abs(late["sampling"])
 
 
 # --- any run --------------------------------------------------------------------------------------------------------
@@ -287,6 +302,20 @@ def test_means_tables_and_json():
     with pytest.raises(InputError, match="no sample"):
         balance.means(begin=99.0)
     assert power_balance_table(run_of(LAWS["pd"](FULL)))[2][1].endswith("W")
+
+
+def test_the_log_of_a_control_loop():
+    """A loop that drives a simulated arm writes a log, of which the balance leaves no more than of a simulation."""
+    law, arm = LAWS["plan"](FULL), pc.Plant(FULL, 2.5e-3)
+    loop = pc.ControlLoop(law, 2.5e-3)
+    q, qd = np.array([[1.0, 0.0]]), np.array([[0.0, 2.0]])
+    loop.start(q[0], qd[0])
+    with loop.record() as log:
+        for k in range(80):
+            q, qd = arm.advance(q, qd, loop.step(q[0], qd[0], k * 2.5e-3)[None])
+    means = pc.power_balance(log.run()).means()
+    assert abs(means["residual"][0]) + abs(means["disturbance"][0]) < 1e-2 * means["friction"][0]
+    assert means["friction"][0] > 0
 
 
 def test_what_has_no_balance_says_why():
