@@ -10,6 +10,7 @@ from .analysis.floquet import floquet as floquet
 from .analysis.friction_identification import FrictionEstimate as FrictionEstimate
 from .analysis.friction_identification import identify_friction as identify_friction
 from .analysis.gamma import distance_to_gamma as distance_to_gamma
+from .analysis.lap_table import lap_errors as lap_errors
 from .analysis.largest_gain import largest_gain as largest_gain
 from .analysis.law_of_run import law_states as law_states
 from .analysis.lyapunov_functions import lyapunov as lyapunov
@@ -48,6 +49,8 @@ from .control.base import diagonal_gain as diagonal_gain
 from .control.branch import BranchPolicy as BranchPolicy
 from .control.event_plan import EventPlan as EventPlan
 from .control.extended_motion_plan import ExtendedMotionPlan as ExtendedMotionPlan
+from .control.learned import Learned as Learned
+from .control.learned_table import LapMemory as LapMemory
 from .control.maneuver_regulation import ManeuverRegulation as ManeuverRegulation
 from .control.motion_control import ComputedTorque as ComputedTorque
 from .control.motion_control import MotionController as MotionController

@@ -60,6 +60,7 @@ LAWS = Kind(
         "paced": "control.paced:Paced",
         "event_plan": "control.event_plan:EventPlan",
         "path_mpc": "control.path_mpc:PathMPC",
+        "learned": "control.learned:Learned",
     },
     ("robot", "task"),
 )

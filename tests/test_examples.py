@@ -29,6 +29,7 @@ EXAMPLES = {
     "lost_sign": 2,
     "basins": 3,
     "predictive_control": 2,
+    "learning": 3,
 }
 OF_A_PACKAGE = {"tune_gains": "pymoo", "predictive_control": "casadi"}
 OF_THE_EXTRA = {"six_joints", "mill_pocket", "deburr_bracket"}
@@ -58,6 +59,11 @@ def test_example(name, tmp_path, monkeypatch, capsys):
     if name == "jammed_joint":  # path control is carried away less far
         peaks = {m[1]: float(m[2]) for m in re.finditer(r"^(\w+) +([\d.]+) +\d+ +[\d.]+$", printed, re.MULTILINE)}
         assert max(peaks["extended_motion_plan"], peaks["projection"]) < peaks["computed_torque"]
+    if name == "learning":  # both begin with the law alone
+        errors = [tuple(map(float, pair)) for pair in re.findall(r": +([\d.]+) deg, learned +([\d.]+) deg", printed)]
+        assert len(errors) == 6
+        assert errors[1][0] == errors[1][1]
+        assert errors[5][1] <= 0.15 < 1.0 < errors[5][0]
     if name == "tune_gains":
         rows = re.findall(r"^(paper|tuned) +(\d) kg +([\d.]+) +([\d.]+) +([\d.]+)$", printed, re.MULTILINE)
         error = {(who, load): float(e) for who, load, e, _, _ in rows}

@@ -8,6 +8,7 @@ from .floquet import floquet as floquet
 from .friction_identification import FrictionEstimate as FrictionEstimate
 from .friction_identification import identify_friction as identify_friction
 from .gamma import distance_to_gamma as distance_to_gamma
+from .lap_table import lap_errors as lap_errors
 from .largest_gain import largest_gain as largest_gain
 from .law_of_run import law_states as law_states
 from .lyapunov_functions import lyapunov as lyapunov

@@ -37,6 +37,12 @@ def accuracy_table(run: Run) -> list[list[str]]:
             ("orientation accuracy, about x, y, z", _angles(found.orientation_accuracy)),
             ("orientation repeatability, about x, y, z", _angles(found.orientation_repeatability)),
         ]
+    if found.corners:
+        many = f"{len(found.corners)} corner{'s' if len(found.corners) > 1 else ''}"
+        rows += [
+            (f"cornering round-off, largest of {many}", readable_number(found.cornering_round_off, found.unit)),
+            (f"cornering overshoot, largest of {many}", readable_number(found.cornering_overshoot, found.unit)),
+        ]
     cycles = f"{found.cycles} cycle{'s' if found.cycles > 1 else ''}, {len(found.s)} sections"
     return [["criterion", cycles], *map(list, rows)]
 

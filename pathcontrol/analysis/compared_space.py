@@ -27,6 +27,10 @@ class ComparedSpace(NamedTuple):
             return cls(Tool(run.robot, frame))
         return cls(None if path.frame is None else Tool(run.robot, path.frame, path.tool_pose))
 
+    def is_made_for(self, path: PathTask) -> bool:
+        """Return whether the tool is the one that a path was made for."""
+        return self.tool is not None and self.tool.frame == path.frame
+
     @property
     def unit(self) -> str:
         """The unit of positions."""

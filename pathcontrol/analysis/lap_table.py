@@ -31,6 +31,18 @@ def lap_times(run: Run, task: PathTask | None = None, rollout: int = 0) -> Array
     return np.diff(_find_lap_ends(part, path)[0])
 
 
+def lap_errors(run: Run, task: PathTask | None = None, rollout: int = 0) -> Array:
+    """Return the largest ‖e_p‖ [rad] in each whole lap of a rollout, (laps,), counted as in :func:`lap_times`.
+
+    Raises:
+        InputError: the path is not closed, or not known.
+    """
+    ends = np.concatenate([[0.0], np.cumsum(lap_times(run, task, rollout))])
+    part = run.rollout(rollout)
+    error, lap = part.norm("e_p")[0], np.searchsorted(ends, part.time, side="right") - 1
+    return np.array([error[lap == i].max() for i in range(len(ends) - 1)])
+
+
 def lap_time(run: Run, task: PathTask) -> Array:
     """Return the mean time [s] of the whole laps of each rollout, (rollout,); NaN without one."""
     found = map(np.diff, _find_lap_ends(run, task))

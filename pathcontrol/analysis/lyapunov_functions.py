@@ -24,7 +24,7 @@ from pathcontrol.control.maneuver_regulation import ManeuverRegulation, StateMet
 from pathcontrol.control.projection import Projection
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.control.transverse_linearization import TransverseLinearization
-from pathcontrol.control.wrapper import LawWrapper
+from pathcontrol.control.wrapper import LawWrapper, unwrap
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
 
@@ -95,7 +95,7 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     resolve_task(run, controller.task)
     e_p, e_v = run.array("e_p"), run.array("e_v")
     if isinstance(controller, LawWrapper):  # whose plan waits for nothing where it is held
-        controller = controller.inner.at_speed(speed_factor(run, controller.task).T)
+        controller = unwrap(controller).at_speed(speed_factor(run, controller.task).T)
     if isinstance(controller, ExtendedMotionPlan):
         s, K_p, K_v = run.array("s").T, _add_time_axis(controller.K_p), _add_time_axis(controller.K_v)
         # the errors of a diverged rollout are NaN, so that any s will do there; laws take the rollouts last in s

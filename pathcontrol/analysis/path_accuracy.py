@@ -14,19 +14,22 @@ v̄_j of a cycle,
     velocity repeatability  RV = 3 S_v / mean(v_c),   S_v the standard deviation of v̄_j
     velocity fluctuation    FV = max_j (max_i d_ij − min_i d_ij),
 
+
 which are the standard's where the commanded speed is the same everywhere. Standard deviations are divided by n − 1.
+Where the path stands for a polyline, round-off and overshoot at its corners are measured (:mod:`.cornering`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, check_whole
 from pathcontrol.analysis.compared_space import ComparedSpace
+from pathcontrol.analysis.cornering import Corner, find_corners, measure_corner, place_corners
 from pathcontrol.analysis.crossings import Crossings, Motion, find_crossings
 from pathcontrol.analysis.metric_helpers import resolve_task
 from pathcontrol.analysis.window import own_samples
@@ -45,6 +48,7 @@ _SCALARS = (
     "velocity_repeatability",
     "velocity_fluctuation",
 )
+_AT_CORNERS = ("cornering_round_off", "cornering_overshoot")
 _VECTORS = ("orientation_accuracy", "orientation_repeatability")
 
 
@@ -61,6 +65,9 @@ class PathAccuracy:
         rotation: rotation vectors [rad] from the commanded orientation to that of each cycle, in the axes of the
             commanded one, (n, m, 3); None in the space of joints.
         unit: ``"m"`` or ``"rad"``.
+        corners: the corners of the polyline that the path stands for.
+        round_off: the least distance of the mean of all cycles from each corner, (k,); NaN where none passes it.
+        overshoot: the largest distance of it from the leg after each corner, beyond the corner, (k,).
     """
 
     s: Array
@@ -70,6 +77,9 @@ class PathAccuracy:
     speed: Array
     rotation: Array | None
     unit: str
+    corners: tuple[Corner, ...] = ()
+    round_off: Array = field(default_factory=lambda: np.zeros(0))
+    overshoot: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def cycles(self) -> int:
@@ -113,6 +123,16 @@ class PathAccuracy:
         return float(np.ptp(self.speed - self.commanded_speed, axis=1).max())
 
     @property
+    def cornering_round_off(self) -> float:
+        """The largest round-off of all corners; NaN without any."""
+        return _largest(self.round_off)
+
+    @property
+    def cornering_overshoot(self) -> float:
+        """The largest overshoot at all corners; NaN without any."""
+        return _largest(self.overshoot)
+
+    @property
     def notes(self) -> list[str]:
         """What cannot be said, and why, in sentences."""
         return ["one cycle says nothing of repeatability; go round more often"] if self.cycles == 1 else []
@@ -122,7 +142,16 @@ class PathAccuracy:
         scalars = {name: _number(getattr(self, name)) for name in _SCALARS}
         vectors = {name: list(map(_number, getattr(self, name))) for name in _VECTORS if self.rotation is not None}
         counts = {"cycles": self.cycles, "sections": len(self.s), "unit": self.unit}
-        return counts | scalars | vectors | {"notes": self.notes}
+        bends = {name: _number(getattr(self, name)) for name in _AT_CORNERS} | {"corners": self._list_corners()}
+        return counts | scalars | vectors | bends | {"notes": self.notes}
+
+    def _list_corners(self) -> list[dict[str, Any]]:
+        """Return point, turn [rad], round-off and overshoot of each corner, as JSON takes them."""
+        numbers = zip(self.corners, self.round_off, self.overshoot, strict=True)
+        return [
+            {"point": one.point.tolist(), "turn": one.turn, "round_off": _number(near), "overshoot": _number(far)}
+            for one, near, far in numbers
+        ]
 
 
 def accuracy(
@@ -133,6 +162,7 @@ def accuracy(
     sections: int = 200,
     skip: int = 1,
     rollout: int = 0,
+    polyline: ArrayLike | None = None,
 ) -> PathAccuracy:
     """Return accuracy and repeatability of a run, or of the log of an arm, in planes normal to its path.
 
@@ -147,6 +177,9 @@ def accuracy(
         sections: number of planes, evenly spread over s, 10 at least.
         skip: laps at the beginning of a closed path that do not count.
         rollout: the rollout that goes round a closed path.
+        polyline: points of the polyline that the path stands for, (k, d) [m or rad], whose corners are measured; on a
+            closed path the first is not repeated. By default the waypoints of a :class:`WaypointPath`, and the
+            straight parts of the contours of a :class:`ToolpathTask`. Corners turn by 45° or more.
 
     Raises:
         InputError: no cycle crosses the planes, the path moves nothing there, each rollout has a path of its own, or
@@ -170,9 +203,21 @@ def accuracy(
     if crossed.sum() < _FEWEST:
         what = "rollout" if path.period is None else f"lap after the first {skip}"
         raise InputError(f"no {what} crosses the {sections} sections of the path; give a longer run, or a smaller skip")
-    x, speed = (np.stack([one[k] for one in cycles])[:, crossed] for k in (0, 1))
+    x, speed = (np.stack(part)[:, crossed] for part in ([one.x for one in cycles], [one.speed for one in cycles]))
     rotation = None if space.tool is None else np.stack([one.rotation for one in cycles])[:, crossed]
-    return PathAccuracy(s[crossed], planes.centre[crossed], x, planes.speed[crossed], speed, rotation, space.unit)
+    corners = find_corners(path, space, polyline)
+    bends = _measure_corners(cycles, corners, path, space)
+    return PathAccuracy(
+        s[crossed],
+        planes.centre[crossed],
+        x,
+        planes.speed[crossed],
+        speed,
+        rotation,
+        space.unit,
+        tuple(corners),
+        *bends,
+    )
 
 
 class _Planes(NamedTuple):
@@ -195,11 +240,16 @@ class _Planes(NamedTuple):
 
 
 class _Cycle(NamedTuple):
-    """A cycle at the sections: positions (m, d), speeds (m,) and rotation vectors (m, 3); NaN where not crossed."""
+    """A cycle at the sections: positions (m, d), speeds (m,) and rotation vectors (m, 3); NaN where not crossed.
+
+    ``first`` is its first section, counting laps, and ``motion`` all of it, or None of one too short.
+    """
 
     x: Array
     speed: Array
     rotation: Array
+    first: float
+    motion: Motion | None = None
 
     @property
     def crossed(self) -> NDArray[np.bool_]:
@@ -242,19 +292,37 @@ def _measure(one: Run, path: PathTask, space: ComparedSpace, planes: _Planes, s:
     time, q, qd = one.time[known], one.array("q")[0, known], one.array("qd")[0, known]
     span = path.s_end - path.s0 if path.period is None else path.period
     near = np.flatnonzero((along > s[0] - span / 2) & (along < s[-1] + span / 2))
-    found = _Cycle(np.full(planes.centre.shape, np.nan), np.full(len(s), np.nan), np.full((len(s), 3), np.nan))
+    m = len(s)
+    found = _Cycle(np.full(planes.centre.shape, np.nan), np.full(m, np.nan), np.full((m, 3), np.nan), float(s[0]))
     if len(near) < _SAMPLES:
         return found
     part = slice(near[0], near[-1] + 1)
     x, v, _ = space.move(q[part], qd[part])
-    crossings = find_crossings(Motion(time[part], along[part], x, v), s, planes.centre, planes.tangent, span)
+    motion = Motion(time[part], along[part], x, v)
+    crossings = find_crossings(motion, s, planes.centre, planes.tangent, span)
     there = np.isfinite(crossings.share)
     crossings = Crossings(crossings.before[there], crossings.share[there])
     x, v, rotation = space.move(crossings.of(time[part], q[part], qd[part]), crossings.between(time[part], qd[part]))
     found.x[there], found.speed[there] = x, np.linalg.norm(v, axis=-1)
     if rotation is not None and planes.rotation is not None:
         found.rotation[there] = rotation_vectors_of(planes.rotation[there].swapaxes(-1, -2) @ rotation)
-    return found
+    return found._replace(motion=motion)
+
+
+def _measure_corners(
+    cycles: list[_Cycle], corners: list[Corner], path: PathTask, space: ComparedSpace
+) -> tuple[Array, Array]:
+    """Return round-off and overshoot at each corner, (k,) each."""
+    motions, first = zip(*((one.motion, one.first) for one in cycles if one.motion is not None), strict=True)
+    found = np.full((2, len(corners)), np.nan)
+    for i, at in enumerate(place_corners(corners, path, space) if corners else []):
+        if path.period is None:
+            s, span = np.full(len(first), at), path.s_end - path.s0
+        else:
+            span = path.period
+            s = at + span * np.ceil((np.array(first) - at) / span)
+        found[:, i] = measure_corner(motions, corners[i], s, span)
+    return found[0], found[1]
 
 
 def _select(found: list[_Cycle], opens: bool) -> tuple[list[_Cycle], NDArray[np.bool_]]:
@@ -272,6 +340,12 @@ def _select(found: list[_Cycle], opens: bool) -> tuple[list[_Cycle], NDArray[np.
 def _deviation(values: Array) -> Array:
     """Return the standard deviation over the cycles, which come first; NaN of one."""
     return np.full(values.shape[1:], np.nan) if len(values) == 1 else np.std(values, axis=0, ddof=1)
+
+
+def _largest(values: Array) -> float:
+    """Return the largest of some values; NaN without any that is known."""
+    known = values[np.isfinite(values)]
+    return float(known.max()) if known.size else np.nan
 
 
 def _number(value: float) -> float | None:

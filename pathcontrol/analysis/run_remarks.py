@@ -57,7 +57,16 @@ def _find_faults(run: Run) -> dict[str, str]:
             found["still"] = f"the arm stands still after {100 * done:.3g} % of what was asked for: {remedy(run)}"
         else:
             found["short"] = f"the arm did not get there: it made {100 * done:.3g} % of what was asked for in the time"
-    return found
+    return found | _find_forgotten(run)
+
+
+def _find_forgotten(run: Run) -> dict[str, str]:
+    """Return a sentence on a law that forgot what it had learned, in a run of one rollout."""
+    count = int(run.array("forgotten")[0]) if "forgotten" in run else 0
+    if not count:
+        return {}
+    when = f"at {run.array('forgotten_time')[0]:.4g} s" + ("" if count == 1 else f", the last of {count} times")
+    return {"forgotten": f"what the law had learned no longer fitted, and was forgotten {when}: is the load another?"}
 
 
 def _progress(run: Run) -> float:

@@ -159,6 +159,10 @@ class Controller(ABC):
             return s
         return np.concatenate([s, self.observer.advance(out.observation, out.tau)], axis=-1)
 
+    def outcome(self, z: Array) -> dict[str, Array]:
+        """Return what the law has to say of a run that ends in its state z, (N, m), as :data:`OUTCOMES`, (N,) each."""
+        return {}
+
     def __repr__(self) -> str:
         gains = ", ".join(f"{name}={np.asarray(getattr(self, name)).tolist()}" for name in self.gains)
         return f"{type(self).__name__}({self.robot.name}, {self.task!r}, {gains})"

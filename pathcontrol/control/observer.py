@@ -86,6 +86,18 @@ class MomentumObserver:
         both = torque + share * (first - torque) + passed * (new - first)
         return Observation(t, p, c, np.where(kept, first, new), np.where(kept, torque, both))
 
+    def elapsed(self, t: float, memory: Array) -> Array:
+        """Return the time from the tick before to t [s], (*batch,), 0 at the first tick."""
+        last = memory[..., -1]
+        return np.where(last < 0.5 * _NEVER, 0.0, t - last)
+
+    def mean_torque(self, seen: Observation, memory: Array) -> Array:
+        """Return the mean of d since the tick before [N m], (*batch, n), behind no low pass; 0 at the first tick."""
+        _, _, before, known, _ = self._split(memory)
+        h = self.elapsed(seen.t, memory)[..., None]
+        mean = np.divide(seen.momentum - before, h, out=np.zeros_like(before), where=h > 0) - known - 0.5 * seen.rate
+        return np.where(h > 0, mean, 0.0)
+
     def rate(self, seen: Observation, tau: Array) -> Array:
         """Return the rate of the memory in continuous time, (*batch, 4n + 1), where τ acts [N m]."""
         first = -self.gain * (tau + seen.rate + seen.first)

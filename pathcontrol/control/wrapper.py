@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller, ControlOutput
+from pathcontrol.control.learning_law import LearningLaw
 from pathcontrol.control.override_rule import Override, OverrideRule
 from pathcontrol.control.speed_rule import Moment, Speed, SpeedRule
 
@@ -33,7 +34,7 @@ class LawWrapper(Controller):
 
     Args:
         law: the law inside.
-        rule: the rule that is added.
+        rule: the rule that is added, or ``None``.
 
     Attributes:
         wrapped: the law, as given.
@@ -42,11 +43,11 @@ class LawWrapper(Controller):
         rules: all rules, in the order in which they are asked.
     """
 
-    def __init__(self, law: Controller, rule: SpeedRule) -> None:
+    def __init__(self, law: Controller, rule: SpeedRule | None = None) -> None:
         expect("law", law, Controller)
         self.wrapped, self.rule = law, rule
         known = law.rules if isinstance(law, LawWrapper) else ()
-        rules = sorted((*known, rule), key=lambda one: one.last)
+        rules = sorted((*known, *([] if rule is None else [rule])), key=lambda one: one.last)
         has_operator = any(isinstance(one, OverrideRule) for one in rules)
         self.rules: tuple[SpeedRule, ...] = tuple(rules if has_operator else [OverrideRule(), *rules])
         self.inner: Controller = law.inner if isinstance(law, LawWrapper) else law
@@ -149,18 +150,26 @@ class LawWrapper(Controller):
         gradient = self.robot.inverse_dynamics(q, np.zeros_like(qd), change) - self.robot.gravity(q)
         return Moment(t, q, qd, law, out, theta, gradient, response)
 
+    def outcome(self, z: Array) -> dict[str, Array]:
+        return self.inner.outcome(self.split(z)[0])
+
     # --- for the record -------------------------------------------------------------------------------------
 
     def __repr__(self) -> str:
-        settings = ", ".join(f"{name}={value}" for name, value in self.rule.describe().items())
+        settings = ", ".join(f"{name}={value}" for name, value in self.settings().items())
         return f"{type(self).__name__}({self.wrapped!r}, {settings})"
 
     def describe(self) -> dict[str, Any]:
         """Return the description of the law inside, with the names of all wrappers and the settings of their rules."""
         inner = self.wrapped.describe()
-        return inner | {"controller": f"{type(self).__name__}({inner['controller']})"} | self.rule.describe()
+        return inner | {"controller": f"{type(self).__name__}({inner['controller']})"} | self.settings()
+
+    def settings(self) -> dict[str, Any]:
+        """Return the settings of this wrapper, those of its rule, for the configuration of a run."""
+        return {} if self.rule is None else self.rule.describe()
 
 
 def unwrap(law: Controller) -> Controller:
     """Return the innermost law of wrappers, or the law itself."""
-    return law.inner if isinstance(law, LawWrapper) else law
+    law = law.inner if isinstance(law, LawWrapper) else law
+    return law.base if isinstance(law, LearningLaw) else law

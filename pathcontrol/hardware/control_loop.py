@@ -124,6 +124,11 @@ class ControlLoop:
         return Status(self._mode, self._reason, dict(self._faults), self._saturated, self._ticks, self._plan.s)
 
     @property
+    def outcome(self) -> dict[str, Array]:
+        """What the law has to say up to now, (1,) each, see :meth:`Controller.outcome`."""
+        return self._plan.outcome
+
+    @property
     def gravity(self) -> Array:
         """The torques that carry the arm at its last good measurement, g(q) [N m], (n,)."""
         return self.law.robot.gravity(self._screen.q)

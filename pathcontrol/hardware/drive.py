@@ -156,7 +156,7 @@ class _Driver:
         """Return what was driven."""
         rows = self._rows[: self._k]
         arrays = {name: rows[name].copy() for name in ("t", "q", "qd", "tau", "s", "mode")}
-        context = LoopContext(self._loop.law, self._loop.period)
+        context = LoopContext(self._loop.law, self._loop.period, self._loop.outcome)
         return DriveRecord(
             **arrays,
             status=self._loop.status,

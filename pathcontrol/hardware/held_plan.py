@@ -39,6 +39,11 @@ class HeldPlan:
         """The factor of its speed at which the plan goes."""
         return 1.0 if self._tick is self._free else float(self._wrapper.split(self._held.state)[-1][0])
 
+    @property
+    def outcome(self) -> dict[str, Array]:
+        """What the law has to say up to now, see :meth:`Controller.outcome`."""
+        return {} if self._tick is self._free else self._wrapper.outcome(self._held.state[None])
+
     def start(self, q: Array, qd: Array) -> None:
         """Start with an arm at (q, q̇), (n,), at full speed."""
         self._held.resume()

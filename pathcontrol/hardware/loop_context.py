@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,10 +31,11 @@ class LoopContext:
     Args:
         law: the law of the loop.
         period: its period [s].
+        outcome: what the law has to say at the end, (1,) each, see :meth:`Controller.outcome`.
     """
 
-    def __init__(self, law: Controller, period: float) -> None:
-        self._law, self._period = law, period
+    def __init__(self, law: Controller, period: float, outcome: Mapping[str, Array] | None = None) -> None:
+        self._law, self._period, self._outcome = law, period, dict(outcome or {})
 
     @property
     def origin(self) -> RunContext:
@@ -87,7 +88,9 @@ class LoopContext:
         import xarray as xr  # it takes a third of a second to load
 
         arrays = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        return Run(xr.Dataset(*self.label(arrays, complete_outcome(1, {}))), self.describe(begin, lost), self.origin)
+        return Run(
+            xr.Dataset(*self.label(arrays, complete_outcome(1, self._outcome))), self.describe(begin, lost), self.origin
+        )
 
     def make_run_of_moments(self, found: Moments) -> Run:
         """Return the run of all samples of a loop.

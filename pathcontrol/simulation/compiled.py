@@ -98,6 +98,7 @@ class CompiledArm:
             self._state |= {name: np.zeros(len(q)) for name in SAID_NUMBERS}
             self._state["q_seen"][...], self._state["qd_seen"][...] = reading
         self.divergence = Divergence(q, qd)
+        self.law_outcome: dict[str, Array] = {}  # its laws have nothing to say
 
     def run(
         self, controller: Controller, duration: float, finish: Finish | None, progress: bool, z: Array | None = None

@@ -70,6 +70,7 @@ class ContinuousArm:
 
     Attributes:
         divergence: which rollouts have diverged, at the time since the present controller took over.
+        law_outcome: what the last controller has to say of each rollout, see :meth:`Controller.outcome`.
     """
 
     def __init__(self, mode: ContinuousTime, robot: Arm, q: Array, qd: Array, outside: Outside) -> None:
@@ -78,6 +79,7 @@ class ContinuousArm:
         self._mode, self._robot, self._period = mode, robot, mode.output_period
         self._disturbance, self._began = outside.disturbance, 0.0
         self._left: Left | None = None
+        self.law_outcome: dict[str, Array] = {}
         self.divergence = Divergence(q, qd)
 
     def run(
@@ -105,6 +107,7 @@ class ContinuousArm:
         arrays = recorder.arrays()
         lost.erase(arrays, time)
         self._began, self._left = self._began + t, Left(controller, z, float(t))
+        self.law_outcome = controller.outcome(z)
         return arrays
 
 

@@ -100,6 +100,7 @@ class SampledArm:
 
     Attributes:
         divergence: which rollouts have diverged, at the time since the present controller took over.
+        law_outcome: what the last controller has to say of each rollout, see :meth:`Controller.outcome`.
     """
 
     def __init__(
@@ -124,6 +125,7 @@ class SampledArm:
         self._walls = [term for term in list_terms(outside.disturbance) if isinstance(term, Wall)]
         self._line = LossyLine(Dropouts(outside.disturbance, loop.period, outside.first, len(q)), self._reading)
         self._left: Left | None = None
+        self.law_outcome: dict[str, Array] = {}
         self.divergence = Divergence(q, qd)
 
     def run(
@@ -163,7 +165,7 @@ class SampledArm:
                 z = self._line.keep(z, controller.advance(z, acting, self._period))
                 self._advance(torques)
                 self._actuator.hold(tau)
-        self._left = Left(controller, z, t)
+        self._left, self.law_outcome = Left(controller, z, t), controller.outcome(z)
         arrays = recorder.arrays()
         lost.erase(arrays, self._period * np.arange(arrays["s"].shape[1]))
         return arrays

@@ -39,12 +39,21 @@ from pathcontrol.tasks.task import PathTask
 
 
 class _PathRecord(NamedTuple):
-    """The record of one path, the time [s] after its begin at which it finished, its first s, and the growth of s."""
+    """The record of one path.
+
+    Attributes:
+        arrays: its samples.
+        finish_time: the time after its begin at which it finished [s].
+        s0: its first s.
+        length: the growth of s.
+        said: what its law has to say of it, see :meth:`Controller.outcome`.
+    """
 
     arrays: dict[str, Array]
     finish_time: float
     s0: float
     length: float
+    said: dict[str, Array]
 
 
 def simulate_sequence(
@@ -112,7 +121,8 @@ def simulate_sequence(
     arm, legs = ready.arm, []
     for law, longest, finish in zip(laws, durations, ends, strict=True):
         arrays = arm.run(law, longest, finish, progress)
-        legs.append(_PathRecord(arrays, float(finish.time[0]), law.task.s0, _length(law.task, laps)))
+        length = _length(law.task, laps)
+        legs.append(_PathRecord(arrays, float(finish.time[0]), law.task.s0, length, arm.law_outcome))
         if arm.divergence.any or np.isnan(legs[-1].finish_time):
             break
     arm.divergence.explain(ready.advice)
@@ -148,12 +158,25 @@ def _join(
     lost.time += begins[-1]
     if lost.any:
         status[len(legs) - 1] = "diverged"
-    return arrays, lost.outcome() | {
+    return arrays, lost.outcome() | _join_said(legs, begins) | {
         "finish_time": times[-1:],
         "path_index": np.repeat(np.arange(len(legs)), kept),
         "path_status": status,
         "path_finish_time": times,
         "path_offset": np.append(offsets, np.full(paths - len(legs), np.nan)),
+    }
+
+
+def _join_said(legs: Sequence[_PathRecord], begins: Array) -> dict[str, Array]:
+    """Return what the laws have to say of paths that begin at some times [s], as one outcome of the whole."""
+    said = [(leg.said, begin) for leg, begin in zip(legs, begins, strict=True) if "forgotten" in leg.said]
+    if not said:
+        return {}
+    times = np.array([one["forgotten_time"] + begin for one, begin in said])
+    known = times[np.isfinite(times)]
+    return {
+        "forgotten": np.sum([one["forgotten"] for one, _ in said], axis=0),
+        "forgotten_time": np.array([known.max() if known.size else np.nan]),
     }
 
 

@@ -101,7 +101,7 @@ def simulate(
     arm = ready.arm
     arrays = arm.run(controller, duration, finish, progress, z0)
     arm.divergence.explain(ready.advice)
-    outcome = arm.divergence.outcome() | ({} if finish is None else {"finish_time": finish.time})
+    outcome = arm.divergence.outcome() | arm.law_outcome | ({} if finish is None else {"finish_time": finish.time})
     if controller.task.closed:
         outcome["laps"] = count_laps(controller.task, *first_and_last(arrays["s"]))
     time = period * np.arange(arrays["s"].shape[1])

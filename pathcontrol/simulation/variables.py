@@ -38,6 +38,8 @@ OUTCOMES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "diverged_time": (("rollout",), "s", "when the rollout diverged, NaN if it did not"),
     "reason": (("rollout",), "", "why the rollout diverged, empty if it did not"),
     "laps": (("rollout",), "1", "whole laps of a closed path"),
+    "forgotten": (("rollout",), "1", "how often the law forgot what it had learned, as it no longer fitted"),
+    "forgotten_time": (("rollout",), "s", "when the law last forgot what it had learned, NaN if it never did"),
     "path_index": (("time",), "1", "which path of a sequence is followed"),
     "path_status": (("path",), "", "finished, diverged, running when its time was up, or waiting"),
     "path_offset": (("path",), "1", "what s of a sequence is more than that of the path"),

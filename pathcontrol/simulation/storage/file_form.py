@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _DEEPEST = 50
 _DENSEST = 1100  # bytes that deflate may expand one byte to, 1032, with a margin
 _UNWRITTEN = 1 << 20  # bytes that a small variable may have without being in the file
-_WORDS, _COUNTS = ("status", "reason", "path_status"), ("laps", "path_index")
+_WORDS, _COUNTS = ("status", "reason", "path_status"), ("laps", "path_index", "forgotten")
 
 
 def check_sizes(file: h5py.File, size: int) -> None:
