@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -78,7 +78,18 @@ class Learned(LawWrapper):
             "nodes": check_whole("nodes", nodes, _FEWEST),
             "misfit": as_scalar("misfit", misfit, positive=True),
         }
-        self.inner = LearningLaw(self.inner, LearnedTable(nodes, self.robot.n, gain, self._settings["misfit"]))
+        self._learn()
+
+    def around(self, law: Controller) -> Self:
+        wrapper = super().around(law)
+        wrapper._learn()
+        return wrapper
+
+    def _learn(self) -> None:
+        """Let the law inside have a table."""
+        said = self._settings
+        table = LearnedTable(said["nodes"], self.robot.n, said["learning_gain"], said["misfit"])
+        self.inner = LearningLaw(self.inner, table)
         self.observer = self.inner.observer
 
     def recall(self, z: ArrayLike) -> LapMemory:

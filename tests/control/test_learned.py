@@ -11,6 +11,7 @@ from strategies import floats
 
 import pathcontrol as pc
 from pathcontrol.analysis.run_remarks import remarks
+from pathcontrol.control.law_gains import with_gains
 from pathcontrol.control.learned_table import LearnedTable
 
 CICESE = pc.load_robot("cicese_2dof")
@@ -200,6 +201,12 @@ def test_wrappers_inside_and_outside_are_the_same():
     outside = run(pc.SpeedOverride(pc.Learned(law(), nodes=32), 0.95), 1)
     assert_allclose(inside.array("q"), outside.array("q"), atol=1e-9)
     assert inside.config["controller"]["controller"] == "Learned(SpeedOverride(Projection))"
+
+
+def test_with_other_gains_it_learns_as_before():
+    other = with_gains(pc.Learned(law(), 0.7, nodes=32), {"k_p": 900.0})
+    assert other.describe() == pc.Learned(pc.Projection(CICESE, CIRCLE, 900.0, [45.0, 100.0]), 0.7, 32).describe()
+    assert other.start(START, np.zeros(2)).shape == pc.Learned(law(), nodes=32).start(START, np.zeros(2)).shape
 
 
 def test_a_rollout_of_a_batch_is_what_it_is_alone():
