@@ -71,7 +71,8 @@ def stability_map(
     At each point of the grid it is what :func:`floquet` says of the law with these gains, in all joints the same.
     Between neighbours of which one is stable and the other is not, the boundary is found by root finding on
     max |μ| = 1, so its points are exact for the linearised loop, however coarse the grid; a stable or unstable island
-    that lies between the points of the grid is not seen.
+    that lies between the points of the grid is not seen. A loop that leaves its path before it settles is linearised
+    along the path itself.
 
     Args:
         law: the law, with one closed path and one set of gains; its own model is the arm.
