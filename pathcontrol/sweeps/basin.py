@@ -17,6 +17,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
+from pathcontrol.control.wrapper import unwrap
 from pathcontrol.errors import InputError, PathControlWarning, SimulationError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
@@ -198,14 +199,14 @@ def _measure(run: Run, task: PathTask, tolerance: float) -> tuple[Array, Array, 
 
 def _guarantee(controller: Controller, q: Array, qd: Array, found: Reach) -> tuple[Array, NDArray[np.bool_], float]:
     """Return the distances of starts from the path, whether the theorem says that they return, and its ball."""
-    task = controller.task
+    task, law = controller.task, unwrap(controller)
     s = task.sigma_bar(q)
     point = task.at(s)
     away = np.linalg.norm(point.q_d - q, axis=-1)
-    if not task.closed or not isinstance(controller, (*_GLOBAL, Projection)):
+    if not task.closed or not isinstance(law, (*_GLOBAL, Projection)):
         return away, np.zeros(len(q), dtype=bool), np.nan
-    if not isinstance(controller, Projection):
+    if not isinstance(law, Projection):
         return away, np.ones(len(q), dtype=bool), np.inf
-    k_p, e_v = float(np.squeeze(controller.k_p)), np.linalg.norm(point.velocity - qd, axis=-1)
+    k_p, e_v = float(np.squeeze(law.k_p)), np.linalg.norm(point.velocity - qd, axis=-1)
     room = found.value**2 - e_v**2 / k_p  # V < ½k_p R², solved for ‖e_p‖²
     return away, away**2 < room, float(np.sqrt(max(room.min(), 0.0)))

@@ -69,6 +69,8 @@ def test_the_guarantee_of_each_law():
     start = [[0.8, 0.9]]
     plan = pc.basin(pc.ExtendedMotionPlan(FREE, CIRCLE, 800.0, 45.0, k=20.0), start, **QUICK)
     assert (plan.guaranteed.all(), plan.ball) == (True, np.inf)
+    paced = pc.basin(pc.Paced(projection()), start, **QUICK)  # a speed factor changes no theorem
+    assert paced.ball == pc.basin(projection(), start, **QUICK).ball
     line = pc.basin(projection(task=pc.Line([0.5, 0.5], [1.0, 1.0], 0.5)), start, **QUICK)
     assert not line.guaranteed.any()
     assert np.isnan(line.ball)

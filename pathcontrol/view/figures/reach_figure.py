@@ -70,7 +70,7 @@ def _draw_plane(
     limits = equal_plane([outline[0]], [outline[1]])
     if 0 < width < np.inf:
         for cx, cy in zip(x[::4], y[::4], strict=True):
-            axes.fill(cx + width * np.cos(_TURN[::6]), cy + width * np.sin(_TURN[::6]), **_TUBE)
+            axes.fill(cx + width * np.cos(_TURN[::6]), cy + width * np.sin(_TURN[::6]), rasterized=True, **_TUBE)
         said = f"within the reach, {width:.4g} {unit}"
         entries[plain(said)] = Patch(**_TUBE)
     axes.plot(x, y, color=GREY, linewidth=2.0)
