@@ -6,6 +6,8 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
+from pathcontrol.control.learning_law import LearningLaw
+from pathcontrol.control.wrapper import LawWrapper
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import viscous_of
 from pathcontrol.simulation.arm.plant import Plant
@@ -21,6 +23,7 @@ class ContinuousMap:
     """
 
     def __init__(self, law: Controller) -> None:
+        _refuse_learning(law)
         self._law, self._robot, self._n = law, law.robot, law.robot.n
         self._of_ticks = np.zeros((1, 2 * self._n + 1))
         self._viscous = np.atleast_2d(viscous_of(law.robot.friction))[0]
@@ -62,6 +65,7 @@ class TickMap:
     """
 
     def __init__(self, law: Controller, loop: SampledLoop) -> None:
+        _refuse_learning(law)
         for name, what in (("encoders", loop.encoders), ("noise", loop.noise), ("torque_limits", loop.torque_limits)):
             if what is not False and what is not None:
                 raise InputError(f"{name} of the loop have no derivative; leave them out")
@@ -117,3 +121,12 @@ class TickMap:
             z = z.copy()
             z[:, self._law.observer.size] = time
         return z
+
+
+def _refuse_learning(law: Controller) -> None:
+    """Check that a law does not learn."""
+    if isinstance(law, LawWrapper) and isinstance(law.inner, LearningLaw):
+        raise InputError(
+            "what a law learns changes at once at the end of a lap, which has no derivative; give the law inside: a "
+            "feedforward that is learned moves no multiplier"
+        )

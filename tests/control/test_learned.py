@@ -163,6 +163,15 @@ def test_motors_at_their_limits_wind_nothing_up(learned):
     assert (np.abs(controller.last.torque[0]).max(0) < [9.0, 2.2]).all()
 
 
+def test_the_table_of_a_run_is_found_again(learned):
+    controller, one = learned
+    early = one.excerpt(np.arange(1), 300)
+    again = pc.Learned(law(), nodes=32)
+    table = again.recall(pc.law_states(early, again)[0, -1])
+    assert (table.lap, table.known.sum()) == (2, 32)
+    assert_allclose(table.torque, controller.last.torque[0], atol=2.0)  # learned once, where joints turn round too
+
+
 # --- what must not disturb it, and what it forgets ----------------------------------------------------------
 
 
@@ -292,6 +301,8 @@ def test_what_cannot_be_learned_is_refused():
         pc.Learned(line)
     with pytest.raises(pc.InputError, match="already"):
         pc.Learned(pc.SpeedOverride(pc.Learned(law())))
+    with pytest.raises(pc.InputError, match="give the law inside"):
+        pc.floquet(pc.Learned(law(arm=CICESE.with_friction(None))), pc.SampledLoop())
     with pytest.raises(pc.InputError, match="SampledLoop"):
         pc.simulate(pc.Learned(law()), START, duration=0.1, loop=pc.ContinuousTime(), progress=False)
 
