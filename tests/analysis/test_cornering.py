@@ -58,10 +58,13 @@ def passes(task, *motions, margin=0.2):
     t = np.arange(0.0, task.s_end + 2 * margin, PERIOD)
     x, v = (np.stack(parts) for parts in zip(*(motion(t - margin) for motion in motions), strict=True))
     s = np.broadcast_to(np.clip(t - margin, 0.0, task.s_end), x.shape[:2])
-    run = pc.Run.from_log(t, x[0], v[0], robot=ARM, task=task)
-    arrays = {name: np.repeat(run.array(name), len(x), axis=0) for name in run.data.data_vars}
-    arrays |= {"q": x, "qd": v, "s": np.array(s)}
-    return pc.Run.from_arrays(t, {"joint_1": "rad", "joint_2": "rad"}, arrays, run.config, robot=ARM, task=task)
+    return run_of(t, x, v, s, task)
+
+
+def run_of(t, x, v, s, task):
+    """A run of such positions, velocities and path parameters, (N, K, …) each."""
+    arrays = {"q": x, "qd": v, "s": np.array(s)}
+    return pc.Run.from_arrays(t, {"joint_1": "rad", "joint_2": "rad"}, arrays, {}, robot=ARM, task=task)
 
 
 def along(task, shift=(0.0, 0.0)):
@@ -167,10 +170,7 @@ def test_every_corner_of_a_closed_square_counts_in_every_lap():
     task = pc.FunctionPath(position, 1.0, period=period)
     t = np.arange(0.0, 2.6 * period, PERIOD)
     v = (position(t + 1e-6) - position(t - 1e-6)) / 2e-6
-    run = pc.Run.from_log(t, position(t), v, robot=ARM, task=task)
-    data = run.data.copy()
-    data["s"] = (("rollout", "time"), t[None])
-    found = pc.accuracy(run.with_data(data), polyline=square, skip=0, sections=20)
+    found = pc.accuracy(run_of(t, position(t)[None], v[None], t[None], task), polyline=square, skip=0, sections=20)
     assert found.cycles == 2
     np.testing.assert_allclose(found.round_off, radius * (np.sqrt(2) - 1), atol=1e-7)  # of differences of numbers
     told = json.loads(json.dumps(found.to_dict(), allow_nan=False))

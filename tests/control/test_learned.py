@@ -188,11 +188,11 @@ def test_a_hold_and_a_way_back_leave_the_table_as_it_is(learned):
 
 
 def test_a_load_that_is_picked_up_is_noticed_forgotten_and_learned(tmp_path):
-    load = pc.PickUp(1.0, "tool", 4.2 * LAP)
-    one = run(pc.Learned(law(), nodes=32), 9, disturbance=load)
+    load = pc.PickUp(1.0, "tool", 3.2 * LAP)
+    one = run(pc.Learned(law(), nodes=32), 8, disturbance=load)
     assert one.array("forgotten").tolist() == [1]
     when = one.array("forgotten_time")[0]
-    assert 4.2 * LAP < when < 6.2 * LAP
+    assert 3.2 * LAP < when < 5.2 * LAP
     said = next(sentence for sentence in remarks(one) if "forgotten" in sentence)
     assert f"forgotten at {when:.4g} s" in said
     errors = pc.lap_errors(one)
