@@ -375,11 +375,16 @@ def each_rollout(gain: Array) -> Array:
 
 
 def positive_rollout_gain(name: str, value: ArrayLike) -> Array:
-    """Return a gain greater than 0 that is one number, (), or has one for each rollout, (N, 1); read-only.
+    """Return a gain greater than 0 that is one number for all joints, (), or of each rollout, (N, 1); read-only.
 
     Raises:
-        InputError: it is no finite number, is not positive, or has other axes.
+        InputError: it is no finite number, is not positive, or has other axes, as one for each joint would.
     """
+    if np.ndim(value) == 1 and np.size(value) > 1:
+        raise InputError(
+            f"{name} = {np.asarray(value).tolist()}, expected one number for all joints; gains of several rollouts are "
+            "rows, (N, 1)"
+        )
     return _check_positive(name, rollout_gain(name, value))
 
 

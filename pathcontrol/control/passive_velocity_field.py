@@ -21,6 +21,11 @@ _SAMPLES = 65  # of the path, for its largest speed and inertia
 _MOST = 0.9  # share of the energy that the field may ask of the arm
 
 
+def _as_rows(numbers: Array) -> Array:
+    """Return one number of each rollout, (N,), as rows (N, 1); one number stays one."""
+    return numbers[..., None] if numbers.ndim else numbers
+
+
 class _Field(NamedTuple):
     """The field V with its covariant derivative, for the arm (*batch, n) and the flywheel (*batch,)."""
 
@@ -57,15 +62,16 @@ class PassiveVelocityField(NearestPoint):
     field. It is not passive, but no more than ρĒ flows in. f has the unit √J: inertia of the flywheel would change
     nothing. Where V needs more than 0.9Ē it is made shorter. At the end of an open path V is that of the timed plan.
 
+    Each gain is one number for all joints, and of several rollouts a column (N, 1).
+
     Args:
         robot: the model the law uses.
         task: path and velocity profile.
-        Lambda: Λ [1/s], the rate at which the field leads to the path, a scalar or one for each rollout, (N,).
-        K_v: rate at which the velocity comes to the field [1/s], a scalar or one for each rollout, (N,).
-        energy: Ē [J], a scalar or one for each rollout, (N,); by default twice that of the arm at v√2, where the path
-            has the largest inertia.
-        approach: v [rad/s], a scalar or one for each rollout, (N,); by default the largest speed ‖r‖ of the task.
-        recharge: ρ [1/s], 0 or more; a scalar or one for each rollout, (N,).
+        Lambda: Λ, the rate at which the field leads to the path [1/s].
+        K_v: rate at which the velocity comes to the field [1/s].
+        energy: Ē [J]; by default twice that of the arm at v√2, where the path has the largest inertia.
+        approach: v [rad/s]; by default the largest speed ‖r‖ of the task.
+        recharge: ρ [1/s], 0 or more.
         options: ``branch``, ``capture``, ``friction`` and ``start`` as of :class:`Projection`.
     """
 
@@ -88,9 +94,9 @@ class PassiveVelocityField(NearestPoint):
         if (self.recharge < 0).any():
             raise InputError(f"recharge = {self.recharge.tolist()}, expected 0 or more: a negative one wastes energy")
         fastest, inertia = np.moveaxis(np.asarray(map_tasks(task, self._survey)), -1, 0)
-        self.approach = positive_rollout_gain("approach", fastest if approach is None else approach)
+        self.approach = positive_rollout_gain("approach", _as_rows(fastest) if approach is None else approach)
         enough = 2 * inertia * each_rollout(self.approach) ** 2
-        self.energy = positive_rollout_gain("energy", enough if energy is None else energy)
+        self.energy = positive_rollout_gain("energy", _as_rows(enough) if energy is None else energy)
         need = np.broadcast_to(0.5 * inertia * fastest**2 / _MOST, np.shape(enough))
         if (need > each_rollout(self.energy)).any():
             raise InputError(

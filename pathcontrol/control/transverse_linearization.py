@@ -40,12 +40,14 @@ class TransverseLinearization(NearestPoint):
 
     q_d''' is taken by differences of q_d''. At the end of an open path the plan is timed, and tracked with k_p and k_v.
 
+    Each gain is one number for all joints, and of several rollouts a column (N, 1).
+
     Args:
         robot: the model the law uses.
         task: path and velocity profile.
-        k_p: stiffness beside the path [1/s²], a scalar or one for each rollout, (N,).
-        k_v: damping beside the path [1/s], a scalar or one for each rollout, (N,).
-        k_s: rate at which the speed comes to the profile [1/s], a scalar or one for each rollout, (N,).
+        k_p: stiffness beside the path [1/s²].
+        k_v: damping beside the path [1/s].
+        k_s: rate at which the speed comes to the profile [1/s].
         options: ``branch``, ``capture``, ``friction`` and ``start`` as of :class:`Projection`.
     """
 

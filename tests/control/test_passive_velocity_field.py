@@ -151,7 +151,7 @@ def test_too_little_energy_and_gains_that_are_none_are_refused(ideal_arm, circle
 
 
 def test_one_start_serves_rollouts_of_several_energies(arm, circle):
-    law = pc.PassiveVelocityField(arm, circle, **GAINS, energy=[20.0, 40.0], recharge=5.0)
+    law = pc.PassiveVelocityField(arm, circle, **GAINS, energy=[[20.0], [40.0]], recharge=5.0)
     both = pc.simulate(law, [0.9, 0.1], duration=0.05, progress=False).array("q")
     for energy, row in zip((20.0, 40.0), both, strict=True):
         alone = pc.PassiveVelocityField(arm, circle, **GAINS, energy=energy, recharge=5.0)

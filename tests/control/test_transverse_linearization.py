@@ -110,3 +110,5 @@ def test_the_third_derivative_is_taken_inside_an_open_path(ideal_arm):
 def test_gains_that_are_none_are_refused(ideal_arm, circle):
     with pytest.raises(InputError, match=r"k_s = 0.0, expected gains greater than 0"):
         pc.TransverseLinearization(ideal_arm, circle, K_P, K_V, 0.0)
+    with pytest.raises(InputError, match=r"k_p = \[800.0, 600.0\], expected one number for all joints"):
+        pc.TransverseLinearization(ideal_arm, circle, [800.0, 600.0], K_V, K_S)
