@@ -8,8 +8,9 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from pathcontrol.analysis.observing_laws import compensates_observed, halts_at_contacts
+from pathcontrol.analysis.power_balance_table import find_power_balance
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
-from pathcontrol.errors import InputError, PathControlError
+from pathcontrol.errors import InputError
 from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
 
@@ -102,13 +103,13 @@ def _draw_ballbar(runs: Run | Mapping[str, Run]) -> Figure | None:
 
 
 def _draw_power_balance(runs: Run | Mapping[str, Run]) -> Figure | None:
-    """Return the figure of the power balance, where all runs have one."""
+    """Return the figure of the power balance, of the runs that have one."""
     from pathcontrol.view.figures.power_balance_figure import power_balance_figure
 
-    try:
-        return power_balance_figure(runs)
-    except PathControlError:
-        return None
+    if isinstance(runs, Run):
+        return None if find_power_balance(runs) is None else power_balance_figure(runs)
+    able = {name: run for name, run in runs.items() if find_power_balance(run) is not None}
+    return power_balance_figure(able) if able else None
 
 
 def picture(figure: Figure, caption: str) -> Picture:
