@@ -68,8 +68,8 @@ def command(
 
 def _analyse(runs: Mapping[str, Run]) -> dict[str, Any]:
     """Return accuracy and power balance of each run that has them, as JSON takes them."""
-    from pathcontrol.analysis.accuracy_table import find_accuracy
-    from pathcontrol.analysis.power_balance_table import find_power_balance
+    from pathcontrol.analysis.lap_accuracy.accuracy_table import find_accuracy
+    from pathcontrol.analysis.power.power_balance_table import find_power_balance
 
     kinds: dict[str, Callable[[Run], Any]] = {"accuracy": find_accuracy, "power_balance": find_power_balance}
     found = {kind: {name: find(run) for name, run in runs.items()} for kind, find in kinds.items()}

@@ -15,8 +15,8 @@ from pathcontrol.cli.group import import_all, json_option
 from pathcontrol.errors import InputError
 
 if TYPE_CHECKING:
-    from pathcontrol.analysis.floquet import Floquet
-    from pathcontrol.analysis.stability_map import StabilityMap
+    from pathcontrol.analysis.stability.floquet import Floquet
+    from pathcontrol.analysis.stability.stability_map import StabilityMap
 
 _DECADES = 10.0  # ratio of ends from which values are spaced by factors
 
@@ -58,10 +58,10 @@ def command(
     if out is not None and not gains:
         raise click.UsageError("--out is for the figure of a map: give --gain NAME FROM TO")
     import_all()
-    from pathcontrol.analysis.floquet import floquet
-    from pathcontrol.analysis.largest_gain import largest_gain
-    from pathcontrol.analysis.smooth_loop import make_smooth
-    from pathcontrol.analysis.stability_map import stability_map
+    from pathcontrol.analysis.stability.floquet import floquet
+    from pathcontrol.analysis.stability.largest_gain import largest_gain
+    from pathcontrol.analysis.stability.smooth_loop import make_smooth
+    from pathcontrol.analysis.stability.stability_map import stability_map
     from pathcontrol.experiments.runner import load_setup
 
     setup = load_setup(file)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import pathcontrol as pc
-from pathcontrol.analysis.accuracy_table import accuracy_table
 from pathcontrol.analysis.compared_space import ComparedSpace
-from pathcontrol.analysis.cornering import find_corners
+from pathcontrol.analysis.lap_accuracy.accuracy_table import accuracy_table
+from pathcontrol.analysis.lap_accuracy.cornering import find_corners
 from pathcontrol.toolpaths.segments.segment import Polyline
 
 ARM = pc.load_robot("cicese_2dof")

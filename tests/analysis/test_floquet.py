@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import pathcontrol as pc
-from pathcontrol.analysis.product_eigen import find_eigen
+from pathcontrol.analysis.stability.product_eigen import find_eigen
 from pathcontrol.errors import InputError
 
 ARM = pc.load_robot("cicese_2dof").with_friction(pc.Viscous(np.zeros(2)))

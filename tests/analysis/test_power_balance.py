@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import pathcontrol as pc
-from pathcontrol.analysis.power_balance import SHARES
-from pathcontrol.analysis.power_balance_table import power_balance_table, relative_rates
+from pathcontrol.analysis.power.power_balance import SHARES
+from pathcontrol.analysis.power.power_balance_table import power_balance_table, relative_rates
 from pathcontrol.errors import InputError
 
 FULL = pc.load_robot("cicese_2dof")

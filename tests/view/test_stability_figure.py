@@ -5,7 +5,7 @@ import pytest
 from matplotlib.collections import LineCollection
 
 import pathcontrol as pc
-from pathcontrol.analysis.stability_map import StabilityMap
+from pathcontrol.analysis.stability.stability_map import StabilityMap
 from pathcontrol.errors import InputError, UnknownNameError
 
 X, Y = np.geomspace(1.0, 1e4, 5), np.array([1.0, 2.0, 3.0])

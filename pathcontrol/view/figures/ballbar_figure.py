@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.ballbar import Ballbar, ballbar
+from pathcontrol.analysis.lap_accuracy.ballbar import Ballbar, ballbar
 from pathcontrol.analysis.readable import reading
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.figures.lettering import joint_label, legend

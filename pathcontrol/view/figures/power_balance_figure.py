@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.power_balance import PowerBalance, power_balance
-from pathcontrol.analysis.power_balance_table import list_causes, relative_rates
+from pathcontrol.analysis.power.power_balance import PowerBalance, power_balance
+from pathcontrol.analysis.power.power_balance_table import list_causes, relative_rates
 from pathcontrol.control.base import Controller
 from pathcontrol.view.figures.lettering import legend
 from pathcontrol.view.figures.limits import over_time, span

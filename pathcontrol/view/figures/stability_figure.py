@@ -16,7 +16,7 @@ from matplotlib.tri import Triangulation
 
 from pathcontrol._arrays import Array, as_scalar
 from pathcontrol._expect import did_you_mean, expect
-from pathcontrol.analysis.stability_map import StabilityMap
+from pathcontrol.analysis.stability.stability_map import StabilityMap
 from pathcontrol.errors import UnknownNameError
 from pathcontrol.view.figures.lettering import legend, plain
 from pathcontrol.view.figures.style import BEYOND, BLUE, COLUMN, DASHED, INK, Look, apply_style, new_figure, style

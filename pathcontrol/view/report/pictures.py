@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from pathcontrol.analysis.observing_laws import compensates_observed, halts_at_contacts
-from pathcontrol.analysis.power_balance_table import find_power_balance
+from pathcontrol.analysis.power.power_balance_table import find_power_balance
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.config import table

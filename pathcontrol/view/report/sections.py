@@ -13,10 +13,10 @@ import numpy as np
 import xarray as xr
 from markupsafe import Markup, escape
 
-from pathcontrol.analysis.accuracy_table import accuracy_table
 from pathcontrol.analysis.contours import contour_table
+from pathcontrol.analysis.lap_accuracy.accuracy_table import accuracy_table
 from pathcontrol.analysis.lap_table import lap_table
-from pathcontrol.analysis.power_balance_table import power_balance_table
+from pathcontrol.analysis.power.power_balance_table import power_balance_table
 from pathcontrol.analysis.readable import describe_outcomes
 from pathcontrol.analysis.run_metrics import LABELS, UNITS
 from pathcontrol.analysis.run_remarks import remarks

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pathcontrol.analysis.power_balance_table import find_power_balance, list_causes, relative_rates
+from pathcontrol.analysis.power.power_balance_table import find_power_balance, list_causes, relative_rates
 from pathcontrol.view.animation.charts.chart import Curve, Entry
 from pathcontrol.view.animation.drawn_rollout import DrawnRollout
 

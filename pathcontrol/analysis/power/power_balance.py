@@ -9,10 +9,10 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
-from pathcontrol.analysis.closed_loop_theorems import Energy, LoopState, Theorem, theorem_of
-from pathcontrol.analysis.law_of_run import LawRecord, find_law, record_of
-from pathcontrol.analysis.loop_states import states_of
-from pathcontrol.analysis.torque_account import TorqueAccount, is_sampled
+from pathcontrol.analysis.power.closed_loop_theorems import Energy, LoopState, Theorem, theorem_of
+from pathcontrol.analysis.power.law_of_run import LawRecord, find_law, record_of
+from pathcontrol.analysis.power.loop_states import states_of
+from pathcontrol.analysis.power.torque_account import TorqueAccount, is_sampled
 from pathcontrol.control.base import Controller
 from pathcontrol.control.reference_law import ReferenceLaw
 from pathcontrol.control.wrapper import unwrap

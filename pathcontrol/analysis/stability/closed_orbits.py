@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.loop_maps import ContinuousMap, TickMap
+from pathcontrol.analysis.stability.loop_maps import ContinuousMap, TickMap
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop

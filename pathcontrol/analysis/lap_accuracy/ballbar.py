@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array, check_whole
 from pathcontrol.analysis.compared_space import ComparedSpace
+from pathcontrol.analysis.lap_accuracy.path_accuracy import choose_path, count_along
 from pathcontrol.analysis.metric_helpers import resolve_task
-from pathcontrol.analysis.path_accuracy import choose_path, count_along
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.task import PathTask

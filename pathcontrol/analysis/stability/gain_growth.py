@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
-from pathcontrol.analysis.floquet import check_path, slowest_growth
+from pathcontrol.analysis.stability.floquet import check_path, slowest_growth
 from pathcontrol.control.base import Controller
 from pathcontrol.control.law_gains import with_gains
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.path_accuracy import PathAccuracy, accuracy
+from pathcontrol.analysis.lap_accuracy.path_accuracy import PathAccuracy, accuracy
 from pathcontrol.analysis.readable import readable_number
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run

@@ -14,8 +14,8 @@ import numpy as np
 
 from pathcontrol._arrays import Array, check_whole
 from pathcontrol._expect import expect
-from pathcontrol.analysis.closed_orbits import Lap, LawOfRows, follow_laps, pad_steps
-from pathcontrol.analysis.product_eigen import ProductEigen, find_eigen, find_eigen_of_many
+from pathcontrol.analysis.stability.closed_orbits import Lap, LawOfRows, follow_laps, pad_steps
+from pathcontrol.analysis.stability.product_eigen import ProductEigen, find_eigen, find_eigen_of_many
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import levels_of

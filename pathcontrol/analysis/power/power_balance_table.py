@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.power_balance import SHARES, PowerBalance, power_balance
+from pathcontrol.analysis.power.power_balance import SHARES, PowerBalance, power_balance
 from pathcontrol.errors import PathControlError
 from pathcontrol.simulation.run import Run
 

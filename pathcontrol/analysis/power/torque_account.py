@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.closed_loop_theorems import Energy, LoopState, Theorem
 from pathcontrol.analysis.disturbance_estimate import loop_number, split_unexplained
-from pathcontrol.analysis.law_of_run import LawRecord, has_demand
+from pathcontrol.analysis.power.closed_loop_theorems import Energy, LoopState, Theorem
+from pathcontrol.analysis.power.law_of_run import LawRecord, has_demand
 from pathcontrol.analysis.torque_limits import torque_limits
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError

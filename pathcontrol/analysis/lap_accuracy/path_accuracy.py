@@ -29,8 +29,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, check_whole
 from pathcontrol.analysis.compared_space import ComparedSpace
-from pathcontrol.analysis.cornering import Corner, find_corners, measure_corner, place_corners
 from pathcontrol.analysis.crossings import Crossings, Motion, find_crossings
+from pathcontrol.analysis.lap_accuracy.cornering import Corner, find_corners, measure_corner, place_corners
 from pathcontrol.analysis.metric_helpers import resolve_task
 from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError

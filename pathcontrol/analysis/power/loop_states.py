@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.closed_loop_theorems import LoopState
-from pathcontrol.analysis.law_of_run import LawRecord
+from pathcontrol.analysis.power.closed_loop_theorems import LoopState
+from pathcontrol.analysis.power.law_of_run import LawRecord
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.maneuver_regulation import ManeuverRegulation

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array, as_array, check_finite, check_whole
 from pathcontrol._progress import progress_bar
-from pathcontrol.analysis.gain_growth import GainGrowth, Loop
+from pathcontrol.analysis.stability.gain_growth import GainGrowth, Loop
 from pathcontrol.control.base import Controller
 from pathcontrol.control.law_gains import single_gain, unit_of_gain, with_gains
 from pathcontrol.errors import InputError

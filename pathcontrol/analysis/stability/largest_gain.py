@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array, check_whole
-from pathcontrol.analysis.gain_growth import GainGrowth, Loop
+from pathcontrol.analysis.stability.gain_growth import GainGrowth, Loop
 from pathcontrol.control.base import Controller
 from pathcontrol.control.law_gains import largest_entry
 from pathcontrol.errors import InputError
