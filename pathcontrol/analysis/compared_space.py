@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.simulation.run import Run
@@ -28,8 +30,11 @@ class ComparedSpace(NamedTuple):
         return cls(None if path.frame is None else Tool(run.robot, path.frame, path.tool_pose))
 
     def is_made_for(self, path: PathTask) -> bool:
-        """Return whether the tool is the one that a path was made for."""
-        return self.tool is not None and self.tool.frame == path.frame
+        """Return whether the space is that of what a path was made for: its tool, or the joints."""
+        if self.tool is None or path.frame is None:
+            return self.tool is None and path.frame is None
+        mine, its = (np.eye(4) if pose is None else pose for pose in (self.tool.pose, path.tool_pose))
+        return self.tool.frame == path.frame and np.array_equal(mine, its)
 
     @property
     def unit(self) -> str:

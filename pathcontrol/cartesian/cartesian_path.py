@@ -103,6 +103,10 @@ class CartesianPath(SplinePath):
         self.posture = self.report.posture
         self.start_posture = freeze(self.q_d(np.array(self.s0)))
 
+    @property
+    def polyline(self) -> Array | None:
+        return self.curve.vertices
+
     def theta(self, s: Array) -> Array:
         return self._feed(s)[0]
 

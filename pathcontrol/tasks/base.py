@@ -154,6 +154,15 @@ class Task(ABC):
         return None
 
     @property
+    def polyline(self) -> Array | None:
+        """The points of the polyline that the path stands for, whose corners :func:`accuracy` measures, (k, d).
+
+        They are in the base frame [m] where the path is made for a frame, and else in the space of joints [rad]; a
+        closed polyline does not repeat its first point. ``None`` for a path that stands for none.
+        """
+        return None
+
+    @property
     def sampled_interval(self) -> tuple[float, float]:
         """A finite part of the domain that represents the whole."""
         end = self.s_end if self.period is None else self.s0 + self.period

@@ -95,6 +95,7 @@ class RecordedPath(PathTask):
         frame: the frame of the arm that it was made for.
         tool_pose: pose in that frame of what follows it, (4, 4).
         rotations: how many of its rotations the path prescribes; older files do not say.
+        polyline: the points of the polyline that it stands for, (k, d); ``None`` for none, or where a file is older.
 
     Raises:
         InputError: wrong shapes, values that are not finite, parameters that do not increase.
@@ -114,6 +115,7 @@ class RecordedPath(PathTask):
         frame: str | None = None,
         tool_pose: ArrayLike | None = None,
         rotations: int = 0,
+        polyline: ArrayLike | None = None,
     ) -> None:
         self.samples, self.jets = _check_samples(samples, jets, 3)
         self.profile, self.endless, self.projects, self.original = profile, endless, projects, original
@@ -123,6 +125,7 @@ class RecordedPath(PathTask):
         self.frame, self.tool_pose = _check_tool(frame, tool_pose)
         self.rotations = _check_rotations(rotations)
         self._knots = None if knots is None else _check_knots(knots)
+        self._polyline = None if polyline is None else _check_polyline(polyline)
 
     @classmethod
     def of(cls, task: PathTask, profile: VelocityProfile | None = None, upto: float | None = None) -> RecordedPath:
@@ -151,7 +154,12 @@ class RecordedPath(PathTask):
             frame=task.frame,
             tool_pose=task.tool_pose,
             rotations=task.rotations,
+            polyline=task.polyline,
         )
+
+    @property
+    def polyline(self) -> Array | None:
+        return self._polyline
 
     @property
     def n(self) -> int:
@@ -251,6 +259,14 @@ def _check_rotations(rotations: int) -> int:
     if rotations not in (0, 2, 3):
         raise InputError(f"rotations = {rotations!r}, expected 3, 2 or 0")
     return rotations
+
+
+def _check_polyline(polyline: ArrayLike) -> Array:
+    """Check the points of a polyline; return them read-only."""
+    points = freeze(check_finite("polyline", as_array("polyline", polyline)))
+    if points.ndim != 2:
+        raise InputError(f"polyline has shape {points.shape}, expected (k, d)")
+    return points
 
 
 def _check_tool(frame: str | None, tool_pose: ArrayLike | None) -> tuple[str | None, Array | None]:

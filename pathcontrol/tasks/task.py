@@ -88,6 +88,10 @@ class Reprofiled(PathTask):
         self.s0, self.s_end, self.period = path.s0, path.s_end, path.period
         self.keep_tool(path)
 
+    @property
+    def polyline(self) -> Array | None:
+        return self.path.polyline
+
     def q_d(self, s: Array) -> Array:
         return self.path.q_d(s)
 

@@ -53,6 +53,10 @@ class WaypointPath(SplinePath):
         super().__init__(_interpolant(self.parameters, ring, closed), speed, closed)
         self._refuse_standstill()
 
+    @property
+    def polyline(self) -> Array:
+        return self.points
+
     def _refuse_standstill(self) -> None:
         lower, upper = self.one_traverse
         slope = np.linalg.norm(self.dq_d(np.linspace(lower, upper, 16 * len(self.points) + 1)), axis=-1)

@@ -37,7 +37,10 @@ class ToolCurve:
         s_end: last parameter [m]; a closed curve goes on with the period ``s_end - s0``.
         closed: whether the curve is closed.
         knots: where p''' may jump [m], (k + 1,).
+        vertices: the points [m] that :meth:`polyline` was given, (m, 3); ``None`` for other curves.
     """
+
+    vertices: Array | None = None
 
     def __init__(self, s: ArrayLike, p: ArrayLike, dp: ArrayLike, ddp: ArrayLike, closed: bool = False) -> None:
         self.knots = freeze(check_finite("s", as_array("s", s)))
@@ -177,7 +180,9 @@ class ToolCurve:
                 f"the edges turn back by {np.rad2deg(sharpest.turn):.0f}° at {sharpest.point.tolist()}, expected 150° "
                 "at most; end a curve there and begin another"
             )
-        return cls(*smooth_knots(contour, as_scalar("tolerance", tolerance, positive=True)).knots, closed=closed)
+        curve = cls(*smooth_knots(contour, as_scalar("tolerance", tolerance, positive=True)).knots, closed=closed)
+        curve.vertices = freeze(given)
+        return curve
 
 
 def _vector(name: str, value: ArrayLike) -> Array:

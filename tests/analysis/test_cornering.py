@@ -191,6 +191,8 @@ def test_waypoints_are_corners_where_they_turn_enough():
     heads = [row[0] for row in accuracy_table(run)]
     assert "cornering round-off, largest of 4 corners" in heads
     assert "cornering overshoot, largest of 4 corners" in heads
+    profiled = pc.accuracy(run, path.with_profile(pc.ConstantRate(1.0)) if (path := run.task) is not None else None)
+    assert len(profiled.corners) == 4
     angle = np.arange(12) * np.pi / 6
     twelve = pc.WaypointPath(np.stack([np.cos(angle), np.sin(angle)], axis=-1), 0.5, closed=True)
     assert find_corners(twelve, ComparedSpace(None), None) == []
@@ -231,3 +233,26 @@ def test_corners_of_a_toolpath_are_rounded_by_no_more_than_its_tolerance_and_wha
     assert (found.round_off > 1e-4).all()
     assert found.cornering_round_off < 5e-4 + found.path_accuracy
     assert found.cornering_overshoot <= found.path_accuracy + 1e-6
+
+
+def test_a_saved_run_knows_the_corners_of_its_path(tmp_path):
+    points = np.array([[0.5, 0.5], [1.0, 0.5], [1.0, 1.0], [0.5, 1.0]])
+    task = pc.WaypointPath(points, speed=1.0, closed=True, tolerance=0.02)
+    run = pc.simulate(pc.Projection(ARM, task, 800.0, 57.0), task.q_d(np.array(0.0)), duration=8.0, progress=False)
+    saved = pc.Run.load(run.save(tmp_path / "square.nc"))
+    np.testing.assert_allclose(pc.accuracy(saved).round_off, pc.accuracy(run).round_off, atol=1e-9)
+    assert len(pc.accuracy(saved).corners) == 4
+
+
+def test_the_corners_of_a_tools_polyline_are_in_metres():
+    arm = ARM.with_frame("pen", "tool", [0.0, 0.0, -0.05])
+    plane = arm.frame_pose(np.zeros(2), "pen")[1, 3]
+    points = [[0.35, plane, 0.6], [0.4, plane, 0.6], [0.4, plane, 0.65]]
+    path = pc.CartesianPath(arm, "pen", pc.ToolCurve.polyline(points, tolerance=5e-4), speed=0.05)
+    run = pc.simulate(
+        pc.Projection(arm, path, 800.0, 57.0, friction="full"), path.start_posture, duration=4.0, progress=False
+    )
+    found = pc.accuracy(run)
+    assert (found.unit, len(found.corners)) == ("m", 1)
+    assert 3e-4 < found.cornering_round_off < 1e-3
+    assert pc.accuracy(run, frame="tool").corners == ()

@@ -24,7 +24,6 @@ from pathcontrol.analysis.crossings import Motion, find_crossings
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.task import PathTask
-from pathcontrol.tasks.waypoints import WaypointPath
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.segments.segment import Polyline
 
@@ -54,17 +53,19 @@ class Corner(NamedTuple):
 def find_corners(path: PathTask, space: ComparedSpace, polyline: ArrayLike | None) -> list[Corner]:
     """Return the corners of a given ``polyline`` (k, d), or of the one that the path was made from, in order.
 
-    A :class:`WaypointPath` is made from its waypoints, in the space of joints; a :class:`ToolpathTask` from contours,
-    whose straight parts count. Corners that turn by less than 45° are bends, and none.
+    That is :attr:`PathTask.polyline`, or for a :class:`ToolpathTask` the straight parts of its contours. Corners that
+    turn by less than 45° are bends, and none.
 
     Raises:
         InputError: the polyline has another shape, or points that are the same.
     """
     if polyline is not None:
         return _corners_of(_check_polyline(polyline, path, space), path.period is not None)
-    if isinstance(path, WaypointPath) and space.tool is None:
-        return _corners_of(np.asarray(path.points), path.closed)
-    if isinstance(path, ToolpathTask) and space.is_made_for(path):
+    if not space.is_made_for(path):
+        return []
+    if path.polyline is not None:
+        return _corners_of(path.polyline, path.period is not None)
+    if isinstance(path, ToolpathTask):
         contours = [contour for contour in dict.fromkeys(path.contours) if not contour.rapid]
         chains = [chain for contour in contours for chain in _straight_parts(contour)]
         return [corner for chain in chains for corner in _corners_of(chain, closed=False)]

@@ -178,8 +178,9 @@ def accuracy(
         skip: laps at the beginning of a closed path that do not count.
         rollout: the rollout that goes round a closed path.
         polyline: points of the polyline that the path stands for, (k, d) [m or rad], whose corners are measured; on a
-            closed path the first is not repeated. By default the waypoints of a :class:`WaypointPath`, and the
-            straight parts of the contours of a :class:`ToolpathTask`. Corners turn by 45° or more.
+            closed path the first is not repeated. By default :attr:`PathTask.polyline`, that of a
+            :class:`WaypointPath` or of :meth:`ToolCurve.polyline`, and the straight parts of the contours of a
+            :class:`ToolpathTask`. Corners turn by 45° or more.
 
     Raises:
         InputError: no cycle crosses the planes, the path moves nothing there, each rollout has a path of its own, or
