@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import ControlOutput, diagonal_gain, rollout_gain
-from pathcontrol.control.plan_feedback import PlanFeedback
+from pathcontrol.control.plan_feedback import Plan, PlanFeedback
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask
@@ -92,9 +92,8 @@ class AdaptiveSlotineLi(PlanFeedback):
 
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         s, learnt = z[..., 0], self.learnt(z)
-        point, e_p, e_v, sdot, slope, drift = self.plan(s, q, qd)
-        velocity = point.velocity + self.Lambda * e_p
-        acceleration = point.velocity_slope * sdot[..., None] + self.Lambda * (point.dq_d * sdot[..., None] - qd)
+        point, e_p, e_v, sdot, slope, drift = plan = self.plan(s, q, qd)
+        velocity, acceleration = self._reference(plan, qd)
         sliding = velocity - qd
         regressor = self.robot.torque_regressor(q, qd, acceleration, velocity=velocity)
         known = self.robot.inverse_dynamics(q, qd, acceleration, velocity=velocity)
@@ -104,6 +103,23 @@ class AdaptiveSlotineLi(PlanFeedback):
         out = self.compensate(t, q, qd, z, out)
         rate = self.adaptation_matrix * (regressor * sliding[..., None]).sum(-2)
         return out._replace(zdot=np.concatenate([out.zdot, rate], axis=-1))
+
+    def learning_rate(self, q: Array, qd: Array, z: Array) -> Array:
+        """Return the largest eigenvalue of K_d⁻¹YΓYᵀ [1/s], (*batch,), at (q, q̇) and z: how fast x makes a torque.
+
+        Times the period of a sampled loop it should be below 1.
+        """
+        velocity, acceleration = self._reference(self.plan(z[..., 0], q, qd), qd)
+        regressor = self.robot.torque_regressor(q, qd, acceleration, velocity=velocity)
+        root = 1 / np.sqrt(np.broadcast_to(self.K_d, q.shape))[..., None]
+        scaled = root * regressor * np.sqrt(self.adaptation_matrix)[..., None, :]
+        return np.asarray(np.linalg.norm(scaled, ord=2, axis=(-2, -1)) ** 2)
+
+    def _reference(self, plan: Plan, qd: Array) -> tuple[Array, Array]:
+        """Return q̇_s [rad/s] and q̈_s [rad/s²], (*batch, n)."""
+        rate = plan.sdot[..., None]
+        velocity = plan.point.velocity + self.Lambda * plan.e_p
+        return velocity, plan.point.velocity_slope * rate + self.Lambda * (plan.point.dq_d * rate - qd)
 
     def advance(self, z: Array, out: ControlOutput, period: float) -> Array:
         learnt = self.learnt(z) + period * self.learnt(out.zdot)

@@ -1,5 +1,7 @@
 """Adaptive control on a path parameter: V with the parameters' error in it never grows, and a payload is learnt."""
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -127,3 +129,32 @@ def test_a_negative_adaptation_is_refused(ideal_arm, circle):
         pc.AdaptiveSlotineLi(ideal_arm, circle, **GAINS, adaptation=-1.0)
     with pytest.raises(InputError, match="adaptation has shape"):
         pc.AdaptiveSlotineLi(ideal_arm, circle, **GAINS, adaptation=[[1.0, 2.0]])
+
+
+def test_an_adaptation_that_is_too_fast_for_the_period_is_told(ideal_arm, heavy, circle):
+    law = pc.AdaptiveSlotineLi(ideal_arm, circle, **GAINS, adaptation=30.0)
+    with (
+        pytest.warns(pc.PathControlWarning, match=r"adaptation = 30 learns at .* take adaptation below") as told,
+        pytest.raises(pc.SimulationError),
+    ):
+        pc.simulate(law, [0.95, 0.0], duration=1.0, plant=heavy, progress=False)
+    most = float(str(told[0].message).split("below ")[1].split(",")[0])
+    law = pc.AdaptiveSlotineLi(ideal_arm, circle, **GAINS, adaptation=0.9 * most)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = pc.simulate(law, [0.95, 0.0], duration=1.0, plant=heavy, progress=False)
+    assert run.norm("e_p")[0, -1] < 0.05
+
+
+def test_the_learning_rate_is_that_of_the_torque_that_is_learnt(ideal_arm, circle):
+    """θ̂ that grows at ΓYᵀx changes the torque by YΓYᵀx; the largest share of K_d x is the rate."""
+    law, rng = pc.AdaptiveSlotineLi(ideal_arm, circle, **GAINS, adaptation=0.3, k=5.0), np.random.default_rng(2)
+    q, qd = rng.normal(size=(2, 1, 2))
+    z, columns = law.start(q, qd), []
+    for learnt in np.eye(20):
+        z[0, 1:] = learnt
+        columns.append(law.law(0.0, q, qd, z).tau[0])
+    z[0, 1:] = 0.0
+    Y = (np.array(columns) - law.law(0.0, q, qd, z).tau[0]).T
+    matrix = np.diag(1 / law.K_d) @ Y @ np.diag(law.adaptation_matrix) @ Y.T
+    assert_allclose(law.learning_rate(q, qd, z), np.linalg.eigvals(matrix).real.max(), rtol=1e-9)

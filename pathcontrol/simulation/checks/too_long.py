@@ -18,6 +18,7 @@ from pathcontrol.errors import PathControlWarning, warn
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import viscous_of
 from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.checks.adaptation import check_adaptation
 from pathcontrol.simulation.checks.extreme_arms import arm_of, find_extreme_arms
 from pathcontrol.simulation.checks.fast_modes import (
     DampedArm,
@@ -34,14 +35,8 @@ from pathcontrol.tasks.task import PathTask
 
 _SAMPLES, _FINE = 9, 65  # samples of a path for the arm and for the plan
 _MOST, _FEWEST = 1 << 16, 3  # samples of all tasks of a batch together, and of each at least
-_NO_FEEDBACK = (
-    "k",
-    "adaptation",
-    "recharge",
-    "energy",
-    "approach",
-    "k_s",
-)  # gains that are no part of the linearised feedback
+# gains that are no part of the linearised feedback
+_NO_FEEDBACK = ("k", "adaptation", "recharge", "energy", "approach", "k_s")
 _SLOW = 1.0  # h times a rate of growth or decay up to which a step resolves it
 _OSCILLATION = 0.3  # h ω up to which the midpoint rule resolves an oscillation, to 1.5 % of ω
 _SPRING = 0.05  # h ω advised for a spring that is held over a step: holding it adds energy at the rate hω²/4
@@ -118,6 +113,7 @@ def _find_warnings(
         postures, speeds = _sample_states(law.task, q, qd)
         yield from _check_gains(law, loop.period, robot, rows, postures)
         yield from _check_plan(law, loop)
+        yield from check_adaptation(law, loop.period, q, qd)
         yield from _select_worst(list(_check_arm(loop, arm, postures, speeds)) for arm in felt.values())
     if disturbance is not None:
         yield from _select_worst(list(_check_disturbance(disturbance, loop, a, q, qd, duration)) for a in felt.values())
