@@ -38,8 +38,8 @@ class Learned(LawWrapper):
     arm comes to its path. A plan that goes back has none of τ̂, as friction turns round with it.
 
     Where a table that fitted leaves more than ``misfit`` of u in a lap, in the root mean square at a joint, the arm is
-    not what it was: the table is forgotten, and learned anew. The outcomes ``forgotten`` and ``forgotten_time`` of a
-    run say so, and its remarks in reports and on the command line.
+    not what it was: the table is forgotten, which is that the next lap replaces all of it, with γ = 1. The outcomes
+    ``forgotten`` and ``forgotten_time`` of a run say so, and its remarks in reports and on the command line.
 
     (Learning from lap to lap: S. Arimoto, S. Kawamura and F. Miyazaki, J. Robotic Systems 1, 1984; surveyed by
     D. A. Bristow, M. Tharayil and A. G. Alleyne, IEEE Control Systems Magazine 26, 2006. The sensed torque: A. De Luca

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 
-_FITS = 0.5  # share of the limit of the misfit below which a table counts as fitting
+_FITS = 0.75  # share of the limit of the misfit below which a table counts as fitting
 _WHOLE = 0.6  # share of the mean weight of all nodes with which one has been passed as a whole
 _LEAST = 0.25  # share of the nodes that have to be compared
 
@@ -58,7 +58,7 @@ class LearnedTable:
         joints: n.
         gain: γ, 0 < γ ≤ 1; a node that knows nothing takes γ = 1.
         misfit: share of u, in the root mean square over a lap, that a table that fitted may leave at a joint before it
-            is forgotten.
+            is forgotten: it is then added until the next lap has replaced it, as if nothing had been known.
 
     Attributes:
         size: length of the memory.
@@ -118,19 +118,21 @@ class LearnedTable:
             parts.seen[row, node] += part[:, None] * torque
 
     def _learn(self, rows: Array, t: float) -> Array:
-        """Return the memory, (N, size), of a table that has learned from its lap at t [s], or forgotten all."""
+        """Return the memory, (N, size), of a table that has learned from its lap at t [s], or forgotten all.
+
+        A lap in which the load changed is no lap of either load, and is not learned from.
+        """
         parts = self.split(rows)
         wanted, enough = _average(parts.seen, parts.weight)
         known = parts.known > 0
         left = _share_left(wanted, parts.torque, enough & known)
         lost = (parts.fits > 0) & (left > self.misfit)
-        gain = np.where(known, self.gain, 1.0) * enough
+        taken = enough & ~lost[:, None]
+        gain = np.where(known, self.gain, 1.0) * taken
         parts.torque[:] += gain[..., None] * (wanted - parts.torque)
-        parts.known[:] = known | enough
-        parts.fits[:] = (parts.fits > 0) | (left < _FITS * self.misfit)
+        parts.known[:] = (known | taken) & ~lost[:, None]
+        parts.fits[:] = ((parts.fits > 0) | (left < _FITS * self.misfit)) & ~lost
         parts.seen[:], parts.weight[:] = 0.0, 0.0
-        for part in (parts.torque, parts.known, parts.fits):
-            part[lost] = 0.0
         parts.forgotten[:] += lost
         parts.time[lost] = t
         return rows

@@ -90,6 +90,17 @@ def test_the_table_never_exceeds_what_was_seen(seen, gain):
     assert np.abs(table.split(memory).torque).max() <= max(map(abs, seen)) + 1e-12
 
 
+def test_a_table_that_no_longer_fits_is_replaced_by_the_next_lap_whatever_its_gain():
+    table = LearnedTable(8, 1, 0.1, 0.4)
+    memory = table.start(np.array([-1.0]))
+    for lap, right in enumerate([2.0, 2.0, 2.0, 5.0, 5.0, 5.0]):
+        memory = go_round(table, memory, lap, lambda at, _, right=right: np.array([right]), ticks=40)
+        parts = table.split(memory)
+        assert parts.forgotten == (lap > 3)  # at the end of the fourth lap, which the fifth begins
+        assert_allclose(parts.torque, 0.0 if lap == 0 else 2.0 if lap < 5 else 5.0)
+    assert parts.time == 0.0
+
+
 @pytest.mark.parametrize("ticks", [40, 33, 24, 18])
 def test_nodes_between_ticks_that_are_far_apart_have_no_gaps(ticks):
     table = LearnedTable(32, 1, 1.0, 0.5)
@@ -196,7 +207,7 @@ def test_a_load_that_is_picked_up_is_noticed_forgotten_and_learned(tmp_path):
     said = next(sentence for sentence in remarks(one) if "forgotten" in sentence)
     assert f"forgotten at {when:.4g} s" in said
     errors = pc.lap_errors(one)
-    assert errors[-1] < 0.2 * errors.max()
+    assert errors[-1] < 0.25 * errors.max()
     saved = pc.Run.load(one.save(tmp_path / "run.nc"))
     assert saved.array("forgotten_time")[0] == when
     assert said in remarks(saved)
