@@ -24,7 +24,7 @@ from pathcontrol.control.maneuver_regulation import ManeuverRegulation, StateMet
 from pathcontrol.control.projection import Projection
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.control.transverse_linearization import TransverseLinearization
-from pathcontrol.control.wrapper import LawWrapper, unwrap
+from pathcontrol.control.wrappers.wrapper import LawWrapper, unwrap
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.run import Run
 

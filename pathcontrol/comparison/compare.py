@@ -14,8 +14,8 @@ from pathcontrol.comparison.laws import Laws, make_laws
 from pathcontrol.comparison.measures import MEASURES, measure
 from pathcontrol.comparison.scenarios import Scenario, make_scenario
 from pathcontrol.control.base import Controller
-from pathcontrol.control.paced import Paced
-from pathcontrol.control.speed_override import SpeedOverride
+from pathcontrol.control.wrappers.paced import Paced
+from pathcontrol.control.wrappers.speed_override import SpeedOverride
 from pathcontrol.errors import SimulationError
 from pathcontrol.simulation.engines import Engine, check_engine
 from pathcontrol.simulation.run import Run

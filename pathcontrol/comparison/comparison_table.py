@@ -8,7 +8,7 @@ from pathcontrol.analysis.readable import reading
 from pathcontrol.comparison.compare import Comparison
 from pathcontrol.comparison.measures import MEASURES, RECOVERED
 from pathcontrol.control.motion_control import MotionController
-from pathcontrol.control.wrapper import unwrap
+from pathcontrol.control.wrappers.wrapper import unwrap
 
 _DIGITS = 3
 _NOTHING = 1e-9  # rad, m, N m, …: rounding of floats for an arm of usual size

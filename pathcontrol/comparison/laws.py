@@ -12,16 +12,16 @@ from pathcontrol.comparison.family import FAMILY
 from pathcontrol.comparison.shared_gains import Gains, mean_inertia, mean_plan_gain, sample_task, split_damping
 from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
 from pathcontrol.control.base import Controller, Start, diagonal_gain
-from pathcontrol.control.event_plan import EventPlan
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.maneuver_regulation import ManeuverRegulation
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
-from pathcontrol.control.paced import Paced
 from pathcontrol.control.passive_velocity_field import PassiveVelocityField
 from pathcontrol.control.projection import Projection
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.control.transverse_linearization import TransverseLinearization
-from pathcontrol.control.wrapper import unwrap
+from pathcontrol.control.wrappers.event_plan import EventPlan
+from pathcontrol.control.wrappers.paced import Paced
+from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run_arguments import check_controller

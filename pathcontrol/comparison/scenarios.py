@@ -14,7 +14,7 @@ from pathcontrol.comparison.paper import DURATION, K_P, K_V, PERIOD, START_DEG, 
 from pathcontrol.comparison.shared_gains import Gains
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
-from pathcontrol.control.override_rule import Override
+from pathcontrol.control.wrappers.override_rule import Override
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel

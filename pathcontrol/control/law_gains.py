@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._expect import did_you_mean
 from pathcontrol.arguments import gains_of, parameters_of
 from pathcontrol.control.base import Controller
-from pathcontrol.control.wrapper import LawWrapper, unwrap
+from pathcontrol.control.wrappers.wrapper import LawWrapper, unwrap
 from pathcontrol.errors import InputError, UnknownNameError
 
 

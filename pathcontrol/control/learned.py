@@ -12,7 +12,7 @@ from pathcontrol.arguments import Form
 from pathcontrol.control.base import Controller
 from pathcontrol.control.learned_table import LapMemory, LearnedTable
 from pathcontrol.control.learning_law import LearningLaw
-from pathcontrol.control.wrapper import LawWrapper
+from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.errors import InputError, TaskError
 
 _FEWEST = 8  # nodes of a lap

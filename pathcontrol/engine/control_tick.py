@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_joint_array, as_scalar
 from pathcontrol.control.base import Controller
-from pathcontrol.control.override_rule import Override
-from pathcontrol.control.wrapper import LawWrapper
+from pathcontrol.control.wrappers.override_rule import Override
+from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.run_settings import GAINS, add_law
 from pathcontrol.engine.structs import Memory, Setup

@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array, as_scalar
 from pathcontrol._expect import expect
-from pathcontrol.control.wrapper import LawWrapper
+from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.errors import ArmError, InputError
 from pathcontrol.hardware.arm import Arm, Measurement
 from pathcontrol.hardware.control_loop import ControlLoop, Status

@@ -6,8 +6,8 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
-from pathcontrol.control.speed_override import SpeedOverride
-from pathcontrol.control.wrapper import LawWrapper
+from pathcontrol.control.wrappers.speed_override import SpeedOverride
+from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.engine.control_tick import ControlTick
 from pathcontrol.errors import EngineError, TaskError
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
-from pathcontrol.control.wrapper import unwrap
+from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.errors import InputError
 from pathcontrol.hardware.sample_ring import Moments
 from pathcontrol.simulation.context import RunContext

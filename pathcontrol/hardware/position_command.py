@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, as_array, as_joint_vector, as_scalar, freeze
 from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
-from pathcontrol.control.override_rule import Override
-from pathcontrol.control.pace_rule import rate_bounds
-from pathcontrol.control.wrapper import LawWrapper
+from pathcontrol.control.wrappers.override_rule import Override
+from pathcontrol.control.wrappers.pace_rule import rate_bounds
+from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.errors import InputError
 from pathcontrol.hardware.servo_model import ServoModel
 from pathcontrol.hardware.wait_rule import WaitRule

@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
-from pathcontrol.control.speed_rule import Moment, Speed, SpeedRule
+from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
 
 _APPROACH = 0.03  # s, time constant with which the factor comes to the one that is wanted
 _LEAST = 1e-4  # of the speed: a plan that waits is not held, so that it can go back to where the arm is

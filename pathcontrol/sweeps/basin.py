@@ -17,7 +17,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
-from pathcontrol.control.wrapper import unwrap
+from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.errors import InputError, PathControlWarning, SimulationError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pathcontrol as pc
-from pathcontrol.control.pace_rule import rate_bounds
+from pathcontrol.control.wrappers.pace_rule import rate_bounds
 
 LIMITS = np.array([150.0, 15.0])
 LOOPS = {

@@ -10,13 +10,13 @@ from scipy.linalg import solve_discrete_are
 from two_link import START_RATE, TwoLinkLine, least_time
 
 import pathcontrol as pc
-from pathcontrol.control.path_problem import Inputs, follow
+from pathcontrol.control.mpc.path_problem import Inputs, follow
 from pathcontrol.experiments.runner import load_setup
 from pathcontrol.view.report.reproduction import script
 
 casadi = pytest.importorskip("casadi")
 
-from pathcontrol.control.path_spline import spline_of  # noqa: E402
+from pathcontrol.control.mpc.path_spline import spline_of  # noqa: E402
 
 TWO_LINK = pc.load_robot("two_link")
 SLIDE = pc.load_robot(

@@ -22,7 +22,7 @@ from pathcontrol.control.maneuver_regulation import ManeuverRegulation
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
-from pathcontrol.control.wrapper import unwrap
+from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.errors import InputError
 
 

@@ -12,7 +12,7 @@ from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.maneuver_regulation import ManeuverRegulation
 from pathcontrol.control.reference_law import ReferenceLaw
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
-from pathcontrol.control.wrapper import unwrap
+from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.tasks.base import PathPoint
 
 

@@ -15,7 +15,7 @@ from pathcontrol.analysis.power.loop_states import states_of
 from pathcontrol.analysis.power.torque_account import TorqueAccount, is_sampled
 from pathcontrol.control.base import Controller
 from pathcontrol.control.reference_law import ReferenceLaw
-from pathcontrol.control.wrapper import unwrap
+from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run

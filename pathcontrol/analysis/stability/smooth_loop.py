@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol.control.base import Controller
-from pathcontrol.control.wrapper import LawWrapper
+from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.robot.friction import Viscous, levels_of, viscous_of
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
 

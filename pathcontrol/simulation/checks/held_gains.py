@@ -17,7 +17,7 @@ from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.passive_velocity_field import PassiveVelocityField
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.control.transverse_linearization import TransverseLinearization
-from pathcontrol.control.wrapper import unwrap
+from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.robot.friction import viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.damping import Damping

@@ -13,7 +13,7 @@ from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
 from pathcontrol.control.base import Controller
 from pathcontrol.control.motion_control import PDPlus, SlotineLi
 from pathcontrol.control.plan_feedback import PlanFeedback
-from pathcontrol.control.wrapper import unwrap
+from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.errors import PathControlWarning, warn
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import viscous_of

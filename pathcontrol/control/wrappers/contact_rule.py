@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.control.base import Controller, diagonal_gain
-from pathcontrol.control.override_rule import OverrideRule
-from pathcontrol.control.speed_rule import Moment, Speed, SpeedRule
+from pathcontrol.control.wrappers.override_rule import OverrideRule
+from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel

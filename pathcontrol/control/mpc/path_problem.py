@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.control.path_spline import spline_of
+from pathcontrol.control.mpc.path_spline import spline_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.robot.symbolic_dynamics import load_casadi, symbolic_inverse_dynamics
 from pathcontrol.tasks.task import PathTask

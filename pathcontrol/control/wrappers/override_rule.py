@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, as_scalar, check_finite, freeze
 from pathcontrol.control.base import Controller
-from pathcontrol.control.speed_rule import Moment, Speed, SpeedRule
+from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
 from pathcontrol.errors import InputError
 
 #: u of the speed: a number, one for each rollout (N,), steps [[t, u], …], or a function of time [s]

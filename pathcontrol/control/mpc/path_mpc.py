@@ -11,7 +11,7 @@ from pathcontrol._arrays import Array, as_scalar, as_whole, check_finite
 from pathcontrol._expect import expect_choice
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import Controller, ControlOutput
-from pathcontrol.control.path_problem import SHORTEST, Around, Inputs, Motion, PathProblem, Weights, follow
+from pathcontrol.control.mpc.path_problem import SHORTEST, Around, Inputs, Motion, PathProblem, Weights, follow
 from pathcontrol.errors import InputError, warn
 from pathcontrol.profiles.topp.joint_limits import joint_values
 from pathcontrol.profiles.topp.time_optimal import time_optimal

@@ -10,8 +10,8 @@ from pathcontrol._arrays import as_scalar
 from pathcontrol._expect import expect
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import Controller
-from pathcontrol.control.pace_rule import FastestPlan, PaceRule
-from pathcontrol.control.wrapper import LawWrapper
+from pathcontrol.control.wrappers.pace_rule import FastestPlan, PaceRule
+from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.topp.joint_limits import LimitChoice, joint_values
 

@@ -12,8 +12,8 @@ from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.control.learning_law import LearningLaw
-from pathcontrol.control.override_rule import Override, OverrideRule
-from pathcontrol.control.speed_rule import Moment, Speed, SpeedRule
+from pathcontrol.control.wrappers.override_rule import Override, OverrideRule
+from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
 
 
 class LawWrapper(Controller):

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import Controller
-from pathcontrol.control.contact_rule import ContactRule
 from pathcontrol.control.observer import CUTOFF
-from pathcontrol.control.wrapper import LawWrapper, unwrap
+from pathcontrol.control.wrappers.contact_rule import ContactRule
+from pathcontrol.control.wrappers.wrapper import LawWrapper, unwrap
 
 
 class EventPlan(LawWrapper):

@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import Controller
-from pathcontrol.control.override_rule import Override, OverrideRule
-from pathcontrol.control.wrapper import LawWrapper
+from pathcontrol.control.wrappers.override_rule import Override, OverrideRule
+from pathcontrol.control.wrappers.wrapper import LawWrapper
 
 
 class SpeedOverride(LawWrapper):

@@ -10,7 +10,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
-from pathcontrol.control.speed_rule import Moment, Speed, SpeedRule
+from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
 from pathcontrol.profiles.topp.time_optimal import time_optimal
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.batch.task_batch import TaskBatch
