@@ -11,7 +11,7 @@ import numpy as np
 import pathcontrol as pc
 
 out = Path(sys.argv[1] if len(sys.argv) > 1 else "results")
-laps = int(sys.argv[2]) if len(sys.argv) > 2 else 6
+laps = int(sys.argv[2]) if len(sys.argv) > 2 else 4
 
 robot = pc.load_robot("cicese_2dof")
 task = pc.Circle(np.deg2rad(57.3), np.deg2rad(114.59))
