@@ -48,8 +48,8 @@ from .control.base import ControlOutput as ControlOutput
 from .control.base import diagonal_gain as diagonal_gain
 from .control.branch import BranchPolicy as BranchPolicy
 from .control.extended_motion_plan import ExtendedMotionPlan as ExtendedMotionPlan
-from .control.learned import Learned as Learned
-from .control.learned_table import LapMemory as LapMemory
+from .control.learning.learned import Learned as Learned
+from .control.learning.learned_table import LapMemory as LapMemory
 from .control.maneuver_regulation import ManeuverRegulation as ManeuverRegulation
 from .control.motion_control import ComputedTorque as ComputedTorque
 from .control.motion_control import MotionController as MotionController

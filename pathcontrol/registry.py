@@ -60,7 +60,7 @@ LAWS = Kind(
         "paced": "control.wrappers.paced:Paced",
         "event_plan": "control.wrappers.event_plan:EventPlan",
         "path_mpc": "control.mpc.path_mpc:PathMPC",
-        "learned": "control.learned:Learned",
+        "learned": "control.learning.learned:Learned",
     },
     ("robot", "task"),
 )

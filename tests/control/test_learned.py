@@ -12,7 +12,7 @@ from strategies import floats
 import pathcontrol as pc
 from pathcontrol.analysis.run_remarks import remarks
 from pathcontrol.control.law_gains import with_gains
-from pathcontrol.control.learned_table import LearnedTable
+from pathcontrol.control.learning.learned_table import LearnedTable
 
 CICESE = pc.load_robot("cicese_2dof")
 CIRCLE = pc.Circle(0.3, 3.0)  # 10 rad/s

@@ -6,7 +6,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
-from pathcontrol.control.learning_law import LearningLaw
+from pathcontrol.control.learning.learning_law import LearningLaw
 from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import viscous_of

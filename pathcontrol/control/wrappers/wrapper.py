@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller, ControlOutput
-from pathcontrol.control.learning_law import LearningLaw
+from pathcontrol.control.learning.learning_law import LearningLaw
 from pathcontrol.control.wrappers.override_rule import Override, OverrideRule
 from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
 

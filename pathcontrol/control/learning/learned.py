@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, as_scalar, check_whole
 from pathcontrol.arguments import Form
 from pathcontrol.control.base import Controller
-from pathcontrol.control.learned_table import LapMemory, LearnedTable
-from pathcontrol.control.learning_law import LearningLaw
+from pathcontrol.control.learning.learned_table import LapMemory, LearnedTable
+from pathcontrol.control.learning.learning_law import LearningLaw
 from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.errors import InputError, TaskError
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller, ControlOutput
-from pathcontrol.control.learned_table import LearnedTable
+from pathcontrol.control.learning.learned_table import LearnedTable
 from pathcontrol.control.observer import CUTOFF, MomentumObserver
 from pathcontrol.errors import InputError
 
