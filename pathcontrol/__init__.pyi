@@ -26,6 +26,7 @@ from .analysis.run_metrics import peak as peak
 from .analysis.run_metrics import rms as rms
 from .analysis.run_metrics import settling_time as settling_time
 from .analysis.run_metrics import steady_state as steady_state
+from .analysis.run_remarks import remarks as remarks
 from .analysis.speed_factor import speed_factor as speed_factor
 from .analysis.stability.floquet import Floquet as Floquet
 from .analysis.stability.floquet import floquet as floquet

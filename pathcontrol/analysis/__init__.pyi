@@ -22,6 +22,7 @@ from .run_metrics import peak as peak
 from .run_metrics import rms as rms
 from .run_metrics import settling_time as settling_time
 from .run_metrics import steady_state as steady_state
+from .run_remarks import remarks as remarks
 from .speed_factor import speed_factor as speed_factor
 from .stability.floquet import Floquet as Floquet
 from .stability.floquet import floquet as floquet

@@ -19,8 +19,13 @@ def make(arm, name, **options):
     return pc.ExtendedMotionPlan(arm, task, 800.0, [45.0, 100.0], 20.0, **options)
 
 
-@pytest.mark.parametrize("wrapped", ["plain", "observed", "event plan", "paced"])
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(
+    ("name", "wrapped"),
+    [
+        *((name, "plain") for name in LAWS),
+        *(("projection", wrapped) for wrapped in ("observed", "event plan", "paced")),
+    ],
+)
 def test_a_hold_is_a_fixed_point_of_loop_and_arm(arm, name, wrapped):
     """Some seconds into a hold no bit of posture, velocity, torque and state changes any more, but for a clock.
 
