@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol._expect import expect
 from pathcontrol.analysis.metric_helpers import apply_by_task
 from pathcontrol.analysis.tool_following import find_tool, tool_speed
 from pathcontrol.analysis.window import own_samples
@@ -24,8 +25,11 @@ def lap_times(run: Run, task: PathTask | None = None, rollout: int = 0) -> Array
     Raises:
         InputError: the path is not closed, or not known.
     """
+    expect("run", run, Run)
     part = run.rollout(rollout)
     path = part.task if task is None else task
+    if path is not None:
+        expect("task", path, PathTask)
     if path is None or not path.closed:
         raise InputError("laps are of closed paths; the path of this run has no period, or is not known")
     return np.diff(_find_lap_ends(part, path)[0])

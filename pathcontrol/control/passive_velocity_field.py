@@ -58,8 +58,9 @@ class PassiveVelocityField(NearestPoint):
     that β = 1.
 
     This holds in continuous time, with all friction compensated and no torque at its limit. Friction that is left takes
-    energy until the arm rests; ``recharge`` ρ gives it back by ρ(Ē − k̄)P̄/(2Ē) in τ̄, whose power is ρ(Ē − k̄) along the
-    field. It is not passive, but no more than ρĒ flows in. f has the unit √J: inertia of the flywheel would change
+    energy until the arm rests; ``recharge`` ρ gives it back by ρ(Ē − k̄)P̄/(2Ē) in τ̄, whose power is ρ(Ē − k̄)β along the
+    field. It is not passive, but no more than 2ρĒ/√27 flows in: where k̄ > Ē the term has the factor x/(2√(Ēk̄)), and
+    takes energy whichever way the arm moves. f has the unit √J: inertia of the flywheel would change
     nothing. Where V needs more than 0.9Ē it is made shorter. At the end of an open path V is that of the timed plan.
 
     Each gain is one number for all joints, and of several rollouts a column (N, 1).
@@ -128,7 +129,7 @@ class PassiveVelocityField(NearestPoint):
         turned = (field.derivative * qd).sum(-1) + field.derivative_f * f  # w̄ᵀq̄̇
         twice = (own * qd).sum(-1) + f**2  # 2k̄
         energy = each_rollout(self.energy)
-        gain, lacking = each_rollout(self.K_v) / (2 * energy), energy - 0.5 * twice
+        gain, lacking = each_rollout(self.K_v) / (2 * energy), self._lacking(energy, 0.5 * twice, along)
         by_w = along / (2 * energy)
         by_P = (each_rollout(self.recharge) * lacking - turned) / (2 * energy) + gain * twice
         by_p = -gain * along
@@ -136,6 +137,13 @@ class PassiveVelocityField(NearestPoint):
         f_rate = by_w * field.derivative_f + by_P * field.momentum_f + by_p * f
         out = self.conclude(t, q, qd, z, here, tau + self.robot.gravity(q), sdot)
         return out._replace(zdot=np.concatenate([out.zdot, f_rate[..., None]], axis=-1))
+
+    @staticmethod
+    def _lacking(energy: Array, own: Array, along: Array) -> Array:
+        """Return Ē − k̄ [J], times x/(2√(Ēk̄)) where k̄ > Ē: then the recharge takes energy, also against the field."""
+        surplus = own > energy
+        cosine = along / np.where(surplus, 2 * np.sqrt(energy * own), 1.0)
+        return np.asarray((energy - own) * np.where(surplus, cosine, 1.0))
 
     def advance(self, z: Array, out: ControlOutput, period: float) -> Array:
         f = z[..., -1:] + period * out.zdot[..., -1:]

@@ -158,3 +158,13 @@ def test_the_learning_rate_is_that_of_the_torque_that_is_learnt(ideal_arm, circl
     Y = (np.array(columns) - law.law(0.0, q, qd, z).tau[0]).T
     matrix = np.diag(1 / law.K_d) @ Y @ np.diag(law.adaptation_matrix) @ Y.T
     assert_allclose(law.learning_rate(q, qd, z), np.linalg.eigvals(matrix).real.max(), rtol=1e-9)
+
+
+def test_each_rollout_may_have_its_own_gain_of_the_plan(ideal_arm, circle):
+    starts, k = [[1.0, 0.05], [0.95, 0.0], [0.9, 0.1]], [0.0, 20.0, 300.0]
+    law = pc.AdaptiveSlotineLi(ideal_arm, circle, **GAINS, adaptation=0.01, k=k)
+    several = pc.simulate(law, starts, duration=0.02, progress=False)
+    for i, one in enumerate(k):
+        law = pc.AdaptiveSlotineLi(ideal_arm, circle, **GAINS, adaptation=0.01, k=one)
+        alone = pc.simulate(law, starts[i], duration=0.02, progress=False)
+        assert_allclose(several.array("q")[i], alone.array("q")[0], rtol=0, atol=1e-12)

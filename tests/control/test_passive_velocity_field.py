@@ -59,6 +59,17 @@ def test_the_recharge_has_the_power_that_it_says(arm, circle):
     assert energy_rate(law, q, qd, z, np.zeros(2))[0] == pytest.approx(power, rel=1e-6)
 
 
+@pytest.mark.parametrize("beta", [-3.0, -1.5, -0.5, 0.0, 3**-0.5, 0.9, 1.2, 3.0])
+def test_the_recharge_takes_what_is_too_much_and_gives_no_more_than_it_says(arm, circle, beta):
+    law = pc.PassiveVelocityField(arm.with_friction(None), circle, **GAINS, recharge=7.0)
+    s = np.array(0.4)
+    q, field = circle.q_d(s), circle.dq_d(s) * circle.theta(s)
+    z = np.array([s, beta * law.start(q, field)[1]])  # a multiple of the field, also against it
+    power = 7.0 * law.energy * (1 - beta**2) * (abs(beta) if abs(beta) > 1 else beta)
+    assert energy_rate(law, q, beta * field, z, np.zeros(2))[0] == pytest.approx(power, rel=1e-6, abs=1e-6)
+    assert power <= 7.0 * law.energy * 2 / np.sqrt(27) + 1e-9
+
+
 def test_energy_is_constant_and_the_motion_comes_to_the_field_by_its_closed_form(ideal_arm):
     law = pc.PassiveVelocityField(ideal_arm, pc.Ellipse((1.0, 0.6), 1.5), **GAINS)
     q, qd = np.array([0.7, 0.9]), np.array([-1.0, 0.5])

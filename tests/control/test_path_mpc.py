@@ -230,6 +230,7 @@ def test_it_is_named_in_files_and_kept_with_runs(tmp_path, monkeypatch):
     [
         ({"W": 0.0}, "W = 0, expected a number greater than 0"),
         ({"margin": 1.0}, "margin = 1, expected the share"),
+        ({"margin": "1.0"}, "margin = 1, expected the share"),
         ({"torque": None}, "expected a limit of each joint"),
         ({"intervals": 1}, "intervals = 1, expected a whole number from 2"),
         ({"horizon": -1.0}, "horizon = -1"),

@@ -83,14 +83,14 @@ class PathMPC(Controller):
         end: Literal["rest", "free"] = "rest",
         **options: Any,
     ) -> None:
-        refuse_batch("task", task)
         super().__init__(robot, task, **options)
+        refuse_batch("task", task)
         expect_choice("end", end, ("rest", "free"))
         self.horizon, self.end = as_scalar("horizon", horizon, positive=True), end
         self.intervals = as_whole("intervals", intervals, 2, 500)
         weights = {"Q": Q, "W": W, "R": R, "R_s": R_s}
         self.Q, self.W, self.R, self.R_s = (as_scalar(name, value, positive=True) for name, value in weights.items())
-        self.torque, self.margin = torque, margin
+        self.torque, self.margin = torque, as_scalar("margin", margin)
         self.step = self.horizon / self.intervals
         self._limits = self._torque_limits()
         self._fastest = self._fastest_profile()
@@ -171,7 +171,7 @@ class PathMPC(Controller):
         Raises:
             InputError: there are none, or dry friction takes all of one.
         """
-        if not 0 <= as_scalar("margin", self.margin) < 1:
+        if not 0 <= self.margin < 1:
             raise InputError(f"margin = {self.margin:g}, expected the share of the torque that is left, 0 ≤ margin < 1")
         limits = (1 - self.margin) * joint_values("torque", self.torque, self.robot.limits.effort, self.robot)
         if not np.isfinite(limits).all():

@@ -27,7 +27,8 @@ def check_adaptation(law: Controller, period: float, q: Array, qd: Array) -> Ite
     places = {}
     if len(q) <= _MOST:
         places["at the start, which is so far from the path"] = law.learning_rate(q, qd, law.start(q, qd))
-    if not isinstance(law.task, TaskBatch) and not any(np.ndim(getattr(law, name)) > 1 for name in law.gains):
+    several = any(np.ndim(getattr(law, name)) > (name != "k") for name in law.gains)  # k has no joints
+    if not isinstance(law.task, TaskBatch) and not several:
         places["on the path"] = _rates_on_path(law)
     fastest = {where: float(np.max(rates, initial=0.0)) for where, rates in places.items()}
     where = max(fastest, key=lambda place: fastest[place], default="")
