@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pathcontrol.analysis.stability.floquet import Floquet
     from pathcontrol.analysis.stability.stability_map import StabilityMap
 
+_NEUTRAL = 1e-4  # of a deviation in a lap; ticks do not fit into a lap, and rates are known to about this
 _DECADES = 10.0  # ratio of ends from which values are spaced by factors
 
 
@@ -118,7 +119,9 @@ def _write(stability: StabilityMap, out: Path) -> dict[str, str]:
 
 def _tell(own: Floquet, left_out: list[str]) -> None:
     """Print how fast errors decay with the experiment's own gains."""
-    what = "decays" if own.stable else "grows"
-    click.echo(f"a lap takes {own.period:.4g} s; the slowest deviation {what} at {abs(own.decay_rate):.4g} 1/s")
+    what = f"{'decays' if own.stable else 'grows'} at {abs(own.decay_rate):.4g} 1/s"
+    if abs(own.decay_rate) * own.period < _NEUTRAL:
+        what = f"neither decays nor grows, to {_NEUTRAL:g} of it in a lap"
+    click.echo(f"a lap takes {own.period:.4g} s; the slowest deviation {what}")
     if left_out:
-        click.echo(f"without {', '.join(left_out)}, which have no derivative")
+        click.echo(f"left out, for want of a derivative: {', '.join(left_out)}")

@@ -214,3 +214,12 @@ def test_products_of_random_matrices_that_are_similar_to_blocks(seed):
     turned = np.mod(np.repeat(count * angles, 2) * [1, -1, 1, -1], 2 * np.pi)
     difference = np.exp(1j * found.imag[1:5])[:, None] - np.exp(1j * turned)
     assert (np.abs(difference).min(0) < 1e-5).all()
+
+
+def test_an_adaptive_law_has_no_boundary_of_stability(ideal_arm):
+    law = pc.AdaptiveSlotineLi(ideal_arm, pc.Circle(1.0, 2.0), 20.0, [100.0, 10.0], 0.001, k=20.0)
+    for one in (law, pc.SpeedOverride(law, 0.5)):
+        with pytest.raises(InputError, match="neither decay nor grow with any gain"):
+            pc.largest_gain(one, "k")
+        with pytest.raises(InputError, match="neither decay nor grow with any gain"):
+            pc.stability_map(one, {"k": [1.0, 2.0]})

@@ -63,6 +63,18 @@ def test_the_figure_is_written(file, tmp_path):
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"stability.svg", "stability.png"}
 
 
+def test_parameters_that_do_not_show_are_not_said_to_grow(tmp_path):
+    path = tmp_path / "adaptive.toml"
+    gains = 'type = "adaptive_slotine_li"\nLambda = 20.0\nK_d = [100.0, 10.0]\nadaptation = 0.001\n'
+    begin, end = FILE.split('type = "extended_motion_plan"')
+    end = end.replace("K_p = 400.0\nK_v = 40.0\n", "").replace("period = 0.02", "period = 0.005")
+    path.write_text(begin + gains + end)
+    done = stability(path)
+    assert done.exit_code == 0, done.output
+    assert "neither decays nor grows" in done.stdout
+    assert "left out, for want of a derivative: " in done.stdout
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

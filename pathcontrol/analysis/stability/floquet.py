@@ -52,7 +52,11 @@ class Floquet:
 
     @property
     def stable(self) -> bool:
-        """Whether all deviations decay, but a shift along the orbit."""
+        """Whether all deviations decay, but a shift along the orbit.
+
+        It is False for :class:`AdaptiveSlotineLi`: parameters that do not show on the path stay as wrong as they are,
+        with multipliers of 1, of which ``along`` is any.
+        """
         return bool((self.transverse.real < 0).all())
 
     @property

@@ -9,8 +9,11 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.analysis.stability.floquet import check_path, slowest_growth
+from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
 from pathcontrol.control.base import Controller
 from pathcontrol.control.law_gains import with_gains
+from pathcontrol.control.wrappers.wrapper import unwrap
+from pathcontrol.errors import InputError
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
 from pathcontrol.simulation.run_arguments import check_controller
 
@@ -30,13 +33,19 @@ class GainGrowth:
         settle: laps of a sampled loop before it is linearised.
 
     Raises:
-        InputError: as of :func:`floquet`.
+        InputError: the law learns parameters, or as of :func:`floquet`.
     """
 
     def __init__(self, law: Controller, names: Sequence[str], loop: Loop, settle: int) -> None:
         check_controller("law", law)
         if loop is not None:
             expect("loop", loop, SampledLoop, ContinuousTime)
+        if isinstance(unwrap(law), AdaptiveSlotineLi):
+            raise InputError(
+                "parameters that an adaptive law learns, and that do not show on the path, neither decay nor grow with "
+                "any gain, so that there is no boundary of stability; floquet(law).exponents has all rates, and "
+                "SlotineLi with the same gains a boundary"
+            )
         self._law, self._names, self._loop, self._settle = law, tuple(names), loop, settle
         self._task = check_path(law)
         ticks = 2000.0

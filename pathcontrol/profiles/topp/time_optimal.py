@@ -138,7 +138,7 @@ def _ends(path: Path, **ends: float | str | None) -> list[float | None]:
 
 def _end(name: str, value: float | str) -> float:
     """Return one rate [1/s], ∞ for a free one, or the time [s] at an end of a path."""
-    if not isinstance(value, str) or name == "end_time":
+    if not isinstance(value, str | bool) or name == "end_time":
         return as_scalar(name, value, positive=True)
     if value != _FREE:
         raise InputError(
