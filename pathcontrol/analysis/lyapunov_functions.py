@@ -122,9 +122,9 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
         tangent = controller.point(np.where(np.isfinite(s), s, controller.task.s0)).dq_d.swapaxes(0, 1)
         return _beside(controller.k_p, controller.k_v, e_p, e_v, tangent)
     raise InputError(
-        f"no Lyapunov function of e_p and e_v is given for {type(controller).__name__}; ExtendedMotionPlan, Projection, "
-        "StateToReferenceProjection, ManeuverRegulation and TransverseLinearization have one; for computed torque take "
-        "ExtendedMotionPlan with k = 0"
+        f"no Lyapunov function of e_p and e_v is given for {type(controller).__name__}; the laws that have one are "
+        "ExtendedMotionPlan (with k = 0 computed torque), StateToReferenceProjection, Projection, ManeuverRegulation "
+        "and TransverseLinearization"
     )
 
 
