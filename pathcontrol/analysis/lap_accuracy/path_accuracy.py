@@ -35,6 +35,7 @@ from pathcontrol.analysis.metric_helpers import resolve_task
 from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError
 from pathcontrol.robot.rotations import rotation_vectors_of
+from pathcontrol.simulation.log_arrays import follow_path
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.task import PathTask
@@ -275,15 +276,30 @@ def choose_path(task: PathTask, rollout: int) -> PathTask:
 def count_along(one: Run, path: PathTask) -> Array:
     """Return s of a rollout, its own samples only until it diverged, counting laps.
 
+    The run's own s, or along another path than that of the run σ̄ of its positions.
+
     Raises:
-        InputError: it has none.
+        InputError: no position is known.
     """
-    s = one.array("s")[0, : own_samples(one)[0]]
+    own = own_samples(one)[0]
+    s, q = one.array("s")[0, :own], one.array("q")[0, :own]
     known = np.isfinite(s)
-    s = s if known.all() else s[: known.argmin()]
+    if not known.any() or not _is_along(one.task, path, s[known]):
+        known = np.isfinite(q).all(-1)
+        s = follow_path(path, q[: own if known.all() else known.argmin()])
+    else:
+        s = s if known.all() else s[: known.argmin()]
     if not len(s):
-        raise InputError("the rollout has no sample with an s, so it has no cycles")
+        raise InputError("the rollout has no sample with a position, so it has no cycles")
     return s if path.period is None else np.unwrap(s, period=path.period)
+
+
+def _is_along(own: PathTask | None, path: PathTask, s: Array) -> bool:
+    """Return whether s of a run along its ``own`` path, where that is known, means the same along ``path``."""
+    if own is None or own is path or isinstance(own, TaskBatch):
+        return True
+    few = s[:: max(len(s) // 16, 1)]
+    return bool(np.allclose(own.q_d(few), path.q_d(few), rtol=0.0, atol=1e-9))
 
 
 def _measure(one: Run, path: PathTask, space: ComparedSpace, planes: _Planes, s: Array) -> _Cycle:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, as_scalar
 from pathcontrol._expect import expect
 from pathcontrol.analysis.power.closed_loop_theorems import Energy, LoopState, Theorem, theorem_of
 from pathcontrol.analysis.power.law_of_run import LawRecord, find_law, record_of
@@ -75,8 +75,9 @@ class PowerBalance:
         Of a rollout that diverged they end there.
 
         Raises:
-            InputError: no sample is in this time.
+            InputError: no sample is in this time, or one of them is no time.
         """
+        begin, end = as_scalar("begin", begin), end if end == np.inf else as_scalar("end", end)
         among, widths = (self.middle >= begin) & (self.middle <= end), np.diff(self.time)
         if not among.any():
             raise InputError(

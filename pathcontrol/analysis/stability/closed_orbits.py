@@ -24,7 +24,21 @@ _ORBIT = 1e-6  # of the largest rate, by which an orbit may differ from the path
 _SLOWEST = 0.05  # of ϑ, of a plan that goes round in the mean
 _AWAY = 0.2  # of the extent of the path, beyond which a loop has left it
 _MORE = 1.1  # laps that are recorded, for the nearest tick to the end of one
-_CELLS = 2000  # of a lap in continuous time
+_ROUNDING = 1e-12  # of the state, which large gains magnify
+_CELLS, _MOST_CELLS = 1000, 8000  # of a lap in continuous time
+_LONGEST = 0.5  # cell over the time of the fastest mode
+
+# nodes, weights and matrix of Radau IIA with three stages
+_ROOT = np.sqrt(6.0)
+_NODES = np.array([(4 - _ROOT) / 10, (4 + _ROOT) / 10, 1.0])
+_WEIGHTS = np.array([(16 - _ROOT) / 36, (16 + _ROOT) / 36, 1 / 9])
+_STAGES = np.array(
+    [
+        [(88 - 7 * _ROOT) / 360, (296 - 169 * _ROOT) / 1800, (-2 + 3 * _ROOT) / 225],
+        [(296 + 169 * _ROOT) / 1800, (88 + 7 * _ROOT) / 360, (-2 - 3 * _ROOT) / 225],
+        _WEIGHTS,
+    ]
+)
 
 #: the law with a row of gains for each of some rows of a grid of gains
 LawOfRows = Callable[[NDArray[np.intp]], Controller]
@@ -54,7 +68,7 @@ def follow_laps(
         InputError: the path is no orbit of the law, the plan does not go round it, or the loop has no derivative.
     """
     if not isinstance(loop, SampledLoop):
-        return [_follow_path(ContinuousMap(laws(np.full(2 * _CELLS + 1, row))), task) for row in range(rows)]
+        return [_follow_path(laws, row, task) for row in range(rows)]
     every = np.arange(rows)
     tick = TickMap(laws(every), loop)
     orbits = [_cut_lap(tick, task, states) for states in _follow_ticks(laws, tick, loop, rows, task, settle)]
@@ -67,31 +81,47 @@ def follow_laps(
     return [Lap(one, duration / way, duration) for one, duration, way in each_lap]
 
 
-def _follow_path(field: ContinuousMap, task: PathTask) -> Lap:
-    """Return a lap in continuous time, along the path itself.
-
-    dδ/ds = A δ/ϑ is integrated over s by the classical Runge–Kutta method.
-    """
+def _follow_path(laws: LawOfRows, row: int, task: PathTask) -> Lap:
+    """Return a lap in continuous time, along the path itself, where dδ/ds = A δ/ϑ."""
     assert task.period is not None
-    s = task.s0 + task.period * np.arange(2 * _CELLS + 1) / (2 * _CELLS)
-    x, point = field.on_path(s), task.at(s)
-    theta = point.theta
-    _check_orbit(field(x), np.column_stack([point.velocity, point.velocity_slope * theta[:, None], theta]))
-    slopes = _differentiate(field, x) / theta[:, None, None]
-    h, one = task.period / _CELLS, np.eye(x.shape[1])
-    first, middle, last = slopes[:-2:2], slopes[1::2], slopes[2::2]
-    k2 = middle @ (one + 0.5 * h * first)
-    k3 = middle @ (one + 0.5 * h * k2)
-    steps = one + h / 6 * (first + 2 * k2 + 2 * k3 + last @ (one + h * k3))
-    time = 1 / theta
-    lap = float(h / 6 * (time[:-2:2] + 4 * time[1::2] + time[2::2]).sum())
-    return Lap(steps, lap, lap)
+    few = _find_slopes(laws, row, task, task.s0 + task.period * np.arange(32) / 32)
+    needed = np.abs(np.linalg.eigvals(few)) * task.period / _LONGEST
+    cells = int(np.clip(needed[needed < 4 * _MOST_CELLS].max(), _CELLS, _MOST_CELLS))  # others vanish in any cell
+    h = task.period / cells
+    s = task.s0 + (h * (np.arange(cells)[:, None] + _NODES)).ravel()
+    slopes = _find_slopes(laws, row, task, s)
+    lap = float(h * ((1 / task.theta(s)).reshape(cells, 3) @ _WEIGHTS).sum())
+    parts = np.array_split(slopes.reshape(cells, 3, *slopes.shape[1:]), -(-cells // _CELLS))
+    return Lap(np.concatenate([_take_steps(part, h) for part in parts]), lap, lap)
 
 
-def _check_orbit(rates: Array, wanted: Array) -> None:
+def _find_slopes(laws: LawOfRows, row: int, task: PathTask, s: Array) -> Array:
+    """Return the matrices A/ϑ on the path at s (k,), (k, D, D)."""
+    field, point = ContinuousMap(laws(np.full(len(s), row))), task.at(s)
+    x, theta = field.on_path(s), point.theta
+    slopes = _differentiate(field, x)
+    wanted = np.column_stack([point.velocity, point.velocity_slope * theta[:, None], theta])
+    _check_orbit(field(x), wanted, _ROUNDING * np.abs(slopes).max())
+    return slopes / theta[:, None, None]
+
+
+def _take_steps(slopes: Array, h: float) -> Array:
+    """Return the steps (K, D, D) of linear equations over cells of width h, from slopes at three nodes (K, 3, D, D).
+
+    Radau IIA of order 5 (Hairer and Wanner, Solving Ordinary Differential Equations II, table IV.5.6): modes that are
+    faster than a cell vanish, where an explicit method would let them grow.
+    """
+    cells, stages, size, _ = slopes.shape
+    parts = _STAGES[:, :, None, None] * h * slopes[:, None]  # how each node moves by the slope at another
+    whole = parts.swapaxes(2, 3).reshape(cells, stages * size, stages * size)
+    nodes = np.linalg.solve(np.eye(stages * size) - whole, np.tile(np.eye(size), (stages, 1)))
+    return nodes[:, -size:]  # the last node is the end
+
+
+def _check_orbit(rates: Array, wanted: Array, rounding: float) -> None:
     """Check that a law moves along its path with the arm on it: the first rates of the state (q, q̇, s) are those."""
     apart = np.abs(rates[:, : wanted.shape[1]] - wanted)
-    if (apart > _ORBIT * np.abs(wanted).max()).any():
+    if (apart > _ORBIT * np.abs(wanted).max() + rounding).any():
         raise InputError(
             "the path at its velocity is no orbit of the law: friction is left, or the speed is another; give a "
             "SampledLoop, of which the orbit is found"
