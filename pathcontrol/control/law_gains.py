@@ -41,6 +41,21 @@ def largest_entry(law: Controller, name: str) -> float:
     return float(np.max(_find(law, name)))
 
 
+def refuse_several_gains(law: Controller) -> None:
+    """Check that a law has one set of gains.
+
+    Raises:
+        InputError: a gain has a row for each of several rollouts.
+    """
+    inner = unwrap(law)
+    for name in inner.gains:
+        shape = np.shape(getattr(inner, name))
+        if len(shape) > 1 and shape[0] > 1:
+            raise InputError(
+                f"{name} has the gains of several rollouts, {shape}, expected those of one, ({law.robot.n},)"
+            )
+
+
 def unit_of_gain(law: Controller, name: str) -> str:
     """Return the unit of a gain, for joints that turn; empty where the law does not say it."""
     unit = parameters_of(type(unwrap(law)))[name].unit if name in parameters_of(type(unwrap(law))) else None

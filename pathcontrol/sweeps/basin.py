@@ -15,6 +15,7 @@ from pathcontrol._progress import progress_bar
 from pathcontrol.analysis.path_reach import Reach, reach
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
+from pathcontrol.control.law_gains import refuse_several_gains
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.projection import Projection
 from pathcontrol.control.wrappers.wrapper import unwrap
@@ -136,6 +137,7 @@ def basin(
     """
     check_controller("controller", controller)
     refuse_batch("the path of the law", controller.task)
+    refuse_several_gains(controller)
     duration, tolerance = (
         as_scalar(name, value, positive=True) for name, value in (("duration", duration), ("tolerance", tolerance))
     )

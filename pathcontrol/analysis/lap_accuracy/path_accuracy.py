@@ -283,9 +283,9 @@ def count_along(one: Run, path: PathTask) -> Array:
     """
     own = own_samples(one)[0]
     s, q = one.array("s")[0, :own], one.array("q")[0, :own]
-    known = np.isfinite(s)
+    known: NDArray[np.bool_] = np.isfinite(s)
     if not known.any() or not _is_along(one.task, path, s[known]):
-        known = np.isfinite(q).all(-1)
+        known = np.all(np.isfinite(q), axis=-1)
         s = follow_path(path, q[: own if known.all() else known.argmin()])
     else:
         s = s if known.all() else s[: known.argmin()]

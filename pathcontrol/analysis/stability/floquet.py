@@ -17,6 +17,7 @@ from pathcontrol._expect import expect
 from pathcontrol.analysis.stability.closed_orbits import Lap, LawOfRows, follow_laps, pad_steps
 from pathcontrol.analysis.stability.product_eigen import ProductEigen, find_eigen, find_eigen_of_many
 from pathcontrol.control.base import Controller
+from pathcontrol.control.law_gains import refuse_several_gains
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import levels_of
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
@@ -108,8 +109,7 @@ def check_path(law: Controller) -> PathTask:
     task, arm = law.task, law.robot
     if isinstance(task, TaskBatch) or task.period is None:
         raise InputError(f"{type(task).__name__} is no single closed path, and multipliers are those of its laps")
-    if several := [name for name in law.gains if np.size(getattr(law, name)) > arm.n]:
-        raise InputError(f"{several[0]} has the gains of several rollouts, expected those of one, ({arm.n},)")
+    refuse_several_gains(law)
     if any(np.any(level) for level in levels_of(arm.friction, np.zeros(arm.n))):
         raise InputError(
             "the arm has dry friction, which has no derivative; give the law the arm with Viscous friction only"

@@ -20,9 +20,10 @@ _MOST_CONTINUOUS = 8  # in continuous time, beyond which rounding is larger than
 def largest_gain(law: Controller, gain: str, loop: Loop = None, *, settle: int = 3) -> float:
     """Return the largest value of a gain with which a law on its closed path is stable, its other gains as they are.
 
-    From the law's own value upwards, where that is stable, and else downwards, gains are tried that double (in continuous
-    time eight times as large); the boundary max |μ| = 1 between two of them is found as by :func:`stability_map`, to 1e-6. It is that of the linearised
-    loop: deviations that are not small may need a smaller gain.
+    From the law's own value upwards, where that is stable, and else downwards, gains are tried that double (in
+    continuous time eight times as large); the boundary max |μ| = 1 between two of them is found as by
+    :func:`stability_map`, to 1e-6. It is that of the linearised loop: deviations that are not small may need a smaller
+    gain.
 
     Args:
         law: the law, with one closed path and one set of gains; its own model is the arm.
