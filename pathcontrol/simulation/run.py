@@ -247,7 +247,12 @@ class Run:
         return norms(self.array(name))
 
     def rollout(self, index: int) -> Run:
-        """Return one of the rollouts as a run of its own."""
+        """Return one of the rollouts as a run of its own.
+
+        Raises:
+            InputError: there is none of that number.
+        """
+        _check_index("rollout", index)
         if not -self.rollouts <= index < self.rollouts:
             raise InputError(f"rollout {index} does not exist: the run has {self.rollouts}, counted from 0")
         if self._samples is not None:
@@ -257,7 +262,12 @@ class Run:
         return Run(part, self.config, self._origin.rollout(int(part["rollout"][0])))
 
     def path(self, index: int) -> Run:
-        """Return one path of a sequence as a run of its own, which begins at 0 s, where the path before finished."""
+        """Return one path of a sequence as a run of its own, which begins at 0 s, where the path before finished.
+
+        Raises:
+            InputError: the run is no sequence, or that path was not followed.
+        """
+        _check_index("path", index)
         if "path_status" not in self:
             raise InputError("the run is no sequence of paths; make one with simulate_sequence")
         status, among, ends = (self.array(f"path_{name}") for name in ("status", "index", "finish_time"))
@@ -394,3 +404,9 @@ def norms(vectors: Array) -> Array:
 def _unpickle(data: xr.Dataset | Samples, config: Mapping[str, Any], stored: StoredContext) -> Run:
     """Return a run from its pickled parts."""
     return Run(data, config, RunContext.load(stored))
+
+
+def _check_index(name: str, value: Any) -> None:
+    """Check that a number of a rollout or a path is an integer."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise InputError(f"{name} = {value!r:.80}, expected a whole number, counted from 0", argument=name, value=value)

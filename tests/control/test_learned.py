@@ -318,6 +318,12 @@ def test_what_cannot_be_learned_is_refused():
         pc.simulate(pc.Learned(law()), START, duration=0.1, loop=pc.ContinuousTime(), progress=False)
 
 
+@pytest.mark.parametrize("z", ["a", 1.0, [], [1.0, 2.0], np.zeros((3, 4))])
+def test_a_table_is_recalled_from_states_of_its_law_alone(z):
+    with pytest.raises(pc.PathControlError, match="^z "):
+        pc.Learned(law()).recall(z)
+
+
 def test_v_is_that_of_the_law_inside():
     one = run(pc.Learned(law(), nodes=32), 1)
     for mine, inside in zip(pc.lyapunov(pc.Learned(law()), one), pc.lyapunov(law(), one), strict=True):

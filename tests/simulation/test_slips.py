@@ -247,3 +247,14 @@ def test_a_gain_of_an_experiment_may_be_a_diagonal_matrix(tmp_path):
     file.write_text(text.replace("\nK_p = 800.0", "\nK_p = [[800.0, 1.0], [0.0, 700.0]]"), encoding="utf-8")
     with pytest.raises(pc.ExperimentError, match=r"controller\.K_p = .* not diagonal"):
         load_setup(file)
+
+
+@pytest.mark.parametrize("number", ["a", None, [0], 0.5, True, float("nan")])
+def test_rollouts_and_paths_are_whole_numbers(things, number):
+    for take, name in (
+        (things["run"].rollout, "rollout"),
+        (lambda index: pc.lap_errors(things["run"], rollout=index), "rollout"),
+        (things["run"].path, "path"),
+    ):
+        with pytest.raises(pc.PathControlError, match=f"^{name} = .*, expected a whole number"):
+            take(number)

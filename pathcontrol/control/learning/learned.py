@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_scalar, check_whole
+from pathcontrol._arrays import Array, as_array, as_scalar, check_whole
 from pathcontrol.arguments import Form
 from pathcontrol.control.base import Controller
 from pathcontrol.control.learning.learned_table import LapMemory, LearnedTable
@@ -93,8 +93,19 @@ class Learned(LawWrapper):
         self.observer = self.inner.observer
 
     def recall(self, z: ArrayLike) -> LapMemory:
-        """Return the table in a state z of this law, (*batch, m), as :attr:`ControlTick.state` gives it."""
-        own = self.split(np.asarray(z, dtype=np.float64))[0]
+        """Return the table in a state z of this law, (*batch, m), as :attr:`ControlTick.state` gives it.
+
+        Raises:
+            InputError: z is shorter than a state of this law.
+        """
+        state = as_array("z", z)
+        own = self.split(state)[0] if state.ndim else state
+        if not own.ndim or own.shape[-1] <= self.inner.table.size:
+            raise InputError(
+                f"z has shape {state.shape}, expected a state of this law, (*batch, m), as ControlTick.state gives it, "
+                "or pc.law_states(run, law)",
+                argument="z",
+            )
         return self.inner.table.split(self.inner.split(own)[1])
 
     @property
