@@ -256,5 +256,5 @@ def test_rollouts_and_paths_are_whole_numbers(things, number):
         (lambda index: pc.lap_errors(things["run"], rollout=index), "rollout"),
         (things["run"].path, "path"),
     ):
-        with pytest.raises(pc.PathControlError, match=f"^{name} = .*, expected a whole number"):
+        with pytest.raises(pc.PathControlError, match=rf"^{name} = .*, expected a whole number"):
             take(number)
