@@ -320,7 +320,7 @@ def test_what_cannot_be_learned_is_refused():
 
 @pytest.mark.parametrize("z", ["a", 1.0, [], [1.0, 2.0], np.zeros((3, 4))])
 def test_a_table_is_recalled_from_states_of_its_law_alone(z):
-    with pytest.raises(pc.PathControlError, match="^z "):
+    with pytest.raises(pc.PathControlError, match=r"^z "):
         pc.Learned(law()).recall(z)
 
 
