@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pathcontrol._expect import expect
 from pathcontrol.analysis.limit_shares import RATIOS, find_worst_shares, is_passed
 from pathcontrol.analysis.progress import ENOUGH, progress
 from pathcontrol.analysis.window import samples_of
@@ -23,6 +24,7 @@ def remarks(run: Run) -> list[str]:
 
     Of several rollouts with the same fault the first ones are named.
     """
+    expect("run", run, Run)
     found: dict[str, list[tuple[int, str]]] = {}
     for i in range(run.rollouts):
         for kind, sentence in _find_faults(run.rollout(i)).items():

@@ -28,6 +28,7 @@ from pathcontrol.simulation.checks.fast_modes import (
     rates_of_disturbance,
 )
 from pathcontrol.simulation.checks.held_gains import linearize_law, longest_period
+from pathcontrol.simulation.checks.own_rates import check_own_rates
 from pathcontrol.simulation.checks.plan_gain import check_plan_gain
 from pathcontrol.simulation.loops import MOST_SUBSTEPS, Arm, ContinuousTime, SampledLoop
 from pathcontrol.tasks.batch.task_batch import TaskBatch
@@ -114,6 +115,7 @@ def _find_warnings(
         yield from _check_gains(law, loop.period, robot, rows, postures)
         yield from _check_plan(law, loop)
         yield from check_adaptation(law, loop.period, q, qd)
+        yield from check_own_rates(law, loop.period)
         yield from _select_worst(list(_check_arm(loop, arm, postures, speeds)) for arm in felt.values())
     if disturbance is not None:
         yield from _select_worst(list(_check_disturbance(disturbance, loop, a, q, qd, duration)) for a in felt.values())
