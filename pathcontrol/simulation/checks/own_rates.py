@@ -20,7 +20,7 @@ _LONGEST = 2.0  # times the rate; an error that decays at the rate λ is multipl
 
 
 def check_own_rates(law: Controller, period: float) -> Iterator[str]:
-    """Yield the warning of a rate of a law that is too fast for a ``period`` [s], or of intervals that are too short."""
+    """Yield warnings of a rate of a law that is too fast for a ``period`` [s], and of intervals too short for it."""
     for kind, (name, what) in _RATES.items():
         rate = float(np.max(getattr(law, name))) if isinstance(law, kind) else 0.0
         if rate * period > _LONGEST:
