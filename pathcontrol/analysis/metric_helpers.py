@@ -42,6 +42,14 @@ def resolve_task(run: Run, task: PathTask | None) -> PathTask:
     return task
 
 
+def is_along(own: PathTask | None, path: PathTask, s: Array) -> bool:
+    """Return whether s (k,) of a run along its ``own`` path, where that is known, means the same along ``path``."""
+    if own is None or own is path or isinstance(own, TaskBatch) or isinstance(path, TaskBatch):
+        return True
+    few = s[:: max(len(s) // 16, 1)]
+    return bool(np.allclose(own.q_d(few), path.q_d(few), rtol=0.0, atol=1e-9))
+
+
 def resolve_toolpath(run: Run, task: ToolpathTask | None) -> ToolpathTask:
     """Return ``task``, or the run's own one by default, which must be a toolpath.
 

@@ -330,7 +330,7 @@ class ArmDynamics:
     def _frame_id(self, frame: str) -> int:
         # getFrameId answers nframes for a frame that does not exist, so ask first
         model = self.pinocchio_model
-        if not model.existFrame(frame):
+        if not isinstance(frame, str) or not model.existFrame(frame):
             raise UnknownNameError(
                 f"{self.name} has no frame {frame!r}; it has {', '.join(self.frame_names)}",
                 value=frame,

@@ -31,3 +31,21 @@ def test_a_begin_of_means_that_is_no_time_is_refused(begin):
     run = pc.simulate(pc.Projection(arm, circle, 800.0, 60.0), [1.0, 0.0], duration=0.02, progress=False)
     with pytest.raises(pc.InputError, match="begin"):
         pc.power_balance(run).means(begin=begin)
+
+
+def test_a_power_balance_of_another_path_is_refused():
+    arm, circle = pc.load_robot("cicese_2dof"), pc.Circle(1.0, 2.0)
+    run = pc.simulate(pc.Projection(arm, circle, 800.0, 60.0), [1.0, 0.0], duration=0.02, progress=False)
+    with pytest.raises(pc.InputError, match="another path"):
+        pc.power_balance(run, pc.Projection(arm, pc.Circle(0.5, 2.0), 800.0, 60.0))
+    same = pc.power_balance(run, pc.Projection(arm, pc.Circle(1.0, 2.0), 800.0, 60.0))
+    assert (same.V == pc.power_balance(run).V).all()
+
+
+@pytest.mark.parametrize("find", [pc.accuracy, pc.ballbar])
+@pytest.mark.parametrize("wrong", [{"rollout": "a"}, {"rollout": 0.5}, {"frame": 3}], ids=str)
+def test_a_rollout_or_a_frame_of_another_kind_is_refused(find, wrong):
+    arm, circle = pc.load_robot("cicese_2dof"), pc.Circle(1.0, 2.0)
+    run = pc.simulate(pc.Projection(arm, circle, 800.0, 60.0), [1.0, 0.0], duration=0.02, progress=False)
+    with pytest.raises(pc.PathControlError, match=r"rollout = |no frame 3"):
+        find(run, **wrong)

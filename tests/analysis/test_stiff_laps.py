@@ -26,3 +26,10 @@ def test_the_plan_is_stable_in_continuous_time_with_a_very_large_gain():
     limit = [[0, 1, 0], [omega**2 - K_p, -K_v, r * omega], [-K_v * omega / r, -2 * omega / r, -K_v]]
     expected = -np.linalg.eigvals(np.array(limit)).real.max()
     assert pc.floquet(law).decay_rate == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("gains", [{"K_v": [30.0]}, {"K_v": [30.0], "K_p": [200.0, 300.0]}], ids=["one", "line"])
+def test_a_map_of_one_value_is_drawn(gains):
+    law = pc.ComputedTorque(ROBOT, pc.Circle(0.25, 2.0), 800.0, 60.0)
+    low, high = pc.stability_figure(pc.stability_map(law, gains, progress=False)).axes[0].get_xlim()
+    assert 0 < low < 30.0 < high

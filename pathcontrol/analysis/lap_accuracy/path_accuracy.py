@@ -31,7 +31,7 @@ from pathcontrol._arrays import Array, check_whole
 from pathcontrol.analysis.compared_space import ComparedSpace
 from pathcontrol.analysis.crossings import Crossings, Motion, find_crossings
 from pathcontrol.analysis.lap_accuracy.cornering import Corner, find_corners, measure_corner, place_corners
-from pathcontrol.analysis.metric_helpers import resolve_task
+from pathcontrol.analysis.metric_helpers import is_along, resolve_task
 from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError
 from pathcontrol.robot.rotations import rotation_vectors_of
@@ -284,7 +284,7 @@ def count_along(one: Run, path: PathTask) -> Array:
     own = own_samples(one)[0]
     s, q = one.array("s")[0, :own], one.array("q")[0, :own]
     known: NDArray[np.bool_] = np.isfinite(s)
-    if not known.any() or not _is_along(one.task, path, s[known]):
+    if not known.any() or not is_along(one.task, path, s[known]):
         known = np.all(np.isfinite(q), axis=-1)
         s = follow_path(path, q[: own if known.all() else known.argmin()])
     else:
@@ -292,14 +292,6 @@ def count_along(one: Run, path: PathTask) -> Array:
     if not len(s):
         raise InputError("the rollout has no sample with a position, so it has no cycles")
     return s if path.period is None else np.unwrap(s, period=path.period)
-
-
-def _is_along(own: PathTask | None, path: PathTask, s: Array) -> bool:
-    """Return whether s of a run along its ``own`` path, where that is known, means the same along ``path``."""
-    if own is None or own is path or isinstance(own, TaskBatch):
-        return True
-    few = s[:: max(len(s) // 16, 1)]
-    return bool(np.allclose(own.q_d(few), path.q_d(few), rtol=0.0, atol=1e-9))
 
 
 def _measure(one: Run, path: PathTask, space: ComparedSpace, planes: _Planes, s: Array) -> _Cycle:

@@ -9,8 +9,9 @@ import numpy as np
 
 from pathcontrol._arrays import Array, as_scalar
 from pathcontrol._expect import expect
+from pathcontrol.analysis.metric_helpers import is_along
 from pathcontrol.analysis.power.closed_loop_theorems import Energy, LoopState, Theorem, theorem_of
-from pathcontrol.analysis.power.law_of_run import LawRecord, find_law, record_of
+from pathcontrol.analysis.power.law_of_run import LawRecord, find_law, has_demand, record_of
 from pathcontrol.analysis.power.loop_states import states_of
 from pathcontrol.analysis.power.torque_account import TorqueAccount, is_sampled
 from pathcontrol.control.base import Controller
@@ -130,7 +131,7 @@ def power_balance(run: Run, controller: Controller | None = None, *, plant: Robo
 
     Raises:
         InputError: the law is not known or has no theorem here, the run has no torques or less than two samples,
-            follows a sequence of paths, or does not know its arm.
+            follows a sequence of paths or another path than the law, or does not know its arm.
     """
     expect("run", run, Run)
     law, theorem = _checked(run, controller)
@@ -159,6 +160,9 @@ def _checked(run: Run, controller: Controller | None) -> tuple[Controller, Theor
     if len(run.time) < 2:
         raise InputError(f"the run has {len(run.time)} sample, expected two at least, between which V changes")
     law = find_law(run, controller)
+    s = run.array("s")
+    if has_demand(run) and not is_along(run.task, law.task, s[np.isfinite(s)]):
+        raise InputError(f"{law!r} goes along another path than the run, {run.task!r}; give a law of that path")
     return law, theorem_of(law)
 
 

@@ -61,9 +61,9 @@ def stability_figure(stability: StabilityMap, mark: Mapping[str, float] | None =
         else:
             entries = _draw_plane(figure, axes, stability)
             ends = stability.grids[0], stability.grids[1]
-            axes.set_ylim(ends[1].min(), ends[1].max())
+            axes.set_ylim(*_limits(ends[1]))
             axes.set_ylabel(_label(stability, 1))
-        axes.set_xlim(ends[0].min(), ends[0].max())
+        axes.set_xlim(*_limits(ends[0]))
         set_scales(axes, *ends)
         axes.set_xlabel(_label(stability, 0))
         if marked is not None:
@@ -139,6 +139,13 @@ def _name_mark(stability: StabilityMap, mark: Mapping[str, float] | None) -> str
     """Return the words for the marked gains."""
     values = stability.own if mark is None else [mark[name] for name in stability.names]
     return ", ".join(f"{plain(name)} = {value:g}" for name, value in zip(stability.names, values, strict=True))
+
+
+def _limits(values: Array) -> tuple[float, float]:
+    """Return the ends of an axis for values; around one that is alone."""
+    low, high = float(values.min()), float(values.max())
+    room = 0.0 if high > low else 0.5 * abs(low) or 1.0
+    return low - room, high + room
 
 
 def _label(stability: StabilityMap, index: int) -> str:
