@@ -1,4 +1,4 @@
-"""The Lyapunov functions of the two path controllers and their derivatives along the closed loop.
+"""The Lyapunov functions of laws of path control and their derivatives along the closed loop.
 
 V̇ ≤ 0 holds for exact compensation, q̈ = u: without uncompensated friction, saturation or sampling. In a run with these
 V follows from its errors, and rises at many ticks once the errors are small.

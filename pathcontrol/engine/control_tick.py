@@ -29,7 +29,8 @@ class ControlTick:
     It computes what ``law.law`` and ``law.advance`` do, without torque limits. The next call writes the returned array
     anew; copy it to keep it.
 
-    The five laws of the library are compiled; others are run in Python. A law that is wrapped, by
+    Computed torque, PD+, Slotine and Li's law, the extended motion plan and projection are compiled; other laws are run
+    in Python, with the same torques. A law that is wrapped, by
     :class:`SpeedOverride` or another :class:`LawWrapper`, has the methods of its speed input: :meth:`hold`,
     :meth:`resume`, :meth:`override` and :meth:`reverse` act at the next call. The observer of a law with
     ``friction="observed"`` takes the returned torques to act up to the next call, within the effort limits of its
