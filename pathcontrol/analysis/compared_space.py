@@ -13,9 +13,10 @@ from pathcontrol.tasks.task import PathTask
 
 
 class ComparedSpace(NamedTuple):
-    """The space of a tool, or of the joints where there is none."""
+    """The space of a tool, or of the joints where there is none, with the unit of their positions."""
 
     tool: Tool | None
+    joint_unit: str = "rad"
 
     @classmethod
     def of(cls, run: Run, path: PathTask, frame: str | None) -> ComparedSpace:
@@ -27,7 +28,7 @@ class ComparedSpace(NamedTuple):
         """
         if frame is not None:
             return cls(Tool(run.robot, frame))
-        return cls(None if path.frame is None else Tool(run.robot, path.frame, path.tool_pose))
+        return cls(None if path.frame is None else Tool(run.robot, path.frame, path.tool_pose), run.unit("q"))
 
     def is_made_for(self, path: PathTask) -> bool:
         """Return whether the space is that of what a path was made for: its tool, or the joints."""
@@ -39,7 +40,7 @@ class ComparedSpace(NamedTuple):
     @property
     def unit(self) -> str:
         """The unit of positions."""
-        return "rad" if self.tool is None else "m"
+        return self.joint_unit if self.tool is None else "m"
 
     def move(self, q: Array, qd: Array) -> tuple[Array, Array, Array | None]:
         """Return positions and velocities (K, d), and of a tool its rotations (K, 3, 3), for q and q̇ (K, n)."""

@@ -63,7 +63,11 @@ class PowerBalance:
     @property
     def rate_unit(self) -> str:
         """The unit of all rates."""
-        return {"J": "W", "rad^2/s^2": "rad^2/s^3", "rad^2 s": "rad^2"}.get(self.unit, f"{self.unit}/s")
+        if self.unit == "J":
+            return "W"
+        if self.unit.endswith(" s"):
+            return self.unit.removesuffix(" s")
+        return self.unit.replace("/s^2", "/s^3") if "/s" in self.unit else f"{self.unit}/s"
 
     @property
     def shares(self) -> dict[str, Array]:
@@ -181,7 +185,8 @@ def _balance(
     rows = {name: np.ascontiguousarray(value.T) for name, value in supply.items()}
     middle = 0.5 * (run.time[1:] + run.time[:-1])
     rates = {"predicted": predicted.T.copy(), "measured": measured.T.copy(), "residual": residual.T.copy()}
-    return PowerBalance(run.time, energy.V.T.copy(), middle, **rates, **rows, unit=theorem.unit)
+    unit = theorem.unit.replace("rad", "m") if run.unit("q") == "m" else theorem.unit
+    return PowerBalance(run.time, energy.V.T.copy(), middle, **rates, **rows, unit=unit)
 
 
 def _compensated(run: Run, law: Controller, theorem: Theorem, record: LawRecord, states: LoopState, w: Array) -> Array:
