@@ -127,4 +127,4 @@ class AdaptiveSlotineLi(PlanFeedback):
 
     def learnt(self, z: Array) -> Array:
         """Return θ̂ less the parameters of the law's model, (*batch, 10n), of a state z."""
-        return z[..., -_PARAMETERS * self.robot.n :]
+        return np.asarray(z)[..., -_PARAMETERS * self.robot.n :]

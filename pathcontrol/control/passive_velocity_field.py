@@ -119,7 +119,7 @@ class PassiveVelocityField(NearestPoint):
 
     def augmented_energy(self, q: Array, qd: Array, z: Array) -> Array:
         """Return k̄ = ½q̇ᵀM(q)q̇ + ½f² [J], (*batch,), of arm and flywheel, for the state z of the law."""
-        return self.robot.kinetic_energy(q, qd) + 0.5 * z[..., -1] ** 2
+        return self.robot.kinetic_energy(q, qd) + 0.5 * np.asarray(z)[..., -1] ** 2
 
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         here, f = self.locate(q, qd, z[..., 0]), z[..., -1]

@@ -245,3 +245,9 @@ def test_bad_arguments_are_told(options, words):
 def test_a_path_that_the_arm_cannot_hold_is_refused():
     with pytest.raises(pc.TaskError, match="the arm cannot pass the posture"):
         pc.PathMPC(TWO_LINK, pc.Line([0.0, 0.0], [0.5, 0.5], 1.0))
+
+
+def test_it_is_not_linearised():
+    for one in (circling(), pc.SpeedOverride(circling(), 0.5)):
+        with pytest.raises(pc.InputError, match="PathMPC solves an optimisation"):
+            pc.floquet(one, pc.SampledLoop(0.03))

@@ -7,7 +7,8 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
 from pathcontrol.control.learning.learning_law import LearningLaw
-from pathcontrol.control.wrappers.wrapper import LawWrapper
+from pathcontrol.control.mpc.path_mpc import PathMPC
+from pathcontrol.control.wrappers.wrapper import LawWrapper, unwrap
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import viscous_of
 from pathcontrol.simulation.arm.plant import Plant
@@ -23,7 +24,7 @@ class ContinuousMap:
     """
 
     def __init__(self, law: Controller) -> None:
-        _refuse_learning(law)
+        _refuse_jumps(law)
         self._law, self._robot, self._n = law, law.robot, law.robot.n
         self._of_ticks = np.zeros((1, 2 * self._n + 1))
         self._viscous = np.atleast_2d(viscous_of(law.robot.friction))[0]
@@ -65,7 +66,7 @@ class TickMap:
     """
 
     def __init__(self, law: Controller, loop: SampledLoop) -> None:
-        _refuse_learning(law)
+        _refuse_jumps(law)
         for name, what in (("encoders", loop.encoders), ("noise", loop.noise), ("torque_limits", loop.torque_limits)):
             if what is not False and what is not None:
                 raise InputError(f"{name} of the loop have no derivative; leave them out")
@@ -123,8 +124,13 @@ class TickMap:
         return z
 
 
-def _refuse_learning(law: Controller) -> None:
-    """Check that a law does not learn."""
+def _refuse_jumps(law: Controller) -> None:
+    """Check that a law neither learns nor optimises."""
+    if isinstance(unwrap(law), PathMPC):
+        raise InputError(
+            "PathMPC solves an optimisation at each tick, to a tolerance and with torque limits, which leaves no "
+            "derivative to rely on; without limits its deviations decay with (Q/R)^¼ and its speed with √(W/R_s)"
+        )
     if isinstance(law, LawWrapper) and isinstance(law.inner, LearningLaw):
         raise InputError(
             "what a law learns changes at once at the end of a lap, which has no derivative; give the law inside: a "
