@@ -49,3 +49,12 @@ def test_a_rollout_or_a_frame_of_another_kind_is_refused(find, wrong):
     run = pc.simulate(pc.Projection(arm, circle, 800.0, 60.0), [1.0, 0.0], duration=0.02, progress=False)
     with pytest.raises(pc.PathControlError, match=r"rollout = |no frame 3"):
         find(run, **wrong)
+
+
+@pytest.mark.parametrize("find", [pc.accuracy, pc.ballbar])
+def test_an_arm_that_goes_round_backwards_is_told(find):
+    time = np.arange(0.0, 8.0, 0.02)
+    run = pc.Run.from_log(time, np.column_stack([np.cos(time), -np.sin(time)]), task=pc.Circle(1.0, 1.0))
+    with pytest.raises(pc.InputError, match=r"1\.27 laps against the direction"):
+        find(run)
+    assert find(run, pc.Circle(1.0, 1.0, clockwise=True), skip=0).unit == "rad"

@@ -42,6 +42,7 @@ from pathcontrol.tasks.task import PathTask
 
 _FEWEST = 10  # sections, as the standard asks for
 _SAMPLES = 4  # of a cycle at least, for cubics between them
+_BACKWARDS = 0.5  # laps, beyond which an arm goes round the other way
 _SCALARS = (
     "path_accuracy",
     "path_repeatability",
@@ -279,7 +280,7 @@ def count_along(one: Run, path: PathTask) -> Array:
     The run's own s, or along another path than that of the run σ̄ of its positions.
 
     Raises:
-        InputError: no position is known.
+        InputError: no position is known, or it goes round a closed path backwards.
     """
     own = own_samples(one)[0]
     s, q = one.array("s")[0, :own], one.array("q")[0, :own]
@@ -291,7 +292,14 @@ def count_along(one: Run, path: PathTask) -> Array:
         s = s if known.all() else s[: known.argmin()]
     if not len(s):
         raise InputError("the rollout has no sample with a position, so it has no cycles")
-    return s if path.period is None else np.unwrap(s, period=path.period)
+    if path.period is None:
+        return s
+    s = np.unwrap(s, period=path.period)
+    if (back := float(s[0] - s[-1]) / path.period) > _BACKWARDS:
+        raise InputError(
+            f"the run goes {back:.2f} laps against the direction of the path; give the path the other way round"
+        )
+    return s
 
 
 def _measure(one: Run, path: PathTask, space: ComparedSpace, planes: _Planes, s: Array) -> _Cycle:
