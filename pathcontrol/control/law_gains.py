@@ -14,6 +14,8 @@ from pathcontrol.control.base import Controller
 from pathcontrol.control.wrappers.wrapper import LawWrapper, unwrap
 from pathcontrol.errors import InputError, UnknownNameError
 
+_NUMBERS = ("k", "recharge", "energy", "approach")  # gains that are one number for a rollout, (N,) for several
+
 
 def gains_of_law(law: Controller) -> dict[str, Any]:
     """Return the gains of a law by the names of its arguments; of a wrapper those of the law inside.
@@ -50,7 +52,8 @@ def refuse_several_gains(law: Controller) -> None:
     inner = unwrap(law)
     for name in inner.gains:
         shape = np.shape(getattr(inner, name))
-        if len(shape) > 1 and shape[0] > 1:
+        rows = len(shape) > 1 or name in _NUMBERS or shape[:1] != (law.robot.n,)
+        if rows and shape and shape[0] > 1:
             raise InputError(
                 f"{name} has the gains of several rollouts, {shape}, expected those of one, ({law.robot.n},)"
             )

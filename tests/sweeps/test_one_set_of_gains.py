@@ -15,3 +15,9 @@ def test_gains_of_several_rollouts_are_refused(find, wrap, k_p):
     law = wrap(pc.Projection(ARM, pc.Circle(0.5, 1.0), k_p, 60.0))
     with pytest.raises(pc.InputError, match="k_p has the gains of several rollouts"):
         find(law)
+
+
+@pytest.mark.parametrize("k", [[5.0, 10.0], [5.0, 10.0, 20.0]], ids=str)
+def test_one_k_for_each_of_several_rollouts_is_refused(k):
+    with pytest.raises(pc.InputError, match="k has the gains of several rollouts"):
+        pc.floquet(pc.ExtendedMotionPlan(ARM, pc.Circle(0.5, 1.0), 800.0, [60.0, 50.0], k=k))
