@@ -46,9 +46,9 @@ from .comparison.scenarios import make_scenario as make_scenario
 from .control.adaptive_slotine_li import AdaptiveSlotineLi as AdaptiveSlotineLi
 from .control.base import Controller as Controller
 from .control.base import ControlOutput as ControlOutput
-from .control.base import diagonal_gain as diagonal_gain
 from .control.branch import BranchPolicy as BranchPolicy
 from .control.extended_motion_plan import ExtendedMotionPlan as ExtendedMotionPlan
+from .control.gains import diagonal_gain as diagonal_gain
 from .control.learning.learned import Learned as Learned
 from .control.learning.learned_table import LapMemory as LapMemory
 from .control.maneuver_regulation import ManeuverRegulation as ManeuverRegulation

@@ -173,3 +173,15 @@ def copy_vectors(array: Array) -> Array:
     copy, vector = np.empty(array.shape, array.dtype), np.dtype((np.void, array.shape[-1] * array.itemsize))
     copy.view(vector)[...] = array.view(vector)
     return copy
+
+
+def norms(vectors: Array) -> Array:
+    """Return Euclidean norms over the last axis; inf beyond 1e154."""
+    with np.errstate(over="ignore"):
+        return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+
+
+def check_index(name: str, value: Any) -> None:
+    """Check that a number of a rollout or a path is an integer."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise InputError(f"{name} = {value!r:.80}, expected a whole number, counted from 0", argument=name, value=value)

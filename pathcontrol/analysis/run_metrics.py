@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array, as_scalar
+from pathcontrol._arrays import Array, as_scalar, norms
 from pathcontrol._expect import expect
 from pathcontrol.analysis.coverage import measure_coverage, path_points
 from pathcontrol.analysis.gamma import distance_to_gamma, planned_rate
@@ -29,7 +29,7 @@ from pathcontrol.analysis.torque import NAMES as TORQUE_METRICS
 from pathcontrol.analysis.torque import torque_metrics
 from pathcontrol.analysis.window import Samples, Window, samples_of
 from pathcontrol.errors import TaskError
-from pathcontrol.simulation.run import Run, norms
+from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.task import PathTask
 
 __all__ = ["LABELS", "UNITS"]

@@ -11,8 +11,9 @@ from pathcontrol._expect import did_you_mean
 from pathcontrol.comparison.family import FAMILY
 from pathcontrol.comparison.shared_gains import Gains, mean_inertia, mean_plan_gain, sample_task, split_damping
 from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
-from pathcontrol.control.base import Controller, Start, diagonal_gain
+from pathcontrol.control.base import Controller, Start
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
+from pathcontrol.control.gains import diagonal_gain
 from pathcontrol.control.maneuver_regulation import ManeuverRegulation
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
 from pathcontrol.control.passive_velocity_field import PassiveVelocityField

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import ControlOutput, diagonal_gain, rollout_gain
+from pathcontrol.control.base import ControlOutput
+from pathcontrol.control.gains import diagonal_gain, rollout_gain
 from pathcontrol.control.plan_feedback import Plan, PlanFeedback
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import ControlOutput, diagonal_gain
+from pathcontrol.control.base import ControlOutput
+from pathcontrol.control.gains import diagonal_gain
 from pathcontrol.control.plan_feedback import PlanFeedback
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask

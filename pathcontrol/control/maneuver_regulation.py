@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import ControlOutput, diagonal_gain
+from pathcontrol.control.base import ControlOutput
+from pathcontrol.control.gains import diagonal_gain
 from pathcontrol.control.reference_law import STEEPEST, Reference, ReferenceLaw, differentiate_along
 from pathcontrol.geometry.closest_point.curve import Curve, Interval
 from pathcontrol.geometry.closest_point.local_search import descend_by_newton

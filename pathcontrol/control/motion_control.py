@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import Controller, ControlOutput, diagonal_gain
+from pathcontrol.control.base import Controller, ControlOutput
+from pathcontrol.control.gains import diagonal_gain
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask
 

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import ControlOutput, each_rollout, positive_rollout_gain, rollout_gain
+from pathcontrol.control.base import ControlOutput
+from pathcontrol.control.gains import each_rollout, positive_rollout_gain, rollout_gain
 from pathcontrol.control.nearest_point import NearestPoint
 from pathcontrol.control.reference_law import Located
 from pathcontrol.errors import InputError

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import Controller, each_rollout, rollout_gain
+from pathcontrol.control.base import Controller
+from pathcontrol.control.gains import each_rollout, rollout_gain
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint

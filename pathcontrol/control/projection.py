@@ -8,8 +8,9 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import FrictionCompensation, Start, scalar_gain
+from pathcontrol.control.base import FrictionCompensation, Start
 from pathcontrol.control.branch import Branch
+from pathcontrol.control.gains import scalar_gain
 from pathcontrol.control.nearest_point import NearestPoint
 from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.robot.model import RobotModel

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import ControlOutput, diagonal_gain
+from pathcontrol.control.base import ControlOutput
 from pathcontrol.control.branch import shift_to_lap
+from pathcontrol.control.gains import diagonal_gain
 from pathcontrol.control.reference_law import STEEPEST, Reference, ReferenceLaw
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, check_index, norms
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
@@ -252,7 +252,7 @@ class Run:
         Raises:
             InputError: there is none of that number.
         """
-        _check_index("rollout", index)
+        check_index("rollout", index)
         if not -self.rollouts <= index < self.rollouts:
             raise InputError(f"rollout {index} does not exist: the run has {self.rollouts}, counted from 0")
         if self._samples is not None:
@@ -267,7 +267,7 @@ class Run:
         Raises:
             InputError: the run is no sequence, or that path was not followed.
         """
-        _check_index("path", index)
+        check_index("path", index)
         if "path_status" not in self:
             raise InputError("the run is no sequence of paths; make one with simulate_sequence")
         status, among, ends = (self.array(f"path_{name}") for name in ("status", "index", "finish_time"))
@@ -395,18 +395,6 @@ class Run:
         return _unpickle, (held, self.config, self._stored())
 
 
-def norms(vectors: Array) -> Array:
-    """Return Euclidean norms over the last axis; inf beyond 1e154."""
-    with np.errstate(over="ignore"):
-        return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
-
-
 def _unpickle(data: xr.Dataset | Samples, config: Mapping[str, Any], stored: StoredContext) -> Run:
     """Return a run from its pickled parts."""
     return Run(data, config, RunContext.load(stored))
-
-
-def _check_index(name: str, value: Any) -> None:
-    """Check that a number of a rollout or a path is an integer."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise InputError(f"{name} = {value!r:.80}, expected a whole number, counted from 0", argument=name, value=value)

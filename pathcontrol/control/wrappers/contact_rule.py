@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_scalar
-from pathcontrol.control.base import Controller, diagonal_gain
+from pathcontrol.control.base import Controller
+from pathcontrol.control.gains import diagonal_gain
 from pathcontrol.control.wrappers.override_rule import OverrideRule
 from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
 from pathcontrol.errors import InputError

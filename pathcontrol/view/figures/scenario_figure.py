@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, norms
 from pathcontrol._expect import expect
 from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.analysis.run_metrics import contour_error, lag_error
 from pathcontrol.comparison.compare import Comparison
 from pathcontrol.comparison.scenarios import Scenario
-from pathcontrol.simulation.run import Run, norms
+from pathcontrol.simulation.run import Run
 from pathcontrol.view.figures.lettering import legend
 from pathcontrol.view.figures.limits import from_zero, span
 from pathcontrol.view.figures.lines import drawable, series
