@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import ControlOutput
-from pathcontrol.control.gains import diagonal_gain
-from pathcontrol.control.reference_law import STEEPEST, Reference, ReferenceLaw, differentiate_along
+from pathcontrol.control.reference_law import STEEPEST, Reference, TrackingReferenceLaw, differentiate_along
 from pathcontrol.geometry.closest_point.curve import Curve, Interval
 from pathcontrol.geometry.closest_point.local_search import descend_by_newton
-from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.task import PathTask
 
 
 class StateMetric(NamedTuple):
@@ -47,7 +43,7 @@ class StateMetric(NamedTuple):
         return np.concatenate([first, np.sqrt(self.c - self.b**2 / self.a) * velocity], axis=-1)
 
 
-class ManeuverRegulation(ReferenceLaw):
+class ManeuverRegulation(TrackingReferenceLaw):
     """Maneuver regulation of the states (q, q̇).
 
     (J. Hauser and R. Hindman, Maneuver regulation from trajectory tracking: feedback linearizable systems, IFAC
@@ -77,22 +73,6 @@ class ManeuverRegulation(ReferenceLaw):
         K_v: velocity gain [1/s], scalar or diagonal (n,).
         options: ``friction`` and ``start`` of :class:`Controller`; the first σ is the one near to ``start``.
     """
-
-    gains = ("K_p", "K_v")
-
-    def __init__(
-        self,
-        robot: RobotModel,
-        task: PathTask,
-        K_p: Annotated[ArrayLike, Form.GAIN, Unit("1/s^2")],
-        K_v: Annotated[ArrayLike, Form.GAIN, Unit("1/s")],
-        **options: Any,
-    ) -> None:
-        super().__init__(robot, task, **options)
-        self.K_p, self.K_v = (
-            diagonal_gain("K_p", K_p, robot.n, robot.joint_names),
-            diagonal_gain("K_v", K_v, robot.n, robot.joint_names),
-        )
 
     @property
     def metric(self) -> StateMetric:

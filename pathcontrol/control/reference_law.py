@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import Controller, ControlOutput
+from pathcontrol.control.gains import diagonal_gain
+from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.task import PathTask
 
@@ -117,6 +120,34 @@ class ReferenceLaw(Controller):
         if self.ending is None and self.speed is None:
             return np.zeros(s.shape, dtype=bool)
         return self.timed(s)
+
+
+class TrackingReferenceLaw(ReferenceLaw):
+    """The base of laws that track the reference at σ with two diagonal gains.
+
+    Args:
+        robot: the model the law uses.
+        task: path and velocity profile.
+        K_p: position gain [1/s²], scalar or diagonal (n,).
+        K_v: velocity gain [1/s], scalar or diagonal (n,).
+        options: ``friction`` and ``start`` of :class:`Controller`; the first σ is the one near to ``start``.
+    """
+
+    gains = ("K_p", "K_v")
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        task: PathTask,
+        K_p: Annotated[ArrayLike, Form.GAIN, Unit("1/s^2")],
+        K_v: Annotated[ArrayLike, Form.GAIN, Unit("1/s")],
+        **options: Any,
+    ) -> None:
+        super().__init__(robot, task, **options)
+        self.K_p, self.K_v = (
+            diagonal_gain("K_p", K_p, robot.n, robot.joint_names),
+            diagonal_gain("K_v", K_v, robot.n, robot.joint_names),
+        )
 
 
 def differentiate_along(function: Callable[[Array], Array], task: PathTask, s: Array) -> Array:

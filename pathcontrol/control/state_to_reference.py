@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
-from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import ControlOutput
 from pathcontrol.control.branch import shift_to_lap
-from pathcontrol.control.gains import diagonal_gain
-from pathcontrol.control.reference_law import STEEPEST, Reference, ReferenceLaw
-from pathcontrol.robot.model import RobotModel
-from pathcontrol.tasks.task import PathTask
+from pathcontrol.control.reference_law import STEEPEST, Reference, TrackingReferenceLaw
 
 _STEP = 6e-6  # rad and rad/s, of central differences: the cube root of the precision of numbers
 
 
-class StateToReferenceProjection(ReferenceLaw):
+class StateToReferenceProjection(TrackingReferenceLaw):
     """Path control whose motion reference is a function of the state of the arm, σ = Π(q, q̇).
 
     In this law a *state-to-reference projection* Π stands in place of time (reference [3] of the paper). The torque is
@@ -52,22 +46,6 @@ class StateToReferenceProjection(ReferenceLaw):
         K_v: velocity gain [1/s], scalar or diagonal (n,).
         options: ``friction`` and ``start`` of :class:`Controller`; the first σ is the one near to ``start``.
     """
-
-    gains = ("K_p", "K_v")
-
-    def __init__(
-        self,
-        robot: RobotModel,
-        task: PathTask,
-        K_p: Annotated[ArrayLike, Form.GAIN, Unit("1/s^2")],
-        K_v: Annotated[ArrayLike, Form.GAIN, Unit("1/s")],
-        **options: Any,
-    ) -> None:
-        super().__init__(robot, task, **options)
-        self.K_p, self.K_v = (
-            diagonal_gain("K_p", K_p, robot.n, robot.joint_names),
-            diagonal_gain("K_v", K_v, robot.n, robot.joint_names),
-        )
 
     @abstractmethod
     def reference(self, q: Array, qd: Array, near: Array) -> Array:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from sliding_arm import sliding_arm
 
 import pathcontrol as pc
 from pathcontrol.analysis.stability.product_eigen import find_eigen
@@ -12,17 +13,6 @@ SPEED, RADIUS = 2.0, 1.0
 CIRCLE = pc.Circle(RADIUS, SPEED)
 OMEGA = SPEED / RADIUS
 FAST = pc.Circle(RADIUS, 3 * SPEED)  # a lap of a third of the ticks
-#: two slides at right angles in a horizontal plane: M is constant, and there is no weight along them
-SLIDES = (
-    '<robot name="slides"><link name="b"/>'
-    + "".join(
-        f'<link name="l{axis}"><inertial><mass value="{kg}"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-        f'</inertial></link><joint name="j{axis}" type="prismatic"><parent link="{parent}"/><child link="l{axis}"/>'
-        f'<axis xyz="{xyz}"/><limit lower="-9" upper="9" velocity="9" effort="999"/></joint>'
-        for axis, parent, kg, xyz in (("x", "b", 2.0, "1 0 0"), ("y", "lx", 3.0, "0 1 0"))
-    )
-    + "</robot>"
-)
 
 
 def arm_of(n):
@@ -101,7 +91,7 @@ def test_the_sum_of_exponents_is_the_mean_divergence():
 
 def test_a_sampled_loop_has_the_multipliers_of_its_held_torque():
     """z² − (2 − K_v h − K_p h²/2)z + 1 − K_v h + K_p h²/2 = 0 for an arm of constant inertia without weight."""
-    flat = pc.load_robot(SLIDES).with_friction(pc.Viscous(np.zeros(2)))
+    flat = sliding_arm()
     task, h, K_p, K_v = pc.Circle(0.1, 0.2), np.pi / 300, 300.0, 30.0  # 300 ticks a lap
     found = pc.floquet(pc.ComputedTorque(flat, task, K_p, K_v), pc.SampledLoop(period=h))
     z = np.roots([1, -(2 - K_v * h - K_p * h**2 / 2), 1 - K_v * h + K_p * h**2 / 2])

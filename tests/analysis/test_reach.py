@@ -2,22 +2,12 @@
 
 import numpy as np
 import pytest
+from sliding_arm import sliding_arm
 
 import pathcontrol as pc
 from pathcontrol.errors import InputError, TaskError
 
-ARM = pc.load_robot("cicese_2dof")
-#: two slides at right angles: its tool is where its joints are
-SLIDES = pc.load_robot(
-    '<robot name="slides"><link name="b"/>'
-    + "".join(
-        f'<link name="l{axis}"><inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-        f'</inertial></link><joint name="j{axis}" type="prismatic"><parent link="{parent}"/><child link="l{axis}"/>'
-        f'<axis xyz="{xyz}"/><limit lower="-9" upper="9" velocity="9" effort="999"/></joint>'
-        for axis, parent, xyz in (("x", "b", "1 0 0"), ("y", "lx", "0 1 0"))
-    )
-    + "</robot>"
-)
+ARM, SLIDES = pc.load_robot("cicese_2dof"), sliding_arm()
 
 
 class Curve(pc.PathTask):

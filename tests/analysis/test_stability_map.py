@@ -5,23 +5,13 @@ import warnings
 import numpy as np
 import pytest
 from scipy.optimize import brentq, fsolve
+from sliding_arm import sliding_arm
 
 import pathcontrol as pc
 from pathcontrol.control.law_gains import gains_of_law, with_gains
 from pathcontrol.errors import InputError, UnknownNameError
 
-#: two slides at right angles in a horizontal plane: M is constant, and there is no weight along them
-SLIDES = (
-    '<robot name="slides"><link name="b"/>'
-    + "".join(
-        f'<link name="l{axis}"><inertial><mass value="{kg}"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-        f'</inertial></link><joint name="j{axis}" type="prismatic"><parent link="{parent}"/><child link="l{axis}"/>'
-        f'<axis xyz="{xyz}"/><limit lower="-9" upper="9" velocity="9" effort="999"/></joint>'
-        for axis, parent, kg, xyz in (("x", "b", 2.0, "1 0 0"), ("y", "lx", 3.0, "0 1 0"))
-    )
-    + "</robot>"
-)
-FLAT = pc.load_robot(SLIDES).with_friction(pc.Viscous(np.zeros(2)))
+FLAT = sliding_arm()
 ARM = pc.load_robot("cicese_2dof").with_friction(pc.Viscous(np.zeros(2)))
 CIRCLE = pc.Circle(1.0, 2.0)
 H = np.pi / 60  # s: 60 ticks in a lap of the circle
