@@ -9,7 +9,7 @@ from pathcontrol.errors import TaskError
 from pathcontrol.tasks.base import Task
 
 _SAMPLES = 129
-_HALVINGS = 40  # of the stretch between two samples, down to rounding
+_HALVINGS = 20  # of the stretch between two samples, to 1e-8 of the domain: nearer to a tip, computed q_d' is rounding
 _OPPOSITE = -0.99  # cosine of an angle
 
 
@@ -46,10 +46,12 @@ def _check_cusps(task: Task, name: str, s: Array) -> None:
         middle = 0.5 * (left + right)
         ahead = (_directions(task, middle) * before).sum(-1) > 0
         left, right = np.where(ahead, middle, left), np.where(ahead, right, middle)
+    beside = right - left  # at the tip itself a direction is rounding
+    left, right = np.maximum(left - beside, s[0]), np.minimum(right + beside, s[-1])
     cosine = (_directions(task, left) * _directions(task, right)).sum(-1)
     # between the paths of a sequence the arm comes to rest, and may turn round
     rests = np.asarray(getattr(task, "starts", ()))
-    cosine[np.isclose(left[:, None], rests, rtol=0, atol=1e-9 * (s[-1] - s[0])).any(-1)] = 1.0
+    cosine[((rests >= left[:, None]) & (rests <= right[:, None])).any(-1)] = 1.0
     if cosine.min() < _OPPOSITE:
         raise TaskError(
             f"{name} turns back at s = {left[int(np.argmin(cosine))]:g}, expected a path without cusps: no arm that "

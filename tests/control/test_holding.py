@@ -26,10 +26,11 @@ def make(arm, name, **options):
         *(("projection", wrapped) for wrapped in ("observed", "event plan", "paced")),
     ],
 )
-def test_a_hold_is_a_fixed_point_of_loop_and_arm(arm, name, wrapped):
-    """Some seconds into a hold no bit of posture, velocity, torque and state changes any more, but for a clock.
+def test_a_hold_is_an_orbit_of_a_few_ticks_of_loop_and_arm(arm, name, wrapped):
+    """Some seconds into a hold posture, velocity, torque and state repeat to the last bit, but for a clock.
 
     Each tick is a function of these alone, so they are the same after an hour, and so is all that follows the hold.
+    Which of a few roundings an integrator of the observer ends in depends on the processor.
     """
     law = make(arm, name, friction="observed" if wrapped == "observed" else "viscous")
     law = pc.SpeedOverride(pc.EventPlan(law) if wrapped == "event plan" else law)
@@ -48,7 +49,8 @@ def test_a_hold_is_a_fixed_point_of_loop_and_arm(arm, name, wrapped):
     pace = {len(seen[0]) - 1} if wrapped == "paced" else set()  # falls towards 0 by a share of itself
     kept = [i for i in range(len(seen[0])) if i not in clock | pace]
     held = np.array(seen[1750:])[:, kept]
-    assert (held == held[0]).all()
+    assert any((held[ticks:] == held[:-ticks]).all() for ticks in range(1, 9))
+    assert np.ptp(held, axis=0).max() < 1e-14
     assert np.abs(qd).max() < 1e-12
     if pace:
         assert 0 <= seen[-1][-1] < seen[1750][-1] < 1e-12

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from pathcontrol.errors import TaskError
@@ -34,18 +36,18 @@ def test_a_closed_spline_cut_beside_a_knot_and_put_together_again_is_the_same_pa
     assert np.isfinite(speeds).all()
 
 
-def semicubical(**given):
+def semicubical(**derivatives):
     """A tip at s = 0.313, of length ((4 + 9s²)^1.5 − 8)/27 from there on."""
     return FunctionPath(
-        lambda s: np.stack([(s - 0.313) ** 2, (s - 0.313) ** 3], -1), theta=1.0, s0=-1.0, s_end=1.0, **given
+        lambda s: np.stack([(s - 0.313) ** 2, (s - 0.313) ** 3], -1), theta=1.0, s0=-1.0, s_end=1.0, **derivatives
     )
 
 
 def test_the_length_of_a_path_with_a_cusp_has_its_closed_form():
     pieces = [((4 + 9 * s**2) ** 1.5 - 8) / 27 for s in (1.313, 0.687)]
     assert semicubical().arc_length() == pytest.approx(sum(pieces), rel=1e-11)
-    given = semicubical(derivative=lambda s: np.stack([2 * (s - 0.313), 3 * (s - 0.313) ** 2], -1))
-    assert given.arc_length() == pytest.approx(sum(pieces), rel=1e-12)
+    exact = semicubical(derivative=lambda s: np.stack([2 * (s - 0.313), 3 * (s - 0.313) ** 2], -1))
+    assert exact.arc_length() == pytest.approx(sum(pieces), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -61,3 +63,23 @@ def test_a_cusp_whose_derivatives_are_computed_has_no_arc_length_as_parameter(fu
     path = FunctionPath(lambda s: np.stack(function(s), -1), theta=1.0, **domain)
     with pytest.raises(TaskError, match=reason):
         path.by_arc_length()
+
+
+@given(st.floats(-0.95, 0.95), st.floats(-2, 2), st.sampled_from(["semicubical", "cycloid"]))
+def test_no_cusp_is_passed_over_wherever_it_is(tip, exponent, kind):
+    size = 10.0**exponent
+
+    def q_d(s):
+        r = s - tip
+        return np.stack([size * r**2, size * r**3] if kind == "semicubical" else [r - np.sin(r), 1 - np.cos(r)], -1)
+
+    with pytest.raises(TaskError, match=r"turns back|cusp or a standstill"):
+        FunctionPath(q_d, theta=1.0, s0=-1.0, s_end=1.0).by_arc_length()
+
+
+@given(st.floats(-0.9, 0.9), st.floats(-6, -1), st.floats(-1.5, 0))
+def test_a_tip_that_is_rounded_however_little_is_none(tip, rounding, opening):
+    def q_d(s):
+        return np.stack([10**opening * (s - tip), np.hypot(s - tip, 10**rounding)], -1)
+
+    FunctionPath(q_d, theta=1.0, s0=-1.0, s_end=1.0).by_arc_length()
