@@ -31,7 +31,14 @@ def pytest_collection() -> Iterator[None]:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(50_000, 20, 20)
         gc.enable()
+
+
+@pytest.hookimpl
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """One more than there are cores: some tests wait, for a browser or for the clock of a robot."""
+    return len(os.sched_getaffinity(0)) + 1
 
 
 START = np.deg2rad([40.0, 70.0])
