@@ -14,6 +14,7 @@ from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 if TYPE_CHECKING:
     import xarray as xr
 
+NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 _DEEPEST = 50
 _DENSEST = 1100  # bytes that deflate may expand one byte to, 1032, with a margin
 _UNWRITTEN = 1 << 20  # bytes that a small variable may have without being in the file
@@ -55,8 +56,7 @@ def _variables(group: h5py.Group) -> Iterator[tuple[str, h5py.Dataset]]:
 
 def _is_length(item: h5py.Dataset) -> bool:
     """Return whether a dataset only holds the length of a dimension."""
-    name = item.attrs.get("NAME", b"")
-    return bytes(name).startswith(b"This is a netCDF dimension but not a netCDF variable")
+    return bytes(item.attrs.get("NAME", b"")).startswith(NO_VARIABLE.encode())
 
 
 def check_form(data: xr.Dataset, config: Any) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,11 +12,12 @@ import h5netcdf  # type: ignore[import-untyped]
 import h5py  # type: ignore[import-untyped]
 import numpy as np
 
+from pathcontrol._arrays import Array
 from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError, warn
 from pathcontrol.simulation.context import StoredContext
 from pathcontrol.simulation.samples import Labelled, Samples
-from pathcontrol.simulation.storage.file_form import check_form, check_sizes
+from pathcontrol.simulation.storage.file_form import NO_VARIABLE, check_form, check_sizes
 from pathcontrol.simulation.storage.seal import check_seal, digest_of, seal
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 
@@ -27,6 +28,7 @@ _LEVEL = 1  # of compression: noisy errors do not shrink further at higher level
 _CONFIG = "pathcontrol_config"
 _DIGEST = "pathcontrol_sha256"
 _GROUP = "origin"
+_WRITER = np.bytes_(f"version=2,h5py={h5py.__version__},hdf5={h5py.version.hdf5_version}")  # netCDF-C wants to know
 _KNOWN = (*VARIABLES, *OUTCOMES, "time", "joint", "rollout")
 _RECIPE = {"long_name": "robot and task of the run, JSON in UTF-8"}
 _NUMBERS = {"long_name": "arrays of the recipe, one after another"}
@@ -43,11 +45,12 @@ def write_run(path: Path, data: xr.Dataset | Samples, config: Mapping[str, Any],
     memory, text = io.BytesIO(), json.dumps(config)
     recipe = np.frombuffer(stored.text.encode(), dtype=np.uint8)
     origin = {"recipe": (("byte",), recipe, _RECIPE), "numbers": (("number",), stored.numbers, _NUMBERS)}
-    with h5netcdf.File(memory, "w") as file:
-        _put(file, data)
-        file.attrs.update({_CONFIG: text, _DIGEST: _digest_of_run(data, text)})
-        group = file.create_group(_GROUP)
-        _put_labelled(group, origin, {}, 4)
+    with h5py.File(memory, "w", track_order=True) as file:
+        variables, about = _encode(data)
+        _put(file, variables, data.arrays if isinstance(data, Samples) else data.data_vars, _LEVEL)
+        file.attrs.update({**about, _CONFIG: text, _DIGEST: _digest_of_run(data, text), "_NCProperties": _WRITER})
+        group = file.create_group(_GROUP, track_order=True)
+        _put(group, origin, origin, 4)
         group.attrs[_DIGEST] = _digest_of_origin(stored)
     content = memory.getbuffer()
     with whole_file(path) as temporary, temporary.open("wb") as written:
@@ -148,49 +151,56 @@ def _digest_of_origin(stored: StoredContext) -> str:
     return digest_of({"numbers": stored.numbers}, stored.text)
 
 
-def _put(file: h5netcdf.File, data: xr.Dataset | Samples) -> None:
-    """Write the data of a run."""
-    if isinstance(data, Samples):
-        _put_labelled(file, *data.label_all(), _LEVEL)
-        return
-    from xarray.backends import H5NetCDFStore  # loaded already, and it handles any other content of the data
+def _encode(data: xr.Dataset | Samples) -> tuple[dict[str, Labelled], dict[str, Any]]:
+    """Return numbers, words and attributes that stand for a run by the conventions of CF and of xarray.
 
-    packed = {name: {"zlib": True, "complevel": _LEVEL, "shuffle": True} for name in data.data_vars}
-    data.dump_to_store(H5NetCDFStore(file), encoding=packed)
-
-
-def _put_labelled(
-    group: h5netcdf.Group, variables: Mapping[str, Labelled], coordinates: Mapping[str, Labelled], level: int
-) -> None:
-    """Write variables, compressed at a ``level``, and the coordinates along which they are laid out.
-
-    By the conventions of CF and of xarray a variable names its coordinates, words are text of any length, truth values
-    are bytes that are called ``bool``, and a missing number is NaN.
+    A variable names its coordinates, truth values are bytes that are called ``bool``, and a missing number is NaN.
     """
-    everything = {**coordinates, **variables}
-    for dims, array, _ in everything.values():
-        group.dimensions.update({d: n for d, n in zip(dims, np.shape(array), strict=True) if d not in group.dimensions})
-    for name, (dims, array, attributes) in everything.items():
-        about = dict(attributes)
-        if name in variables and (named := _list_coordinates(dims, coordinates)):
-            about["coordinates"] = named
-        _put_variable(group, name, (dims, array, about), level if name in variables else None)
+    if not isinstance(data, Samples):
+        from xarray.conventions import cf_encoder, encode_dataset_coordinates  # loaded already
+
+        variables, about = cf_encoder(*encode_dataset_coordinates(data))
+        return {name: (v.dims, v.to_numpy(), v.attrs) for name, v in variables.items()}, dict(about)
+    variables, coordinates = data.label_all()
+    for dims, _, attributes in variables.values():
+        if named := _list_coordinates(dims, coordinates):
+            attributes["coordinates"] = named
     loose = _list_unused_coordinates(variables.values(), coordinates)
-    if loose:
-        group.attrs["coordinates"] = loose
+    everything = {name: _encode_array(*labelled) for name, labelled in (coordinates | variables).items()}
+    return everything, {"coordinates": loose} if loose else {}
 
 
-def _put_variable(group: h5netcdf.Group, name: str, labelled: Labelled, level: int | None) -> None:
-    """Write one labelled array."""
-    dims, array, attributes = labelled
+def _encode_array(dims: tuple[str, ...], array: Array, attributes: dict[str, Any]) -> Labelled:
+    """Return a labelled array in the form of a file."""
     kind = array.dtype.kind
-    packed = {} if level is None else {"compression": "gzip", "compression_opts": level, "shuffle": True}
-    numbers = array.astype("i1") if kind == "b" else array.astype(object) if kind == "U" else array
-    dtype = h5py.string_dtype() if kind == "U" else numbers.dtype
-    variable = group.create_variable(
-        name, dims, dtype=dtype, data=numbers, fillvalue=np.nan if kind == "f" else None, **packed
-    )
-    variable.attrs.update({**attributes, **({"dtype": "bool"} if kind == "b" else {})})
+    more = {"dtype": "bool"} if kind == "b" else {"_FillValue": array.dtype.type(np.nan)} if kind == "f" else {}
+    return dims, array.astype("i1") if kind == "b" else array, attributes | more
+
+
+def _put(group: h5py.Group, labelled: Mapping[str, Labelled], packed: Collection[Any], level: int) -> None:
+    """Write arrays over dimensions as netCDF-4 does, the ``packed`` ones compressed at a ``level``.
+
+    A dimension is a scale of HDF5, the array of its name or else an empty one.
+    """
+    sizes = {dim: n for dims, array, _ in labelled.values() for dim, n in zip(dims, np.shape(array), strict=True)}
+    for name, (_, array, attributes) in labelled.items():
+        variable = _put_array(group, name, array, attributes.get("_FillValue"), level if name in packed else None)
+        variable.attrs.update({key: v if isinstance(v, str) else np.atleast_1d(v) for key, v in attributes.items()})
+    for dim, size in sizes.items():
+        own = dim in labelled
+        scale = group[dim] if own else group.create_dataset(dim, (size,), ">f4", track_order=True)
+        scale.make_scale(dim if own else f"{NO_VARIABLE}{size:10}")
+        for name, (dims, *_) in labelled.items():
+            if dim in dims and name != dim:
+                group[name].dims[dims.index(dim)].attach_scale(scale)
+
+
+def _put_array(group: h5py.Group, name: str, array: Array, missing: Any, level: int | None) -> h5py.Dataset:
+    """Write an array, words as text of any length, and return its place in the file."""
+    more = {"compression": "gzip", "compression_opts": level, "shuffle": True} if level and array.size > 1 else {}
+    if array.dtype.kind in "UO":
+        array, more["dtype"] = array.astype(object), h5py.string_dtype()
+    return group.create_dataset(name, data=array, fillvalue=missing, track_order=True, **more)
 
 
 def _list_coordinates(dims: Iterable[str], coordinates: Mapping[str, Labelled]) -> str:
