@@ -73,7 +73,7 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | No
         check_seal(path)
         with h5py.File(path, "r") as file:
             check_sizes(file, path.stat().st_size)
-        data = _read_data(path)
+            data = _read_data(file)
         digest, text = data.attrs.pop(_DIGEST, None), data.attrs.pop(_CONFIG)
         config = json.loads(text)
         check_form(data, config)
@@ -92,22 +92,23 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | No
     return data, config, stored
 
 
-def _read_data(path: Path) -> xr.Dataset:
+def _read_data(file: h5py.File) -> xr.Dataset:
     """Read all variables, and decode them by the conventions of CF.
 
     The backend of xarray would ask for the encoding of each variable too, which takes longer than to read it.
     """
     import xarray as xr  # takes half a second to load
 
-    with h5netcdf.File(path, "r", decode_vlen_strings=True, phony_dims="access") as file:
-        found = {name: (item.dimensions, _read_array(item), dict(item.attrs)) for name, item in file.variables.items()}
-        return xr.decode_cf(xr.Dataset(found, attrs=dict(file.attrs)), decode_times=False)
+    form = h5netcdf.File(file, "r", phony_dims="access")
+    found = {
+        name: (item.dimensions, _read_array(file[name]), dict(item.attrs)) for name, item in form.variables.items()
+    }
+    return xr.decode_cf(xr.Dataset(found, attrs=dict(form.attrs)), decode_times=False)
 
 
-def _read_array(variable: h5netcdf.Variable) -> Any:
+def _read_array(variable: h5py.Dataset) -> Any:
     """Read an array, and words as NumPy's text: as objects not every version of xarray can write them again."""
-    array = variable[...]
-    return array.astype(str) if h5py.check_string_dtype(variable.dtype) else array
+    return variable.asstr()[...].astype(str) if h5py.check_string_dtype(variable.dtype) else variable[...]
 
 
 def _remedy(path: Path) -> str:
