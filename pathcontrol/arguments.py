@@ -5,12 +5,15 @@ A file is read by them: ``speed: Annotated[float, Form.POSITIVE, Unit("m/s")]`` 
 
 from __future__ import annotations
 
+import builtins
 import inspect
+import sys
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
-from types import NoneType, UnionType
+from types import NoneType, SimpleNamespace, UnionType
 from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin, get_type_hints
 
 from numpy.typing import ArrayLike
@@ -142,11 +145,15 @@ def _functions(target: Callable[..., Any]) -> Iterator[Callable[..., Any]]:
 
 
 def _hints(target: Any) -> dict[str, Any]:
-    """Return what annotations say, where they can be understood."""
-    try:
-        return get_type_hints(target, include_extras=True)
-    except (NameError, TypeError, AttributeError):  # of a user, or for type checkers only
-        return {}
+    """Return what annotations say, those that can be understood."""
+    found: dict[str, Any] = {}
+    for one in reversed(getattr(target, "__mro__", (inspect.unwrap(target),))):
+        names = getattr(one, "__globals__", None) or vars(sys.modules.get(one.__module__, builtins))
+        for name, annotation in inspect.get_annotations(one).items():
+            alone = SimpleNamespace(__annotations__={name: annotation})
+            with suppress(NameError, TypeError, AttributeError, SyntaxError):  # of a user, or for type checkers only
+                found |= get_type_hints(alone, names, include_extras=True)
+    return found
 
 
 def _parts(annotation: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:

@@ -62,15 +62,16 @@ def run_sweep(
             data = of_samples(read_toml(path)) | ({} if engine is None else {"engine": engine})
             build = SweptExperiment(data, Path(path).parent.absolute(), section.parameters)
             space = space_of(section)
+            options = section.arguments(float)
             with report_by_key("sweep", ("metrics",)):
-                make_measure(section.metrics)
-                keep = Keep(**({} if section.keep is None else section.keep.arguments(float)))
+                make_measure(options.get("metrics"))
+                if "keep" in options:
+                    options["keep"] = Keep(**options["keep"].arguments(float))
                 design = space.design(section.seed)
             build.check(design)
         except ExperimentError as error:
             raise make_file_error(path, [str(error)]) from error
-        options: dict[str, Any] = {"chunk": chunk, "resume": resume, "progress": progress, "cluster": client}
-        return sweep(build, space, out, metrics=section.metrics, keep=keep, seed=section.seed, **options)
+        return sweep(build, space, out, chunk=chunk, resume=resume, progress=progress, cluster=client, **options)
 
 
 def space_of(section: SweepSection) -> Space:

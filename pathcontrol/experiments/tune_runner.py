@@ -59,9 +59,8 @@ def run_tune(
         _check(build, space, scenarios)
     except ExperimentError as error:
         raise make_file_error(path, [str(error)]) from error
-    options = section.arguments(float) | {"scenarios": scenarios, "out": out}
-    options = {name: value for name, value in options.items() if name != "parameters"}
-    return tune(build, space, chunk=chunk, resume=resume, progress=progress, **options)
+    options = {"out": out, "chunk": chunk, "resume": resume, "progress": progress} | section.arguments(float)
+    return tune(build, space, scenarios=scenarios, **options)
 
 
 def _space(section: TuneSection) -> Space:

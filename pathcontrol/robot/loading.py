@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from lxml import etree
 
 from pathcontrol._arrays import LARGEST, Array, as_quantity, freeze
+from pathcontrol.arguments import Form
 from pathcontrol.errors import UrdfError, warn
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.arm_dynamics import UrdfSource, build_model
@@ -29,10 +30,10 @@ def load_robot(
     source: str | Path,
     *,
     lock: Mapping[str, float] | None = None,
-    keep: Sequence[str] = (),
+    keep: Annotated[Sequence[str], Form.TEXTS] = (),
     tip: str | None = None,
     estimated_inertia: bool | float = False,
-    package_dirs: str | Path | Sequence[str | Path] = (),
+    package_dirs: Annotated[str | Path | Sequence[str | Path], Form.TEXTS] = (),
     threads: int = 1,
 ) -> RobotModel:
     """Load the model of an arm.

@@ -9,13 +9,14 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Se
 from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pathcontrol._arrays import Array, check_whole
 from pathcontrol._expect import expect
 from pathcontrol._files import hold_lock, writing
 from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import refuse_suffix
+from pathcontrol.arguments import Form
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.engines import Engine, settle_engine
 from pathcontrol.sweeps.chunk import Build, Chunk, Job, Measure, Piece, make_measure
@@ -38,7 +39,7 @@ def sweep(
     space: Space,
     out: str | Path,
     *,
-    metrics: Sequence[str] | Measure | None = None,
+    metrics: Annotated[Sequence[str] | Measure | None, Form.TEXTS] = None,
     chunk: int = 500,
     keep: Keep | None = None,
     seed: int = 0,

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any, get_args
+from typing import Annotated, Any, get_args
 
 import numpy as np
 import xarray as xr
@@ -14,6 +14,7 @@ import xarray as xr
 from pathcontrol._arrays import Array, check_whole
 from pathcontrol._expect import expect, expect_choice
 from pathcontrol._progress import progress_bar
+from pathcontrol.arguments import Form
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.engines import Engine, settle_engine
 from pathcontrol.sweeps.chunk import OUTCOME, Build, Job, Measure, make_measure
@@ -37,7 +38,7 @@ def tune(
     limits: Limits | None = None,
     scenarios: Space | Mapping[str, Any] | None = None,
     reduce: Reduce = "worst",
-    metrics: Sequence[str] | Measure | None = None,
+    metrics: Annotated[Sequence[str] | Measure | None, Form.TEXTS] = None,
     population: int = 40,
     generations: int = 25,
     seed: int = 0,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -15,10 +16,8 @@ from pathcontrol.arguments import Form, Unit, parameters_of
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.load import load_experiment
 from pathcontrol.experiments.runner import run_experiment
-from pathcontrol.experiments.schema.arm_sections import Robot
 from pathcontrol.experiments.schema.derived import section_of
 from pathcontrol.experiments.schema.experiment import Experiment, Start
-from pathcontrol.experiments.schema.sweep_sections import SweepSection, TuneSection
 from pathcontrol.experiments.template import example_text
 from pathcontrol.registry import KINDS, LOOPS, Kind
 
@@ -105,13 +104,42 @@ def arguments_of(function, but=""):
     return parameters_of(function).keys() - set(but.split())
 
 
-def test_sections_that_are_not_derived_have_the_arguments_of_their_functions():
-    """A file says them in other words, as [sweep] says its space by keys of the file; but none is forgotten."""
+def keys_of(name):
+    """The keys that a table of an experiment file may have."""
+    with pytest.raises(ValidationError) as error:
+        Experiment.model_validate({name: {"no_such_key": 1}})
+    message = next(one["msg"] for one in error.value.errors() if one["loc"] == (name, "no_such_key"))
+    return set(message.partition("valid keys: ")[2].split(", "))
+
+
+def test_tables_of_functions_have_their_arguments():
+    """A file says some in other words, as [sweep] says its space by keys of the file; but none is forgotten."""
     of_the_call = "build space out chunk resume progress cluster security engine"
-    swept = arguments_of(sweep, of_the_call) | arguments_of(Space)
-    assert SweepSection.model_fields.keys() == swept
-    assert TuneSection.model_fields.keys() == arguments_of(tune, of_the_call) | {"parameters"}
-    assert Robot.model_fields.keys() == arguments_of(load_robot, "threads") | {"payload", "tool"}
+    assert keys_of("sweep") == arguments_of(sweep, of_the_call) | arguments_of(Space)
+    assert keys_of("tune") == arguments_of(tune, of_the_call) | {"parameters"}
+    assert keys_of("robot") == arguments_of(load_robot, "threads") | {"payload", "tool"}
     assert Start.model_fields.keys() | Experiment.model_fields.keys() >= arguments_of(
         simulate, "first_rollout progress"
     )
+
+
+def test_an_argument_more_of_a_function_is_a_key_more(monkeypatch):
+    def load(source: str, *, mirrored: bool = False, threads: int = 1) -> None:
+        """Load an arm, mirrored if asked."""
+
+    monkeypatch.setattr("pathcontrol.robot.loading.load_robot", load)
+    assert keys_of("robot") == {"source", "lock", "estimated_inertia", "payload", "tool", "mirrored"}
+    with pytest.raises(ValidationError) as error:
+        Experiment.model_validate({"robot": {"source": "two_link", "mirrored": 1}})
+    assert any(one["msg"] == " = 1, expected true or false" for one in error.value.errors())
+
+
+def partly_understood(speed: Annotated[float, Form.POSITIVE, Unit("m/s")], other: NowhereDefined) -> None:  # noqa: F821
+    """Arguments of which one has a type that only a type checker knows."""
+
+
+def test_an_annotation_that_cannot_be_understood_leaves_the_others_alone():
+    section = section_of(partly_understood)
+    assert section.model_validate({"speed": "50 mm/s", "other": "x"}).arguments(float) == {"speed": 0.05, "other": "x"}
+    with pytest.raises(ValidationError, match="greater than 0"):
+        section.model_validate({"speed": -1, "other": 1})

@@ -67,27 +67,21 @@ def build_plant(experiment: Experiment, bare: RobotModel, model: RobotModel, bas
 
 def _load(experiment: Experiment, base_dir: Path) -> RobotModel:
     section = experiment.robot
-    package_dirs = [base_dir / folder for folder in section.package_dirs or ()]
+    options = section.arguments(float)
+    package_dirs = options["package_dirs"] = [base_dir / folder for folder in options.get("package_dirs", ())]
     with report_by_key("robot.source"):
         source = _source(section.source, base_dir)
         urdf = find_urdf(source, tuple(package_dirs))
         needed = section.lock or experiment.angle_unit == "deg"
         sliding = _sliding_joints(urdf.text) if needed else set()
-    lock = {
+    options["lock"] = {
         joint: value if joint in sliding else convert_numbers(value, experiment.to_radians)
         for joint, value in (section.lock or {}).items()
     }
-    for joint, value in lock.items():
+    for joint, value in options["lock"].items():
         refuse_unit(f"robot.lock.{joint}", value, "m" if joint in sliding else "rad")
-    with report_by_key("robot", ("lock", "keep", "tip", "estimated_inertia")):
-        robot = load_robot(
-            source,
-            lock=lock,
-            keep=section.keep or (),
-            tip=section.tip,
-            estimated_inertia=section.estimated_inertia,
-            package_dirs=package_dirs,
-        )
+    with report_by_key("robot", tuple(options)):
+        robot = load_robot(source, **options)
     if experiment.angle_unit == "deg":
         _refuse_degrees(robot, sliding)
     return robot

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import PlainValidator, model_validator
 
@@ -42,17 +42,22 @@ def _density(value: Any) -> Any:
     return value
 
 
-class Robot(Section):
-    """The arm as the controller knows it. ``lock`` is in ``angle_unit``, and in metres for sliding joints."""
+class RobotSection(Section):
+    """The arm as the controller knows it: the arguments of :func:`pathcontrol.load_robot`, and what is mounted on it.
 
+    ``lock`` is in ``angle_unit``, and in metres for sliding joints.
+    """
+
+    not_arguments: ClassVar[tuple[str, ...]] = ("source", "payload", "tool")
     source: Text
     lock: Annotated[dict[str, Number] | None, Unit("rad", "m")] = None
-    keep: list[Text] | None = None
-    tip: Text | None = None
-    estimated_inertia: Annotated[bool | float, PlainValidator(_density)] = False
-    package_dirs: list[Text] | None = None
+    estimated_inertia: Annotated[bool | float | None, PlainValidator(_density)] = None
     payload: Payload = None
     tool: ToolFrame | None = None
+
+
+#: a robot section with the rest of the arguments
+Robot = Annotated[RobotSection, table_for("robot.loading:load_robot", ("threads",), RobotSection)]
 
 
 class Directions(Section):

@@ -93,8 +93,12 @@ def accept_several(validate: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 @lru_cache(maxsize=256)
 def section_of(target: Callable[..., Any], base: type[Section] = Section, given: tuple[str, ...] = ()) -> type[Section]:
-    """Return the section whose keys are the parameters of a class or function, but for those that are ``given``."""
-    made = create_model(getattr(target, "__name__", "section"), __base__=base, **fields_of(target, given))
+    """Return the section whose keys are the parameters of a class or function, but for those that are ``given``.
+
+    A key that ``base`` has stays as it is there.
+    """
+    fields = fields_of(target, (*given, *base.model_fields))
+    made = create_model(getattr(target, "__name__", "section"), __base__=base, **fields)
     made.target = target  # type: ignore[attr-defined]
     return made
 
@@ -108,9 +112,9 @@ def fields_of(target: Callable[..., Any], given: Container[str] = ()) -> dict[st
     }
 
 
-def table_for(place: str, given: tuple[str, ...] = ()) -> PlainValidator:
+def table_for(place: str, given: tuple[str, ...] = (), base: type[Section] = Section) -> PlainValidator:
     """Return the validator of a table for the class or function at a ``place``, which is loaded on first use."""
-    return PlainValidator(lambda value: section_of(load(place), given=given).model_validate(value))
+    return PlainValidator(lambda value: section_of(load(place), base, given).model_validate(value))
 
 
 def _annotation(parameter: Parameter) -> Any:

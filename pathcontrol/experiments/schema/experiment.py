@@ -13,7 +13,7 @@ from pathcontrol.arguments import Unit
 from pathcontrol.experiments.schema.arm_sections import Plant, Robot
 from pathcontrol.experiments.schema.derived import accept_several, make_chooser
 from pathcontrol.experiments.schema.section import Section
-from pathcontrol.experiments.schema.sweep_sections import SweepSection, TuneSection
+from pathcontrol.experiments.schema.sweep_sections import Sweep, Tune
 from pathcontrol.experiments.schema.task_sections import Task
 from pathcontrol.experiments.schema.validators import Numbers, Positive, Whole, expected
 from pathcontrol.registry import DISTURBANCES, LAWS, LOOPS
@@ -105,8 +105,8 @@ class Experiment(Section):
     loop: Annotated[Any, PlainValidator(_LOOP)] = Field(default_factory=lambda: _LOOP({}))
     disturbance: Annotated[Any, PlainValidator(accept_several(make_chooser(DISTURBANCES)))] | None = None
     output: Output = Output()
-    sweep: SweepSection | None = None
-    tune: TuneSection | None = None
+    sweep: Sweep | None = None
+    tune: Tune | None = None
 
     @property
     def to_radians(self) -> Callable[[float], float]:

@@ -1,15 +1,15 @@
-"""``[sweep]``: which keys of an experiment file vary, and how."""
+"""``[sweep]`` and ``[tune]``: which keys of an experiment file vary, and how."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import PlainValidator
 
 from pathcontrol.experiments.schema.derived import table_for
 from pathcontrol.experiments.schema.section import Section
-from pathcontrol.experiments.schema.validators import Text, Whole, expected
+from pathcontrol.experiments.schema.validators import Whole, expected
 
 KINDS = ("grid", "uniform", "log_uniform", "normal")
 _EXAMPLE = '"controller.k" = { uniform = [1.0, 50.0] }'
@@ -51,8 +51,11 @@ def _checked(key: str, value: dict[str, Any]) -> dict[str, list[Any]]:
 Varied = Annotated[dict[str, dict[str, list[Any]]], PlainValidator(_parameters)]
 
 
+_OF_THE_CALL = ("build", "space", "out", "chunk", "resume", "progress", "cluster", "security", "engine")
+
+
 class SweepSection(Section):
-    """``[sweep]``: values of other keys of the file, in the units of the file.
+    """What ``[sweep]`` says in words of its own: the space, by other keys of the file, in the units of the file.
 
     Attributes:
         parameters: by dotted key, as ``controller.k`` or ``start.q[0]``, its values ``grid = [...]``, or a
@@ -60,16 +63,17 @@ class SweepSection(Section):
         method: every combination of the grids, or so many samples, random or by a Latin hypercube or a Sobol sequence.
         samples: how many, of all methods but the grid.
         seed: where the random numbers begin.
-        metrics: which ones to compute; default all.
-        keep: the rollouts whose history is kept; default none.
     """
 
+    not_arguments: ClassVar[tuple[str, ...]] = ("parameters", "method", "samples")
     parameters: Varied
     method: Literal["grid", "random", "lhs", "sobol"] = "grid"
     samples: Whole | None = None
     seed: Whole = 0
-    metrics: list[Text] | None = None
-    keep: Annotated[Any, table_for("sweeps.histories:Keep")] = None
+
+
+#: ``[sweep]`` with the arguments of :func:`pathcontrol.sweep`
+Sweep = Annotated[SweepSection, table_for("sweeps.sweep:sweep", _OF_THE_CALL, SweepSection)]
 
 
 def _objectives(value: Any) -> Any:
@@ -81,7 +85,7 @@ def _objectives(value: Any) -> Any:
 
 
 class TuneSection(Section):
-    """``[tune]``: see :func:`pathcontrol.tune`; values of other keys of the file are in the units of the file.
+    """What ``[tune]`` says in words of its own; values of other keys of the file are in the units of the file.
 
     Attributes:
         parameters: by dotted key, as ``controller.k``, what is searched: ``uniform = [a, b]``, ``log_uniform = [a, b]``
@@ -90,19 +94,14 @@ class TuneSection(Section):
         limits: of metrics the largest value allowed, or ``[smallest, largest]`` with ``inf`` where there is none, in SI
             units.
         scenarios: by dotted key a list with a value for each scenario.
-        reduce: how several scenarios become one number.
-        population: candidates in a generation.
-        generations: how many.
-        seed: where the random numbers begin.
-        metrics: more of them for the table.
     """
 
+    not_arguments: ClassVar[tuple[str, ...]] = ("parameters", "scenarios")
     parameters: Varied
     objectives: Annotated[str | list[str] | dict[str, str], PlainValidator(_objectives)]
     limits: dict[str, Any] | None = None
     scenarios: dict[str, list[Any]] | None = None
-    reduce: Literal["worst", "mean"] | None = None
-    population: Whole | None = None
-    generations: Whole | None = None
-    seed: Whole | None = None
-    metrics: list[Text] | None = None
+
+
+#: ``[tune]`` with the arguments of :func:`pathcontrol.tune`
+Tune = Annotated[TuneSection, table_for("tuning.tune:tune", _OF_THE_CALL, TuneSection)]
