@@ -126,11 +126,12 @@ class CompleteEnvelope:
 
     def find_motion_fault(self, q: Array, qd: Array) -> str:
         """Return the sentence on a joint that is too fast, or too near to a position limit to be braked, or ""."""
-        if (np.abs(qd) > self.velocity).any():
-            i = int((np.abs(qd) - self.velocity).argmax())
+        speed = np.abs(qd)
+        if (speed > self.velocity).any():
+            i = int((speed - self.velocity).argmax())
             return f"joint {i + 1} moves at {qd[i]:.3g} rad/s, its limit is {self.velocity[i]:.3g}"
-        ahead = q + qd * np.abs(qd) / (2 * self.deceleration)
-        over = np.maximum(np.where(qd > 0, ahead, q) - self.upper, self.lower - np.where(qd < 0, ahead, q))
+        ahead = q + qd * speed / (2 * self.deceleration)
+        over = np.maximum(np.maximum(q, ahead) - self.upper, self.lower - np.minimum(q, ahead))
         if (over > 0).any():
             i = int(over.argmax())
             return f"joint {i + 1} at {q[i]:.3g} rad and {qd[i]:.3g} rad/s cannot be braked before its limit"

@@ -9,7 +9,7 @@ import pathcontrol as pc
 from pathcontrol.errors import InputError
 
 H = 2e-3
-JAM = 2.0, 2.6  # s
+JAM, END = (1.0, 1.6), 2.4  # s
 
 
 def task_of(n):
@@ -75,30 +75,30 @@ def test_an_override_is_followed_as_in_the_simulation():
 
 
 @pytest.mark.parametrize("kind", [pc.ExtendedMotionPlan, pc.Projection])
-@pytest.mark.parametrize(("n", "jammed"), [(2, 0), (2, 1), (6, 0), (6, 1), (6, 2), (6, 3), (6, 5)])
+@pytest.mark.parametrize(("n", "jammed"), [(2, 0), (6, 1), (6, 2), (6, 3)])
 def test_an_arm_that_jams_waits_on_its_path(n, jammed, kind):
     law, limit = law_of(n, kind), 2.0
     command = pc.PositionCommand(law, H, lag=0.1, velocity=limit)
     start = start_of(law)
     command.start(start)
-    commands, q = serve(command.step, start, 4.0, 0.1, jammed)
-    plan = iter(pc.plan_trajectory(law.task, 1 / H, 4.1).q[1:])
-    _, timed = serve(lambda q: next(plan), start, 4.0, 0.1, jammed)
+    commands, q = serve(command.step, start, END, 0.1, jammed)
+    plan = iter(pc.plan_trajectory(law.task, 1 / H, END + 0.1).q[1:])
+    _, timed = serve(lambda q: next(plan), start, END, 0.1, jammed)
     released = slice(round(JAM[1] / H), None)
     ours, theirs = (contour_error(law.task, each[released]).max() for each in (q, timed))
     assert theirs > 0.1
     assert ours <= theirs / 3
     steps = np.abs(np.diff(commands, axis=0))
     assert steps.max() <= limit * H * (1 + 1e-9)
-    there, later = (command_parameter(law.task, commands, t) for t in (JAM[0], JAM[1]))
+    there, later, last = command_parameters(law.task, commands, [*JAM, END - H])
     assert later - there < 0.6 * 0.5  # half of what the timed plan passes in a unit of ϑ; it waited
-    assert command_parameter(law.task, commands, 4.0 - H) - later > 0.3  # and goes on
+    assert last - later > 0.3  # and goes on
 
 
-def command_parameter(task, commands, t):
-    """The path parameter, counted on, of the command at a time, in units of ϑ."""
+def command_parameters(task, commands, times):
+    """The path parameters, counted on, of the commands at some times, in units of ϑ."""
     s = np.unwrap(task.sigma_bar(commands), period=task.period)
-    return (s[min(round(t / H), len(s) - 1)] - s[0]) / float(np.mean(task.theta(s)))
+    return (s[np.round(np.array(times) / H).astype(int)] - s[0]) / float(np.mean(task.theta(s)))
 
 
 def test_commands_keep_to_the_path_when_they_are_paced():
@@ -128,7 +128,7 @@ def test_holding_and_going_on_without_a_jump():
     command, q = pc.PositionCommand(law, H), start_of(law)
     command.start(q)
     went, q = [], q
-    for act, seconds in ((None, 1.0), (command.hold, 1.0), (command.resume, 1.0), (command.reverse, 2.0)):
+    for act, seconds in ((None, 0.5), (command.hold, 1.0), (command.resume, 0.5), (command.reverse, 1.5)):
         if act is not None:
             act()
         s = command.s
