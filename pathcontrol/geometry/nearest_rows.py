@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 
 _PAIRS = 20_000_000  # up to which all distances take less time than loading the search tree
-_BLOCK = 500_000  # pairs at once
+_BLOCK = 20_000  # pairs at once: they stay in the cache of a core
 
 
 def nearest_rows(x: Array, points: Array) -> NDArray[np.intp]:
