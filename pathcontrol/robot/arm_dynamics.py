@@ -238,11 +238,11 @@ class ArmDynamics:
         """Return the pose of ``frame`` (*batch, 4, 4) and its Jacobian (*batch, 6, n), for the cost of one of them."""
         i, data, array = self._frame_id(frame), self._data, self._array("q", q)
         batch, rows = array.shape[:-1], array.reshape(-1, self.n)
-        poses, jacobians = np.empty((len(rows), 4, 4)), np.empty((len(rows), 6, self.n))
+        poses, jacobians, placement = np.empty((len(rows), 4, 4)), np.empty((len(rows), 6, self.n)), data.oMf[i]
         for k, qi in enumerate(rows):
             jacobian = pin.computeFrameJacobian(self.pinocchio_model, data, qi, i, _ALIGNED)
             jacobians[k] = jacobian.reshape(6, self.n)  # that of a single joint comes as (6,)
-            poses[k] = data.oMf[i].homogeneous  # which computeFrameJacobian leaves up to date
+            poses[k] = placement.homogeneous  # which computeFrameJacobian leaves up to date
         return poses.reshape(*batch, 4, 4), jacobians.reshape(*batch, 6, self.n)
 
     def frame_motion(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, frame: str) -> tuple[Array, Array]:

@@ -87,9 +87,9 @@ class NotebookFigure(Figure):
 
         A copy is drawn, since the layout of what was drawn before differs in its last digits.
         """
-        picture = BytesIO()
-        with style():
-            pickle.loads(pickle.dumps(self)).savefig(picture, format="png", dpi=_NOTEBOOK_DPI)
+        picture, copy = BytesIO(), pickle.loads(pickle.dumps(self))
+        with style(), laid_out(copy, _NOTEBOOK_DPI):
+            copy.savefig(picture, format="png", dpi=_NOTEBOOK_DPI)
         return picture.getvalue()
 
 

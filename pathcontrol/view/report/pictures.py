@@ -122,9 +122,10 @@ def picture(figure: Figure, caption: str) -> Picture:
 
 def _draw(figure: Figure, kind: str) -> bytes:
     """Return the file of a figure."""
+    from pathcontrol.view.figures.panel_layout import laid_out
     from pathcontrol.view.figures.style import style
 
     drawn = io.BytesIO()
-    with style():
+    with style(), laid_out(figure, _PNG_DPI):
         figure.savefig(drawn, format=kind, dpi=_PNG_DPI, metadata={"Date": None} if kind == "svg" else None)
     return drawn.getvalue()
