@@ -2,32 +2,50 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 
 import pytest
 
-LARGE = "{'xarray', 'pandas', 'trimesh', 'yourdfpy', 'sympy', 'pydantic', 'matplotlib.pyplot', 'scipy'}"
-RUN = "import pathcontrol as pc; from pathcontrol.experiments.reproduce import paper_experiment; " + (
-    "robot = pc.load_robot('cicese_2dof'); run = paper_experiment('projection', robot, False, 'compiled').run"
-)
 USES = {
     "metrics": "pc.metrics(run)",
     "file": "run.save('run.nc')",
     "figures": "[pc.save_figure(f(run), 'figure') for f in (pc.error_figure, pc.path_figure, pc.torque_figure)]",
     "film": "pc.record(run).save('film.html')",
     "one rollout": "pc.metrics(run.rollout(0).with_robot(robot))",
+    "labels": "run.data.sizes['time']",
 }
+CODE = f"""
+import json, sys
+import pathcontrol as pc
+from pathcontrol.experiments.reproduce import paper_experiment
+
+large = {{"xarray", "pandas", "trimesh", "yourdfpy", "sympy", "pydantic", "matplotlib.pyplot", "scipy"}}
+robot = pc.load_robot("cicese_2dof")
+run = paper_experiment("projection", robot, False, "compiled").run
+loaded = {{}}
+for name, use in {USES!r}.items():
+    value = eval(use)
+    loaded[name] = sorted(large & {{*sys.modules}})
+print(json.dumps([loaded, value]))
+"""
 
 
-@pytest.mark.parametrize("use", USES)
-def test_no_large_library_is_loaded(use, tmp_path):
-    code = f"import sys; {RUN}; {USES[use]}; print({LARGE} & {{*sys.modules}})"
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout == "set()\n"
+@pytest.fixture(scope="module")
+def told(tmp_path_factory):
+    """What is loaded after each use, one after another in a process of their own, and the value of the last one."""
+    folder = tmp_path_factory.mktemp("used")
+    done = subprocess.run([sys.executable, "-c", CODE], cwd=folder, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
 
 
-def test_labels_are_there_when_they_are_asked_for():
-    code = f"import sys; {RUN}; print('xarray' in sys.modules, run.data.sizes['time'], 'xarray' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "False 4001 True\n"
+@pytest.mark.parametrize("use", [use for use in USES if use != "labels"])
+def test_no_large_library_is_loaded(use, told):
+    assert told[0][use] == []
+
+
+def test_labels_are_there_when_they_are_asked_for(told):
+    loaded, samples = told
+    assert "xarray" in loaded["labels"]
+    assert samples == 4001

@@ -39,8 +39,7 @@ ROWS = {
 
 def made_again(run, folder, monkeypatch):
     monkeypatch.chdir(folder)
-    run.save("mine.nc")
-    found = recipe("mine", run)
+    found = recipe("mine", pc.Run.load(run.save("mine.nc")))
     assert found.kind == "python"
     namespace = {}
     exec(found.text, namespace)
@@ -64,7 +63,7 @@ def simulated(disturbance, rows=1, loop=None, plant=ROBOT):
 )
 def test_a_disturbed_run_is_made_again_bit_for_bit(name, loop, tmp_path, monkeypatch):
     run = simulated(ALONE[name], loop=loop)
-    again = made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch)
+    again = made_again(run, tmp_path, monkeypatch)
     assert_the_very_run(run, again)
     assert again.config == run.config
 
@@ -72,35 +71,35 @@ def test_a_disturbed_run_is_made_again_bit_for_bit(name, loop, tmp_path, monkeyp
 @pytest.mark.parametrize("joint", [1, "joint_2"])
 def test_a_run_with_a_jam_is_made_again(joint, tmp_path, monkeypatch):
     run = simulated(PUSH + pc.JammedJoint(joint, 0.02, 0.03))
-    assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
+    assert_the_very_run(run, made_again(run, tmp_path, monkeypatch))
 
 
 def test_a_run_with_weak_motors_is_made_again(tmp_path, monkeypatch):
     run = simulated(PUSH + pc.TorqueLimitDrop([0.01, 0.5], 0.02, 0.03), loop=pc.SampledLoop(torque_limits=True))
-    assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
+    assert_the_very_run(run, made_again(run, tmp_path, monkeypatch))
 
 
 @pytest.mark.parametrize("what", ["ticks", "measurements"])
 def test_a_run_with_a_dropout_is_made_again(what, tmp_path, monkeypatch):
     run = simulated(PUSH + pc.Dropout(0.02, 0.03, what, "zero", 0.5, seed=3))
-    assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
+    assert_the_very_run(run, made_again(run, tmp_path, monkeypatch))
 
 
 @pytest.mark.parametrize("kind", [{"stiffness": 1e5, "friction": 0.3}, {"rigid": True}])
 def test_a_run_that_meets_a_wall_is_made_again(kind, tmp_path, monkeypatch):
     tool = ROBOT.frame_pose(np.array([0.7, 1.2]), "tool")[:3, 3]
     run = simulated(PUSH + pc.Wall("tool", tool, [-1.0, 0.0, 2.0], start=0.02, **kind))
-    assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
+    assert_the_very_run(run, made_again(run, tmp_path, monkeypatch))
 
 
 def test_a_run_with_a_pick_up_is_made_again(tmp_path, monkeypatch):
     run = simulated(PUSH + pc.PickUp(1.0, "tool", 0.02, 0.03, velocity=[0.1, 0.0, 0.0]))
-    assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
+    assert_the_very_run(run, made_again(run, tmp_path, monkeypatch))
 
 
 def test_a_run_with_a_change_of_friction_is_made_again(tmp_path, monkeypatch):
     run = simulated(PUSH + pc.FrictionChange(3.0, 0.02, 0.03))
-    assert_the_very_run(run, made_again(pc.Run.load(run.save(tmp_path / "run.nc")), tmp_path, monkeypatch))
+    assert_the_very_run(run, made_again(run, tmp_path, monkeypatch))
 
 
 @pytest.mark.parametrize("name", ROWS)

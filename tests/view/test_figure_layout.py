@@ -68,7 +68,7 @@ OF_TABLES = {
 @pytest.mark.parametrize("name", OF_TABLES)
 def test_words_of_sweeps_are_on_the_page_and_apart(name, tmp_path):
     figure = OF_TABLES[name]()
-    save_figure(figure, tmp_path / "figure")
+    save_figure(figure, tmp_path / "figure", ["svg"])
     assert_readable(figure, name)
 
 
@@ -83,7 +83,7 @@ def test_words_of_tools_are_on_the_page_and_apart(errors, arm):
     assert_readable(tool_figure(run, arm, Circle(1.0, 2.0), errors=errors), "tool")
 
 
-@pytest.mark.parametrize("kind", ["path", "errors", "comparison", "torque"])
+@pytest.mark.parametrize("kind", ["path", "errors"])  # with equal scales, and free ones
 def test_all_formats_have_one_layout_and_the_figure_keeps_its_own(kind, tmp_path):
     figure = makers(made(3, scale=1.3))[kind]()
     engine, dpi, places = figure.get_layout_engine(), figure.dpi, []
@@ -122,7 +122,7 @@ def panel(low, high):
     return figure, axes
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(middle=st.floats(-1e6, 1e6), half=st.floats(1e-9, 1e9))
 def test_numbers_are_plain_text_and_are_what_they_stand_at(middle, half):
     half = max(half, 1e-6 * abs(middle))

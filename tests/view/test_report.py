@@ -230,11 +230,13 @@ keys = st.text("abcxyz", min_size=1, max_size=3)
 configs = st.dictionaries(keys, st.one_of(scalars, st.dictionaries(keys, st.one_of(scalars, st.lists(scalars)))))
 
 
+@settings(max_examples=10)
 @given(configs)
 def test_equal_configurations_do_not_differ(config):
     assert not any(setting.differs for group in groups_of([config, config]) for setting in group.settings)
 
 
+@settings(max_examples=10)
 @given(configs, st.data())
 def test_one_change_is_one_difference(config, data):
     key = data.draw(st.sampled_from(["a", "law"]))

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 
 from pathcontrol import (
     Circle,
@@ -185,11 +188,20 @@ def test_files_are_the_same_for_the_same_run(runs, tmp_path):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
+@pytest.fixture
+def undrawn(monkeypatch):
+    """For files whose content does not matter: the name of their format stands in them."""
+    monkeypatch.setattr(Figure, "savefig", lambda self, file, format, **more: file.write_text(format))  # noqa: A006
+    monkeypatch.setattr("pathcontrol.view.figures.style.laid_out", lambda figure, dpi: nullcontext())
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_a_suffix_asks_for_its_format(runs, tmp_path):
     figure = speed_figure(runs)
     assert [p.name for p in save_figure(figure, tmp_path / "v1.2")] == ["v1.2.svg", "v1.2.png"]
     assert [p.name for p in save_figure(figure, tmp_path / "x.svg")] == ["x.svg", "x.png"]
     assert [p.name for p in save_figure(figure, tmp_path / "y.pdf", formats=["svg"])] == ["y.svg", "y.pdf"]
+    assert all(file.read_text() == file.suffix[1:] for file in tmp_path.iterdir())
     with pytest.raises(InputError, match="'jpg', expected some of 'svg', 'png', 'pdf'"):
         save_figure(figure, tmp_path / "z", formats=["jpg"])
 
@@ -211,6 +223,7 @@ def test_what_does_not_belong_together_is_refused(runs, circle):
         comparison_figure({**runs, "other": one})
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_figures_of_an_experiment(runs, tmp_path):
     written = run_figure(runs["plan"], tmp_path / "a.pdf", joints=(1, 0))
     kinds = [f"a-{kind}.{suffix}" for kind in ("errors", "path", "torque", "speed") for suffix in ("svg", "png", "pdf")]
