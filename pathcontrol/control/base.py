@@ -185,6 +185,8 @@ class Controller(ABC):
 
     #: the factor w of ϑ that the plan goes at, (*batch,), set by :meth:`at_speed`; ``None`` for 1
     speed: Array | None = None
+    #: the s that a law at a speed asked its task for last, and the answer
+    _asked: tuple[Array, PathPoint] | None = None
 
     def at_speed(self, factor: Array) -> Self:
         """Return this law with the profile wϑ in place of ϑ, for a ``factor`` w (*batch,) that is constant.
@@ -193,7 +195,7 @@ class Controller(ABC):
         acceleration lacks ẇ q_d'ϑ, which :class:`LawWrapper` adds.
         """
         law = copy(self)
-        law.speed = np.where(np.abs(factor) < _HELD, 0.0, factor)
+        law.speed, law._asked = np.where(np.abs(factor) < _HELD, 0.0, factor), None
         return law
 
     def point(self, s: Array) -> PathPoint:
@@ -203,10 +205,23 @@ class Controller(ABC):
         """
         if not s.ndim:  # tasks take arrays
             return PathPoint(*(value[0] for value in self.point(s[None])))
-        if self.ending is None:
-            return self.task.at(s) if self.speed is None else self.task.at(s).at_speed(self.speed)
-        point = self.task.at(np.minimum(np.maximum(s, self.task.s0), self.task.s_end))
-        return self.ending.brake(point, s, 1.0 if self.speed is None else self.speed)
+        point = self._ask_task(s)
+        if self.ending is not None:
+            return self.ending.brake(point, s, 1.0 if self.speed is None else self.speed)
+        return point if self.speed is None else point.at_speed(self.speed)
+
+    def _ask_task(self, s: Array) -> PathPoint:
+        """Return the task at s, of an open path within its ends; it is asked once for an array at a speed.
+
+        A law at a speed lives for one moment, in which the law and its wrapper want the same point.
+        """
+        if self._asked is not None and self._asked[0] is s:
+            return self._asked[1]
+        inside = s if self.ending is None else np.minimum(np.maximum(s, self.task.s0), self.task.s_end)
+        point = self.task.at(inside)
+        if self.speed is not None:
+            self._asked = s, point
+        return point
 
     def timed(self, s: Array) -> NDArray[np.bool_]:
         """Return where the plan follows σ̇ = ϑ(σ) without feedback: at the end of an open path, and held, (*batch,).
@@ -227,11 +242,9 @@ class Controller(ABC):
         if not s.ndim:
             velocity, theta = self.full_speed(s[None])
             return velocity[0], theta[0]
-        if self.ending is None:
-            point = self.task.at(s)
-            return point.velocity, point.theta
-        point = self.task.at(np.minimum(np.maximum(s, self.task.s0), self.task.s_end))
-        point = point.at_speed(self.ending.follows(s, np.ones(()) if self.speed is None else self.speed))
+        point = self._ask_task(s)
+        if self.ending is not None:
+            point = point.at_speed(self.ending.follows(s, np.ones(()) if self.speed is None else self.speed))
         return point.velocity, point.theta
 
     def speed_response(self, s: Array, theta: Array) -> Array:
@@ -284,7 +297,7 @@ class Controller(ABC):
         if self.observer is None:
             return out
         memory, compensates = z[..., 1 : 1 + self.observer.size], self.friction == "observed"
-        kept = (qd == 0) & (np.abs(out.e_v) < _RESTING) & compensates
+        kept = (qd == 0) & (np.abs(out.e_v) < _RESTING) if compensates else False
         seen = self.observer.observe(t, q, qd, memory, kept)
         out = out._replace(tau=out.tau - seen.torque if compensates else out.tau, observation=seen)
         return out._replace(zdot=self.rate(out))

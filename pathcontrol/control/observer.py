@@ -80,7 +80,7 @@ class MomentumObserver:
         h = np.where(last < 0.5 * _NEVER, 0.0, t - last)
         p, c = self.robot.momentum(q, qd), self.robot.momentum_rate(q, qd, np.zeros(self.robot.n))
         share = -np.expm1(-self.gain * h)
-        slope = np.divide(share, h, out=np.broadcast_to(self.gain, share.shape).copy(), where=h > 0)
+        slope = np.divide(share, h, out=np.zeros_like(share) + self.gain, where=h > 0)
         new = first + slope * (p - before) - share * (known + 0.5 * c + first)
         passed = 1 - (1 - share) * self.gain / slope
         both = torque + share * (first - torque) + passed * (new - first)
@@ -100,9 +100,10 @@ class MomentumObserver:
 
     def rate(self, seen: Observation, tau: Array) -> Array:
         """Return the rate of the memory in continuous time, (*batch, 4n + 1), where τ acts [N m]."""
-        first = -self.gain * (tau + seen.rate + seen.first)
-        none = np.zeros_like(first)
-        return np.concatenate([first, self.gain * (seen.first - seen.torque), none, none, none[..., :1]], axis=-1)
+        first, n = -self.gain * (tau + seen.rate + seen.first), self.robot.n
+        rate = np.zeros((*first.shape[:-1], self.size))
+        rate[..., :n], rate[..., n : 2 * n] = first, self.gain * (seen.first - seen.torque)
+        return rate
 
     def advance(self, seen: Observation, tau: Array) -> Array:
         """Return the memory at the next tick, (*batch, 4n + 1), up to which τ acts in the mean [N m]."""

@@ -64,7 +64,7 @@ class TabulatedProfile(VelocityProfile):
     def _both(self, s: Array) -> tuple[Array, Array]:
         s = self._within(s)
         theta = np.sqrt(np.interp(s, self.s, self.squared))
-        cell = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
+        cell = np.minimum(np.maximum(np.searchsorted(self.s, s, side="right") - 1, 0), len(self.s) - 2)
         inside = (s >= self.s[0]) & (s <= self.s[-1])
         return theta, np.where(inside, self._acceleration[cell], 0.0) / theta
 

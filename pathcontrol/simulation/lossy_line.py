@@ -58,7 +58,7 @@ class LossyLine:
 
     def keep(self, z: Array, advanced: Array) -> Array:
         """Return the law's state after a tick: the ``advanced`` one, or where the tick is missed still z."""
-        return _choose(self._missed, z, advanced) if self._missed.any() else advanced
+        return _choose(self._missed, z, advanced) if self._dropouts.any and self._missed.any() else advanced
 
     def reset(self, lost: Divergence) -> None:
         """Put the measurements of lost rollouts back to their initial states."""

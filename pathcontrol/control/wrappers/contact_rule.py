@@ -70,7 +70,7 @@ class ContactRule(SpeedRule):
         return np.concatenate([ramp, winding[..., None]], axis=-1)
 
     def advance(self, x: Array, xdot: Array, period: float) -> Array:
-        left = np.clip(x[..., 2:] + period * xdot[..., 2:], -self.pause, self.pause)
+        left = np.minimum(np.maximum(x[..., 2:] + period * xdot[..., 2:], -self.pause), self.pause)
         return np.concatenate([self._ramp.advance(x[..., :2], xdot[..., :2], period), left], axis=-1)
 
     def describe(self) -> dict[str, Any]:

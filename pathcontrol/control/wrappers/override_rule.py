@@ -21,6 +21,16 @@ _SMOOTHING = 0.02  # s, time constant T of the rate of w
 _ARRIVED = 1e-9  # distance of w from u, and from there in a time T, at which w is u
 
 
+class GivenSpeed:
+    """A speed that a function of time gives, checked whenever it is asked for."""
+
+    def __init__(self, function: Callable[[float], ArrayLike]) -> None:
+        self.function = function
+
+    def __call__(self, t: float) -> Array:
+        return _check_range(f"override at t = {t:g} s", self.function(t))
+
+
 class FixedSpeed:
     """A speed that does not change: u, a number or (N,)."""
 
@@ -93,7 +103,7 @@ class OverrideRule(SpeedRule):
         """Return u at time t [s], a number or (N,)."""
         if self._held:
             return np.zeros(())
-        u = _check_range(f"override at t = {t:g} s", self._value(t))
+        u = self._value(t)
         return -u if self._back else u
 
     def start(self, law: Controller, q: Array, qd: Array, s: Array) -> Array:
@@ -122,12 +132,16 @@ class OverrideRule(SpeedRule):
         v = x[..., 1]
         wanted = v + _SMOOTHING * xdot[..., 1]
         bounded = np.abs(wanted) >= self.acceleration * (1 - 1e-12)
-        ramp, approach = _advance_ramp(v, wanted, period), _advance_approach(v, wanted, period)
         gap = 4 * _SMOOTHING * wanted
         arrived = ~bounded & (np.maximum(np.abs(gap), _SMOOTHING * np.abs(v)) < _ARRIVED)
+        new = np.empty(x.shape)
+        if arrived.all():  # the common case
+            new[..., 0], new[..., 1] = x[..., 0] + gap, 0.0
+            return new
+        ramp, approach = _advance_ramp(v, wanted, period), _advance_approach(v, wanted, period)
         step, v = (np.where(bounded, one, other) for one, other in zip(ramp, approach, strict=True))
-        step, v = np.where(arrived, gap, step), np.where(arrived, 0.0, v)
-        return np.stack([x[..., 0] + step, v], axis=-1)
+        new[..., 0], new[..., 1] = x[..., 0] + np.where(arrived, gap, step), np.where(arrived, 0.0, v)
+        return new
 
     def describe(self) -> dict[str, Any]:
         given = getattr(self._given, "__name__", repr(self._given)) if callable(self._given) else self._given
@@ -148,10 +162,10 @@ def _advance_approach(v: Array, wanted: Array, period: float) -> tuple[Array, Ar
     return decay * (gap + slope * period) - gap, decay * (v - pole * period * slope)
 
 
-def _make_function(override: Override) -> Callable[[float], ArrayLike]:
-    """Return u as a function of time."""
+def _make_function(override: Override) -> Callable[[float], Array]:
+    """Return u as a function of time that gives nothing out of range."""
     if callable(override):
-        return override
+        return GivenSpeed(override)
     array = check_finite("override", as_array("override", override))
     if array.ndim > 1:
         steps = SpeedSteps(array)

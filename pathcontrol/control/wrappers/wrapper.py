@@ -147,8 +147,7 @@ class LawWrapper(Controller):
         out = law.law(t, q, qd, own)
         velocity, theta = law.full_speed(out.s)
         change, response = law.speed_gradient(q, qd, out.s, velocity)
-        gradient = self.robot.inverse_dynamics(q, np.zeros_like(qd), change) - self.robot.gravity(q)
-        return Moment(t, q, qd, law, out, theta, gradient, response)
+        return Moment(t, q, qd, law, out, theta, self.robot.momentum(q, change), response)
 
     def outcome(self, z: Array) -> dict[str, Array]:
         return self.inner.outcome(self.split(z)[0])

@@ -16,6 +16,7 @@ _STEPS = 12
 _CONVERGED = 1e-9  # rad of the curve
 _SHARES = 4  # samples in a cell
 _FIRST_SAMPLES = 16
+_TINY = float(np.finfo(np.float64).tiny)
 
 
 class Slope(NamedTuple):
@@ -40,7 +41,7 @@ class Slope(NamedTuple):
 
     def step(self, reach: Array) -> Array:
         """Return the step of Newton's method, damped where the distance is flat, and bounded."""
-        longest = np.minimum(reach, _TURN * np.sqrt(self.gradient) / np.maximum(self.bend, np.finfo(float).tiny))
+        longest = np.minimum(reach, _TURN * np.sqrt(self.gradient) / np.maximum(self.bend, _TINY))
         step = -self.slope / np.maximum(self.curvature, 0.1 * self.gradient)
         return np.minimum(np.maximum(step, -longest), longest)
 
