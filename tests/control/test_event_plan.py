@@ -70,8 +70,8 @@ def test_v_falls_as_the_theorem_says_from_where_the_arm_is_let_go(ideal_arm, kin
     """A push halts the plan; from its end on, held, waiting and speeding up again, V follows the V̇ of the theorem."""
     controller = pc.EventPlan(law(kind, ideal_arm), threshold=[5.0, 1.0], acceleration=8.0, pause=0.1)
     loop = pc.ContinuousTime(output_period=1e-3)
-    pushed = run(controller, duration=1.2, loop=loop, disturbance=pc.Push([40.0, 6.0], 0.3, 0.3))
-    free, w = pushed.time > 0.602, pc.speed_factor(pushed)[0]
+    pushed = run(controller, duration=0.75, loop=loop, disturbance=pc.Push([40.0, 6.0], 0.1, 0.2))
+    free, w = pushed.time > 0.302, pc.speed_factor(pushed)[0]
     V, Vdot = (part[0, free] for part in pc.lyapunov(controller, pushed))
     change = cumulative_simpson(Vdot, dx=1e-3, initial=0)
     assert_allclose(V, V[0] + change, rtol=0, atol=5e-4 * V[0])  # Simpson's rule: h⁴(2K_v)⁴/180
@@ -84,8 +84,8 @@ def test_it_halts_and_goes_on_when_the_low_passed_push_says_so():
     """r = A(1 − (1 + Kt)e^{−Kt}) passes the threshold, and its half when it is gone; then the pause begins."""
     K, A, threshold, pause, h = 2 * np.pi * 20.0, 6.0, 3.0, 0.15, 1e-3
     controller = pc.EventPlan(law(pc.ComputedTorque, SMOOTH), threshold, pause=pause, observer_hz=20.0)
-    begin, length = 0.5, 0.3
-    pushed = run(controller, duration=1.6, loop=pc.SampledLoop(h), disturbance=pc.Push([0.0, A], begin, length))
+    begin, length = 0.3, 0.3
+    pushed = run(controller, duration=1.2, loop=pc.SampledLoop(h), disturbance=pc.Push([0.0, A], begin, length))
     w = pc.speed_factor(pushed)[0]
     seen = begin + brentq(lambda t: A * (1 - (1 + K * t) * np.exp(-K * t)) - threshold, 0, 0.1)
     gone = begin + length + brentq(lambda t: A * (1 + K * t) * np.exp(-K * t) - threshold / 2, 0, 0.1)
@@ -98,7 +98,7 @@ def test_it_halts_and_goes_on_when_the_low_passed_push_says_so():
 @every_law
 def test_nothing_changes_where_nothing_is_met(kind):
     """The paper's experiment, from rest beside the path and with all friction, raises no alarm."""
-    plain, watched = run(law(kind), duration=3.0), run(pc.EventPlan(law(kind)), duration=3.0)
+    plain, watched = run(law(kind), duration=2.0), run(pc.EventPlan(law(kind)), duration=2.0)
     assert_allclose(watched.array("q"), plain.array("q"), rtol=0, atol=1e-9)
 
 
@@ -106,7 +106,7 @@ def test_nothing_changes_where_nothing_is_met(kind):
 def test_in_a_jam_it_does_not_push_on_and_leaves_its_path_less(kind):
     """The torque of the jammed joint is at its limit for less of the time; the arm goes on when it is let go."""
     jam = pc.JammedJoint(1, 2.0, 0.6)  # when the errors that friction leaves are those of every lap
-    plain, event = (run(one, duration=4.5, disturbance=jam) for one in (law(kind), pc.EventPlan(law(kind))))
+    plain, event = (run(one, duration=3.9, disturbance=jam) for one in (law(kind), pc.EventPlan(law(kind))))
     jammed, after = (plain.time > 2.0) & (plain.time < 2.6), plain.time > 2.0
     peaks = [np.abs(pc.contour_error(one)[0, after]).max() for one in (plain, event)]
     pushes = [np.abs(one.array("tau")[0, jammed, 1]).mean() for one in (plain, event)]
@@ -114,41 +114,41 @@ def test_in_a_jam_it_does_not_push_on_and_leaves_its_path_less(kind):
     assert pushes[1] < (0.5 if kind is not pc.ComputedTorque else 1.0) * pushes[0]
     w = pc.speed_factor(event)[0]
     assert w[jammed].min() < 0.01
-    assert w[event.time > 3.5].min() > 0.99
-    assert np.ptp(event.array("s")[0, event.time > 3.5]) > 0.8 * 2.0 * 1.0
+    assert w[event.time > 3.4].min() > 0.99
+    assert np.ptp(event.array("s")[0, event.time > 3.4]) > 0.8 * 2.0 * 0.5
 
 
 @pytest.mark.parametrize("kind", KINDS[:2])
 def test_at_a_wall_it_halts_and_when_that_is_gone_it_goes_on(kind):
-    """A stiff wall comes before the tool at 2.8 s, for 1.5 s; the arm waits at it with less than half its torque."""
+    """A stiff wall comes before the tool at 2.8 s, for 1.1 s; the arm waits at it with less than half its torque."""
     free = run(law(kind), duration=3.1)
     before, at = (CICESE.frame_pose(free.array("q")[0, round(t / 2.5e-3)], "tool")[:3, 3] for t in (2.95, 3.0))
-    wall = pc.Wall("tool", at, before - at, stiffness=1e5, start=2.8, duration=1.5)
-    event = run(pc.EventPlan(law(kind)), duration=6.5, disturbance=wall)
-    there, w = (event.time > 3.4) & (event.time < 4.3), pc.speed_factor(event)[0]
+    wall = pc.Wall("tool", at, before - at, stiffness=1e5, start=2.8, duration=1.1)
+    event = run(pc.EventPlan(law(kind)), duration=5.3, disturbance=wall)
+    there, w = (event.time > 3.4) & (event.time < 3.9), pc.speed_factor(event)[0]
     away = np.array([CICESE.frame_pose(q, "tool")[:3, 3] - at for q in event.array("q")[0, there]]) @ (before - at)
     assert np.abs(away / np.linalg.norm(before - at)).max() < 1e-2
     push = event.array("tau") - CICESE.gravity(event.array("q"))
     assert (np.abs(push[0, there]) < 0.5 * CICESE.limits.effort).all()
     assert w[there].min() < 0.01
     assert w[-1] > 0.99
-    assert np.ptp(event.array("s")[0, event.time > 5.0]) > 0.8 * 2.0 * 1.5
+    assert np.ptp(event.array("s")[0, event.time > 4.5]) > 0.8 * 2.0 * 0.8
 
 
 def test_with_an_observed_law_it_shares_the_observer():
     controller = pc.EventPlan(law(pc.Projection, friction="observed", observer_hz=25.0))
     assert_array_equal(controller.observer.gain, 2 * np.pi * 25.0)
-    event = run(controller, disturbance=JAM)
+    event = run(controller, duration=2.8, disturbance=JAM)
     assert pc.speed_factor(event)[0, (event.time > 1.3) & (event.time < 1.6)].max() < 0.01
     assert pc.speed_factor(event)[0, -1] > 0.99
 
 
 def test_the_speed_input_goes_on_working(arm):
     outer = pc.SpeedOverride(pc.EventPlan(law(pc.ExtendedMotionPlan)), [[0.5, 0.5]])
-    event = run(outer, disturbance=pc.JammedJoint(1, 2.0, 0.6))
+    event = run(outer, duration=3.4, disturbance=pc.JammedJoint(1, 1.6, 0.6))
     w = pc.speed_factor(event)[0]
-    assert_allclose(w[(event.time > 1.5) & (event.time < 2.0)], 0.5, atol=1e-6)
-    assert w[(event.time > 2.0) & (event.time < 2.6)].min() < 0.01
+    assert_allclose(w[(event.time > 1.3) & (event.time < 1.6)], 0.5, atol=1e-6)
+    assert w[(event.time > 1.6) & (event.time < 2.2)].min() < 0.01
     assert w[-1] == pytest.approx(0.5, abs=1e-3)
 
 

@@ -72,7 +72,7 @@ def law(arm, friction="observed", **options):
     return ExtendedMotionPlan(arm, winding(arm.n), 200.0, 30.0, 5.0, friction=friction, **options)
 
 
-def moved(controller, duration=0.6, *, starts=1, **settings):
+def moved(controller, duration=0.5, *, starts=1, **settings):
     """A run from beside the path."""
     start = controller.task.q_d(np.zeros(starts)) + 0.05 * (1 + np.arange(starts))[:, None]
     return simulate(controller, start, duration=duration, until="duration", progress=False, **settings)
@@ -111,7 +111,7 @@ def test_a_harmonic_torque_has_amplitude_and_phase_of_both_low_passes(arm):
     """d = A sin ωt is compensated as the imaginary part of A (K/(K + iω))² e^{iωt}, once the start has died out."""
     A, w, errors = np.linspace(1.0, 2.0, arm.n), 2 * np.pi * 8.0, []
     for h in PERIODS:
-        run = moved(law(arm), 0.8, loop=SampledLoop(period=h), disturbance=Harmonic(A, 8.0))
+        run = moved(law(arm), 0.5, loop=SampledLoop(period=h), disturbance=Harmonic(A, 8.0))
         late = run.time > 0.3
         exact = A * ((RATE / (RATE + 1j * w)) ** 2 * np.exp(1j * w * run.time)).imag[:, None]
         errors.append(np.abs(compensated(run, arm) - exact)[late].max())
@@ -160,7 +160,7 @@ def test_the_residual_error_of_the_papers_experiments_all_but_vanishes(kind):
     noise = {}
     for friction in ("viscous", "observed"):
         controller = kind(CICESE, paper_task(), *gains, friction=friction)
-        run = simulate(controller, np.deg2rad(START_DEG), duration=7.0, loop=paper_loop(), progress=False)
+        run = simulate(controller, np.deg2rad(START_DEG), duration=5.0, loop=paper_loop(), progress=False)
         noise[friction], late = metrics(run)["tau_noise"][0], steady_state(run)
     assert np.rad2deg(peak(late.norm("e_p"))[0]) <= 0.3
     assert np.rad2deg(peak(late.norm("e_v"))[0]) <= 8.0
@@ -174,7 +174,7 @@ def test_every_law_carries_a_load_that_it_does_not_know(kind):
     for friction in ("none", "observed"):
         controller = kind(smooth, Circle(0.8, 1.0), **LAWS[kind], friction=friction)
         heavy = smooth.with_payload(2.0, "tool")
-        run = simulate(controller, [0.8, 0.0], duration=6.5, plant=heavy, progress=False)
+        run = simulate(controller, [0.8, 0.0], duration=6.5, loop=SampledLoop(5e-3), plant=heavy, progress=False)
         errors[friction] = peak(steady_state(run).norm("e_p"))[0]
     assert errors["observed"] < 0.1 * errors["none"]
 
@@ -183,15 +183,15 @@ STICKY = CICESE.with_friction(Stribeck([7.17, 1.734], [10.7, 2.6], [0.1, 0.1]) +
 
 
 @pytest.mark.parametrize("kind", [ExtendedMotionPlan, Projection, ComputedTorque])
-@pytest.mark.parametrize("loop", [SampledLoop(), paper_loop()], ids=["exact", "encoders"])
+@pytest.mark.parametrize("loop", [SampledLoop(5e-3), paper_loop()], ids=["exact", "encoders"])
 def test_an_arm_that_has_arrived_rests_and_its_torque_does_not_grow(kind, loop):
     """Static friction is half more than Coulomb's; at the end of its path the arm rests, with the same torque."""
     gains = {name: 800.0 if "p" in name else 60.0 for name in LAWS[kind]}
-    controller = kind(CICESE, Line([0.3, 0.2], [1.0, 0.6], 0.5), **gains, friction="observed")
+    controller = kind(CICESE, Line([0.3, 0.2], [1.0, 0.6], 1.0), **gains, friction="observed")
     run = simulate(
-        controller, [0.3, 0.2], duration=6.0, plant=STICKY, loop=loop, until="duration", progress=False
+        controller, [0.3, 0.2], duration=4.2, plant=STICKY, loop=loop, until="duration", progress=False
     ).rollout(0)
-    late = run.time > 4.0
+    late = run.time > 3.2
     assert np.ptp(run.array("q")[0, late], axis=0).max() < 1e-6
     assert np.ptp(run.array("tau")[0, late], axis=0).max() < 1e-6
     assert np.rad2deg(np.abs(run.array("e_p")[0, -1]).max()) < 0.01
@@ -204,15 +204,15 @@ def test_without_the_rule_for_rest_the_torque_would_grow(monkeypatch):
     observe = controller.observer.observe
     monkeypatch.setattr(controller.observer, "observe", lambda t, q, qd, memory, kept: observe(t, q, qd, memory))
     run = simulate(
-        controller, [0.3, 0.2], duration=8.0, plant=STICKY, loop=paper_loop(), until="duration", progress=False
+        controller, [0.3, 0.2], duration=5.0, plant=STICKY, loop=paper_loop(), until="duration", progress=False
     )
-    assert np.ptp(run.array("tau")[0, run.time > 4.0], axis=0).max() > 0.1
+    assert np.ptp(run.array("tau")[0, run.time > 3.0], axis=0).max() > 0.1
 
 
 def test_a_slow_path_is_followed_without_stick_and_slip():
     """At 0.05 rad/s friction holds for ever an arm whose law does not compensate it."""
     controller = ExtendedMotionPlan(CICESE, Circle(1.0, 0.05), 800.0, (45.0, 100.0), 20.0, friction="observed")
-    run = simulate(controller, [1.0, 0.0], duration=8.0, plant=STICKY, loop=paper_loop(), progress=False)
+    run = simulate(controller, [1.0, 0.0], duration=4.0, plant=STICKY, loop=paper_loop(), progress=False)
     late = steady_state(run)
     assert np.rad2deg(peak(late.norm("e_p"))[0]) < 0.01
     assert (late.array("qd") == 0).mean() < 0.02
@@ -294,17 +294,18 @@ q = [0.7, 1.2]
 """
 
 
-def test_a_file_a_saved_run_and_a_report_have_it(tmp_path):
-    (tmp_path / "one.toml").write_text("duration = 1.0\n" + FILE, encoding="utf-8")
+def test_a_file_a_saved_run_and_a_report_have_it(tmp_path, monkeypatch):
+    (tmp_path / "one.toml").write_text("duration = 0.4\n" + FILE, encoding="utf-8")
     run = run_experiment(tmp_path / "one.toml", tmp_path / "out", progress=False).run
     same = Projection(CICESE, Circle(1.0, 2.0), 800.0, [45.0, 100.0], friction="observed", observer_hz=25.0)
     loop = SampledLoop(encoders=True)
-    again = simulate(same, [0.7, 1.2], duration=1.0, loop=loop, progress=False)
+    again = simulate(same, [0.7, 1.2], duration=0.4, loop=loop, progress=False)
     assert_array_equal(again.array("q"), run.array("q"))
     again.save(tmp_path / "again.nc")
     saved = Run.load(tmp_path / "again.nc")
     assert saved.config["controller"]["friction"] == "observed"
     assert saved.config["controller"]["observer_hz"] == 25.0
+    monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure, kind: b"")
     page = report({"again": saved}, tmp_path / "report.html").read_text(encoding="utf-8")
     assert "observer_hz=25.0" in page
     assert "Torques beside those of motors, as the law compensates them" in page

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 import pathcontrol as pc
 
+ARM = pc.load_robot("cicese_2dof")
 LOOPS = {
     "exact": {},
     "encoders": {"encoders": True, "velocity": "difference"},
@@ -29,6 +32,13 @@ def contour(law, loop, duration=2.4, **settings):
     return np.rad2deg(pc.contour_error(run)[0]), run
 
 
+@cache
+def paced_circle(name, loop, speed):
+    """The contour error of a circle at a pace, for motors with their limits, and the run."""
+    law = pc.Paced(make_law(name, ARM, pc.Circle(1.0, speed)))
+    return contour(law, pc.SampledLoop(torque_limits=True, **LOOPS[loop]))
+
+
 def mean_rate(run):
     """The mean rate of s in the second half [1/s]."""
     s, half = run.array("s")[0], len(run.time) // 2
@@ -43,26 +53,27 @@ def late(error):
 @pytest.mark.parametrize("speed", [6.0, 9.0])
 @every_loop
 @every_law
-def test_from_a_start_at_rest_a_paced_law_leaves_its_path_no_farther(arm, name, loop, speed):
-    loop, law = pc.SampledLoop(torque_limits=True, **LOOPS[loop]), make_law(name, arm, pc.Circle(1.0, speed))
-    plain, paced = contour(law, loop)[0], contour(pc.Paced(law), loop)[0]
+def test_from_a_start_at_rest_a_paced_law_leaves_its_path_no_farther(name, loop, speed):
+    paced, _ = paced_circle(name, loop, speed)
+    law = make_law(name, ARM, pc.Circle(1.0, speed))
+    plain, _ = contour(law, pc.SampledLoop(torque_limits=True, **LOOPS[loop]))
     assert paced.max() < 1.002 * plain.max()
 
 
 @pytest.mark.parametrize("speed", [6.0, 9.0])
 @every_loop
 @every_law
-def test_the_pace_costs_no_more_than_the_friction_of_a_slower_lap(arm, name, loop, speed):
+def test_the_pace_costs_no_more_than_the_friction_of_a_slower_lap(name, loop, speed):
     """Motors without limits go the circle as the law asks: at the speed of the profile, and at that of the pace.
 
     A slower lap has a larger error, since dry friction that the law does not compensate has more time to displace the
     arm; the pace adds nothing to that.
     """
-    limited, free = (pc.SampledLoop(torque_limits=on, **LOOPS[loop]) for on in (True, False))
-    paced, run = contour(pc.Paced(make_law(name, arm, pc.Circle(1.0, speed))), limited)
-    fast, free_run = contour(make_law(name, arm, pc.Circle(1.0, speed)), free)
+    free = pc.SampledLoop(**LOOPS[loop])
+    paced, run = paced_circle(name, loop, speed)
+    fast, free_run = contour(make_law(name, ARM, pc.Circle(1.0, speed)), free)
     share = mean_rate(run) / mean_rate(free_run)
-    slow, _ = contour(make_law(name, arm, pc.Circle(1.0, share * speed)), free)
+    slow, _ = contour(make_law(name, ARM, pc.Circle(1.0, share * speed)), free)
     assert late(paced) < 1.005 * max(late(fast), late(slow))
 
 

@@ -87,7 +87,7 @@ def test_the_full_speed_is_the_law_itself(arm, engine):
         *path_laws(arm, pc.Circle(1.0, 2.0)),
         pc.ComputedTorque(arm, pc.Line([0.1, 0], [1.0, 1.2], 1.0), **GAINS),
     ):
-        plain, wrapped = run(law, duration=1.0, engine=engine), run(pc.SpeedOverride(law), duration=1.0, engine=engine)
+        plain, wrapped = run(law, duration=0.5, engine=engine), run(pc.SpeedOverride(law), duration=0.5, engine=engine)
         for name in ("q", "s", "sdot", "e_v"):
             np.testing.assert_allclose(wrapped.array(name), plain.array(name), rtol=0, atol=1e-9)
 
@@ -101,18 +101,18 @@ def test_a_step_of_a_free_override_is_its_closed_form(ideal_arm):
         np.testing.assert_allclose(pc.speed_factor(held)[0], (1 + t) * np.exp(-t), rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("a", [0.5, 2.0, 8.0, 400.0])
+@pytest.mark.parametrize("a", [2.0, 8.0, 400.0])
 def test_a_hold_is_a_ramp_within_its_bound_and_the_plan_its_integral(ideal_arm, a):
-    law = pc.SpeedOverride(pc.ComputedTorque(ideal_arm, pc.Circle(1.0, 2.0), 400.0, 40.0), [[0.5, 0.0]], a)
-    held = run(law, duration=1.5 + 1 / a, loop=pc.SampledLoop(1e-3))
-    after, w = held.time[500:] - 0.5, pc.speed_factor(held)[0, 500:]
+    law = pc.SpeedOverride(pc.ComputedTorque(ideal_arm, pc.Circle(1.0, 2.0), 400.0, 40.0), [[0.2, 0.0]], a)
+    held = run(law, duration=1.2 + 1 / a, loop=pc.SampledLoop(1e-3))
+    after, w = held.time[200:] - 0.2, pc.speed_factor(held)[0, 200:]
     rate = np.diff(w) / 1e-3
     assert (np.abs(rate) <= a * (1 + 1e-9)).all()
     assert (rate <= 1e-9).all()
     assert (np.abs(np.diff(rate)) <= a * 1e-3 / 0.02 * (1 + 1e-9) + 1e-9).all()
     assert w[after > 1 / a + 0.8].max() < 1e-6
     assert w[after < 1 / a].min() > 0
-    s = held.array("s")[0, 500:]
+    s = held.array("s")[0, 200:]
     middle = s[0] + np.concatenate([[0.0], np.cumsum(1e-3 * (w[1:] + w[:-1]))])
     np.testing.assert_allclose(s, middle, rtol=0, atol=1e-6 * 2.0 / 0.02)  # h²ϑ/T
     assert np.abs(held.array("e_p")[0, -1]).max() < 1e-6
@@ -125,7 +125,7 @@ def test_v_falls_as_the_theorem_says_while_an_operator_plays(ideal_arm, which):
         return 1.2 * np.cos(3.0 * t)
 
     law = pc.SpeedOverride(path_laws(ideal_arm, pc.Ellipse([1.0, 0.6], 1.5))[which], u, acceleration=3.0)
-    played = run(law, duration=1.5, loop=pc.ContinuousTime(output_period=2e-3))
+    played = run(law, duration=1.2, loop=pc.ContinuousTime(output_period=2e-3))
     V, Vdot = (part[0] for part in pc.lyapunov(law, played))
     change = cumulative_simpson(Vdot, dx=2e-3, initial=0)
     np.testing.assert_allclose(V, V[0] + change, rtol=0, atol=2e-4 * V[0])
@@ -137,9 +137,9 @@ def test_v_falls_as_the_theorem_says_while_an_operator_plays(ideal_arm, which):
 def test_holding_and_resuming_does_not_leave_the_path(arm, which):
     task = pc.Circle(1.0, 2.0)
     law = path_laws(arm, task)[which]
-    plain = run(law, duration=10.0)
-    held = run(pc.SpeedOverride(law, [[4.0, 0.0], [6.0, 1.0], [9.0, 0.0], [9.1, 1.0]]), duration=10.0)
-    late = plain.time > 3.0
+    plain = run(law, duration=6.0)
+    held = run(pc.SpeedOverride(law, [[2.5, 0.0], [3.7, 1.0], [5.2, 0.0], [5.3, 1.0]]), duration=6.0)
+    late = plain.time > 2.0
     without, within = (pc.contour_error(one)[0, late].max() for one in (plain, held))
     assert within < 1.02 * without  # at other moments a joint may stick a little longer
     jumps = [np.abs(np.diff(one.array("tau_demand")[0, late], axis=0)).max() for one in (plain, held)]
@@ -154,11 +154,11 @@ def test_a_held_plan_stays_whatever_pushes_the_arm(arm, which):
     heavy = arm.with_masses({arm.joint_names[1]: 1.5})
     push = pc.Push([6.0, 0.5], 2.0, 1e9)
     ends = []
-    for hold in (4.0, 8.0):
+    for hold in (2.0, 4.0):
         override = pc.SpeedOverride(law, [[1.0, 0.0], [1.0 + hold, 1.0]])
-        held = run(override, duration=3.0 + hold, plant=heavy, disturbance=push)
+        held = run(override, duration=2.5 + hold, plant=heavy, disturbance=push)
         s = held.array("s")[0]
-        during = (held.time > 3.0) & (held.time < 1.0 + hold)
+        during = (held.time > 2.5) & (held.time < 1.0 + hold)
         assert np.ptp(s[during]) < 1e-8
         ends.append(held.array("s")[0, -1] - s[during][-1])
         assert np.abs(pc.contour_error(held)[0, during]).max() < np.deg2rad(1.5)
@@ -168,10 +168,10 @@ def test_a_held_plan_stays_whatever_pushes_the_arm(arm, which):
 @pytest.mark.parametrize("which", [0, 1])
 def test_reversing_reaches_the_start_again_and_stops_there(arm, which):
     task = pc.Line([0.2, 0.1], [1.2, 1.4], 1.0)
-    law = pc.SpeedOverride(path_laws(arm, task)[which], [[0.8, -1.0], [4.0, 1.0]])
-    there = run(law, task.q_d(np.array(0.0)), duration=8.0, until="duration")
+    law = pc.SpeedOverride(path_laws(arm, task)[which], [[0.6, -1.0], [3.2, 1.0]])
+    there = run(law, task.q_d(np.array(0.0)), duration=6.6, until="duration")
     s, w = there.array("s")[0], pc.speed_factor(there)[0]
-    back = np.searchsorted(there.time, 4.0) - 1
+    back = np.searchsorted(there.time, 3.2) - 1
     np.testing.assert_allclose(there.array("q")[0, back], task.q_d(np.array(task.s0)), rtol=0, atol=0.03)
     assert s[back] == pytest.approx(task.s0, abs=1e-3)
     assert s.min() >= task.s0
@@ -183,26 +183,26 @@ def test_reversing_reaches_the_start_again_and_stops_there(arm, which):
 @pytest.mark.parametrize("which", [0, 1])
 def test_rows_of_overrides_are_runs_of_their_own(arm, which):
     law = path_laws(arm, pc.Circle(1.0, 2.0))[which]
-    together = run(pc.SpeedOverride(law, [0.5, 0.0, -1.0]), duration=1.0)
+    together = run(pc.SpeedOverride(law, [0.5, 0.0, -1.0]), duration=0.5)
     assert together.rollouts == 3
     for row, u in enumerate([0.5, 0.0, -1.0]):
-        alone = run(pc.SpeedOverride(law, u), duration=1.0)
+        alone = run(pc.SpeedOverride(law, u), duration=0.5)
         np.testing.assert_array_equal(together.array("q")[row], alone.array("q")[0])
-    function = run(pc.SpeedOverride(law, lambda t: np.array([0.5, 0.0, -1.0])), duration=1.0)
+    function = run(pc.SpeedOverride(law, lambda t: np.array([0.5, 0.0, -1.0])), duration=0.5)
     np.testing.assert_array_equal(function.array("q"), together.array("q"))
 
 
 def test_the_operators_buttons_in_a_control_tick(ideal_arm):
     arm = ideal_arm
     law = pc.SpeedOverride(path_laws(arm, pc.Circle(1.0, 2.0))[0])
-    tick, plant = pc.ControlTick(law, 2.5e-3), pc.Plant(arm, 2.5e-3)
+    tick, plant = pc.ControlTick(law, 5e-3), pc.Plant(arm, 5e-3)
     q, qd = law.task.q_d(np.zeros(1)), np.zeros((1, 2))
     tick.start(q[0], qd[0])
 
     def go(seconds):
         nonlocal q, qd
         first = tick.s
-        for _ in range(round(seconds / 2.5e-3)):
+        for _ in range(round(seconds / 5e-3)):
             q, qd = plant.advance(q, qd, tick(q[0], qd[0])[None])
         return tick.s - first
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ MIDDLE = {
 LAWS = ("ComputedTorque", "PDPlus", "SlotineLi", "ExtendedMotionPlan", "Projection")
 
 
+@cache
 def _arm(name):
     robot = pc.load_robot(name, lock=FINGERS if name == "panda" else None)
     friction = pc.Viscous(np.full(robot.n, 0.05)) + pc.Coulomb(np.full(robot.n, 0.1), np.full(robot.n, 0.08))
@@ -31,7 +33,7 @@ def _task(name, closed):
         ones = np.arange(len(middle))
         return pc.Lissajous(0.25 + 0.05 * (ones % 3), 1 + ones % 2, 0.6, phases=ones, center=middle)
     turns = 0.4 * np.sin(np.arange(len(middle)) + np.arange(5)[:, None])
-    return pc.WaypointPath(middle + turns, speed=0.6)
+    return pc.WaypointPath(middle + turns, speed=1.0)
 
 
 def _law(kind, robot, task, **options):
@@ -68,7 +70,7 @@ def test_every_law_moves_the_arm_as_the_reference_does(kind, name, closed):
     robot, task = _arm(name), _task(name, closed)
     start = task.q_d(np.array(task.s0)) + 0.02
     loop = SampledLoop() if closed and name == "cicese_2dof" else SampledLoop(period=0.01)
-    duration = 3.0 if closed else 5.0  # by which an open path has ended
+    duration = 1.5 if closed else 3.2  # by which an open path has ended
     runs = _pair(_law(kind, robot, task), start, duration=duration, until="duration", loop=loop)
     assert _apart(runs) < 1e-11
     assert _apart(runs, "s") < 1e-10
@@ -81,7 +83,7 @@ def test_encoders_differences_filter_delay_and_limits_are_those_of_the_reference
     loop = SampledLoop(
         encoders=True, velocity="difference", filter_hz=80.0, delay=3.3e-3, torque_limits=True, substeps=2
     )
-    runs = _pair(_law("ExtendedMotionPlan", robot, task), [0.9, 0.1], duration=2.0, loop=loop)
+    runs = _pair(_law("ExtendedMotionPlan", robot, task), [0.9, 0.1], duration=1.5, loop=loop)
     counts = 2 * np.pi / robot.actuation.encoder_counts
     measured = [np.round(run.array("q_measured") / counts) for run in runs]
     differs = np.argwhere((measured[0] != measured[1]).any(axis=(0, 2)))
@@ -133,7 +135,7 @@ def test_stribeck_friction_and_sums_are_those_of_the_reference():
         + pc.Stribeck([0.5, 0.1], [0.6, 0.3], [0.5, 0.4])
     )
     task = _task("cicese_2dof", True)
-    runs = _pair(_law("ExtendedMotionPlan", robot, task, friction="full"), [0.5, 0.3], duration=3.0)
+    runs = _pair(_law("ExtendedMotionPlan", robot, task, friction="full"), [0.5, 0.3], duration=1.5)
     assert _apart(runs) < 1e-10
 
 
@@ -150,7 +152,7 @@ def test_each_rollout_has_its_own_gains_task_plant_friction_and_limits():
         k=rng.uniform(0, 20, 11),
     )
     loop = SampledLoop(torque_limits=rng.uniform(40, 150, (11, 2)))
-    runs = _pair(law, [0.8, 0.1], duration=1.5, plant=plants, loop=loop)
+    runs = _pair(law, [0.8, 0.1], duration=0.8, plant=plants, loop=loop)
     assert _apart(runs) < 1e-10
     assert _apart(runs, "tau") < 1e-6
 
@@ -187,7 +189,7 @@ def test_the_branches_of_a_path_that_crosses_itself_are_left_as_the_reference_le
     push = pc.Push([60.0, 8.0], start=0.4, duration=0.15)
     for branch in ("follow", "nearest", "local"):
         law = pc.Projection(robot, eight, 800.0, [45.0, 100.0], branch=branch)
-        runs = _pair(law, eight.q_d(np.array(0.3)), duration=2.0, disturbance=push)
+        runs = _pair(law, eight.q_d(np.array(0.3)), duration=1.2, disturbance=push)
         assert _apart(runs) < 1e-9, branch
 
 
@@ -211,7 +213,7 @@ def test_strong_viscous_friction_is_condensed_as_in_the_reference_also_beside_we
     task = pc.Lissajous(np.full(7, 0.2), [1, 2, 1, 2, 1, 2, 1], 0.4, phases=np.arange(7), center=middle)
     weak = robot.with_friction(pc.Viscous(np.full(7, 1e-4)))
     law = pc.ComputedTorque(robot, task, 100.0, 20.0, friction="none")
-    runs = _pair(law, task.q_d(np.array(0.0)), duration=1.0, plant=[robot, weak, robot])
+    runs = _pair(law, task.q_d(np.array(0.0)), duration=0.6, plant=[robot, weak, robot])
     assert _apart(runs) < 1e-10
-    alone = simulate(law, task.q_d(np.array(0.0)), duration=1.0, plant=weak, engine="compiled", progress=False)
+    alone = simulate(law, task.q_d(np.array(0.0)), duration=0.6, plant=weak, engine="compiled", progress=False)
     assert np.array_equal(alone.array("q")[0], runs[1].array("q")[1])
