@@ -36,13 +36,13 @@ class Problem(NamedTuple):
     low: Array
     high: Array
 
-    def solve(self, weights: Sequence[tuple[float, Array, float]]) -> Array:
-        """Return v⁺ (n,) under impulses −(c J v⁺ − b) along rows J, given as (c, J, b)."""
+    def solve(self, weights: Sequence[tuple[float, Array, float]], guess: Array) -> Array:
+        """Return v⁺ (n,) under impulses −(c J v⁺ − b) along rows J, given as (c, J, b), from a ``guess`` of it (n,)."""
         M, p = self.M.copy(), self.p.copy()
         for c, row, b in weights:
             M += c * np.outer(row, row)
             p += b * row
-        return stick_slip(M[None], p[None], self.low[None], self.high[None])[0]
+        return stick_slip(M[None], p[None], self.low[None], self.high[None], guess[None])[0]
 
     def mobility(self, row: Array) -> float:
         """Return J M⁻¹ Jᵀ [1/kg]."""
@@ -163,7 +163,7 @@ def _iterate(
         for touch, weight, on in zip(touches, c, pushed, strict=True):
             if on and weight:
                 weights += [(weight, row, 0.0) for row in touch.along]
-        last, v = v, problem.solve(weights)
+        last, v = v, problem.solve(weights, v)
         now = [touch.push(v) > 0 for touch in touches]
         if now == pushed and (not slips or np.abs(v - last).max() <= _CLOSE * np.abs(v).max()):
             break

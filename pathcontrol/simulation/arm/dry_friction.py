@@ -87,20 +87,23 @@ class _Problem(NamedTuple):
 
     def velocities(self, states: _States) -> Array:
         """Solve M v = p − λ for the joints that slip; the others rest, (N, n)."""
-        slips = states != 0
+        slips, momentum = states != 0, self.p - np.where(states > 0, self.high, self.low)
+        if slips.all():  # most often
+            return _solve(self.M, momentum)
         M = np.where(slips[:, :, None] & slips[:, None, :], self.M, np.eye(states.shape[-1]))
-        momentum = np.where(slips, self.p - np.where(states > 0, self.high, self.low), 0.0)
-        return np.where(slips, _solve(M, momentum), 0.0)
+        return np.where(slips, _solve(M, np.where(slips, momentum, 0.0)), 0.0)
 
     def required_states(self, v: Array, states: _States) -> _States:
         """Return the states that the velocities, and the impulses where joints stick, require, (N, n)."""
+        wanted, sticks = np.where((v * states < 0) & ~self.free, 0, states), states == 0
+        if not sticks.any():
+            return wanted
         # p − Mv may be a small difference of large terms: allow for their rounding, and not for more
         terms = _multiply(np.abs(self.M), np.abs(v)).max(-1)
         margin = (_ROUNDING * np.abs(self.p).max(-1) + 8 * v.shape[-1] * _EPSILON * terms)[:, None]
         needed = self.p - _multiply(self.M, v)
         released = np.where(needed > self.high + margin, 1, np.where(needed < self.low - margin, -1, 0))
-        wanted = np.where(states == 0, released, np.where(v * states < 0, 0, states))
-        return np.where(self.free, states, wanted)
+        return np.where(sticks, released, wanted)
 
 
 def _keep_last(wrong: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -115,8 +118,8 @@ def _solve(M: Array, b: Array) -> Array:
         return np.linalg.solve(M, b[..., None])[..., 0]
     except np.linalg.LinAlgError:  # it ends the other rows too
         with np.errstate(invalid="ignore"):
-            M[np.linalg.slogdet(M).sign == 0] = np.nan
-        return np.linalg.solve(M, b[..., None])[..., 0]
+            singular = np.linalg.slogdet(M).sign == 0
+        return np.linalg.solve(np.where(singular[:, None, None], np.nan, M), b[..., None])[..., 0]
 
 
 def _multiply(M: Array, x: Array) -> Array:
