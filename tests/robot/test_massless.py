@@ -224,7 +224,7 @@ def test_a_negative_moment_that_counts_stays_an_error():
 @given(st.integers(0, 2**32 - 1))
 def test_dynamics_of_the_checks_are_those_of_pinocchio(seed):
     from pathcontrol.robot.urdf.model_values import moving_bodies, read_arm
-    from pathcontrol.robot.urdf.posture_dynamics import dynamics, postures
+    from pathcontrol.robot.urdf.posture_dynamics import gravity_torque, mass_matrix, postures
 
     rng = np.random.default_rng(seed)
     text = arm("", *(solid(rng.uniform(0.1, 5), *rng.uniform(0.01, 0.1, 3)) for _ in range(4)))
@@ -235,7 +235,7 @@ def test_dynamics_of_the_checks_are_those_of_pinocchio(seed):
     text = text.replace("</robot>", f'<link name="hand">{solid(1, 0.1, 0.1, 0.1)}</link>{flange}</robot>')
     values, robot = read_arm(parse_urdf(text)), pc.load_robot(text)
     q = postures(values, 10)
-    M, g = dynamics(values, q)
+    M, g = mass_matrix(values, q), gravity_torque(values, q)
     order = [[body.joint.name for body in moving_bodies(values)].index(name) for name in robot.joint_names]
     np.testing.assert_allclose(M[:, order][:, :, order], robot.mass_matrix(q[:, order]), rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(g[:, order], robot.gravity(q[:, order]), rtol=1e-9, atol=1e-9)

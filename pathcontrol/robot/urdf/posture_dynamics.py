@@ -27,6 +27,16 @@ class _Placed(NamedTuple):
     moved_by: tuple[tuple[int, np.ndarray, np.ndarray], ...]
 
 
+class _Link(NamedTuple):
+    """A link at N postures: the joints that move it, its rotation (N, 3, 3) and its Jacobians (N, 3, k)."""
+
+    inertial: Inertial
+    joints: list[int]
+    rotation: np.ndarray
+    J_v: np.ndarray
+    J_w: np.ndarray
+
+
 def postures(arm: Arm, count: int = POSTURES) -> np.ndarray:
     """Return postures within the limits of the free joints, (count, n): the zero posture first, then random ones."""
     bodies = moving_bodies(arm)
@@ -36,36 +46,48 @@ def postures(arm: Arm, count: int = POSTURES) -> np.ndarray:
     return drawn
 
 
-def dynamics(arm: Arm, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return mass matrix [kg m^2], (N, n, n), and gravity torque [N m], (N, n), at postures q (N, n).
+def mass_matrix(arm: Arm, q: np.ndarray) -> np.ndarray:
+    """Return the mass matrix [kg m^2], (N, n, n), at postures q (N, n), joints in the order of :func:`moving_bodies`.
 
-    The joints are in the order of :func:`moving_bodies`. With J_v and J_w the Jacobians of the centre of mass of a
-    link and of its rotation, M is the sum of m J_v' J_v + J_w' R I R' J_w and g that of m J_v' (0, 0, 9.81).
+    With J_v and J_w the Jacobians of the centre of mass of a link and of its rotation, it is the sum of
+    m J_v' J_v + J_w' R I R' J_w.
     """
     count, n = q.shape
-    M, g = np.zeros((count, n, n)), np.zeros((count, n))
+    M = np.zeros((count, n, n))
+    for link in _place_links(arm, q):
+        J_v, joints, turned = link.J_v, link.joints, link.rotation.swapaxes(1, 2) @ link.J_w
+        of_link = link.inertial.mass * J_v.swapaxes(1, 2) @ J_v + turned.swapaxes(1, 2) @ link.inertial.inertia @ turned
+        M[np.ix_(range(count), joints, joints)] += of_link
+    return M
+
+
+def gravity_torque(arm: Arm, q: np.ndarray) -> np.ndarray:
+    """Return the gravity torque [N m], (N, n), at postures q (N, n): the sum of m J_v' (0, 0, 9.81)."""
+    g = np.zeros(q.shape)
+    for link in _place_links(arm, q):
+        g[:, link.joints] += link.inertial.mass * GRAVITY * link.J_v[:, 2]
+    return g
+
+
+def _place_links(arm: Arm, q: np.ndarray) -> Iterator[_Link]:
+    """Yield the links that have a mass, at postures q (N, n)."""
     for placed in _place_bodies(arm, q):
         for link, pose in placed.body.poses.items():
             if (inertial := arm.links[link].inertial) is not None:
-                _add_link(M, g, inertial, placed, placed.pose @ pose)
-    return M, g
+                own = pose if inertial.origin is None else pose @ inertial.origin
+                yield _place_link(inertial, placed, placed.pose @ own)
 
 
-def _add_link(M: np.ndarray, g: np.ndarray, inertial: Inertial, placed: _Placed, link: np.ndarray) -> None:
-    """Add the contribution of one link to M and g, in the rows and columns of the joints that move it."""
-    centre = link if inertial.origin is None else link @ inertial.origin
-    count, joints = len(g), [i for i, _, _ in placed.moved_by]
-    J_v, J_w = np.zeros((count, 3, len(joints))), np.zeros((count, 3, len(joints)))
+def _place_link(inertial: Inertial, placed: _Placed, centre: np.ndarray) -> _Link:
+    """Return a link with its Jacobians; ``centre`` is the pose of its centre of mass, (N, 4, 4)."""
+    J_v, J_w = np.zeros((2, len(centre), 3, len(placed.moved_by)))
     for k, (_, origin, axis) in enumerate(placed.moved_by):
         if origin.size:
             J_w[:, :, k] = axis
             J_v[:, :, k] = np.cross(axis, centre[:, :3, 3] - origin)
         else:
             J_v[:, :, k] = axis
-    turned = centre[:, :3, :3].swapaxes(1, 2) @ J_w
-    of_link = inertial.mass * J_v.swapaxes(1, 2) @ J_v + turned.swapaxes(1, 2) @ inertial.inertia @ turned
-    M[np.ix_(range(count), joints, joints)] += of_link
-    g[:, joints] += inertial.mass * GRAVITY * J_v[:, 2]
+    return _Link(inertial, [i for i, _, _ in placed.moved_by], centre[:, :3, :3], J_v, J_w)
 
 
 def _place_bodies(arm: Arm, q: np.ndarray) -> Iterator[_Placed]:

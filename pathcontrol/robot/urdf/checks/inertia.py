@@ -10,7 +10,7 @@ import numpy as np
 from pathcontrol.robot.urdf.checks.finding import Finding, Level, place
 from pathcontrol.robot.urdf.links import Link
 from pathcontrol.robot.urdf.model_values import Arm, axis_inertia, has_direction, moving_bodies
-from pathcontrol.robot.urdf.posture_dynamics import dynamics, postures
+from pathcontrol.robot.urdf.posture_dynamics import mass_matrix, postures
 
 INERTIA_TOLERANCE = 1e-6  # of the largest principal moment: what rounding in a file may cost
 NO_INERTIA = 1e-15  # kg m^2, far below any finger joint
@@ -100,7 +100,7 @@ def is_massless(arm: Arm) -> bool:
 
 def _is_positive_definite(arm: Arm) -> bool:
     """Return whether the mass matrix is positive definite in all sampled postures."""
-    M, _ = dynamics(arm, postures(arm))
+    M = mass_matrix(arm, postures(arm))
     return bool(np.linalg.eigvalsh(M).min() > NO_INERTIA)
 
 

@@ -11,7 +11,7 @@ from pathcontrol.robot.urdf.elements import MOVABLE_TYPES
 from pathcontrol.robot.urdf.links import Joint, Limit
 from pathcontrol.robot.urdf.model_values import Arm, has_direction, moving_bodies
 from pathcontrol.robot.urdf.numbers import ABSURD
-from pathcontrol.robot.urdf.posture_dynamics import dynamics, postures
+from pathcontrol.robot.urdf.posture_dynamics import gravity_torque, postures
 
 UNIT_TOLERANCE = 1e-3
 
@@ -87,7 +87,7 @@ def check_efforts(arm: Arm) -> Iterator[Finding]:
     if not bodies or not all(has_direction(body.joint) for body in bodies):
         return
     q = postures(arm)
-    for body, torque in zip(bodies, np.abs(dynamics(arm, q)[1]).T, strict=True):
+    for body, torque in zip(bodies, np.abs(gravity_torque(arm, q)).T, strict=True):
         effort = np.inf if body.joint.limit is None else body.joint.limit.effort
         if 0 < effort < torque.max():
             unit = "N" if body.joint.type == "prismatic" else "N m"
