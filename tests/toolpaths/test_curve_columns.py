@@ -15,7 +15,7 @@ from pathcontrol.toolpaths.smoothing.corners import corners, end_tangent, start_
 from pathcontrol.toolpaths.svg.reader import read_svg
 
 
-def odd_and_random(degree: int, count: int = 60) -> np.ndarray:
+def odd_and_random(degree: int, count: int = 25) -> np.ndarray:
     """Control points (k, degree + 1, 3): at random, on a grid, flat, with a cusp, with handles of no length."""
     rng = np.random.default_rng(degree)
     points = rng.uniform(-0.1, 0.1, (count, degree + 1, 3))

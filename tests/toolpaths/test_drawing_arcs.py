@@ -6,7 +6,7 @@ import ezdxf
 import numpy as np
 import pytest
 from drawings import dxf_reader
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol.errors import ToolpathError
@@ -39,6 +39,7 @@ def test_an_arc_within_1e_4_of_a_whole_turn_is_one(read, start, end):
     assert contour.length == pytest.approx(TURN * 0.01, rel=1e-12)
 
 
+@settings(max_examples=10)
 @given(st.floats(-TURN, 2 * TURN), st.floats(-1e-4, 1e-4), st.integers(1, 2))
 def test_an_ellipse_within_1e_4_of_a_whole_turn_is_one(read, start, off, turns):
     (contour,) = read(lambda m: m.add_ellipse((1, 2), (0.02, 0.01), 0.4, start, start + turns * TURN + 0.99 * off))
@@ -51,6 +52,7 @@ def test_ellipses_as_programs_write_them(read, end):
     assert whole(contour)
 
 
+@settings(max_examples=10)
 @given(st.floats(-400, 400), st.floats(-4.9, -2).map(lambda e: 10**e))
 def test_short_arcs_and_arcs_with_a_gap_stay_what_they_are(read, start, sweep):
     """Not near a whole turn by more than 1e-4 rad, or short without having been reduced by a turn."""

@@ -41,6 +41,7 @@ def test_lines_and_circles(read):
     assert np.allclose(samples(circle)[0], [1, 2, 3] + 0.5 * flat(np.exp(1j * TURN * U)), atol=1e-15)
 
 
+@settings(max_examples=10)
 @given(st.integers(0, 10**6))
 def test_arcs_run_counterclockwise(read, seed):
     rng = np.random.default_rng(seed)
@@ -51,6 +52,7 @@ def test_arcs_run_counterclockwise(read, seed):
     assert there.length + back.length == pytest.approx(TURN * radius)
 
 
+@settings(max_examples=10)
 @given(st.integers(0, 10**6))
 def test_ellipses(read, seed):
     rng = np.random.default_rng(seed)
@@ -75,6 +77,7 @@ def bulge_arc(a: complex, b: complex, bulge: float) -> np.ndarray:
     return a + share * (b - a) * np.exp(1j * 2 * quarter * (U - 1))
 
 
+@settings(max_examples=10)
 @given(st.integers(0, 10**6), st.booleans(), st.sampled_from(["LWPOLYLINE", "POLYLINE"]))
 def test_bulges_are_arcs(read, seed, closed, kind):
     rng = np.random.default_rng(seed)
@@ -121,6 +124,7 @@ def test_polylines_in_space_and_fitted_ones(read):
 # --- coordinate systems, blocks -------------------------------------------------------------------------------------
 
 
+@settings(max_examples=10)
 @given(st.integers(0, 10**6))
 def test_object_coordinates(read, seed):
     """Entities drawn in a plane of any normal, against ezdxf's own conversion."""
@@ -154,7 +158,7 @@ def random_insert(rng: np.random.Generator) -> dict:
     return {"rotation": rng.uniform(0, 360), "extrusion": (0, 0, rng.choice([-1, 1])), **scale}
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(st.integers(0, 10**6), st.integers(1, 3))
 def test_nested_blocks_are_the_product_of_their_matrices(read, seed, depth):
     rng = np.random.default_rng(seed)

@@ -101,7 +101,7 @@ def test_points_text_and_dimensions_are_skipped_when_asked(read):
         read(draw, skip=[1])
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(st.floats(1.5e-6, 4.5e-5))
 def test_a_gap_that_stays_open_is_told_with_the_option_that_closes_it(read, gap):
     def draw(m):

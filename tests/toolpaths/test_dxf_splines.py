@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from drawings import U, dxf_reader, samples
 from ezdxf.math import BSpline
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol.toolpaths.segments.bezier import Bezier
@@ -20,6 +20,7 @@ def read(tmp_path_factory):
     return dxf_reader(tmp_path_factory.mktemp("dxf"))
 
 
+@settings(max_examples=10)
 @given(st.integers(0, 10**6), st.integers(2, 5), st.booleans())
 def test_splines_are_exact_bezier_curves(read, seed, degree, rational):
     rng = np.random.default_rng(seed)
@@ -79,6 +80,7 @@ def test_unclamped_closed_splines_begin_at_their_first_inner_knot(read):
     assert np.allclose(radii, (4 + 2 * np.cos(TURN / 8)) / 6, atol=1e-15)
 
 
+@settings(max_examples=10)
 @given(st.integers(0, 10**6), st.integers(3, 9))
 def test_fit_points_are_passed_as_cad_programs_do(read, seed, count):
     points = np.random.default_rng(seed).normal(size=(count, 3))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pathcontrol import InputError
@@ -112,6 +112,7 @@ def test_inches_are_25_4_millimetres(program):
     same(toolpath, read(text(program)))
 
 
+@settings(max_examples=10)
 @given(programs(), st.data())
 def test_spelling_does_not_matter(program, data):
     """Order of words, case, blanks, leading zeros, comments, line numbers, and saying again what is in force."""

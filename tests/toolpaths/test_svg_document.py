@@ -226,14 +226,14 @@ BOMB = "".join(f'<!ENTITY l{i + 1} "' + f"&l{i};" * 10 + '">' for i in range(9))
         ("", '<path d="M0 0' + " " * 5_000_000 + 'x"/>', "after M"),
         ("", '<path d="M' + " " * 5_000_000 + 'x"/>', "after M"),
         ("", '<path d="M0 0A' + " " * 5_000_000 + 'x"/>', "after A"),
-        ("", '<path d="M0 0A' + "1 1 0 0 0 1 1 " * 500_000 + 'x"/>', "after A"),
+        ("", '<path d="M0 0A' + "1 1 0 0 0 1 1 " * 100_000 + 'x"/>', "after A"),
         ("", f'<path transform="{"a" * 5_000_000}" d="M0 0H1"/>', "transform has"),
         ("", f'<path transform="{" " * 5_000_000}(" d="M0 0H1"/>', "transform has"),
         ("", f'<rect width="1{" " * 5_000_000}!" height="1"/>', "expected a length"),
         ("<!DOCTYPE " * 500_000, LINE, "well-formed"),
         ("", "<style>" + "a," * 500_000 + "a{" + "x:1;" * 500_000 + "}</style>", "more than 500000"),
         ("", "<style>" + "/*" * 1_000_000 + "</style>", "more than 500000"),
-        ("", "<style>" + "@a{" * 150_000 + "</style>", "nested too deep"),
+        ("", "<style>" + "@a{" * 30_000 + "</style>", "nested too deep"),
     ],
 )
 def test_hostile_files_end_in_an_error(read, prolog, body, words):

@@ -110,7 +110,7 @@ def nearly(draw) -> str:
 
 
 @given(st.one_of(ROUGHLY, ROUGHLY.map(lambda text: "M1 2" + text), nearly()))
-@settings(max_examples=400)
+@settings(max_examples=150)
 def test_path_data_are_taken_exactly_if_they_follow_the_grammar(data):
     assert accepted(data) == Reader(data).valid(), data
 

@@ -54,7 +54,7 @@ def test_a_segment_is_what_it_says(kind, seed):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=10)
+@settings(max_examples=4)
 @given(seed=SEEDS)
 def test_distances_are_those_of_brute_force_and_moves_keep_them(kind, seed):
     one, rng = segment(kind, seed), np.random.default_rng(seed + 1)
@@ -177,7 +177,7 @@ def contour(seed: int, size: float, closed: bool) -> Contour:
     return builder.contour()
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(SEEDS, st.sampled_from([0.01, 0.2, 5.0]), st.sampled_from([1e-5, 1e-4, 1e-3]), st.booleans(), st.booleans())
 def test_smooth_curves_keep_the_tolerance_on_both_sides(seed, size, tolerance, closed, stop):
     given_contour = contour(seed, size, closed)

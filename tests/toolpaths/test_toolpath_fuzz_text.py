@@ -48,7 +48,7 @@ def test_the_seeds_are_valid(reader):
 
 
 @pytest.mark.parametrize("reader", READERS)
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(data=st.binary(max_size=200) | st.text(max_size=100).map(lambda text: text.encode("utf-8", "surrogatepass")))
 def test_any_bytes(reader, data):
     check(reader, data)
@@ -75,7 +75,7 @@ NUMBERS = [
 
 
 @pytest.mark.parametrize("reader", READERS)
-@settings(max_examples=200)
+@settings(max_examples=70)
 @given(data=st.data())
 def test_mutations_of_valid_files(reader, data):
     """Pieces cut out, doubled, moved and replaced, in bytes and in words."""
@@ -101,7 +101,7 @@ WORDS = (
 )
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(st.lists(st.lists(WORDS, min_size=1, max_size=5).map(" ".join), max_size=12))
 @example(["G2 X1 I.0000001"])
 @example(["G2 X.000001 R9999", "G3 X0 R-9999"])
@@ -109,7 +109,7 @@ def test_programs_of_random_words(blocks):
     check(read_gcode, "\n".join(["G21 G90 F100 G0 X0 Y0 Z0", *blocks]).encode())
 
 
-@settings(max_examples=200)
+@settings(max_examples=80)
 @given(
     st.lists(st.lists(st.sampled_from([*NUMBERS, "x", "y", "z", "contour", "i", "#"]), max_size=7), max_size=6),
     st.sampled_from([" ", ",", ";", "\t"]),

@@ -124,7 +124,7 @@ def test_the_distance_from_the_axis_of_a_circle_and_of_a_helix():
     assert np.allclose(helix.distance(height[:, None] * Z), 1.0, atol=1e-9)
 
 
-@settings(max_examples=100)
+@settings(max_examples=25)
 @given(st.sampled_from(KINDS), SEEDS, floats(-6.0, 2.0))
 def test_distances_are_those_of_a_dense_polygon(kind, seed, exponent):
     one, rng = any_segment(kind, seed), np.random.default_rng(seed)
@@ -190,6 +190,7 @@ def test_boxes_name_all_that_is_nearer_than_the_bound(seed, count, points):
     assert named == {(int(r), int(b)) for r, b in np.argwhere(away < bound[:, None])}
 
 
+@settings(max_examples=10)
 @given(SEEDS, floats(-4.0, 1.0))
 def test_a_contour_is_as_near_as_the_nearest_of_its_segments(seed, exponent):
     rng = np.random.default_rng(seed)
@@ -239,6 +240,7 @@ def test_a_contour_reversed_and_placed_is_that_of_its_segments(seed):
     assert np.allclose(whole.placed(a).start, a[:3, :3] @ whole.start + a[:3, 3])
 
 
+@settings(max_examples=10)
 @given(st.sampled_from(KINDS), SEEDS, floats(-1.0, 2.0))
 def test_bounds_hold_all_points_and_no_more(kind, seed, exponent):
     one = any_segment(kind, seed)
