@@ -34,7 +34,7 @@ def circle_past(distance: float, seed: int) -> ToolCurve:
 
 
 @pytest.mark.parametrize("closed", [None, False])
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(degrees=st.floats(1.0, 5.0), seed=seeds)
 def test_the_bundled_arm_keeps_its_elbow_on_one_side(closed, degrees, seed):
     """The elbow angle is the closed form's all along, and of one sign."""
@@ -70,7 +70,7 @@ def test_a_line_through_the_shoulder_is_refused_as_singular():
 
 
 @pytest.mark.parametrize("held", ["fixed", "normal", "free"])
-@pytest.mark.parametrize(("degrees", "seed"), [(1.0, 0), (-2.0, 1), (3.5, 2), (-5.0, 3)])
+@pytest.mark.parametrize(("degrees", "seed"), [(1.0, 0), (-5.0, 3)])
 def test_a_ur5_keeps_its_elbow_on_one_side(held, degrees, seed):
     """A circle in the plane of the arm touches from within the sphere that the wrist reaches with this elbow."""
     pytest.importorskip("example_robot_data")

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import ellipe
@@ -96,6 +96,7 @@ def test_the_length_of_a_spline_is_that_of_its_pieces(seed, closed):
     assert np.allclose(path.arc_length(path.knots[:-1], path.knots[1:]), pieces, rtol=1e-10)
 
 
+@settings(max_examples=10)
 @given(tasks(), floats(-5, 5), floats(-5, 5), floats(-5, 5))
 def test_lengths_add_up_and_count_laps(task, a, b, c):
     whole = task.arc_length()
@@ -112,6 +113,7 @@ def test_length_and_curvature_do_not_know_the_parameter(task, amount):
     assert np.allclose(other.curvature(u), task.curvature(s), rtol=1e-6, atol=1e-7)
 
 
+@settings(max_examples=10)
 @given(tasks(), vectors(2, 2.0), st.one_of(floats(0.2, 3), floats(-3, -0.2)))
 def test_length_and_curvature_under_transforms(task, offset, factor):
     s, length = np.linspace(0, 6, 9), task.arc_length()
@@ -166,6 +168,7 @@ def test_ends_broadcast(shape):
     assert Line([0, 0], [1, 0], 1.0).arc_length(0.5, np.full(shape, 0.5)).shape == shape
 
 
+@settings(max_examples=10)
 @given(wobbles())
 def test_computed_derivatives_are_good_enough(task):
     """Their noise of 1e-12 must not be mistaken for detail."""
@@ -176,6 +179,7 @@ def test_computed_derivatives_are_good_enough(task):
 # --- the length as parameter --------------------------------------------------------------------------------------
 
 
+@settings(max_examples=10)
 @given(st.one_of(tasks(), st.integers(0, 99).map(lambda seed: spline(seed))))
 def test_by_arc_length_it_is_the_same_motion_at_unit_slope(task):
     path = task.by_arc_length()

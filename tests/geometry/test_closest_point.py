@@ -71,6 +71,7 @@ def test_warm_start_falls_back_to_the_global_minimum_after_a_jump():
     assert task.sigma_bar(q, near=1.0) == pytest.approx(4.0, abs=1e-9)
 
 
+@settings(max_examples=10)
 @given(wobbles())
 def test_many_are_as_one(task):
     rng = np.random.default_rng(0)
@@ -200,7 +201,7 @@ class Counting(WaypointPath):
         return super().q_d(s)
 
 
-@settings(max_examples=30)
+@settings(max_examples=12)
 @given(st.integers(0, 9999), st.integers(2, 4), st.integers(4, 40), st.booleans())
 def test_the_global_minimum_of_random_splines(seed, n, count, closed):
     rng = np.random.default_rng(seed)
@@ -269,7 +270,7 @@ def test_once_built_the_global_search_asks_little():
         assert path.asked < 200
 
 
-@settings(max_examples=30)
+@settings(max_examples=12)
 @given(st.integers(0, 9999), st.integers(2, 4), st.integers(6, 20), st.booleans())
 def test_the_local_search_finds_the_first_minimum_downhill(seed, n, count, closed):
     rng = np.random.default_rng(seed)

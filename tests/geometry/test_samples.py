@@ -84,7 +84,7 @@ def test_noise_is_smoothed_by_a_tolerance_above_it(closed):
 
 
 @given(st.integers(0, 99), st.booleans(), st.sampled_from(["normal", "cauchy", "outlier", "step"]))
-@settings(max_examples=30)
+@settings(max_examples=12)
 def test_no_noise_makes_it_explode(seed, closed, kind):
     clean, s = smooth(500, closed, seed)
     rng = np.random.default_rng(seed)

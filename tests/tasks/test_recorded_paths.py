@@ -134,7 +134,7 @@ def test_a_library_curve_whose_domain_was_changed_is_kept_as_it_is():
 
 
 @given(tasks())
-@settings(max_examples=25)
+@settings(max_examples=10)
 def test_random_tasks_are_kept_with_their_projection(task):
     other = again(task)
     check_task(other, 2)

@@ -42,7 +42,7 @@ def meaning(text, at, a):
     return eval(text, {"__builtins__": {}}, NUMPY | {"s": at, "a": a}) + 0 * at
 
 
-@settings(max_examples=25)  # each is differentiated twice and compiled
+@settings(max_examples=10)  # each is differentiated twice and compiled
 @given(TEXTS, TEXTS, floats(-2, 2))
 def test_texts_mean_what_they_say_and_derivatives_are_exact(first, second, a):
     path = SymbolicPath([first, second, "s"], 1.0, s0=-2, s_end=2, parameters={"a": a})
@@ -58,7 +58,7 @@ def test_texts_mean_what_they_say_and_derivatives_are_exact(first, second, a):
     assert np.allclose(path.ddq_d(S), difference, rtol=1e-5, atol=1e-5 * (1 + np.abs(difference).max()))
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(TEXTS, floats(0.5, 2))
 def test_a_profile_has_its_exact_derivative_too(text, a):
     path = SymbolicPath(["s", "cos(s)"], theta=f"exp(sin({text}))", s0=-2, s_end=2, parameters={"a": a})

@@ -274,7 +274,7 @@ def test_each_different_task_is_asked_once_for_all_rollouts_that_have_it():
     assert [(task, rows.tolist()) for task, rows in batch.groups()] == [(one, [0, 2, 3]), (other, [1])]
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(st.lists(random_tasks(), min_size=2, max_size=5), st.integers(0, 9999))
 def test_a_batch_has_the_values_of_its_tasks(tasks, seed):
     rng, batch = np.random.default_rng(seed), TaskBatch(tasks)

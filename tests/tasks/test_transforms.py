@@ -69,7 +69,7 @@ def inside(task, count=31):
 
 
 @given(EVERY, HOW, HOW)
-@settings(max_examples=100)
+@settings(max_examples=30)
 def test_derivatives_are_those_of_the_transformed_path(task, first, second):
     task = TRANSFORMS[second](TRANSFORMS[first](task))
     check_task(task, 2)
@@ -140,6 +140,7 @@ def beside(task, seed):
     return task.q_d(s) + 0.05 * rng.normal(size=(20, 2)), s
 
 
+@settings(max_examples=10)
 @given(EVERY, st.integers(0, 99), vectors(2, 2.0), floats(0.2, 3), st.booleans())
 def test_shifts_scales_and_reversals_commute_with_the_projection(task, seed, offset, factor, mirrored):
     q, near = beside(task, seed)
