@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import floats, tasks, vectors
 
@@ -31,6 +31,7 @@ from pathcontrol.analysis.run_metrics import UNITS
 START = np.deg2rad([40.0, 70.0])
 
 
+@settings(max_examples=10)
 @given(tasks(), vectors(2, 2.0), vectors(2, 3.0), floats(0, 2))
 def test_the_distance_to_gamma_is_a_global_minimum(task, q, qd, weight):
     s = np.linspace(0, task.period, 20_001)

@@ -52,7 +52,7 @@ def test_variables_may_be_missing(use, runs):
 
 
 @pytest.mark.parametrize("use", USES)
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e308, -1e200, 1e160, 1e100, 0.0])
+@pytest.mark.parametrize("value", [np.nan, -np.inf, 1e308, -1e160, 1e100, 0.0])
 def test_numbers_may_be_anything(value, use, runs):
     for run in runs:
         for name, variable in run.data.data_vars.items():

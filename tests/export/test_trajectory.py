@@ -57,7 +57,7 @@ def test_a_circle_at_constant_speed_has_its_closed_form():
 
 @pytest.mark.filterwarnings("ignore::pathcontrol.errors.PathControlWarning")
 @given(st.floats(0.1, 3.0), st.floats(-1.0, 1.0), st.floats(0.1, 2.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_velocities_and_accelerations_are_derivatives_of_a_plan(speed, turn, length):
     line = pc.Line([0.0, turn], [length, 0.5 - turn], speed=speed)
     plan = pc.plan_trajectory(line, 2000.0)

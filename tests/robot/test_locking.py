@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_massless import arm, hand, solid
 
@@ -17,6 +17,7 @@ from pathcontrol.errors import InputError, UnknownNameError, UrdfError
 from pathcontrol.robot.recipe import recipe_of, robot_of
 
 
+@settings(max_examples=10)
 @given(st.floats(-1, 1), st.sampled_from([-1.0, -0.5, 1.0, 2.0]), st.sampled_from([0.0, 0.1]))
 def test_locking_the_leader_locks_its_mimics(angle, multiplier, offset):
     text = hand(multiplier, offset)

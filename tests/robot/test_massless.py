@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 import trimesh
 from click.testing import CliRunner
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pathcontrol as pc
@@ -221,6 +221,7 @@ def test_a_negative_moment_that_counts_stays_an_error():
         assert "inertia-negative" in [finding.code for finding in check_urdf(text).errors]
 
 
+@settings(max_examples=10)
 @given(st.integers(0, 2**32 - 1))
 def test_dynamics_of_the_checks_are_those_of_pinocchio(seed):
     from pathcontrol.robot.urdf.model_values import moving_bodies, read_arm

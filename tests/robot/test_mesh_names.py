@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pathcontrol as pc
@@ -160,6 +160,7 @@ def test_a_shape_that_a_mass_lacks_is_told_unless_another_stands_for_it(tmp_path
     assert masses(file) == pytest.approx(1300)
 
 
+@settings(max_examples=10)
 @given(st.text(st.characters(blacklist_categories=("Cs",)), max_size=30), st.sampled_from(["", "file:", "package://"]))
 def test_no_name_breaks_the_search(tmp_path_factory, text, scheme):
     folder = tmp_path_factory.getbasetemp()

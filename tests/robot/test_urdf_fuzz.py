@@ -129,7 +129,7 @@ def replaced_number(line, number):
 
 
 @given(mutated_urdfs())
-@settings(FUZZ, max_examples=600)
+@settings(FUZZ, max_examples=200)
 def test_what_is_accepted_is_read_by_pinocchio(text):
     report = check_urdf(text)
     if report.ok:

@@ -103,7 +103,7 @@ def test_a_law_without_measurements_runs_on_with_the_last_ones(law, engine):
     assert_allclose(run.array("e_p")[0, stale[3]], said.e_p[0], rtol=0, atol=1e-12)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["cicese_2dof", "ur5", "panda"]))
 def test_the_engine_agrees_with_the_reference_on_random_dropouts(seed, name):
     rng = np.random.default_rng(seed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from circle_file import CIRCLE_FILE
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -44,6 +44,7 @@ def test_it_moves_by_exactly_nothing_and_goes_on_when_it_is_let_go(name, engine)
     assert np.ptp(q[run.time > 0.5 + 1e-9], axis=0)[joint] > 1e-3
 
 
+@settings(max_examples=10)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["cicese_2dof", "panda"]))
 def test_the_impulse_of_stopping_acts_on_the_jammed_joint_alone(seed, name):
     rng, robot = np.random.default_rng(seed), arm(name)

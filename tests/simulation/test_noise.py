@@ -36,6 +36,7 @@ def test_any_cut_of_a_batch_gives_the_whole(cuts, difference, seed):
         assert_array_equal(np.concatenate([part.array(name) for part in parts]), whole.array(name), err_msg=name)
 
 
+@settings(max_examples=5)
 @given(st.integers(1, 40), st.integers(0, 3))
 def test_how_many_numbers_are_drawn_in_advance_does_not_matter(rollouts, first):
     """A few of many rollouts see what all of them see, over more samples than are drawn at once."""

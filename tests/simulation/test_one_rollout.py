@@ -56,7 +56,7 @@ def assert_runs_equal(one, other):
 
 @pytest.mark.parametrize("task", TASKS.values(), ids=TASKS)
 @pytest.mark.parametrize("make", LAWS.values(), ids=LAWS)
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=2, deadline=None)
 @given(state=st.lists(st.floats(-0.3, 0.3), min_size=4, max_size=4))
 def test_a_rollout_alone_is_the_one_in_a_batch(make, task, state):
     law, q = make(task), task.q_d(np.array(task.s0)) + state[:2]

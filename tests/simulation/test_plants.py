@@ -76,7 +76,7 @@ def law(arm, circle, **options):
 
 
 @pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
-@settings(max_examples=15)
+@settings(max_examples=6)
 @given(st.data(), st.integers(1, 3))
 def test_a_batch_is_the_loop_over_its_plants(engine, data, copies):
     from pathcontrol import Circle
@@ -149,6 +149,7 @@ def test_friction_of_each_is_that_of_each():
     assert_array_equal(together.smoothed(qd, 0.1), [one.smoothed(v, 0.1) for one, v in zip(laws, qd, strict=True)])
 
 
+@settings(max_examples=10)
 @given(st.lists(floats(0, 10), min_size=4, max_size=4))
 def test_friction_coefficients_may_have_rows(levels):
     """The same as a plant for each, and one object for all of them."""

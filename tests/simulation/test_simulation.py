@@ -205,11 +205,11 @@ def test_the_end_of_an_open_path_is_the_same_in_both_modes(ideal_arm, kind, star
         "plan": ExtendedMotionPlan(ideal_arm, task, 400.0, 40.0, 20.0),
         "projection": Projection(ideal_arm, task, 400.0, 40.0),
     }[kind]
-    loops = SampledLoop(period=1e-3), ContinuousTime(output_period=1e-3)
+    loops = SampledLoop(period=1e-3), ContinuousTime(output_period=5e-3)
     sampled, continuous = (simulate(law, start, duration=2.5, until="duration", loop=x, progress=False) for x in loops)
     assert np.allclose(sampled.finish_time, continuous.finish_time, atol=0.01)
     # the hold makes the loop first order in the period
-    assert np.abs(sampled.array("q") - continuous.array("q")).max() < 0.01
+    assert np.abs(sampled.array("q")[:, ::5] - continuous.array("q")).max() < 0.01
     for run in (sampled, continuous):
         assert np.abs(run.array("q")[0, -1] - task.end).max() < 1e-4
         s, sdot = run.array("s")[0], run.array("sdot")[0]
