@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 
@@ -18,7 +19,13 @@ def directions(count: int) -> Array:
     return np.column_stack([circle, height])
 
 
-_DIRECTIONS = directions(60)
+def outermost(points: Array, count: int) -> NDArray[np.intp]:
+    """Return the indices of those points (k, 3) that are farthest out in some of ``count`` directions, in order."""
+    columns = np.ascontiguousarray(points.T)
+    return np.unique([(direction @ columns).argmax() for direction in directions(count)])
+
+
+_OUTLINE = 60  # points of an outline, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +79,7 @@ class Sphere:
     @property
     def outline(self) -> Array:
         """Points all over the sphere [m], (k, 3)."""
-        return self.radius * _DIRECTIONS
+        return self.radius * directions(_OUTLINE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +97,7 @@ class Mesh:
     @property
     def outline(self) -> Array:
         """The outermost vertices [m], (k, 3)."""
-        return self.vertices[np.unique((_DIRECTIONS @ self.vertices.T).argmax(axis=1))]
+        return self.vertices[outermost(self.vertices, _OUTLINE)]
 
 
 Shape: TypeAlias = Box | Cylinder | Sphere | Mesh

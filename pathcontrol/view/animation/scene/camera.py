@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.view.bodies.body_shapes import directions
+from pathcontrol.view.bodies.body_shapes import outermost
 
 LOWEST, HIGHEST = np.deg2rad([22.0, 42.0])
 ASIDE = np.deg2rad(20.0)
@@ -40,9 +40,8 @@ class Camera:
         lower, upper = seen.min(axis=0), seen.max(axis=0)
         lower[1] -= LEGEND * (upper[1] - lower[1])
         middle = (lower + upper) / 2
-        outermost = np.unique((directions(200) @ seen.T).argmax(axis=1))
         bottom = [0.0, lower[1] - middle[1], 0.0]
-        return cls(middle @ axes, axes[2], np.vstack([seen[outermost] - middle, bottom]))
+        return cls(middle @ axes, axes[2], np.vstack([seen[outermost(seen, 200)] - middle, bottom]))
 
     @property
     def size(self) -> float:
