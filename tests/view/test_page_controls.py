@@ -322,7 +322,7 @@ def test_labels_of_arms_in_one_place_stand_apart(arm: RobotModel, circle: Circle
     run = short_run(arm, circle)
     ghosts = record({f"a law with the name {k}": run for k in range(4)}, arm, circle, layout="ghosted")
     written = ghosts.save(tmp_path / "ghosts.html")
-    with opened(written, hash="#t=0") as film:
+    with opened(written, (390, 844), "#t=0") as film:
         for width, height in ((390, 844), (1440, 900), (700, 400)):
             film.tab.set_viewport_size({"width": width, "height": height})
             settle(film)

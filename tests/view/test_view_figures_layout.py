@@ -11,10 +11,11 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from lxml import etree
-from matplotlib.axis import Axis
+from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 
 from pathcontrol import (
     Ellipse,
@@ -91,29 +92,24 @@ def figures(run, limits=None) -> dict[str, Figure]:
     return {name: make() for name, make in makers(run, limits).items()}
 
 
-def drawn(figure: Figure) -> list[Text]:
-    """The words of a figure as they stand on the page."""
-    canvas = FigureCanvasAgg(figure)
-    with style():
-        canvas.draw()
-    beyond = _beyond_limits(figure)
-    words = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
-    return [text for text in words if id(text) not in beyond and text.get_window_extent().width > 0]
+def drawn(figure: Figure) -> list[tuple[str, Bbox]]:
+    """The words of a figure and where they stand on the page."""
+    found, draw = [], Text.draw
 
+    def note(text: Text, renderer: RendererBase) -> None:
+        if text.get_visible() and text.get_text().strip():
+            found.append((text.get_text(), text.get_window_extent(renderer)))
+        draw(text, renderer)
 
-def _beyond_limits(figure: Figure) -> set[int]:
-    """Numbers of ticks outside the limits, which are kept but not drawn."""
-    found = set()
-    for axis in figure.findobj(Axis):
-        shown = {id(tick) for tick in axis._update_ticks()}
-        found |= {id(t) for k in axis.get_major_ticks() if id(k) not in shown for t in (k.label1, k.label2)}
-    return found
+    with style(), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Text, "draw", note)
+        FigureCanvasAgg(figure).draw()
+    return [(word, box) for word, box in found if box.width > 0]
 
 
 def assert_readable(figure: Figure, name: str) -> None:
     """Words are inside the figure and apart from each other."""
-    page, words = figure.bbox, drawn(figure)
-    boxes = [(text.get_text(), text.get_window_extent()) for text in words]
+    page, boxes = figure.bbox, drawn(figure)
     for text, box in boxes:
         assert min(box.x0, box.y0, page.x1 - box.x1, page.y1 - box.y1) > -1, f"{name}: {text} is cut off"
     for k, (text, box) in enumerate(boxes):
