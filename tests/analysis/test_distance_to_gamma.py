@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,20 +12,27 @@ from hypothesis import strategies as st
 import pathcontrol as pc
 
 
-def brute_force(task, q, qd, weight=1.0):
-    """The least distance on a dense grid with all corners in it, refined about the best of it."""
+@lru_cache(maxsize=1)
+def dense(task):
+    """A dense grid with all corners in it, and the path there."""
     lower, upper = task.one_traverse
     s = np.linspace(lower, upper, 20_001)
     if task.profile_knots is not None:
         s = np.union1d(s, np.clip(task.profile_knots, lower, upper))
+    return s, task.at(s)
+
+
+def brute_force(task, q, qd, weight=1.0):
+    """The least distance on a dense grid, refined about the best of it."""
+    s, point = dense(task)
     for _ in range(4):
-        point = task.at(s)
         distance = np.hypot(
             np.linalg.norm(point.q_d - q, axis=-1), weight * np.linalg.norm(point.velocity - qd, axis=-1)
         )
         best = int(distance.argmin())
         found = distance[best]
         s = np.linspace(s[max(best - 1, 0)], s[min(best + 1, len(s) - 1)], 2001)
+        point = task.at(s)
     return found
 
 

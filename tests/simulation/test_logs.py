@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ CIRCLE = pc.Circle(0.5, 2.0)
 EIGHT = pc.Lissajous([0.3, 0.3], [1, 2], speed=0.8, center=[0.2, 0.4])
 
 
+@cache
 def run_of(task, duration=3.0):
     law = pc.Projection(ROBOT, task, k_p=400.0, K_v=40.0)
     start = np.asarray(task.q_d(np.array(task.s0))) + np.array([0.02, -0.01])

@@ -50,12 +50,12 @@ def test_one_step_per_tick_gives_the_converged_peaks(arm, name):
 @pytest.mark.parametrize("clockwise", [False, True])
 @pytest.mark.parametrize("kind", [ExtendedMotionPlan, Projection])
 def test_gamma_is_reached_exponentially_from_anywhere(ideal_arm, kind, clockwise):
-    """100 random states, turning either way; without Coulomb friction the distance falls like e^{−αt}."""
+    """50 random states, turning either way; without Coulomb friction the distance falls like e^{−αt}."""
     rng = np.random.default_rng(7)
     task = Circle(1.0, 2.0, clockwise=clockwise)
-    angle, radius = rng.uniform(-np.pi, np.pi, 100), rng.uniform(0.4, 2.0, 100)
+    angle, radius = rng.uniform(-np.pi, np.pi, 50), rng.uniform(0.4, 2.0, 50)
     q = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], -1)
-    qd = rng.uniform(-3, 3, (100, 2))
+    qd = rng.uniform(-3, 3, (50, 2))
     gain = {"k": 20.0} if kind is ExtendedMotionPlan else {}
     law = kind(ideal_arm, task, 800.0, [45.0, 100.0], **gain)
     loop = ContinuousTime(output_period=0.05, rtol=1e-11, atol=1e-13)
