@@ -81,6 +81,7 @@ def test_errors_are_one_message_without_a_traceback(arguments, words):
 def test_run_prints_metrics_and_writes_beside_its_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = CliRunner().invoke(main, ["run", "--example"]).stdout.replace("duration = 10.0", "duration = 0.2")
+    text = text.replace('html = "run.html"', "").replace('figure = "run"', "")
     Path("mine.toml").write_text(text)
     done = CliRunner().invoke(main, ["run", "mine.toml", "--json"])
     assert done.exit_code == 0, done.stderr
@@ -116,22 +117,6 @@ def test_ctrl_c_while_everything_is_imported(tmp_path, library):
     assert process.returncode == 130, err
     assert b"Traceback" not in err
     assert not (tmp_path / "out").exists()
-
-
-def test_ctrl_c_leaves_no_half_written_file(tmp_path):
-    process = subprocess.Popen(
-        [*COMMAND, "reproduce", "--out", str(tmp_path / "out")],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background ignore it
-    )
-    wait_until(lambda: list(tmp_path.glob("out/*")) or process.poll() is not None)  # the first file begins to appear
-    os.kill(process.pid, signal.SIGINT)
-    _, err = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 130, err
-    assert b"Traceback" not in err
-    assert not [p.name for p in (tmp_path / "out").iterdir() if p.name.startswith(".")]
-    assert not (tmp_path / "out" / "summary.json").exists()
 
 
 def test_the_console_script_is_the_same_command():

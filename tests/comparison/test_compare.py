@@ -230,9 +230,9 @@ def test_what_does_not_fit_is_refused(arm, circle):
 
 def test_json_has_the_keys_in_si_units_for_every_scenario():
     for name in pc.known_scenarios():
-        result = compared(*KNOWN_LAWS, scenario=shortened(name), rollouts=1)
+        result = compared("computed_torque", "projection", scenario=shortened(name), rollouts=1)
         said = json.loads(json.dumps(result.to_dict(), allow_nan=False))
-        assert list(said["controllers"]) == list(KNOWN_LAWS)
+        assert list(said["controllers"]) == ["computed_torque", "projection"]
         for numbers in said["controllers"].values():
             assert set(MEASURES) <= set(numbers)
             assert all(numbers[key] is None or isinstance(numbers[key], float) for key in MEASURES)
@@ -251,7 +251,7 @@ def test_an_event_plan_is_compared_where_it_is_named():
 
 
 def test_a_held_plan_loses_the_time_it_is_held_and_stays_on_the_path():
-    held = compared("computed_torque", "projection", scenario="hold", rollouts=2)
+    held = compared("computed_torque", "projection", scenario="hold", rollouts=1)
     for law in held.measures:
         assert 1.7 < held.mean(law, "time_lost_s") < 2.1  # of the 2 s
         calm = pc.contour_error(held.undisturbed[law]).max()
