@@ -57,7 +57,7 @@ def pids(cluster):
 def test_others_take_over_from_a_frozen_worker(here, tmp_path, monkeypatch):
     monkeypatch.setattr(dispatch, "_SILENCE", 3.0)
     monkeypatch.setattr(dispatch, "_LOOK", 0.5)
-    monkeypatch.setattr(dispatch, "_RESTART", 15.0)  # what computes chunks may go to the frozen one
+    monkeypatch.setattr(dispatch, "_RESTART", 10.0)  # what computes chunks may go to the frozen one
     with distributed.LocalCluster(**TWO) as cluster:
         frozen = pids(cluster)[0]
         when_chunks_are_there(tmp_path / "out", 2, lambda: os.kill(frozen, signal.SIGSTOP))
