@@ -42,7 +42,8 @@ def _start():  # type: ignore[no-untyped-def]
     console = Console(stderr=True)
     # in a notebook without ipywidgets rich warns, and cannot draw a bar
     missing = console.is_jupyter and find_spec("ipywidgets") is None
-    if missing:
+    # into a file it draws nothing, and ends that with an empty line
+    if missing or not (console.is_terminal or console.is_jupyter):
         console = Console(force_jupyter=False, quiet=True)
     bar = Progress(console=console, transient=True, auto_refresh=False)
     bar.start()

@@ -42,3 +42,11 @@ def test_updates_that_follow_each_other_at_once_are_drawn_once(terminal, monkeyp
         for done in range(100):
             update(done)
     assert "99%" not in capsys.readouterr().err
+
+
+def test_a_file_gets_nothing_of_a_bar(monkeypatch, capfd):
+    monkeypatch.setattr(_progress, "_PATIENCE", 0.0)
+    monkeypatch.delenv("FORCE_COLOR", raising=False)
+    with progress_bar("into a file", 4) as update:
+        update(1)
+    assert capfd.readouterr().err == ""
