@@ -10,7 +10,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.engine.library import load_library
-from pathcontrol.engine.structs import MOST_JOINTS, Arm, Arms, Memory, fill
+from pathcontrol.engine.structs import MOST_JOINTS, Arm, Arms, Memory, address_of, fill
 from pathcontrol.errors import EngineError
 from pathcontrol.robot.constants import ArmConstants, arm_constants
 from pathcontrol.robot.model import RobotModel
@@ -67,9 +67,9 @@ def check_against_pinocchio(robot: RobotModel, arm: Arm) -> None:
 
 def inverse_dynamics(arm: Arm, q: Array, qd: Array, qdd: Array) -> Array:
     """Return τ [N m], (N, n), of the engine, for q, q̇ and q̈ (N, n)."""
-    tau = np.empty_like(q)
+    tau = np.empty(q.shape)  # in the order of rows, whatever that of q
     arrays = [np.ascontiguousarray(a) for a in (q, qd, qdd)]
-    addresses = (a.ctypes.data for a in (*arrays, tau))
+    addresses = map(address_of, (*arrays, tau))
     load_library().pathcontrol_inverse_dynamics(addressof(arm), len(q), *addresses)
     return tau
 
@@ -77,7 +77,7 @@ def inverse_dynamics(arm: Arm, q: Array, qd: Array, qdd: Array) -> Array:
 def mass_matrix(arm: Arm, q: Array) -> Array:
     """Return M(q) [kg m²], (N, n, n), of the engine, for q (N, n)."""
     rows, M = np.ascontiguousarray(q), np.empty((*q.shape, q.shape[1]))
-    load_library().pathcontrol_mass_matrix(addressof(arm), len(q), rows.ctypes.data, M.ctypes.data)
+    load_library().pathcontrol_mass_matrix(addressof(arm), len(q), address_of(rows), address_of(M))
     return M
 
 

@@ -14,7 +14,7 @@ from pathcontrol.control.wrappers.override_rule import Override
 from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.run_settings import GAINS, add_law
-from pathcontrol.engine.structs import Memory, Setup
+from pathcontrol.engine.structs import Memory, Setup, address_of
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 
@@ -118,7 +118,7 @@ class _CompiledTick:
         self._io = np.zeros(3 * n + 1)
         self._q, self._qd, self._tau = self._io[:n], self._io[n : 2 * n], self._io[2 * n + 1 :]
         self._function: Callable[..., object] = load_library().pathcontrol_control_tick
-        self._arguments = addressof(self._setup), self._io.ctypes.data
+        self._arguments = addressof(self._setup), address_of(self._io)
 
     @property
     def s(self) -> float:

@@ -13,7 +13,7 @@ from pathcontrol._arrays import Array
 from pathcontrol._identity import IdentityCache
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.path_table import PathTable, bezier_points, task_table
-from pathcontrol.engine.structs import Gamma, Memory
+from pathcontrol.engine.structs import Gamma, Memory, address_of
 from pathcontrol.errors import EngineError
 from pathcontrol.tasks.task import PathTask
 
@@ -74,7 +74,7 @@ def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braki
     *series, rows, _ = q.shape
     states = [np.ascontiguousarray(values, dtype=np.float64) for values in (q, qd)]
     distance, s = np.empty((2, *series, rows))
-    pointers = (array.ctypes.data for array in (*states, distance, s))
+    pointers = map(address_of, (*states, distance, s))
     library.pathcontrol_gamma(addressof(known.gamma), prod(series), rows, *pointers)
     return distance, s
 

@@ -13,7 +13,7 @@ from pathcontrol._arrays import Array
 from pathcontrol._identity import IdentityCache
 from pathcontrol.control.ending import Ending, arrival_parameter
 from pathcontrol.engine.library import load_library
-from pathcontrol.engine.structs import Memory, Path
+from pathcontrol.engine.structs import Memory, Path, address_of
 from pathcontrol.errors import EngineError
 from pathcontrol.geometry import hermite
 from pathcontrol.geometry.hermite import horner
@@ -140,7 +140,7 @@ def has_same_projection(task: PathTask, path: Path) -> bool:
     aside /= np.maximum(np.linalg.norm(aside, axis=-1, keepdims=True), 1e-12)
     q = np.ascontiguousarray(q_d + 1e-2 * np.ptp(q_d) * aside)  # beside the path, at a hundredth of its size
     found = np.empty(len(s))
-    load_library().pathcontrol_nearest(addressof(path), len(s), q.ctypes.data, s.ctypes.data, found.ctypes.data)
+    load_library().pathcontrol_nearest(addressof(path), len(s), *map(address_of, (q, s, found)))
     return bool(np.allclose(task.sigma_bar(q, near=s), found, rtol=0, atol=1e-7 * (path.s_end - path.s0)))
 
 

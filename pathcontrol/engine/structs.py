@@ -6,8 +6,10 @@ from ctypes import Structure, c_double, c_int, c_longlong, c_void_p
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
+from pathcontrol.errors import EngineError
 
 MOST_JOINTS, MOST_STRIBECK, MOST_WALLS = 16, 4, 4
 
@@ -184,6 +186,17 @@ class Memory:
         """Return values () or (N,) as rows of one number."""
         array = np.asarray(values, dtype=np.float64).reshape(-1)
         return Rows(self.address(array), 1 if len(array) > 1 else 0)
+
+
+def address_of(array: NDArray[Any]) -> int:
+    """Return the address of an array that lies row after row, as the engine reads it.
+
+    Raises:
+        EngineError: it lies in another order, of which a copy of a repeated row may be.
+    """
+    if not array.flags.c_contiguous:
+        raise EngineError(f"an array of shape {array.shape} with strides {array.strides} does not lie row after row")
+    return array.ctypes.data
 
 
 def fill(field: Any, values: Array) -> None:

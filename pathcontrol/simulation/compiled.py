@@ -24,6 +24,7 @@ from pathcontrol.engine.structs import (
     Setup,
     Span,
     State,
+    address_of,
 )
 from pathcontrol.errors import EngineError
 from pathcontrol.simulation.arm.changing_arm import ChangingArm
@@ -160,13 +161,13 @@ class CompiledArm:
         noise = self._draw_noise(count)
         arrays = recorder.reserve(count + last)
         record = Record(**{name: arrays[name].ctypes.data for name in RECORDED}, stride=arrays["q"].strides[0])
-        state = State(**{name: array.ctypes.data for name, array in self._state.items()})
+        state = State(**{name: address_of(array) for name, array in self._state.items()})
         span = Span(done, self._ticks, count, rollouts, last, rollouts <= width)
         losses = self._lose(count + last)
         if losses is not None:
-            span.missed, span.stale = losses[0].ctypes.data, losses[1].ctypes.data
+            span.missed, span.stale = map(address_of, losses)
         pointers = [addressof(setup), addressof(state), addressof(record)]
-        tail = [None if noise is None else noise.ctypes.data, addressof(span)]
+        tail = [None if noise is None else address_of(noise), addressof(span)]
 
         def work(begin: int, end: int) -> int:
             return int(self._library.pathcontrol_run(*pointers, *tail, begin, end))
@@ -197,7 +198,7 @@ class CompiledArm:
             return None
         ticks, lost = self._ticks + np.arange(count), self._dropouts
         missed = lost.missed(ticks).astype(np.uint8) + lost.silent(ticks)
-        return np.stack([missed, lost.stale(ticks)]).astype(np.uint8)
+        return np.stack([missed, lost.stale(ticks)]).astype(np.uint8, order="C")
 
     def _is_over(self, finish: Finish | None, setup: Setup) -> bool:
         """Return whether all rollouts are finished or lost."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.run_settings import add_plant
-from pathcontrol.engine.structs import Memory, Rows, Setup
+from pathcontrol.engine.structs import Memory, Rows, Setup, address_of
 from pathcontrol.simulation.arm.plant import Walls, has_strong_friction
 from pathcontrol.simulation.compiled_disturbances import add_structs, disturbance_struct
 from pathcontrol.simulation.loops import Arm as SimulatedArm
@@ -46,9 +46,11 @@ class CompiledPlant:
         if walls:
             self._set_walls(walls)
         q, qd = np.array(q, order="C"), np.array(qd, order="C")
-        torque = np.ascontiguousarray(tau)
-        still = None if held is None or not held.any() else np.array(np.broadcast_to(held, q.shape), np.float64)
-        arrays = [q.ctypes.data, qd.ctypes.data, torque.ctypes.data, None if still is None else still.ctypes.data]
+        torque, still = np.ascontiguousarray(tau), None
+        if held is not None and held.any():
+            still = np.empty(q.shape)
+            still[...] = held
+        arrays = [None if array is None else address_of(array) for array in (q, qd, torque, still)]
         self._advance(addressof(self._setup), self.step, *arrays, 0, len(q))
         return q, qd
 
@@ -58,7 +60,7 @@ class CompiledPlant:
             self._begins = [np.empty(len(stands)) for _, stands in walls]
             structs = [disturbance_struct(wall, self._setup.joints, self._memory) for wall, _ in walls]
             for struct, begin in zip(structs, self._begins, strict=True):
-                struct.start, struct.duration = Rows(begin.ctypes.data, 1), self._memory.numbers(np.inf)
+                struct.start, struct.duration = Rows(address_of(begin), 1), self._memory.numbers(np.inf)
             add_structs(self._setup, structs, self._memory)
         for begin, (_, stands) in zip(self._begins, walls, strict=True):
             begin[...] = np.where(stands, 0.0, np.inf)
