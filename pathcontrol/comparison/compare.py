@@ -152,10 +152,10 @@ def compare(
 
 def _run(law: Controller, scenario: Scenario, starts: Array, engine: Engine | None, progress: bool) -> Run:
     """Return the run of one law; where all rollouts diverged, what happened until then."""
-    if scenario.override is not None:
-        law = SpeedOverride(law, scenario.override)
     if isinstance(law, Paced) and not np.any(scenario.loop.torque_limits):  # nothing is there to be paced by
         law = law.wrapped
+    if scenario.override is not None:
+        law = SpeedOverride(law, scenario.override, scenario.acceleration)
     try:
         return simulate(
             law,

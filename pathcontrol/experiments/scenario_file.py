@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from pathcontrol._arrays import Array
 from pathcontrol.comparison.laws import recover_gains
 from pathcontrol.comparison.scenarios import Scenario
-from pathcontrol.errors import ExperimentError, InputError
+from pathcontrol.control.base import Controller
+from pathcontrol.control.wrappers.speed_override import SpeedOverride
+from pathcontrol.control.wrappers.wrapper import LawWrapper, wrappers_of
+from pathcontrol.errors import ExperimentError, InputError, warn
 from pathcontrol.experiments.builders.setup import Setup
 from pathcontrol.experiments.runner import load_setup
 from pathcontrol.simulation.arm.disturbance import Disturbance, TimedDisturbance, list_terms
@@ -19,17 +24,20 @@ from pathcontrol.tasks.joined.path_sequence import PathSequence
 def load_scenario(path: str | Path) -> Scenario:
     """Return the scenario that an experiment file describes; all laws share the gains of its ``[controller]``.
 
-    What happens in it are its disturbances; the event lasts from the first begin to the last end of those that have
-    them. It is compared with the same without them. ``laps`` and ``until`` are not used: all laws have as long.
+    What happens in it are its disturbances and its speed override, which all laws have; the event lasts from the first
+    begin to the last end of those that have them. It is compared with the same without them. ``laps`` and ``until`` are
+    not used: all laws have as long. Another wrapper of the file's law, such as :class:`Paced`, is a part of that law:
+    the others are compared without it, which a warning says.
 
     Raises:
-        ExperimentError: the file is invalid, follows a sequence of paths, or its law is one of your own.
+        ExperimentError: the file is invalid, follows a sequence of paths, its law is one of your own, or overridden
+            twice.
     """
     setup, path = load_setup(path), Path(path)
     if isinstance(setup.task, PathSequence):
         raise ExperimentError(f"{str(path)!r} follows a sequence of paths; laws are compared on a single path")
     try:
-        gains = recover_gains(setup.controller)
+        gains, operator = recover_gains(setup.controller), _find_override(setup.controller)
         scenario = Scenario(
             name=path.stem,
             sentence=_describe(setup),
@@ -40,31 +48,76 @@ def load_scenario(path: str | Path) -> Scenario:
             loop=setup.loop,
             plant=setup.plant,
             disturbance=setup.disturbance,
-            event=find_event(setup.disturbance, float(setup.duration)),
+            event=find_event(setup.disturbance, float(setup.duration), operator.get("override")),
             gains=gains,
             engine=setup.engine,
+            **operator,
         )
     except InputError as error:
         raise ExperimentError(f"{str(path)!r} is no scenario for a comparison: {error}") from error
-    calm = replace(scenario, disturbance=None)
-    return scenario if setup.disturbance is None else replace(scenario, undisturbed=calm)
+    _warn_of_wrappers(setup.controller, path)
+    calm = replace(scenario, disturbance=None, override=None)
+    return scenario if setup.disturbance is None and not operator else replace(scenario, undisturbed=calm)
 
 
-def find_event(disturbance: Disturbance | None, duration: float) -> tuple[float, float] | None:
-    """Return from when to when the timed ones of some disturbances act [s], ``None`` without one.
+def find_event(disturbance: Disturbance | None, duration: float, override: Any = None) -> tuple[float, float] | None:
+    """Return from when to when some disturbances and an override act [s], ``None`` where none has a time.
 
     An event lasts until the end of the run, ``duration`` [s], where one of them does, or another one has no time.
     """
     terms = list_terms(disturbance)
-    timed = [term for term in terms if isinstance(term, TimedDisturbance)]
-    if not timed:
+    times = [
+        (float(np.min(term.start)), float(np.max(term.start + term.duration)))
+        for term in terms
+        if isinstance(term, TimedDisturbance)
+    ]
+    timeless = len(times) < len(terms) or (override is not None and np.ndim(override) < 2)
+    if override is not None and np.ndim(override) == 2:
+        times.append(_time_of_steps(np.asarray(override), duration))
+    if not times:
         return None
-    begin = max(0.0, min(float(np.min(term.start)) for term in timed))
-    end = max(float(np.max(term.start + term.duration)) for term in timed)
-    return (begin, duration if len(timed) < len(terms) else min(end, duration))
+    begin, end = max(0.0, min(begin for begin, _ in times)), max(end for _, end in times)
+    return (begin, duration if timeless else min(end, duration))
+
+
+def _time_of_steps(steps: Array, duration: float) -> tuple[float, float]:
+    """Return from when the speed of the steps [[t, u], …] is another one than that of the profile, and until when."""
+    changed = np.flatnonzero(steps[:, 1] != 1.0)
+    last = changed[-1] + 1
+    return (float(steps[changed[0], 0]), float(steps[last, 0]) if last < len(steps) else duration)
+
+
+def _find_override(law: Controller) -> dict[str, Any]:
+    """Return ``override`` and ``acceleration`` of the speed override around a law, nothing where none changes it.
+
+    Raises:
+        InputError: there are two of them.
+    """
+    found = [one.arguments() for one in wrappers_of(law) if isinstance(one, SpeedOverride)]
+    if len(found) > 1:
+        raise InputError("its law has two speed overrides around each other, expected one; make one input of them")
+    if not found:
+        return {}
+    u = np.asarray(found[0]["override"])
+    if not np.any((u[:, 1] if u.ndim == 2 else u) != 1.0):
+        return {}
+    return found[0] | {"override": u.item() if u.size == 1 else u.tolist()}
+
+
+def _warn_of_wrappers(law: Controller, path: Path) -> None:
+    """Warn of wrappers that the laws of a comparison do not have."""
+    left = [type(one).__name__ for one in wrappers_of(law) if type(one) not in (SpeedOverride, LawWrapper)]
+    if left:
+        warn(
+            f"the law of {str(path)!r} is {' of '.join(left)}, which is no part of the scenario: the laws are compared "
+            "without it; name those that have it, such as paced_projection, paced_extended_motion_plan or event_plan, "
+            "or give compare a law of your own"
+        )
 
 
 def _describe(setup: Setup) -> str:
     """Return what happens in an experiment in one sentence."""
     kinds = [type(term).__name__ for term in list_terms(setup.disturbance)]
-    return f"The experiment of the file{f', with {chr(32).join(kinds)}' if kinds else ', undisturbed'}."
+    kinds += ["SpeedOverride"] if _find_override(setup.controller) else []
+    what = f"with {' and '.join(kinds)}" if kinds else "undisturbed"
+    return f"The experiment of the file, {what}."

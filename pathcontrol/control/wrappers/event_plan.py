@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import Controller
+from pathcontrol.control.gains import diagonal_gain
 from pathcontrol.control.observer import CUTOFF
 from pathcontrol.control.wrappers.contact_rule import ContactRule
 from pathcontrol.control.wrappers.wrapper import LawWrapper, unwrap
@@ -56,15 +56,18 @@ class EventPlan(LawWrapper):
         observer_hz: Annotated[ArrayLike, Form.GAIN, Unit("Hz")] = CUTOFF,
     ) -> None:
         super().__init__(law, ContactRule(unwrap(law).robot, threshold, acceleration, pause))
-        self._watch(observer_hz)
+        self._observer_hz = diagonal_gain("observer_hz", observer_hz, self.robot.n, self.robot.joint_names)
+        self._watch()
 
     def around(self, law: Controller) -> Self:
         wrapper = super().around(law)
-        if self.observer is not None:
-            wrapper._watch(self.observer.gain / (2 * np.pi))
+        wrapper._watch()
         return wrapper
 
-    def _watch(self, observer_hz: ArrayLike) -> None:
+    def arguments(self) -> dict[str, Any]:
+        return self.settings() | {"observer_hz": self._observer_hz.tolist()}
+
+    def _watch(self) -> None:
         """Let the law inside have an observer."""
-        self.inner = self.inner.watching(observer_hz)
+        self.inner = self.inner.watching(self._observer_hz)
         self.observer = self.inner.observer

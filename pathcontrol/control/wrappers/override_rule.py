@@ -145,7 +145,8 @@ class OverrideRule(SpeedRule):
 
     def describe(self) -> dict[str, Any]:
         given = getattr(self._given, "__name__", repr(self._given)) if callable(self._given) else self._given
-        return {"override": given, "acceleration": self.acceleration}
+        said = {"override": given, "acceleration": self.acceleration}
+        return said | ({"held": True} if self._held else {"reversed": True} if self._back else {})
 
 
 def _advance_ramp(v: Array, wanted: Array, period: float) -> tuple[Array, Array]:

@@ -59,5 +59,6 @@ class Paced(LawWrapper):
         torque = joint_values("torque_limits", torque_limits, law.robot.limits.effort, law.robot)
         if not np.isfinite(torque).any():
             raise InputError(f"{law.robot.name} has no torque limits; give torque_limits = [...] in N m, one per joint")
-        settings = {"torque_margin": margin, "torque_limits": np.asarray(torque_limits).tolist()}
+        limits = torque_limits if isinstance(torque_limits, bool) else torque.tolist()
+        settings = {"torque_margin": margin, "torque_limits": limits}
         super().__init__(law, PaceRule(FastestPlan(law.robot, law.task, torque, margin), torque, settings))

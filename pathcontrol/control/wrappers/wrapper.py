@@ -161,11 +161,38 @@ class LawWrapper(Controller):
     def describe(self) -> dict[str, Any]:
         """Return the description of the law inside, with the names of all wrappers and the settings of their rules."""
         inner = self.wrapped.describe()
-        return inner | {"controller": f"{type(self).__name__}({inner['controller']})"} | self.settings()
+        named = {"controller": f"{type(self).__name__}({inner['controller']})"} | self.settings()
+        return inner | named | {"wrappers": self._describe_wrappers(), "law": self._describe_innermost()}
 
     def settings(self) -> dict[str, Any]:
         """Return the settings of this wrapper, those of its rule, for the configuration of a run."""
         return {} if self.rule is None else self.rule.describe()
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments that make this wrapper around its law again, by name."""
+        return self.settings()
+
+    def _describe_wrappers(self) -> list[dict[str, Any]]:
+        """Return name and arguments of each wrapper, the outermost first, and of a speed input that was changed."""
+        chain = wrappers_of(self)
+        said = [{"wrapper": type(one).__name__} | one.arguments() for one in chain]
+        added = [rule for rule in self.rules if all(rule is not one.rule for one in chain)]
+        changed = [rule for rule in added if rule.describe() != OverrideRule().describe()]
+        return said + [{"wrapper": type(rule).__name__} | rule.describe() for rule in changed]
+
+    def _describe_innermost(self) -> dict[str, Any]:
+        """Return the description of the law inside all wrappers, without the arm and the task."""
+        law = wrappers_of(self)[-1].wrapped.describe()
+        return {name: value for name, value in law.items() if name not in ("robot", "task")}
+
+
+def wrappers_of(law: Controller) -> list[LawWrapper]:
+    """Return the wrappers around a law, the outermost first."""
+    found: list[LawWrapper] = []
+    while isinstance(law, LawWrapper):
+        found.append(law)
+        law = law.wrapped
+    return found
 
 
 def unwrap(law: Controller) -> Controller:

@@ -5,13 +5,20 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from pathcontrol.arguments import parameters_of
 from pathcontrol.registry import Kind, load
 
 _LONGEST_LINE = 100
 _NOT_IMPORTED = ("__main__", "pathcontrol_file_")  # modules that a script cannot import
+
+
+class Code(NamedTuple):
+    """An expression, and the import lines that it needs."""
+
+    text: str
+    imports: tuple[str, ...] = ()
 
 
 class Name(str):

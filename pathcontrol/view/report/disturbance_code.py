@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from pathcontrol.arguments import Form, Parameter, parameters_of
 from pathcontrol.registry import DISTURBANCES
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.summaries import is_whole
-from pathcontrol.view.report.code import call, class_code
+from pathcontrol.view.report.code import Code, call, class_code
 
 _AXES = {Form.NUMBERS: 1, Form.GAIN: 1, Form.NUMBER: 0, Form.POSITIVE: 0}  # axes of a value for a single rollout
 _DEEPEST = 20  # sums in one another
-
-
-class Code(NamedTuple):
-    """An expression, and the import lines that it needs."""
-
-    text: str
-    imports: tuple[str, ...] = ()
 
 
 def disturbance_code(described: Any, run: Run, depth: int = 0) -> Code | None:

@@ -6,17 +6,16 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from pathcontrol.registry import LAWS
 from pathcontrol.simulation.config import laws, table
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.summaries import is_whole
-from pathcontrol.view.report.code import Name, call, class_code
+from pathcontrol.view.report.code import Name, call
 from pathcontrol.view.report.disturbance_code import disturbance_code
 from pathcontrol.view.report.downloads import Download, file_name, text_file
+from pathcontrol.view.report.law_code import law_code
 from pathcontrol.view.report.settings_table import Setting
 
 _LOOPS = {"sampled": "SampledLoop", "continuous": "ContinuousTime"}
-_NOT_ARGUMENTS = ("controller", "robot", "task")
 
 
 class Recipe(NamedTuple):
@@ -60,7 +59,7 @@ def script(name: str, run: Run) -> str:
     """
     loop, several = table(run.config, "loop"), laws(run.config)
     sequence = isinstance(run.config.get("duration"), list)
-    law = class_code(LAWS, several[0].get("controller"), several[0])
+    law = law_code(several[0], "path" if sequence else "saved.task")
     if run.task is None or law is None or not _is_known(several, loop) or not _has_end(run.config, sequence):
         return ""
     outside = disturbance_code(run.config["disturbance"], run) if "disturbance" in run.config else None
@@ -73,33 +72,29 @@ def script(name: str, run: Run) -> str:
     if "noise" in settings:
         settings["noise"] = Name(call("pc.SensorNoise", [], settings["noise"]))
     closed = call(f"pc.{_LOOPS[loop['loop']]}", [], settings)
-    imports = [line for line in dict.fromkeys([law[1], *(outside.imports if outside else ())]) if line]
+    imports = [line for line in dict.fromkeys([*law.imports, *(outside.imports if outside else ())]) if line]
     lines = [
         "\n".join([*imports, "import pathcontrol as pc\n"]),
         f'saved = pc.Run.load("{file_name(name)}.nc")  # knows its robot, the model of its law and its path',
         f"loop = {closed}",
         'q, qd = saved.array("q")[:, 0], saved.array("qd")[:, 0]',
         *([] if outside is None else [f"disturbance = {outside.text}"]),
-        *(_script_of_sequence if sequence else _script_of_one)(law[0], several[0], run.config, more),
+        *(_script_of_sequence if sequence else _script_of_one)(law.text, run.config, more),
     ]
     text = "\n".join(lines) + "\n"
     return f"from math import inf\n\n{text}" if re.search(r"\binf\b", text) else text
 
 
-def _script_of_one(name: str, law: Mapping[str, Any], config: Mapping[str, Any], more: Mapping[str, Any]) -> list[str]:
+def _script_of_one(law: str, config: Mapping[str, Any], more: Mapping[str, Any]) -> list[str]:
     """Return the lines for a run along one path."""
-    made = call(name, ["saved.model", "saved.task"], _without(law, _NOT_ARGUMENTS))
     settings = {key: config[key] for key in ("duration", "laps", "until")} | {**more, "loop": Name("loop")}
     if config.get("first_rollout"):
         settings["first_rollout"] = config["first_rollout"]
-    return [f"law = {made}", f"run = {call('pc.simulate', ['law', 'q', 'qd'], settings)}"]
+    return [f"law = {law}", f"run = {call('pc.simulate', ['law', 'q', 'qd'], settings)}"]
 
 
-def _script_of_sequence(
-    name: str, law: Mapping[str, Any], config: Mapping[str, Any], more: Mapping[str, Any]
-) -> list[str]:
+def _script_of_sequence(law: str, config: Mapping[str, Any], more: Mapping[str, Any]) -> list[str]:
     """Return the lines for a run along a sequence of paths."""
-    made = call(name, ["saved.model", "path"], _without(law, _NOT_ARGUMENTS))
     times = config["duration"]
     duration = times[0] if all(each == times[0] for each in times) else times
     settings = {
@@ -110,7 +105,7 @@ def _script_of_sequence(
         "loop": Name("loop"),
     }
     run = call("pc.simulate_sequence", ["laws", "q", "qd"], settings)
-    return [f"laws = [{made} for path in saved.task]", f"run = {run}"]
+    return [f"laws = [{law} for path in saved.task]", f"run = {run}"]
 
 
 def _is_known(several: Sequence[Mapping[str, Any]], loop: Mapping[str, Any]) -> bool:

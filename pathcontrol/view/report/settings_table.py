@@ -52,12 +52,21 @@ def _list_settings(config: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str],
             continue
         laws = value["sequence"] if _are_tables(value.get("sequence")) else [value]
         paths = [law["task"] for law in laws if isinstance(law.get("task"), Mapping)]
-        left = [{key: item for key, item in law.items() if key != "task" or not paths} for law in laws]
+        left = [{key: item for key, item in _unwrap(law).items() if key != "task" or not paths} for law in laws]
         own = _summarize_tables(left) if value not in laws else _flatten(left[0])
         yield from (((name, key), said) for key, said in own)
         yield from (
             (("path", key), said) for key, said in (_flatten(paths[0]) if len(paths) == 1 else _summarize_tables(paths))
         )
+
+
+def _unwrap(law: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the settings of a law with those of each wrapper under its name, which may be called the same."""
+    wrappers, inside = law.get("wrappers"), law.get("law")
+    if not _are_tables(wrappers) or not isinstance(inside, Mapping):
+        return law
+    kept = {key: law[key] for key in ("controller", "robot", "task") if key in law}
+    return {**inside, **kept, "wrappers": wrappers}
 
 
 def _flatten(value: Any, name: str = "") -> Iterator[tuple[str, str]]:
