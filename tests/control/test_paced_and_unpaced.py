@@ -99,7 +99,10 @@ def arms():
 @every_law
 @pytest.mark.parametrize("which", ["ur5", "panda"])
 def test_arms_with_half_of_their_torque_stay_on_a_contour(which, name):
-    """Peaks over a lap and more, from a start at rest."""
+    """Peaks over a lap and more, from a start at rest, with dry friction, whose error a slow lap has too.
+
+    Without any friction the error is that of sampling, which is larger in a fast lap.
+    """
     robot, home = arms()[which]
     inertia = robot.mass_matrix(home).diagonal()
     robot = robot.with_friction(pc.Viscous(np.full(robot.n, 0.2)) + pc.Coulomb(2.0 * inertia))
