@@ -151,6 +151,14 @@ def merge_rows(values: Sequence[Array]) -> Array:
     return freeze(rows[0] if (rows == rows[0]).all() else rows)
 
 
+def join_columns(parts: Sequence[Array]) -> Array:
+    """Return arrays (*batch, m) side by side, (*batch, Σm), with their batch axes broadcast against each other."""
+    if any(part.shape[:-1] != parts[0].shape[:-1] for part in parts):
+        batch = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
+        parts = [np.broadcast_to(part, (*batch, part.shape[-1])) for part in parts]
+    return np.concatenate(parts, axis=-1)
+
+
 def check_rigid(name: str, pose: ArrayLike, tolerance: float = 1e-9) -> Array:
     """Check that ``pose`` is a homogeneous transform (4, 4) of a rigid motion up to ``tolerance``; errors name it."""
     transform = check_finite(name, as_array(name, pose))

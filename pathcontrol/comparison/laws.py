@@ -11,7 +11,7 @@ from pathcontrol._expect import did_you_mean
 from pathcontrol.comparison.family import FAMILY
 from pathcontrol.comparison.shared_gains import Gains, mean_inertia, mean_plan_gain, sample_task, split_damping
 from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
-from pathcontrol.control.base import Controller, Start
+from pathcontrol.control.base import Controller, Start, check_controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.gains import diagonal_gain
 from pathcontrol.control.maneuver_regulation import ManeuverRegulation
@@ -25,7 +25,6 @@ from pathcontrol.control.wrappers.paced import Paced
 from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.run_arguments import check_controller
 from pathcontrol.tasks.task import PathTask
 
 _SAME = 1e-9  # share of the size of a path up to which two are the same

@@ -9,13 +9,13 @@ from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pathcontrol._arrays import Array, as_joint_array
+from pathcontrol._arrays import Array, as_joint_array, join_columns
 from pathcontrol._expect import expect, expect_choice
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.ending import Ending
 from pathcontrol.control.gains import diagonal_gain
 from pathcontrol.control.observer import CUTOFF, MomentumObserver, Observation
-from pathcontrol.errors import warn, warn_of_single
+from pathcontrol.errors import InputError, warn, warn_of_single
 from pathcontrol.robot.friction import levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint
@@ -122,7 +122,7 @@ class Controller(ABC):
         q = as_joint_array("q", q, self.robot.n, self.robot.joint_names)
         qd = np.broadcast_to(as_joint_array("qd", qd, self.robot.n), q.shape)
         s = np.asarray(self.first_parameter(q, qd))[..., None]
-        return s if self.observer is None else np.concatenate([s, self.observer.start(q, qd)], axis=-1)
+        return s if self.observer is None else join_columns([s, self.observer.start(q, qd)])
 
     def first_parameter(self, q: Array, qd: Array) -> Array:
         """Return the path parameter, (*batch,), of an arm that starts at (q, q̇), (*batch, n) each."""
@@ -140,7 +140,7 @@ class Controller(ABC):
         if self.observer is None or out.observation is None:
             return out.zdot
         memory, own = self.observer.rate(out.observation, out.tau), out.zdot[..., 1 + self.observer.size :]
-        return np.concatenate([out.zdot[..., :1], memory, own], axis=-1)
+        return join_columns([out.zdot[..., :1], memory, own])
 
     def advance(self, z: Array, out: ControlOutput, period: float) -> Array:
         """Return the state one control ``period`` [s] after z; ``out.tau`` is the mean of the torque that acts in it.
@@ -312,6 +312,20 @@ class Controller(ABC):
         law, cutoff = copy(self), diagonal_gain("observer_hz", observer_hz, self.robot.n, self.robot.joint_names)
         law.observer = MomentumObserver(self.robot, cutoff)
         return law
+
+
+def check_controller(name: str, controller: Any) -> None:
+    """Check that an argument is a control law, and that its class has made it whole.
+
+    Raises:
+        InputError: it is none, or its ``__init__`` does not call that of its base class.
+    """
+    expect(name, controller, Controller)
+    if not hasattr(controller, "task"):
+        kind = type(controller).__name__
+        raise InputError(
+            f"{kind}.__init__ does not call super().__init__(robot, task), which gives a law its arm and task"
+        )
 
 
 def _phi(x: Array) -> tuple[Array, Array]:

@@ -47,9 +47,14 @@ def refuse_several_gains(law: Controller) -> None:
     """Check that a law has one set of gains.
 
     Raises:
-        InputError: a gain has a row for each of several rollouts.
+        InputError: a gain, the observer or a rule of a wrapper has a row for each of several rollouts.
     """
+    if isinstance(law, LawWrapper) and (rows := max(rule.count_rows() for rule in law.rules)) > 1:
+        raise InputError(f"{type(law).__name__} has settings of {rows} rollouts, expected those of one")
     inner = unwrap(law)
+    if law.observer is not None and law.observer.gain.ndim > 1:
+        rows = len(law.observer.gain)
+        raise InputError(f"observer_hz has rows for {rows} rollouts, expected one value, or one for each joint")
     for name in inner.gains:
         shape = np.shape(getattr(inner, name))
         rows = len(shape) > 1 or name in _NUMBERS or shape[:1] != (law.robot.n,)

@@ -61,8 +61,21 @@ class MomentumObserver:
         self.size = 4 * robot.n + 1
 
     def start(self, q: Array, qd: Array) -> Array:
-        """Return the memory, (*batch, 4n + 1), of an arm that starts at (q, q̇), with r = 0."""
+        """Return the memory, (*batch, 4n + 1), of an arm that starts at (q, q̇), with r = 0.
+
+        Of an observer with rows, one state (q, q̇) gives a row for each.
+
+        Raises:
+            InputError: there are neither as many states as rows nor one.
+        """
+        rows = self.gain.shape[:-1]
+        if rows and q.shape[:-1] not in ((), (1,), rows):
+            raise InputError(
+                f"observer_hz has rows for {rows[0]} rollouts, expected as many as there are initial states, {len(q)}",
+                argument="observer_hz",
+            )
         p = self.robot.momentum(q, qd)
+        p = np.broadcast_to(p, (*np.broadcast_shapes(rows, p.shape[:-1]), self.robot.n))
         none = np.zeros_like(p)
         return np.concatenate([none, none, p, none, none[..., :1] + _NEVER], axis=-1)
 

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_joint_array, as_scalar
-from pathcontrol.control.base import Controller
-from pathcontrol.control.wrappers.override_rule import Override
+from pathcontrol.control.base import Controller, check_controller
+from pathcontrol.control.law_gains import refuse_several_gains
+from pathcontrol.control.wrappers.override_rule import Override, check_one_speed
 from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.run_settings import GAINS, add_law
@@ -50,9 +51,11 @@ class ControlTick:
     """
 
     def __init__(self, law: Controller, period: float) -> None:
+        check_controller("law", law)
         gains = [law.observer_hz, *(getattr(law, name) for name in law.gains)]
         if isinstance(law.task, TaskBatch) or any(np.ndim(gain) > 1 for gain in gains):
             raise InputError("the law is for several rollouts, expected one task and one set of gains")
+        refuse_several_gains(law)
         self.law, self._period = law, as_scalar("period", period, positive=True)
         make = _CompiledTick if type(law) in GAINS and law.observer is None else _PythonTick
         self._tick: _PythonTick | _CompiledTick = make(law, self._period)
@@ -93,7 +96,9 @@ class ControlTick:
 
     def override(self, value: Override) -> None:
         """Set how fast the plan goes when it is not held, as a factor from 0 to 2; see :meth:`LawWrapper.override`."""
-        self._wrapper().override(value)
+        law = self._wrapper()
+        check_one_speed(value, self._tick.time)
+        law.override(value)
 
     def reverse(self) -> None:
         """Let the plan go back along its path; see :meth:`LawWrapper.reverse`."""
@@ -126,6 +131,11 @@ class _CompiledTick:
         return float(self._io[len(self._q) * 2])
 
     @property
+    def time(self) -> float:
+        """The time of the law at the next call [s], 0 as it is not for compiled laws."""
+        return 0.0
+
+    @property
     def state(self) -> Array:
         """The state z (1,)."""
         return np.array([self.s])
@@ -155,6 +165,11 @@ class _PythonTick:
     def s(self) -> float:
         """The path parameter of the plan at the next call."""
         return float(self._z[0, 0])
+
+    @property
+    def time(self) -> float:
+        """The time of the law at the next call [s]."""
+        return self._ticks * self._period
 
     @property
     def state(self) -> Array:

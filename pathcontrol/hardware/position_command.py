@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, as_joint_vector, as_scalar, freeze
-from pathcontrol._expect import expect
-from pathcontrol.control.base import Controller
-from pathcontrol.control.wrappers.override_rule import Override
+from pathcontrol.control.base import Controller, check_controller
+from pathcontrol.control.law_gains import refuse_several_gains
+from pathcontrol.control.wrappers.override_rule import Override, check_one_speed
 from pathcontrol.control.wrappers.pace_rule import rate_bounds
 from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.errors import InputError
@@ -88,9 +88,10 @@ class PositionCommand:
         tolerance: float = 0.01,
         bandwidth: float = 20.0,
     ) -> None:
-        expect("law", law, Controller)
+        check_controller("law", law)
         if isinstance(law.task, TaskBatch) or any(np.ndim(getattr(law, name)) > 1 for name in law.gains):
             raise InputError("the law is for several rollouts, expected one task and one set of gains")
+        refuse_several_gains(law)
         self._wait = WaitRule(as_scalar("tolerance", tolerance, positive=True))
         self.law = LawWrapper(law, self._wait)
         self.period, robot = as_scalar("period", period, positive=True), law.robot
@@ -159,6 +160,7 @@ class PositionCommand:
 
     def override(self, value: Override) -> None:
         """Set how fast the plan goes when it is not held, as a factor from 0 to 2; see :meth:`LawWrapper.override`."""
+        check_one_speed(value, self._ticks * self.period)
         self.law.override(value)
 
     def reverse(self) -> None:

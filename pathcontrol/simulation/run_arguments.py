@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_joint_array, check_finite
-from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller, ControlOutput
+from pathcontrol.control.wrappers.wrapper import LawWrapper, unwrap
 from pathcontrol.errors import InputError, PathControlError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import levels_of, viscous_of
@@ -151,6 +151,8 @@ def start_law(
         InputError: the law fails there, or does not give what :class:`ControlOutput` says.
     """
     z = _call_law(controller, q, controller.start, q, qd)
+    if len(q) == 1 and len(z) > 1:  # an observer or a wrapper with rows
+        q, qd = q.repeat(len(z), axis=0), qd.repeat(len(z), axis=0)
     out = _call_law(controller, q, controller.law, 0.0, q, qd, z)
     if len(q) == 1:
         pushed = None if disturbance is None else _first_torque(disturbance, q, qd)
@@ -179,20 +181,6 @@ def _count_rows(torque: Any) -> int:
     return max(1, shape[0]) if len(shape) == 2 else 1
 
 
-def check_controller(name: str, controller: Any) -> None:
-    """Check that an argument is a control law, and that its class has made it whole.
-
-    Raises:
-        InputError: it is none, or its ``__init__`` does not call that of its base class.
-    """
-    expect(name, controller, Controller)
-    if not hasattr(controller, "task"):
-        kind = type(controller).__name__
-        raise InputError(
-            f"{kind}.__init__ does not call super().__init__(robot, task), which gives a law its arm and task"
-        )
-
-
 def check_law(controller: Controller, q: Array, qd: Array, z: Array) -> None:
     """Check what the law returns at the initial states.
 
@@ -204,12 +192,12 @@ def check_law(controller: Controller, q: Array, qd: Array, z: Array) -> None:
 
 def _check_output(controller: Controller, out: Any, q: Array, z: Array) -> None:
     """Check that a law returned a :class:`ControlOutput` whose shapes fit the initial states, with finite numbers."""
-    name = type(controller).__name__
+    name = _name_law(controller)
     if not isinstance(out, ControlOutput):
         raise InputError(f"{name}.law returns {type(out).__name__}, expected a ControlOutput")
     if controller.observer is not None and out.observation is None:
         raise InputError(
-            f"{name}.law does not compensate what its observer estimates; end it with "
+            f"{type(unwrap(controller)).__name__}.law does not compensate what its observer estimates; end it with "
             "return self.compensate(t, q, qd, z, ControlOutput(...))"
         )
     wanted = {"tau": q.shape, "e_p": q.shape, "e_v": q.shape, "zdot": np.shape(z)}
@@ -232,8 +220,14 @@ def _call_law(controller: Controller, q: Array, function: Callable[..., Any], *a
     except (ValueError, IndexError, TypeError) as error:
         if isinstance(error, PathControlError):
             raise
-        name = f"{type(controller).__name__}.law"
+        name = f"{_name_law(controller)}.law"
         raise InputError(f"{name} fails at the initial states, of shape {q.shape}: {error}") from error
+
+
+def _name_law(controller: Controller) -> str:
+    """Return the class of a law, of a wrapper with those inside: ``SpeedOverride(Projection)``."""
+    name = type(controller).__name__
+    return f"{name}({_name_law(controller.wrapped)})" if isinstance(controller, LawWrapper) else name
 
 
 def make_config(

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, check_finite
 from pathcontrol._expect import describe
-from pathcontrol.control.base import Controller
+from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
@@ -21,7 +21,6 @@ from pathcontrol.simulation.loops import ContinuousTime, Outside, SampledLoop
 from pathcontrol.simulation.prepare import prepare
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.run_arguments import (
-    check_controller,
     check_joints,
     check_law,
     check_length,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import as_scalar, check_whole
-from pathcontrol.control.base import Controller
+from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.checks.slips import warn_if_still
@@ -19,7 +19,6 @@ from pathcontrol.simulation.prepare import prepare
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.run_arguments import (
     broadcast_states,
-    check_controller,
     check_joints,
     check_length,
     check_loop,

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pathcontrol._arrays import Array, as_joint_array, as_scalar, check_finite, check_whole
 from pathcontrol._progress import progress_bar
 from pathcontrol.analysis.path_reach import Reach, reach
-from pathcontrol.control.base import Controller
+from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.law_gains import refuse_several_gains
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
@@ -23,7 +23,7 @@ from pathcontrol.errors import InputError, PathControlWarning, SimulationError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
 from pathcontrol.simulation.run import Run
-from pathcontrol.simulation.run_arguments import Loop, check_controller, check_loop, sample_period
+from pathcontrol.simulation.run_arguments import Loop, check_loop, sample_period
 from pathcontrol.simulation.simulate import simulate
 from pathcontrol.simulation.variables import bytes_of_sample
 from pathcontrol.sweeps.basin_starts import make_starts

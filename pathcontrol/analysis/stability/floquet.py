@@ -16,12 +16,11 @@ from pathcontrol._arrays import Array, check_whole
 from pathcontrol._expect import expect
 from pathcontrol.analysis.stability.closed_orbits import Lap, LawOfRows, follow_laps, pad_steps
 from pathcontrol.analysis.stability.product_eigen import ProductEigen, find_eigen, find_eigen_of_many
-from pathcontrol.control.base import Controller
+from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.control.law_gains import refuse_several_gains
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import levels_of
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
-from pathcontrol.simulation.run_arguments import check_controller
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.task import PathTask
 

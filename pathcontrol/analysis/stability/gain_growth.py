@@ -10,12 +10,11 @@ from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.analysis.stability.floquet import check_path, slowest_growth
 from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
-from pathcontrol.control.base import Controller
+from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.control.law_gains import with_gains
 from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
-from pathcontrol.simulation.run_arguments import check_controller
 
 Loop = SampledLoop | ContinuousTime | None
 

@@ -6,11 +6,10 @@ import numpy as np
 
 from pathcontrol._arrays import Array, check_whole
 from pathcontrol.analysis.stability.gain_growth import GainGrowth, Loop
-from pathcontrol.control.base import Controller
+from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.control.law_gains import largest_entry
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.loops import SampledLoop
-from pathcontrol.simulation.run_arguments import check_controller
 
 _STEP, _CONTINUOUS_STEP = 2.0, 8.0  # factors between gains that are tried, in a sampled loop and in continuous time
 _TOGETHER, _MOST = 8, 40  # gains that are tried at once, and at most in either direction

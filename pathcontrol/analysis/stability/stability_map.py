@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array, as_array, check_finite, check_whole
 from pathcontrol._progress import progress_bar
 from pathcontrol.analysis.stability.gain_growth import GainGrowth, Loop
-from pathcontrol.control.base import Controller
+from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.control.law_gains import single_gain, unit_of_gain, with_gains
 from pathcontrol.errors import InputError
-from pathcontrol.simulation.run_arguments import check_controller
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, join_columns
 from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.control.learning.learned_table import LearnedTable
 from pathcontrol.control.observer import CUTOFF, MomentumObserver
@@ -47,7 +47,7 @@ class LearningLaw(Controller):
 
     def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
         z = self.base.start(q, qd)
-        return np.concatenate([z, self.table.start(self._count_laps(z[..., 0]))], axis=-1)
+        return join_columns([z, self.table.start(self._count_laps(z[..., 0]))])
 
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         """Return the output of the law inside with τ̂(s) added, at the s of the middle of the period to come."""
@@ -55,7 +55,7 @@ class LearningLaw(Controller):
         out = self.base.law(t, q, qd, own)
         middle = out.s + 0.5 * self.observer.elapsed(t, self._observer_memory(own)) * out.sdot
         learned = self._fade()[..., None] * self.table.read(memory, self._count_laps(middle))
-        zdot = np.concatenate([out.zdot, np.zeros_like(memory)], axis=-1)
+        zdot = join_columns([out.zdot, np.zeros_like(memory)])
         return out._replace(tau=out.tau + learned, zdot=zdot)
 
     def advance(self, z: Array, out: ControlOutput, period: float) -> Array:

@@ -11,7 +11,8 @@ from pathcontrol._arrays import Array, as_scalar
 from pathcontrol.control.base import Controller
 from pathcontrol.control.gains import diagonal_gain
 from pathcontrol.control.wrappers.override_rule import OverrideRule
-from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
+from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule, check_rows
+from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
@@ -40,6 +41,7 @@ class ContactRule(SpeedRule):
     """
 
     size = 3
+    relative = True
 
     def __init__(self, robot: RobotModel, threshold: ArrayLike | None, acceleration: float, pause: float) -> None:
         self.threshold = _check_threshold(robot, threshold)
@@ -50,11 +52,19 @@ class ContactRule(SpeedRule):
         """Return |r + b q̇| − F [N m], (*batch, n), negative where friction explains what is seen."""
         observation, friction = moment.out.observation, self._robot.friction
         if observation is None:
-            raise InputError(f"{type(moment.law).__name__}.law does not watch for contacts; see Controller.compensate")
+            name = type(unwrap(moment.law)).__name__
+            raise InputError(
+                f"{name}.law does not watch for contacts; end it with "
+                "return self.compensate(t, q, qd, z, ControlOutput(...))"
+            )
         dry = np.maximum(*levels_of(friction, moment.qd))
         return np.asarray(np.abs(observation.torque + viscous_of(friction) * moment.qd) - dry)
 
+    def count_rows(self) -> int:
+        return len(self.threshold) if self.threshold.ndim > 1 else 1
+
     def start(self, law: Controller, q: Array, qd: Array, s: Array) -> Array:
+        check_rows("threshold", self.count_rows(), s.size)
         return np.concatenate([self._ramp.start(law, q, qd, s), np.full((*s.shape, 1), -self.pause)], axis=-1)
 
     def rate(self, moment: Moment, asked: Speed, x: Array) -> Array:

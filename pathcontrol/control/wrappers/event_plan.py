@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 from numpy.typing import ArrayLike
 
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import Controller
+from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.control.gains import diagonal_gain
 from pathcontrol.control.observer import CUTOFF
 from pathcontrol.control.wrappers.contact_rule import ContactRule
@@ -55,6 +55,7 @@ class EventPlan(LawWrapper):
         pause: Annotated[float, Form.POSITIVE, Unit("s")] = 0.2,
         observer_hz: Annotated[ArrayLike, Form.GAIN, Unit("Hz")] = CUTOFF,
     ) -> None:
+        check_controller("law", law)
         super().__init__(law, ContactRule(unwrap(law).robot, threshold, acceleration, pause))
         self._observer_hz = diagonal_gain("observer_hz", observer_hz, self.robot.n, self.robot.joint_names)
         self._watch()

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, as_scalar, check_finite, freeze
 from pathcontrol.control.base import Controller
-from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
+from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule, check_rows
 from pathcontrol.errors import InputError
 
 #: u of the speed: a number, one for each rollout (N,), steps [[t, u], …], or a function of time [s]
@@ -73,6 +73,7 @@ class OverrideRule(SpeedRule):
     """
 
     size = 2
+    relative = True
 
     def __init__(self, override: Override = 1.0, acceleration: float = 2.0) -> None:
         self.acceleration = as_scalar("acceleration", acceleration, positive=True)
@@ -106,8 +107,12 @@ class OverrideRule(SpeedRule):
         u = self._value(t)
         return -u if self._back else u
 
+    def count_rows(self) -> int:
+        return self._value(0.0).size
+
     def start(self, law: Controller, q: Array, qd: Array, s: Array) -> Array:
         u = self.value(0.0)
+        check_rows("override", u.size, s.size)
         u = np.broadcast_to(u, np.broadcast_shapes(s.shape, u.shape))
         return np.stack([u, np.zeros_like(u)], axis=-1)
 
@@ -117,9 +122,7 @@ class OverrideRule(SpeedRule):
     def memory_rate(self, moment: Moment, asked: Speed, tau: Array, x: Array) -> Array:
         u = self.value(moment.t)
         if u.ndim and u.shape != x.shape[:-1]:
-            raise InputError(
-                f"override at t = {moment.t:g} s has {len(u)} values for {len(x)} rollouts, expected as many"
-            )
+            check_rows(f"override at t = {moment.t:g} s", u.size, x[..., 0].size)
         wanted = (asked.factor * u - x[..., 0]) / (4 * _SMOOTHING)
         wanted = np.minimum(np.maximum(wanted, -self.acceleration), self.acceleration)
         return ((wanted - x[..., 1]) / _SMOOTHING)[..., None]
@@ -173,6 +176,21 @@ def _make_function(override: Override) -> Callable[[float], Array]:
         _check_range("override", steps.factors)
         return steps
     return FixedSpeed(_check_range("override", array))
+
+
+def check_one_speed(value: Override, t: float) -> None:
+    """Check that an override is for one arm, one that is a function at the time t [s].
+
+    Raises:
+        InputError: it has factors of several rollouts, or is out of range.
+    """
+    u = _make_function(value)(t)
+    if u.size != 1:
+        raise InputError(
+            f"override = {u.tolist()}, expected one factor, as it is for one arm; a number, steps [[t, u], …], or a "
+            "function of time",
+            argument="override",
+        )
 
 
 def _check_range(name: str, u: ArrayLike) -> Array:

@@ -7,13 +7,13 @@ from typing import Annotated
 import numpy as np
 
 from pathcontrol._arrays import as_scalar
-from pathcontrol._expect import expect
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import Controller
+from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.control.wrappers.pace_rule import FastestPlan, PaceRule
 from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.topp.joint_limits import LimitChoice, joint_values
+from pathcontrol.robot.model import RobotModel
 
 
 class Paced(LawWrapper):
@@ -52,13 +52,23 @@ class Paced(LawWrapper):
         torque_margin: Annotated[float, Form.NOT_NEGATIVE] = 0.1,
         torque_limits: Annotated[LimitChoice, Form.LIMITS, Unit("N m", "N")] = True,
     ) -> None:
-        expect("law", law, Controller)
+        check_controller("law", law)
         margin = as_scalar("torque_margin", torque_margin)
         if not 0 <= margin < 1:
             raise InputError(f"torque_margin = {margin:g}, expected a share of the torque limits, 0 ≤ margin < 1")
         torque = joint_values("torque_limits", torque_limits, law.robot.limits.effort, law.robot)
         if not np.isfinite(torque).any():
-            raise InputError(f"{law.robot.name} has no torque limits; give torque_limits = [...] in N m, one per joint")
+            raise InputError(_say_no_limits(law.robot, torque_limits), argument="torque_limits")
         limits = torque_limits if isinstance(torque_limits, bool) else torque.tolist()
         settings = {"torque_margin": margin, "torque_limits": limits}
         super().__init__(law, PaceRule(FastestPlan(law.robot, law.task, torque, margin), torque, settings))
+
+
+def _say_no_limits(robot: RobotModel, given: LimitChoice) -> str:
+    """Return what an error says where no joint has a torque limit."""
+    give = "give torque_limits = [...] in N m, one per joint"
+    if given is True:
+        return f"{robot.name} has no torque limits; {give}"
+    said = given if given is None or isinstance(given, bool) else np.asarray(given).tolist()
+    own = f", or leave them out for those of {robot.name}" if np.isfinite(robot.limits.effort).any() else ""
+    return f"torque_limits = {said}, but a pace needs limits that it keeps; {give}{own}"

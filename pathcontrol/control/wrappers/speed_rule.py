@@ -9,6 +9,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller, ControlOutput
+from pathcontrol.errors import InputError
 
 
 class Speed(NamedTuple):
@@ -43,6 +44,20 @@ class Moment(NamedTuple):
     response: Array
 
 
+def check_rows(name: str, rows: int, rollouts: int) -> None:
+    """Check that a setting has a row for each of the rollouts, or one for all.
+
+    Raises:
+        InputError: it has not; the error says its ``name``.
+    """
+    if rows not in (1, rollouts):
+        raise InputError(
+            f"{name} has {rows} values for {rollouts} rollouts, expected as many, or one for all; give as many initial "
+            "states, or one",
+            argument=name.split()[0],
+        )
+
+
 class SpeedRule(ABC):
     """A rule that makes of the speed that is asked for the speed that is taken.
 
@@ -52,10 +67,12 @@ class SpeedRule(ABC):
     Attributes:
         size: length of the state.
         last: whether the rule comes after all others, because it knows what the motors can do.
+        relative: whether the factor that :meth:`start` gives is of the speed that is asked for.
     """
 
     size: int = 1
     last: bool = False
+    relative: bool = False
 
     @abstractmethod
     def start(self, law: Controller, q: Array, qd: Array, s: Array) -> Array:
@@ -64,6 +81,10 @@ class SpeedRule(ABC):
     @abstractmethod
     def rate(self, moment: Moment, asked: Speed, x: Array) -> Array:
         """Return ẇ [1/s], (*batch,), where another rule, or the profile itself, asks for a speed."""
+
+    def count_rows(self) -> int:
+        """Return for how many rollouts the settings have a row, 1 for settings that are for all."""
+        return 1
 
     def memory_rate(self, moment: Moment, asked: Speed, tau: Array, x: Array) -> Array:
         """Return the rate of the rest of the state, (*batch, size − 1), for the torque demand ``tau`` (*batch, n)."""

@@ -8,9 +8,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array
-from pathcontrol._expect import expect
-from pathcontrol.control.base import Controller, ControlOutput
+from pathcontrol._arrays import Array, as_joint_array, join_columns
+from pathcontrol.control.base import Controller, ControlOutput, check_controller
 from pathcontrol.control.learning.learning_law import LearningLaw
 from pathcontrol.control.wrappers.override_rule import Override, OverrideRule
 from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
@@ -44,7 +43,7 @@ class LawWrapper(Controller):
     """
 
     def __init__(self, law: Controller, rule: SpeedRule | None = None) -> None:
-        expect("law", law, Controller)
+        check_controller("law", law)
         self.wrapped, self.rule = law, rule
         known = law.rules if isinstance(law, LawWrapper) else ()
         rules = sorted((*known, *([] if rule is None else [rule])), key=lambda one: one.last)
@@ -97,12 +96,34 @@ class LawWrapper(Controller):
 
     def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """Return the state z of the law inside and of all rules, (*batch, m), for an arm that starts at (q, q̇)."""
-        own = self.inner.start(q, qd)
-        position, velocity = np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64)
-        velocity = np.broadcast_to(velocity, position.shape)
-        parts = [own, *(rule.start(self.inner, position, velocity, own[..., 0]) for rule in self.rules)]
-        batch = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
-        return np.concatenate([np.broadcast_to(part, (*batch, part.shape[-1])) for part in parts], axis=-1)
+        position, velocity = self._repeat(*self._arm_state(q, qd))
+        own = self.inner.start(position, velocity)
+        position, velocity = (np.broadcast_to(one, (*own.shape[:-1], self.robot.n)) for one in (position, velocity))
+        parts, asked = [own], np.ones(own.shape[:-1])
+        for rule in self.rules:
+            x = rule.start(self.inner, position, velocity, own[..., 0])
+            if rule.relative:
+                x = np.concatenate([(asked * x[..., 0])[..., None], x[..., 1:]], axis=-1)
+            parts.append(x)
+            asked = x[..., 0]
+        return join_columns(parts)
+
+    def _arm_state(self, q: ArrayLike, qd: ArrayLike) -> tuple[Array, Array]:
+        """Return q and q̇, (*batch, n) each."""
+        position = as_joint_array("q", q, self.robot.n, self.robot.joint_names)
+        return position, np.broadcast_to(as_joint_array("qd", qd, self.robot.n), position.shape)
+
+    def _repeat(self, q: Array, qd: Array) -> tuple[Array, Array]:
+        """Return one state (q, q̇) for each rollout that the law inside or a rule has a row for, and others as given.
+
+        The law inside is asked for its torques, as only they tell gains of joints from gains of rollouts.
+        """
+        rows = max(rule.count_rows() for rule in self.rules)
+        if q.shape[:-1] == (1,) and any(np.size(getattr(self, name)) > 1 for name in self.gains):
+            rows = max(rows, len(self.inner.law(0.0, q, qd, self.inner.start(q, qd)).tau))
+        if rows == 1 or q.shape[:-1] not in ((), (1,)):
+            return q, qd
+        return np.broadcast_to(q, (rows, self.robot.n)).copy(), np.broadcast_to(qd, (rows, self.robot.n)).copy()
 
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         if q.shape[:-1] != z.shape[:-1]:  # one arm, and rules with a row for each rollout
