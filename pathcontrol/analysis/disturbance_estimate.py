@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array
 from pathcontrol._expect import expect, expect_choice
+from pathcontrol.analysis.lost_samples import bridge, find_lost, hold_at_end, spread_over_gaps
 from pathcontrol.control.base import KnownFriction
 from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import select_friction
@@ -43,6 +44,9 @@ def momentum_observer(
     From one sample to the next the mean of d follows from the change of p, the mean torque, and the trapezoidal rule
     for the rest; to this mean, held, the filter responds exactly. The error is of second order in the period.
 
+    Over a ``Dropout``, at whose samples no new measurement came, the motion is a cubic between the measurements before
+    and after it, and d is its mean over the gap; in a gap that lasts to the end of the run r stays as it is.
+
     Args:
         run: a run of any law and loop, or a log with q, q̇ and τ.
         robot: the arm's model; by default the one that the law computed with.
@@ -66,7 +70,10 @@ def momentum_observer(
     time, q, qd = motion_of(run, measured)
     known, dt = enumerate(zip(q, qd, _mean_torque(run, time), strict=True)), np.diff(time)[:, None]
     means = [_mean_disturbance(select_friction(arm, i), friction, dt, *rollout) for i, rollout in known]
-    return _low_pass(np.stack(means), np.diff(time), rate, np.where(np.isfinite(q[:, 0]), 0.0, np.nan))
+    if measured:
+        means = [spread_over_gaps(one, dt, lost) for one, lost in zip(means, _lost(run), strict=True)]
+    r = _low_pass(np.stack(means), np.diff(time), rate, np.where(np.isfinite(q[:, 0]), 0.0, np.nan))
+    return hold_at_end(r, _lost(run)) if measured else r
 
 
 def _find_arm(run: Run, robot: RobotModel | None) -> RobotModel:
@@ -113,7 +120,13 @@ def motion_of(run: Run, measured: bool) -> tuple[Array, Array, Array]:
     qd, position = _unfiltered(run), run.array("q_measured" if "q_measured" in run else "q")
     age = np.full(len(run.time), _velocity_age(run))
     age[0] = 0.0  # the first velocity is that of the start
-    return run.time - age, position - age[:, None] * qd, qd
+    time = run.time - age
+    return time, *bridge(time, position - age[:, None] * qd, qd, _lost(run))
+
+
+def _lost(run: Run) -> NDArray[np.bool_]:
+    """Return the samples at which no new measurement came, (rollout, time)."""
+    return find_lost(run, filtered=loop_number(run, "filter_hz") > 0)
 
 
 def _unfiltered(run: Run) -> Array:
