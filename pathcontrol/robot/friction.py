@@ -83,6 +83,9 @@ class FrictionLaw(ABC):
     def __add__(self, other: FrictionLaw) -> FrictionSum:
         return FrictionSum((self, other))
 
+    def __radd__(self, other: object) -> FrictionLaw:  # sum(...) begins with 0
+        return self if isinstance(other, int) and other == 0 else NotImplemented
+
     def describe(self) -> dict[str, object]:
         """Return the name of the law and its coefficients, for the record of a run."""
         return {"law": type(self).__name__} | {f.name: np.asarray(getattr(self, f.name)).tolist() for f in fields(self)}

@@ -37,6 +37,8 @@ def report_by_key(key: str, fields: Iterable[str] | Mapping[str, str] = ()) -> I
 
 def _line(name: str, value: str) -> str:
     """Return how a key is given in a file."""
+    if value in ("True", "False"):
+        return f"{name} = {value.lower()}"
     return (
         f"{name} = {json.dumps(value)}"
         if re.fullmatch(r"[^\W\d]\w*", value)

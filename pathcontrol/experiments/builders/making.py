@@ -61,7 +61,7 @@ def make(
         inspect.signature(target).bind(**needed)
     except TypeError as error:
         raise ExperimentError(f"{where}: {error}; it is {target.__name__}{_plain_signature(target)}") from error
-    with report_users_code(where, target.__name__, arguments):
+    with report_users_code(where, target.__name__, [name for name in parameters_of(target) if name not in given]):
         return target(**needed)
 
 

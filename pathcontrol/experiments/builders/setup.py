@@ -22,6 +22,7 @@ from pathcontrol.registry import LAWS
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.arm.noise import NoiseSource
+from pathcontrol.simulation.checks.disturbance_loop import find_misfit
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.finish import Until
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop, torque_limits
@@ -29,6 +30,10 @@ from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 
 _MOST_SAMPLES = 10_000_000
+_LOOP_KEYS = {
+    "sampling": 'expected mode = "sampled" in [loop]',
+    "torque_limits": "expected torque_limits = true in [loop]",
+}
 
 
 class Setup(NamedTuple):
@@ -88,6 +93,7 @@ def build(experiment: Experiment, base_dir: str | Path = ".") -> Setup:
         loop = _loop(experiment, plant, float(np.max(duration)), place)
         q, qd = _state(experiment, controllers[0])
         disturbance = build_disturbance([experiment], plant, q[None], qd[None], place)
+        _check_loop(disturbance, loop, plant, q)
     setup = Setup(controllers, task, plant, loop, q, qd, duration, laps, experiment.engine, experiment.output)
     return setup._replace(until=experiment.until, disturbance=disturbance)
 
@@ -141,6 +147,15 @@ def _loop(experiment: Experiment, plant: RobotModel, duration: float, place: Pla
                 NoiseSource(loop.noise, (1, plant.n), 0)
             _refuse_too_long(duration, "period", loop.period, loop.delay)
     return loop
+
+
+def _check_loop(
+    disturbance: Disturbance | None, loop: SampledLoop | ContinuousTime, plant: RobotModel, q: Array
+) -> None:
+    """Check that the loop can do what the disturbance does, and say so in the keys of the file."""
+    named = None if disturbance is None else disturbance.find_names(plant)
+    if misfit := find_misfit(named, loop, q[None]):
+        raise ExperimentError(f"disturbance: {misfit.problem}; {_LOOP_KEYS[misfit.lacks]}")
 
 
 def _refuse_too_long(duration: float, name: str, period: float, delay: float = 0.0) -> None:

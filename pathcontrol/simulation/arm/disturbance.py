@@ -15,6 +15,7 @@ from pathcontrol.arguments import Form, Torques, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.summaries import summarize
 from pathcontrol.tasks.profile import plain_attributes
 
 Begin = Annotated[ArrayLike, Form.NUMBER, Unit("s")]
@@ -69,8 +70,16 @@ class Disturbance(ABC):
         """
         return self
 
-    def __add__(self, other: Disturbance) -> Disturbance:
-        return _Sum((self, other))
+    def __add__(self, other: Any) -> Disturbance:
+        return _Sum((self, other)) if isinstance(other, Disturbance) else self.__radd__(other)
+
+    def __radd__(self, other: Any) -> Disturbance:  # sum(...) begins with 0
+        return self if isinstance(other, int) and other == 0 else NotImplemented
+
+    def __repr__(self) -> str:
+        described = self.describe()
+        known = (f"{name}={summarize(value)!r}" for name, value in described.items() if name != "disturbance")
+        return f"{type(self).__name__}({', '.join(known)})"
 
     def describe(self) -> dict[str, Any]:
         """Return name and public parameters, for the configuration of a run."""
@@ -109,6 +118,9 @@ class _Sum(Disturbance):
     def strike(self, before: float, now: float, q: Array, qd: Array) -> Array | None:
         impulses = [one for term in self.terms if (one := term.strike(before, now, q, qd)) is not None]
         return reduce(np.add, impulses) if impulses else None
+
+    def __repr__(self) -> str:
+        return " + ".join(map(repr, list_terms(self)))
 
     def find_names(self, robot: RobotModel) -> Disturbance:
         return _Sum(tuple(term.find_names(robot) for term in self.terms))

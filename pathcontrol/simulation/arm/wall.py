@@ -62,10 +62,12 @@ class Wall(TimedDisturbance):
         length = np.linalg.norm(self.normal, axis=-1, keepdims=True)
         if (length == 0).any():
             raise InputError("normal = [0, 0, 0], expected the direction out of the wall, of any other length")
-        if rigid == (stiffness is not None):
+        if stiffness is None and not rigid:
             raise InputError(
-                f"stiffness = {stiffness!r} and rigid = {self.rigid}, expected a stiffness [N/m] or rigid=True"
+                "a wall has nothing to push with, expected a stiffness: give stiffness=1e5 [N/m] or rigid=True"
             )
+        if stiffness is not None and rigid:
+            raise InputError(f"stiffness = {stiffness!r} and rigid = True, expected a stiffness [N/m] or rigid=True")
         self.stiffness = None if stiffness is None else _check_each("stiffness", stiffness, np.inf)
         self.friction = _check_each("friction", friction)
         self.damping = None if damping is None else _check_each("damping", damping)
