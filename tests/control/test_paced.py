@@ -165,3 +165,21 @@ def test_bad_arguments_are_told(arm):
             pc.Paced(law, torque_limits=limits)
     with pytest.raises(pc.TaskError, match="torque limit"):
         pc.Paced(law, torque_limits=[1.0, 1.0])
+
+
+@pytest.mark.parametrize("start", [[0.7, 1.2], [1.3, -0.5], [0.2, 0.1]])
+def test_a_plan_that_goes_back_from_beside_its_path_does_not_run_away(arm, start):
+    """Where no pace keeps all limits, slower is better, also for a plan that goes back: −1 ≤ w at all times."""
+    law = pc.Paced(pc.ExtendedMotionPlan(arm, pc.Circle(1.0, 2.0), 800.0, [45.0, 100.0], 20.0))
+    law.reverse()
+    tick, plant = pc.ControlTick(law, 2.5e-3), pc.Plant(arm, 2.5e-3)
+    q, qd = np.array([start]), np.array([[0.1, 0.2]])
+    tick.start(q[0], qd[0])
+    factors = [tick.state[-1]]
+    for _ in range(480):
+        tau = np.clip(tick(q[0], qd[0]), -arm.limits.effort, arm.limits.effort)
+        q, qd = plant.advance(q, qd, tau[None])
+        factors.append(tick.state[-1])
+    assert -1 - 1e-9 <= min(factors) < -0.99
+    assert max(factors) <= max(factors[0], 0.0) + 1e-12
+    assert abs(np.linalg.norm(q) - 1.0) < np.deg2rad(2.0)

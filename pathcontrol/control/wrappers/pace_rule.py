@@ -94,14 +94,14 @@ class PaceRule(SpeedRule):
         return np.minimum(np.maximum(along, 0.0), self.plan.forward(s)[0])[..., None]
 
     def rate(self, moment: Moment, asked: Speed, x: Array) -> Array:
-        target = self._within_reach(moment, asked)
-        wanted = target.rate + (target.factor - x[..., 0]) / _APPROACH
-        least, most = rate_bounds(moment.out.tau, moment.gradient, self.torque)
-        # where nothing keeps all limits, slower is better; but no pace turns back, it only comes to rest
+        """Return ẇ [1/s], (*batch,); a plan that is to go back does what one that goes forward does, mirrored."""
+        target, way = self._within_reach(moment, asked), np.where(asked.factor < 0, -1.0, 1.0)
+        wanted = way * (target.rate + (target.factor - x[..., 0]) / _APPROACH)
+        least, most = rate_bounds(moment.out.tau, way[..., None] * moment.gradient, self.torque)
+        # where nothing keeps all limits, slower is better; but no pace turns round, it only comes to rest
         rate = np.where(least <= most, np.minimum(np.maximum(wanted, least), most), np.minimum(most, 0.0))
-        rest = -x[..., 0] / _APPROACH
-        forward = np.maximum(rate, np.minimum(rest, wanted))
-        return np.where(asked.factor < 0, np.minimum(rate, np.maximum(rest, wanted)), forward)
+        rest = -way * x[..., 0] / _APPROACH
+        return np.asarray(way * np.maximum(rate, np.minimum(rest, wanted)))
 
     def describe(self) -> dict[str, Any]:
         return self._settings
