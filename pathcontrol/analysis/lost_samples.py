@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from pathcontrol._arrays import Array
 from pathcontrol.simulation.config import table
@@ -69,6 +68,10 @@ def bridge(time: Array, q: Array, qd: Array, lost: _Marks) -> tuple[Array, Array
 
     After the last measurement that came they stay as they are.
     """
+    if not lost.any():
+        return q, qd
+    from scipy.interpolate import CubicHermiteSpline  # takes a quarter of a second to load, and few runs have gaps
+
     q, qd = q.copy(), qd.copy()
     for row in np.flatnonzero(lost.any(1)).tolist():
         for before, after in find_gaps(lost[row]):
