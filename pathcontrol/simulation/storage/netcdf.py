@@ -73,7 +73,7 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | No
         check_seal(path)
         with h5py.File(path, "r") as file:
             check_sizes(file, path.stat().st_size)
-            data = _read_data(file)
+        data = _read_data(path)
         digest, text = data.attrs.pop(_DIGEST, None), data.attrs.pop(_CONFIG)
         config = json.loads(text)
         check_form(data, config)
@@ -92,18 +92,18 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | No
     return data, config, stored
 
 
-def _read_data(file: h5py.File) -> xr.Dataset:
+def _read_data(path: Path) -> xr.Dataset:
     """Read all variables, and decode them by the conventions of CF.
 
     The backend of xarray would ask for the encoding of each variable too, which takes longer than to read it.
     """
     import xarray as xr  # takes half a second to load
 
-    form = h5netcdf.File(file, "r", phony_dims="access")
-    found = {
-        name: (item.dimensions, _read_array(file[name]), dict(item.attrs)) for name, item in form.variables.items()
-    }
-    return xr.decode_cf(xr.Dataset(found, attrs=dict(form.attrs)), decode_times=False)
+    with h5netcdf.File(path, "r", phony_dims="access") as form, h5py.File(path, "r") as file:
+        found = {
+            name: (item.dimensions, _read_array(file[name]), dict(item.attrs)) for name, item in form.variables.items()
+        }
+        return xr.decode_cf(xr.Dataset(found, attrs=dict(form.attrs)), decode_times=False)
 
 
 def _read_array(variable: h5py.Dataset) -> Any:
