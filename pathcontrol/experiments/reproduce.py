@@ -14,6 +14,7 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from itertools import repeat
 from multiprocessing import active_children, get_context
@@ -159,7 +160,7 @@ def _mapped() -> Iterator[Callable[..., Iterable[Any]]]:
         return
     with ProcessPoolExecutor(len(PAPER), get_context("fork"), _prepare_process) as pool:
         try:
-            yield pool.map
+            yield partial(_start_whole, pool)
         except KeyboardInterrupt:
             for process in active_children():  # of a Ctrl-C that only this process got
                 process.terminate()
@@ -169,6 +170,12 @@ def _mapped() -> Iterator[Callable[..., Iterable[Any]]]:
                 "a process that ran an experiment has ended before it was done, as when it is killed or memory runs "
                 "out; free some, or run it with one core, as `taskset 1 pathcontrol reproduce` does on Linux"
             ) from error
+
+
+def _start_whole(pool: ProcessPoolExecutor, function: Callable[..., T], *items: Iterable[Any]) -> Iterable[T]:
+    """Begin to map in the processes of a pool; a Ctrl-C meanwhile comes when its thread runs, which it waits for."""
+    with delay_interrupt():
+        return pool.map(function, *items)
 
 
 def _prepare_process() -> None:

@@ -158,3 +158,17 @@ def test_a_process_that_is_killed_is_told_in_one_sentence(tmp_path):
     assert command.returncode == 2
     assert told.startswith("error: a process that ran an experiment has ended before it was done")
     assert told.count("\n") == 1
+
+
+def test_ctrl_c_while_a_pool_starts_comes_when_it_has_started():
+    """Before its thread runs it could not be shut down."""
+    done = []
+
+    class Pool:
+        def map(self, function, *items):
+            os.kill(os.getpid(), signal.SIGINT)
+            done.append(function)
+
+    with pytest.raises(KeyboardInterrupt):
+        module._start_whole(Pool(), max, [1])
+    assert done == [max]
