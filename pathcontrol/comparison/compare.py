@@ -138,7 +138,7 @@ def compare(
     if isinstance(scenario, str):
         scenario = make_scenario(scenario)
     expect("scenario", scenario, Scenario)
-    made = make_laws(laws, scenario.robot, scenario.task, scenario.gains, scenario.laws)
+    made = make_laws(laws, scenario.robot, scenario.task, scenario.gains, scenario.laws, scenario.pattern)
     if engine is not None:
         check_engine(engine)
     starts = scenario.starts(rollouts, seed)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from pathcontrol._expect import did_you_mean
 from pathcontrol.comparison.family import FAMILY
 from pathcontrol.comparison.shared_gains import Gains, mean_inertia, mean_plan_gain, sample_task, split_damping
 from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
-from pathcontrol.control.base import Controller, Start, check_controller
+from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.gains import diagonal_gain
 from pathcontrol.control.maneuver_regulation import ManeuverRegulation
@@ -22,8 +24,9 @@ from pathcontrol.control.state_to_reference import StateToReferenceProjection
 from pathcontrol.control.transverse_linearization import TransverseLinearization
 from pathcontrol.control.wrappers.event_plan import EventPlan
 from pathcontrol.control.wrappers.paced import Paced
-from pathcontrol.control.wrappers.wrapper import unwrap
+from pathcontrol.control.wrappers.wrapper import unwrap, wrappers_of
 from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.registry import LAWS
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask
 
@@ -32,35 +35,36 @@ _SAME = 1e-9  # share of the size of a path up to which two are the same
 Maker = Callable[[RobotModel, PathTask], Controller]
 Law = str | Controller | Maker
 Laws = Law | Iterable[Law] | Mapping[str, Law]
+Options = Mapping[str, Any]
 _NONE: Mapping[str, Law] = MappingProxyType({})
 
 
-def _computed_torque(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+def _computed_torque(robot: RobotModel, task: PathTask, gains: Gains, options: Options) -> Controller:
     """Return computed torque."""
-    return ComputedTorque(robot, task, gains.K_p, gains.K_v, start=start)
+    return ComputedTorque(robot, task, gains.K_p, gains.K_v, **options)
 
 
-def _pd_plus(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+def _pd_plus(robot: RobotModel, task: PathTask, gains: Gains, options: Options) -> Controller:
     """Return PD+ with gains times the diagonal of M at the mean posture."""
     mass = mean_inertia(robot, task)
-    return PDPlus(robot, task, mass * np.asarray(gains.K_p), mass * np.asarray(gains.K_v), start=start)
+    return PDPlus(robot, task, mass * np.asarray(gains.K_p), mass * np.asarray(gains.K_v), **options)
 
 
-def _slotine_li(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+def _slotine_li(robot: RobotModel, task: PathTask, gains: Gains, options: Options) -> Controller:
     """Return Slotine and Li's law with the poles of the others at the mean posture, where it can have them."""
     Lambda, damping = split_damping(*(np.broadcast_to(gain, robot.n) for gain in gains[:2]))
-    return SlotineLi(robot, task, Lambda, mean_inertia(robot, task) * damping, start=start)
+    return SlotineLi(robot, task, Lambda, mean_inertia(robot, task) * damping, **options)
 
 
-def _extended_motion_plan(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+def _extended_motion_plan(robot: RobotModel, task: PathTask, gains: Gains, options: Options) -> Controller:
     """Return the extended motion plan."""
     k = mean_plan_gain(task) if gains.k is None else gains.k
-    return ExtendedMotionPlan(robot, task, gains.K_p, gains.K_v, k, start=start)
+    return ExtendedMotionPlan(robot, task, gains.K_p, gains.K_v, k, **options)
 
 
-def _projection(robot: RobotModel, task: PathTask, gains: Gains, start: Start) -> Controller:
+def _projection(robot: RobotModel, task: PathTask, gains: Gains, options: Options) -> Controller:
     """Return projection, whose position gain is one number: the mean of all joints."""
-    return Projection(robot, task, float(np.asarray(gains.K_p).mean()), gains.K_v, start=start)
+    return Projection(robot, task, float(np.asarray(gains.K_p).mean()), gains.K_v, **options)
 
 
 _MAKERS = {
@@ -76,11 +80,11 @@ KNOWN_LAWS = tuple(_MAKERS)
 PACED_LAWS = ("paced_extended_motion_plan", "paced_projection")
 #: the name of all of these and of :data:`FAMILY` together
 ALL_LAWS = "all"
-#: laws around these, compared where they are named
-_WRAPPED = {
-    "event_plan": lambda *scenario: EventPlan(_extended_motion_plan(*scenario)),
-    PACED_LAWS[0]: lambda *scenario: Paced(_extended_motion_plan(*scenario)),
-    PACED_LAWS[1]: lambda *scenario: Paced(_projection(*scenario)),
+#: laws around these, compared where they are named, by the law inside and the wrapper
+_WRAPPED: dict[str, tuple[str, type[EventPlan | Paced]]] = {
+    "event_plan": ("extended_motion_plan", EventPlan),
+    PACED_LAWS[0]: ("extended_motion_plan", Paced),
+    PACED_LAWS[1]: ("projection", Paced),
 }
 
 
@@ -114,12 +118,19 @@ def recover_gains(law: Controller) -> Gains:
 
 
 def make_laws(
-    laws: Laws | None, robot: RobotModel, task: PathTask, gains: Gains, more: Mapping[str, Law] = _NONE
+    laws: Laws | None,
+    robot: RobotModel,
+    task: PathTask,
+    gains: Gains,
+    more: Mapping[str, Law] = _NONE,
+    pattern: Controller | None = None,
 ) -> dict[str, Controller]:
     """Return control laws by name for one arm and one task, from names, laws, or functions of arm and task.
 
     On a closed path the known laws begin at the point that is nearest to the arm, on an open one at its begin. ``more``
-    are laws that have names too, here only.
+    are laws that have names too, here only. The known laws compensate what the ``pattern`` compensates of friction,
+    with its observer, and begin on an open path where it does; the one of its own kind is that law, and the wrappers
+    of its kinds are its own.
 
     Raises:
         UnknownNameError: there is no law of that name.
@@ -129,15 +140,15 @@ def make_laws(
         diagonal_gain(name, getattr(gains, name), robot.n, robot.joint_names)
     made: dict[str, Controller] = {}
     if laws is None or laws == ALL_LAWS:
-        laws = [*KNOWN_LAWS, *(FAMILY if laws == ALL_LAWS else ()), *more]
+        laws = list(dict.fromkeys([*KNOWN_LAWS, *(FAMILY if laws == ALL_LAWS else ()), *more]))
     for name, law in _list_laws(laws):
-        one = _make_law(law, robot, task, gains, more)
+        one = _make_law(law, robot, task, gains, more, pattern)
         key = name or (law if isinstance(law, str) else type(one).__name__)
         if key in made:
             raise InputError(f"two laws are called {key!r}; give them names: {{'first': …, 'second': …}}")
         made[key] = one
     if not made:
-        known = ", ".join(_MAKERS | FAMILY | _WRAPPED)
+        known = ", ".join([*_MAKERS, *FAMILY, *_WRAPPED])
         raise InputError(f"there is no law to compare; expected some of {known}, or laws of your own")
     return made
 
@@ -154,17 +165,22 @@ def _list_laws(laws: Laws) -> list[tuple[str, Law]]:
         raise InputError(f"laws = {laws!r:.80}, expected names, control laws, or a table of them by name") from error
 
 
-def _make_law(law: Law, robot: RobotModel, task: PathTask, gains: Gains, more: Mapping[str, Law]) -> Controller:
+def _make_law(
+    law: Law, robot: RobotModel, task: PathTask, gains: Gains, more: Mapping[str, Law], pattern: Controller | None
+) -> Controller:
     """Return one law."""
     if isinstance(law, str) and law in more:
         law = more[law]
     if isinstance(law, str):
-        makers = _MAKERS | FAMILY | _WRAPPED
-        if law not in makers:
-            known = list(dict.fromkeys([*makers, *more, ALL_LAWS]))
+        makers = _MAKERS | FAMILY
+        if law not in makers | _WRAPPED:
+            known = list(dict.fromkeys([*makers, *_WRAPPED, *more, ALL_LAWS]))
             choices = ", ".join(known)
             raise UnknownNameError(f"there is no law {law!r}, expected one of {choices}{did_you_mean(law, known)}")
-        return makers[law](robot, task, gains, "nearest" if task.closed else "s0")
+        name, wrapper = _WRAPPED.get(law, (law, None))
+        inside, options = _make_like(pattern, name), _options_of(pattern, task)
+        made = makers[name](robot, task, gains, options) if inside is None else inside
+        return made if wrapper is None else _wrap_like(pattern, wrapper, made)
     made = law(robot, task) if callable(law) else law
     check_controller("laws", made)
     if made.robot.joint_names != robot.joint_names:
@@ -172,6 +188,32 @@ def _make_law(law: Law, robot: RobotModel, task: PathTask, gains: Gains, more: M
     if not _is_same(made.task, task):
         raise InputError(f"{type(made).__name__} is for another task than the scenario; make it with scenario.task")
     return made
+
+
+def _options_of(pattern: Controller | None, task: PathTask) -> dict[str, Any]:
+    """Return the arguments that all laws have from the ``pattern``; on a closed path all begin where they are."""
+    start = "nearest" if task.closed else "s0"
+    if pattern is None:
+        return {"start": start}
+    inside = unwrap(pattern)
+    start = "nearest" if task.closed else inside.start_at
+    return {"friction": inside.friction, "observer_hz": inside.observer_hz, "start": start}
+
+
+def _make_like(pattern: Controller | None, name: str) -> Controller | None:
+    """Return the law inside the ``pattern`` with the start of all, where it is of the kind of a ``name``, else none."""
+    if pattern is None or type(unwrap(pattern)) is not LAWS.find(name):
+        return None
+    wrappers = wrappers_of(pattern)
+    law = copy(wrappers[-1].wrapped if wrappers else pattern)  # as it was given, without what a wrapper made of it
+    law.start_at = _options_of(pattern, law.task)["start"]
+    return law
+
+
+def _wrap_like(pattern: Controller | None, wrapper: type[EventPlan | Paced], law: Controller) -> Controller:
+    """Return a wrapper around a law, with the settings of the one of its kind around the ``pattern``."""
+    found = [] if pattern is None else [one for one in wrappers_of(pattern) if type(one) is wrapper]
+    return found[0].around(law) if found else wrapper(law)
 
 
 def _is_same(one: PathTask, other: PathTask) -> bool:

@@ -59,6 +59,9 @@ class Scenario:
         engine: which engine runs it, see :func:`simulate`.
         undisturbed: the scenario without what happens in it; ``None`` if nothing does.
         laws: laws beside the known ones, by name: names of others, or functions of arm and task.
+        pattern: a law whose ``friction`` and ``observer_hz``, and ``start`` on an open path, all known laws have; the
+            one of its own kind is that law itself. By default they have those of their classes, and on a closed path
+            they begin at the nearest point.
 
     Raises:
         InputError: the event does not begin within the run.
@@ -80,6 +83,7 @@ class Scenario:
     engine: Engine = "auto"
     undisturbed: Scenario | None = None
     laws: Mapping[str, Law] = field(default_factory=dict)
+    pattern: Controller | None = None
 
     def __post_init__(self) -> None:
         if self.event is not None and not 0 <= self.event[0] < min(self.event[1], self.duration):
