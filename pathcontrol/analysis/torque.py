@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.limit_shares import stack_torque_limits
+from pathcontrol.analysis.lost_samples import find_lost
 from pathcontrol.analysis.window import Samples
 from pathcontrol.simulation.config import laws
 from pathcontrol.simulation.run import Run
@@ -19,18 +20,20 @@ NAMES = ("tau_demand_peak", "tau_peak", "tau_demand_ratio", "tau_noise", "noise_
 def torque_metrics(run: Run, own: Samples, counted: Samples) -> dict[str, Array]:
     """Return the metrics of torques, (rollout,) each: peaks of all samples, noise of those ``counted``.
 
-    Each is the largest over the joints.
+    Each is the largest over the joints. Samples to which no measurement came in a ``Dropout`` are none of noise: the
+    torque jumps when the next one comes, and a frozen measurement is no error of the sensor.
     """
     values = {f"{name}_peak": own.reduce(_peak, run.array(name)).max(-1) for name in (_DEMAND, "tau") if name in run}
     limits = stack_torque_limits(run)
     if np.isfinite(limits).any():
         values["tau_demand_ratio"] = (own.reduce(_peak, run.array(_DEMAND)) / limits).max(-1)
-    noise = _expand_joints(counted.reduce(_noise, run.array(_DEMAND), _compensated_direction(run)), run)
+    lost = find_lost(run, filtered=False)
+    noise = _expand_joints(counted.reduce(_noise, run.array(_DEMAND), _compensated_direction(run), lost), run)
     values["tau_noise"] = noise.max(-1)
     if "q_measured" in run:
-        heard = _expand_joints(counted.reduce(_rms, run.array("q_measured") - run.array("q")), run)
+        heard = _expand_joints(counted.reduce(_rms, run.array("q_measured") - run.array("q"), lost), run)
         if (heard > 0).any():
-            gains = np.divide(noise, heard, out=np.zeros_like(noise), where=heard > 0)
+            gains = np.divide(noise, heard, out=0.0 * heard, where=heard > 0)
             values["noise_amplification"] = gains.max(-1)
     return values
 
@@ -54,9 +57,13 @@ def noise_deviation(values: Array, left_out: NDArray[np.bool_] | None = None) ->
     return np.stack([_noise_of_one(*row) for row in zip(values, steps, strict=True)])
 
 
-def _noise(values: Array, unsteady: Array) -> Array:
-    """Return the deviation of one rollout, (joint,), from torques (time, joint) and compensated directions."""
-    return noise_deviation(values[None], (np.diff(unsteady, axis=0) != 0)[None])[0]
+def _noise(values: Array, unsteady: Array, lost: NDArray[np.bool_]) -> Array:
+    """Return the deviation of one rollout, (joint,), from torques (time, joint) and compensated directions.
+
+    Steps from and to ``lost`` samples (time,) do not count.
+    """
+    gap = (lost[1:] | lost[:-1])[:, None]
+    return noise_deviation(values[None], ((np.diff(unsteady, axis=0) != 0) | gap)[None])[0]
 
 
 def _noise_of_one(values: Array, left_out: NDArray[np.bool_]) -> Array:
@@ -86,9 +93,13 @@ def _peak(values: Array) -> Array:
     return np.abs(values).max(0)
 
 
-def _rms(values: Array) -> Array:
-    """Return the RMS over time, (joint,) from (time, joint); bit-identical for any number of rollouts."""
-    return np.sqrt(np.ascontiguousarray((values**2).T).mean(-1))
+def _rms(values: Array, lost: NDArray[np.bool_]) -> Array:
+    """Return the RMS over the times that are not ``lost``, (joint,) from (time, joint); NaN where all are.
+
+    It is bit-identical for any number of rollouts.
+    """
+    came = np.ascontiguousarray((values[~lost] ** 2).T)
+    return np.sqrt(came.mean(-1)) if came.size else np.full(values.shape[-1], np.nan)
 
 
 def _expand_joints(values: Array, run: Run) -> Array:

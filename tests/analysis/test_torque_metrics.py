@@ -78,6 +78,39 @@ def test_without_an_error_of_the_sensors_there_is_no_amplification(ideal_arm):
     assert numbers["tau_noise"][0] < 1e-3
 
 
+@pytest.mark.parametrize("what", ["ticks", "measurements"])
+def test_frozen_measurements_are_no_noise(ideal_arm, circle, what):
+    law = pc.ExtendedMotionPlan(ideal_arm, circle, 800.0, [45.0, 100.0], 20.0)
+    gap = pc.Dropout(0.6, 0.01, what)
+
+    def numbers(disturbance, **loop):
+        run = pc.simulate(
+            law, START, duration=1.0, loop=pc.SampledLoop(**loop), disturbance=disturbance, progress=False
+        )
+        return pc.metrics(run, window=(0.5, 1.0), only=["tau_noise", "noise_amplification"])
+
+    exact = numbers(gap)
+    assert "noise_amplification" not in exact
+    # what is left are second derivatives of smooth torques; with the jump after the gap it was 1.6 and 2.2
+    assert exact["tau_noise"][0] < 0.1
+    noisy = {"noise": pc.SensorNoise(position=1e-4, seed=1)}
+    calm, lossy = numbers(None, **noisy), numbers(gap, **noisy)
+    for name in calm:  # 180 samples and not 200 tell it: 0.25 are three of its deviations
+        assert lossy[name] == pytest.approx(calm[name], rel=0.25)
+
+
+def test_a_rollout_without_any_measurement_has_no_noise(ideal_arm, circle):
+    law = pc.ExtendedMotionPlan(ideal_arm, circle, 800.0, [45.0, 100.0], 20.0)
+    loop = pc.SampledLoop(noise=pc.SensorNoise(position=1e-4, seed=1))
+    lost = pc.Dropout([0.0, 0.4], [np.inf, 0.02], "measurements")
+    run = pc.simulate(law, [START] * 2, duration=0.5, loop=loop, disturbance=lost, progress=False)
+    numbers = pc.metrics(run)
+    for name in ("tau_noise", "noise_amplification"):
+        assert np.isnan(numbers[name][0])
+        assert numbers[name][1] > 0
+        assert pc.metrics(run.rollout(1))[name][0] == numbers[name][1]
+
+
 def test_peaks_and_their_share_of_the_limits(arm, circle):
     law = pc.ExtendedMotionPlan(arm, circle, 800.0, [45.0, 100.0], 20.0)
     run = pc.simulate(law, START, duration=0.5, loop=pc.SampledLoop(torque_limits=True), progress=False)
