@@ -15,6 +15,7 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.config import laws, table
 from pathcontrol.simulation.context import RunContext, StoredContext, check_sequence
+from pathcontrol.simulation.described_disturbance import move_described
 from pathcontrol.simulation.samples import Samples, complete_outcome, label_outcome
 from pathcontrol.simulation.storage.run_file import read_file, write_file
 from pathcontrol.simulation.trajectory import Trajectory, interpolate_motion
@@ -264,6 +265,9 @@ class Run:
     def path(self, index: int) -> Run:
         """Return one path of a sequence as a run of its own, which begins at 0 s, where the path before finished.
 
+        The disturbance of its configuration has the times of this run; that of a class of one's own has them where it
+        calls them ``start`` and ``duration``.
+
         Raises:
             InputError: the run is no sequence, or that path was not followed.
         """
@@ -281,6 +285,8 @@ class Run:
         data = data.drop_vars(name for name in OUTCOMES if name in data.coords)
         data = data.assign_coords(time=("time", data["time"].to_numpy() - begin, data["time"].attrs))
         config = self.config | {"controller": dict(enumerate(laws(self.config))).get(index, {})}
+        if "disturbance" in config:
+            config["disturbance"] = move_described(config["disturbance"], float(begin))
         outcome = {"finish_time": ends[[index]] - begin}
         if status[index] == "diverged":
             outcome |= {"diverged_time": self.diverged_time - begin, "reason": self.reason}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,20 +14,30 @@ from pathcontrol import (
     Circle,
     ComputedTorque,
     ContinuousTime,
+    Dropout,
     ExtendedMotionPlan,
+    FrictionChange,
+    Harmonic,
     InputError,
+    JammedJoint,
     Line,
     PathSequence,
     PathTask,
+    PickUp,
     Projection,
+    Push,
     Run,
     SampledLoop,
+    TorqueLimitDrop,
+    Wall,
     WaypointPath,
     load_robot,
     metrics,
     record,
     simulate,
 )
+from pathcontrol.analysis.lost_samples import find_lost
+from pathcontrol.registry import DISTURBANCES
 from pathcontrol.simulation.sequence import simulate_sequence
 
 HOME, AWAY = np.array([0.2, -0.3]), np.array([0.9, 0.6])
@@ -190,3 +202,53 @@ def test_a_run_of_a_sequence_has_the_parameters_of_the_task_of_its_paths(arm):
     assert np.all(np.diff(s) >= 0)
     assert np.array_equal(task.index(s)[:-1], run["path_index"].to_numpy()[:-1])
     assert np.allclose(task.q_d(s) - run.array("q")[0], run.array("e_p")[0], atol=1e-9)
+
+
+def made(described):
+    """A disturbance from its description in the configuration of a run."""
+    kind = DISTURBANCES.find(described["disturbance"])
+    known = inspect.signature(kind).parameters
+    return kind(**{name: value for name, value in described.items() if name in known})
+
+
+@pytest.mark.parametrize(
+    "disturbance",
+    [
+        Push([1.0, 2.0], [0.9], 0.4),
+        Harmonic([1.0, 2.0], 3.0, 0.2),
+        JammedJoint(1, 0.9, 0.4),
+        TorqueLimitDrop(0.5, 0.9, 0.4),
+        FrictionChange(2.0, 0.9, 0.4),
+        Dropout(0.9, 0.4, "measurements"),
+        PickUp(0.5, "tool", 0.9, 0.4),
+        Wall("tool", [9.0, 0.0, 0.0], [-1.0, 0.0, 0.0], rigid=True, start=0.9, duration=0.4),
+    ],
+    ids=lambda one: type(one).__name__,
+)
+def test_the_disturbance_of_one_path_has_the_time_of_its_run(arm, disturbance):
+    laws, loop = [there(arm), back(arm)], SampledLoop(torque_limits=True)
+    run = simulate_sequence(laws, HOME, duration=9.0, loop=loop, disturbance=disturbance, gaps=True, progress=False)
+    whole = simulate_sequence(
+        laws, HOME, duration=9.0, loop=loop, disturbance=disturbance + Push([0.0, 0.0]), gaps=True, progress=False
+    )
+    begin = run.time[int((run["path_index"].to_numpy() == 0).sum())]
+    moved = made(run.path(1).config["disturbance"])
+    assert run.path(0).config["disturbance"] == run.config["disturbance"]
+    assert made(whole.path(1).config["disturbance"]["terms"][0]).describe() == moved.describe()
+    times = begin + np.linspace(-2.0, 2.0, 41) + 1e-3  # at none of them something begins or ends
+    q = np.zeros((1, 2))
+    for t in times:
+        if isinstance(disturbance, Harmonic):
+            np.testing.assert_allclose(moved.torque(t - begin, q, q), disturbance.torque(t, q, q), atol=1e-12)
+        else:
+            np.testing.assert_array_equal(moved.share(t - begin), disturbance.share(t))
+
+
+def test_measurements_that_are_lost_on_one_path_are_those_of_the_whole(arm):
+    laws = [there(arm), back(arm)]
+    run = simulate_sequence(laws, HOME, duration=9.0, disturbance=Dropout(2.0, 0.1, "measurements"), progress=False)
+    among, lost = run["path_index"].to_numpy(), find_lost(run, filtered=False)
+    assert run["path_finish_time"].to_numpy()[0] < 2.0
+    assert lost[0, among == 1].sum() == 40
+    for i in range(2):
+        np.testing.assert_array_equal(find_lost(run.path(i), filtered=False), lost[:, among == i])
