@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 import pathcontrol as pc
 from pathcontrol import errors
@@ -85,6 +86,48 @@ def test_findings_are_told(tmp_path):
     assert any(finding.startswith("robot") for finding in error.findings)
     file.write_text("a = 1\nb =\n")
     assert raised(pc.ExperimentError, lambda: pc.run_experiment(file, tmp_path / "out")).line == 2
+
+
+FILE = """duration = 1.0
+[robot]
+source = "cicese_2dof"
+[task]
+type = "circle"
+radius = 1.0
+speed = 1.0
+[controller]
+type = "pd_plus"
+K_p = 100.0
+K_v = 10.0
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "value"),
+    [
+        ("radius = 1.0", "radius = true", "task.radius", True),  # of the file alone
+        ("radius = 1.0", "radius = -1.0", "task.radius", -1.0),
+        ("K_p = 100.0", "K_p = [100.0, -1.0]", "controller.K_p", [100.0, -1.0]),  # of what the law takes
+    ],
+)
+def test_an_experiment_file_names_the_key_and_its_value(tmp_path, old, new, key, value):
+    file = tmp_path / "e.toml"
+    file.write_text(FILE.replace(old, new))
+    error = raised(pc.ExperimentError, lambda: pc.run_experiment(file, tmp_path / "out"))
+    assert (error.file, error.argument, error.line) == (str(file), key, None)
+    assert_array_equal(error.value, value)
+    assert pickle.loads(pickle.dumps(error)).argument == key
+
+
+def test_a_drawing_that_cannot_be_read_names_its_own_line(tmp_path):
+    drawing, file = tmp_path / "part.csv", tmp_path / "e.toml"
+    drawing.write_text("0,0,0\n1,0,0\n1,x,0\n")
+    start = FILE.index("[task]"), FILE.index("[controller]")
+    task = '[task]\ntype = "toolpath"\nfile = "part.csv"\nframe = "tool"\nunit = "mm"\n'
+    file.write_text(FILE[: start[0]] + task + FILE[start[1] :])
+    error = raised(pc.ExperimentError, lambda: pc.run_experiment(file, tmp_path / "out"))
+    assert (error.file, error.line) == (str(drawing), 3)
+    assert error.findings[0].startswith("task.file: ")
 
 
 def test_all_is_none_where_an_error_is_not_about_it():

@@ -17,6 +17,12 @@ def test_figures_and_metrics_have_packages_of_their_own():
             assert getattr(package, name) is getattr(pc, name), name
 
 
+def test_every_analysis_is_in_analysis():
+    public = {name: getattr(pc, name) for name in pc.__all__}
+    own = {name for name, one in public.items() if getattr(one, "__module__", "").startswith("pathcontrol.analysis.")}
+    assert own <= {*dir(analysis)}
+
+
 def test_every_figure_is_in_figures():
     assert {name for name in pc.__all__ if name.endswith("_figure")} | {"save_figure"} <= {*dir(figures)}
 

@@ -11,6 +11,8 @@ from .lap_accuracy.path_accuracy import accuracy as accuracy
 from .lap_table import lap_errors as lap_errors
 from .lyapunov_functions import lyapunov as lyapunov
 from .pareto import non_dominated as non_dominated
+from .path_reach import Reach as Reach
+from .path_reach import reach as reach
 from .power.law_of_run import law_states as law_states
 from .power.power_balance import PowerBalance as PowerBalance
 from .power.power_balance import power_balance as power_balance

@@ -29,7 +29,9 @@ def diagonal_gain(name: str, value: ArrayLike, n: int, joints: Sequence[str] | N
     array = _diagonal_of_matrix(name, check_finite(name, as_array(name, given)), n)
     if array.ndim and array.shape[-1] not in (1, n):
         raise InputError(
-            f"{name} has shape {array.shape}, expected a scalar, its diagonal ({n},) or a diagonal matrix ({n}, {n})"
+            f"{name} has shape {array.shape}, expected a scalar, its diagonal ({n},) or a diagonal matrix ({n}, {n})",
+            argument=name,
+            value=value,
         )
     return _check_positive(name, array)
 
@@ -47,7 +49,9 @@ def scalar_gain(name: str, value: ArrayLike) -> Array:
     if array.ndim and array.shape[-1] != 1:
         raise InputError(
             f"{name} = {np.asarray(value).tolist()}, expected a scalar: the Lyapunov function (42) is for one "
-            f"gain; give one {name}, or weigh the joints with K_v"
+            f"gain; give one {name}, or weigh the joints with K_v",
+            argument=name,
+            value=value,
         )
     return _check_positive(name, array)
 
@@ -60,7 +64,11 @@ def rollout_gain(name: str, value: ArrayLike) -> Array:
     """
     array = check_finite(name, as_array(name, value))
     if array.ndim > 2 or (array.ndim == 2 and array.shape[1] != 1):
-        raise InputError(f"{name} has shape {array.shape}, expected a number, or one for each rollout, (N,) or (N, 1)")
+        raise InputError(
+            f"{name} has shape {array.shape}, expected a number, or one for each rollout, (N,) or (N, 1)",
+            argument=name,
+            value=value,
+        )
     return freeze(array[:, None] if array.ndim == 1 else array)
 
 
@@ -78,7 +86,9 @@ def positive_rollout_gain(name: str, value: ArrayLike) -> Array:
     if np.ndim(value) == 1 and np.size(value) > 1:
         raise InputError(
             f"{name} = {np.asarray(value).tolist()}, expected one number for all joints; gains of several rollouts are "
-            "rows, (N, 1)"
+            "rows, (N, 1)",
+            argument=name,
+            value=value,
         )
     return _check_positive(name, rollout_gain(name, value))
 
@@ -94,7 +104,9 @@ def _diagonal_of_matrix(name: str, array: Array, n: int) -> Array:
         raise InputError(
             f"{name} = {array.tolist()} is a matrix that is not diagonal; the theorems ask for diagonal gains: "
             f"give its diagonal, as {name} = {diagonal.tolist()} (gains of {n} rollouts are rows, "
-            f"({n}, 1, {n}))"
+            f"({n}, 1, {n}))",
+            argument=name,
+            value=array.tolist(),
         )
     return diagonal
 
@@ -108,5 +120,7 @@ def _is_matrix(array: Array) -> bool:
 def _check_positive(name: str, array: Array) -> Array:
     """Check that all gains are greater than 0; return them read-only."""
     if (array <= 0).any():
-        raise InputError(f"{name} = {array.tolist()}, expected gains greater than 0")
+        raise InputError(
+            f"{name} = {array.tolist()}, expected gains greater than 0", argument=name, value=array.tolist(), limit=0.0
+        )
     return freeze(array)

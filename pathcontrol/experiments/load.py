@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 import stat
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from pydantic import ValidationError
@@ -17,7 +18,7 @@ from pathcontrol.experiments.schema.validators import show_value
 
 _LONGEST = 2_000_000  # bytes
 _DEEPEST = 100  # parts of a key
-_MOST_TOLD = 20  # findings
+_MOST_LISTED = 20  # findings
 _LONGEST_KEY = 200
 
 
@@ -33,18 +34,31 @@ def load_experiment(path: str | Path) -> Experiment:
     try:
         return Experiment.model_validate(data)
     except ValidationError as error:
-        raise make_file_error(path, map(describe_finding, error.errors(include_url=False))) from None
+        found = error.errors(include_url=False)
+        details = {"argument": _key_of(found[0]), "value": found[0]["input"]} if len(found) == 1 else {}
+        raise make_file_error(path, map(describe_finding, found), details) from None
 
 
-def make_file_error(path: str | Path, findings: Iterable[str]) -> ExperimentError:
-    """Return the error that lists what is wrong in the file ``path``."""
-    told = list(findings)
-    more = ["and more"] if len(told) > _MOST_TOLD else []
-    lines = "\n".join([*told[:_MOST_TOLD], *more]).replace("\n", "\n  ")
-    line = re.search(r"\bline (\d+)", told[0]) if len(told) == 1 else None
-    where = {"line": int(line[1])} if line else {}
+def make_file_error(
+    path: str | Path, findings: Iterable[str], details: Mapping[str, Any] = MappingProxyType({})
+) -> ExperimentError:
+    """Return the error that lists what is wrong in the file ``path``, with ``details`` beside the message."""
+    listed = tuple(findings)
+    more = ["and more"] if len(listed) > _MOST_LISTED else []
+    lines = "\n".join([*listed[:_MOST_LISTED], *more]).replace("\n", "\n  ")
     message = f"{str(path)!r} is not a valid experiment:\n  {lines}"
-    return ExperimentError(message, file=str(path), findings=tuple(told), **where)
+    return ExperimentError(message, **{"file": str(path), **details, "findings": listed})
+
+
+def make_build_error(path: str | Path, error: ExperimentError) -> ExperimentError:
+    """Return the error of what the file ``path`` describes, which could not be made, with what stands beside it."""
+    return make_file_error(path, [str(error)], error.details_with())
+
+
+def _make_text_error(path: str | Path, finding: str) -> ExperimentError:
+    """Return the error of the text of a file, which may say the line."""
+    line = re.search(r"\bline (\d+)", finding)
+    return make_file_error(path, [finding], {"line": int(line[1])} if line else {})
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
@@ -58,7 +72,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # integers of thousands of digits are a ValueError
-        raise make_file_error(path, [f"it cannot be read as TOML: {error}"]) from error
+        raise _make_text_error(path, f"it cannot be read as TOML: {error}") from error
 
 
 def read_text(path: str | Path) -> str:
@@ -77,8 +91,8 @@ def read_text(path: str | Path) -> str:
         ) from error
     except UnicodeDecodeError as error:
         line, byte = data[: error.start].count(b"\n") + 1, data[error.start]
-        raise make_file_error(
-            path, [f"line {line} has the byte 0x{byte:02x}, expected text in UTF-8; save it so"]
+        raise _make_text_error(
+            path, f"line {line} has the byte 0x{byte:02x}, expected text in UTF-8; save it so"
         ) from error
     except ExperimentError:
         raise
@@ -90,7 +104,7 @@ def _refuse_deep_keys(path: str | Path, text: str) -> None:
     """Refuse keys of very many parts, ``a.a.a…``: the time to parse one grows with their square."""
     for number, line in enumerate(text.split("\n"), 1):
         if line.count(".") > _DEEPEST and max(part.count(".") for part in re.split(r"[=,\[\]{}]", line)) > _DEEPEST:
-            raise make_file_error(path, [f"line {number} has a key of more than {_DEEPEST} parts, expected a few"])
+            raise _make_text_error(path, f"line {number} has a key of more than {_DEEPEST} parts, expected a few")
 
 
 def _read(path: Path) -> bytes:
@@ -106,10 +120,15 @@ def _read(path: Path) -> bytes:
     return data
 
 
-def describe_finding(error: Any) -> str:
-    """One line: the key path, and what is wrong with it."""
+def _key_of(error: Any) -> str:
+    """Return the key path that an error of a validation is about."""
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error["loc"]).lstrip(".")
-    key = key if len(key) <= _LONGEST_KEY else f"{key[:_LONGEST_KEY]}…"
+    return key if len(key) <= _LONGEST_KEY else f"{key[:_LONGEST_KEY]}…"
+
+
+def describe_finding(error: Any) -> str:
+    """Return one line of the message: the key path, and what is wrong with it."""
+    key = _key_of(error)
     if error["type"] == "explained":
         return key + error["ctx"]["text"]
     return f"{key} = {show_value(error['input'])}, expected {error['msg']}"

@@ -9,7 +9,7 @@ import numpy as np
 
 from pathcontrol.errors import ExperimentError, warn
 from pathcontrol.experiments.builders.setup import Setup, build
-from pathcontrol.experiments.load import load_experiment, make_file_error, read_text
+from pathcontrol.experiments.load import load_experiment, make_build_error, read_text
 from pathcontrol.experiments.outputs import check_folder, measure_run, write_outputs
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.run import Run
@@ -88,4 +88,4 @@ def load_setup(path: str | Path) -> Setup:
     try:
         return build(experiment, Path(path).parent)
     except ExperimentError as error:
-        raise make_file_error(path, [str(error)]) from error
+        raise make_build_error(path, error) from error

@@ -9,7 +9,7 @@ import numpy as np
 
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.builders.file_errors import report_by_key
-from pathcontrol.experiments.load import load_experiment, make_file_error, read_toml
+from pathcontrol.experiments.load import load_experiment, make_build_error, read_toml
 from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
 from pathcontrol.experiments.schema.sweep_sections import SweepSection
 from pathcontrol.simulation.engines import Engine
@@ -70,7 +70,7 @@ def run_sweep(
                 design = space.design(section.seed)
             build.check(design)
         except ExperimentError as error:
-            raise make_file_error(path, [str(error)]) from error
+            raise make_build_error(path, error) from error
         return sweep(build, space, out, chunk=chunk, resume=resume, progress=progress, cluster=client, **options)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.builders.file_errors import report_by_key
-from pathcontrol.experiments.load import load_experiment, make_file_error, read_toml
+from pathcontrol.experiments.load import load_experiment, make_build_error, read_toml
 from pathcontrol.experiments.samples.swept_experiment import SweptExperiment
 from pathcontrol.experiments.schema.sweep_sections import TuneSection
 from pathcontrol.experiments.sweep_runner import of_samples, values_of
@@ -58,7 +58,7 @@ def run_tune(
             scenarios = None if section.scenarios is None else Space.given(section.scenarios)
         _check(build, space, scenarios)
     except ExperimentError as error:
-        raise make_file_error(path, [str(error)]) from error
+        raise make_build_error(path, error) from error
     options = {"out": out, "chunk": chunk, "resume": resume, "progress": progress} | section.arguments(float)
     return tune(build, space, scenarios=scenarios, **options)
 

@@ -372,10 +372,11 @@ def rebuild_law(description: Mapping[str, Any]) -> FrictionLaw:
     if name == "FrictionSum":
         return FrictionSum(tuple(rebuild_law(term) for term in values["terms"]))
     own = {key: law for key, law in FRICTION_LAWS.defined().items() if law.describe is FrictionLaw.describe}
-    if name in (known := own | _LAWS):
+    if name in (known := _LAWS | own):
         return known[name](**values)
     raise UnknownNameError(
-        f"friction law {name!r}, expected one of {', '.join(_LAWS)} or a FrictionSum of them",
+        f"friction law {name!r}, expected one of {', '.join(known)} or a FrictionSum of them; import the module that "
+        "defines it first",
         value=name,
-        choices=tuple(_LAWS),
+        choices=tuple(known),
     )

@@ -84,7 +84,7 @@ BAD = {
     "parameter missing": ({"task": {"type": "tasks.py:Spiral"}}, "argument: 'size'; it is Spiral(size"),
     "parameter unknown": (
         {"task": {"type": "tasks.py:Spiral", "parameters": {"size": 1.0, "turn": 1.0}}},
-        "got an unexpected keyword argument 'turn'; it is Spiral(size, turns=1.0)",
+        "task.parameters.turn: unknown key; did you mean 'turns'? it is Spiral(size, turns=1.0)",
     ),
     "constructor fails": (
         {"task": {"type": "tasks.py:Spiral", "parameters": {"size": 9.0}}},

@@ -194,7 +194,7 @@ def test_a_report_shows_the_file_that_names_them(own, tmp_path, monkeypatch):
         (
             "py:Stiff",
             "py:Stif",
-            "controller.type: there is no 'Stif' in my_classes.py; its Controller subclasses are Stiff",
+            "there is no 'Stif' in my_classes.py; did you mean 'Stiff'? its Controller subclasses are Stiff",
         ),
         ("py:Stiff", "py:Flower", "controller.type: 'Flower' in my_classes.py is not a subclass of pathcontrol.Contr"),
         ("py:Bump", "py:Rough", "disturbance.type: 'Rough' in my_classes.py is not a subclass of pathcontrol.Disturb"),
@@ -209,8 +209,12 @@ def test_a_report_shows_the_file_that_names_them(own, tmp_path, monkeypatch):
         (
             "depth = 0.3",
             "deep = 0.3",
-            "task.profile.parameters: missing a required argument: 'depth'; it is Breathing(",
+            "task.profile.parameters.deep: unknown key; did you mean 'depth'? it is Breathing(rate, depth)",
         ),
+        ("depth = 0.3", "rest = 0.3", "parameters.rest: unknown key; it is Breathing(rate, depth)"),
+        ("rate = 2.0, ", "", "task.profile.parameters: missing a required argument: 'rate'; it is Breathing("),
+        ("2000 N m/rad", "stiff", "parameters.K = 'stiff', expected a finite number, or a list with one for each"),
+        ("size = 45.0", 'size = "large"', "task: "),
         ("height = [20.0, -5.0]", "height = [1.0, 2.0, 3.0]", "disturbance: Bump.torque has shape (3,), expected"),
         ("level = [3.0, 1.0]", "level = [3.0, 1.0, 1.0]", "plant.friction"),
     ],

@@ -32,7 +32,10 @@ def report_by_key(key: str, fields: Iterable[str] | Mapping[str, str] = ()) -> I
         word = re.match(r"\w*", str(error))
         joint = "." if word and word[0] in names else ": "
         message = reword_advice(str(error), lambda name, value: _line(names[name], value) if name in names else None)
-        raise ExperimentError(f"{key}{joint}{message}") from error
+        details = error.details_with() if isinstance(error, PathControlError) else {}
+        if (name := details.get("argument")) in names:
+            details["argument"] = f"{key}.{names[name]}"
+        raise ExperimentError(f"{key}{joint}{message}", **details) from error
 
 
 def _line(name: str, value: str) -> str:

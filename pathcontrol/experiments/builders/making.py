@@ -8,11 +8,16 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from pathcontrol.arguments import parameters_of
+from pydantic import TypeAdapter, ValidationError
+
+from pathcontrol._expect import did_you_mean
+from pathcontrol._units import list_units
+from pathcontrol.arguments import Parameter, parameters_of
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.builders.file_errors import report_by_key, report_users_code
 from pathcontrol.experiments.builders.own_class import find_own_class
-from pathcontrol.experiments.schema.derived import OwnSection
+from pathcontrol.experiments.load import describe_finding
+from pathcontrol.experiments.schema.derived import OwnSection, annotation_of
 from pathcontrol.experiments.schema.section import Section, convert_angles, read_quantities, units_of
 from pathcontrol.registry import Kind, find_kind
 
@@ -60,15 +65,16 @@ def make(
     try:
         inspect.signature(target).bind(**needed)
     except TypeError as error:
-        raise ExperimentError(f"{where}: {error}; it is {target.__name__}{_plain_signature(target)}") from error
+        raise ExperimentError(f"{where}: {error}; it is {_call_of(target)}") from error
     with report_users_code(where, target.__name__, [name for name in parameters_of(target) if name not in given]):
         return target(**needed)
 
 
-def _plain_signature(target: Callable[..., Any]) -> inspect.Signature:
-    """Return the names and defaults of parameters, without annotations."""
+def _call_of(target: Callable[..., Any]) -> str:
+    """Return the name of a class with the names and defaults of its parameters, without annotations."""
     parameters = inspect.signature(target).parameters.values()
-    return inspect.Signature([parameter.replace(annotation=parameter.empty) for parameter in parameters])
+    plain = inspect.Signature([parameter.replace(annotation=parameter.empty) for parameter in parameters])
+    return f"{target.__name__}{plain}"
 
 
 def target_of(key: str, section: Any, kind: Kind | None, place: Place) -> Callable[..., Any]:
@@ -111,11 +117,27 @@ def _kind_of(section: Section, name: str) -> Kind | None:
 
 
 def _own_arguments(key: str, target: Callable[..., Any], parameters: Mapping[str, Any], place: Place) -> dict[str, Any]:
-    """Return keyword arguments for a class of the user, with the units that its annotations have."""
-    quantities = {name: one.unit for name, one in parameters_of(target).items() if one.unit is not None}
-    units = units_of(quantities, parameters)
+    """Return keyword arguments for a class of the user, with the units and the forms that its annotations have."""
+    known = parameters_of(target)
+    units = units_of({name: one.unit for name, one in known.items() if one.unit is not None}, parameters)
     wrong: dict[Any, Any] = {}
     values = {name: read_quantities((name,), value, units.get(name, ()), wrong) for name, value in parameters.items()}
     for (name, *_), error in wrong.items():
         raise ExperimentError(f"{key}.{name}{error['type'].message()}")
+    for name, value in values.items():
+        if name in known:
+            _check_form(f"{key}.{name}", known[name], value, units.get(name, ()))
+        elif not any(one.kind is one.VAR_KEYWORD for one in inspect.signature(target).parameters.values()):
+            meant = did_you_mean(name, known)
+            raise ExperimentError(f"{key}.{name}: unknown key{meant or ';'} it is {_call_of(target)}")
     return {name: convert_angles(value, units.get(name, ()), place.to_radians) for name, value in values.items()}
+
+
+def _check_form(key: str, parameter: Parameter, value: Any, units: tuple[str, ...]) -> None:
+    """Check that the value of a key has the form that the annotation of its parameter states, if it states one."""
+    if parameter.form is not None:
+        try:
+            TypeAdapter(annotation_of(parameter)).validate_python(value)
+        except ValidationError as error:
+            unit = f", or one with a unit: {list_units(units)}" if units and isinstance(value, str) else ""
+            raise ExperimentError(f"{describe_finding(error.errors()[0] | {'loc': (key,)})}{unit}") from None

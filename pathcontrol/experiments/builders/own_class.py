@@ -10,6 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 
+from pathcontrol._expect import did_you_mean
 from pathcontrol.errors import InputError
 from pathcontrol.experiments.builders.file_errors import describe_error
 from pathcontrol.registry import Kind, load
@@ -31,7 +32,7 @@ def find_own_class(folder: Path, source: str, name: str, kind: Kind) -> type:
     there = f"its {kinds}es are {', '.join(own)}" if own else f"it defines no {kinds}"
     where = Path(source).name
     if found is None:
-        raise InputError(f"there is no {name!r} in {where}; {there}")
+        raise InputError(f"there is no {name!r} in {where}{did_you_mean(name, own) or ';'} {there}")
     raise InputError(f"{name!r} in {where} is not a subclass of pathcontrol.{base.__name__}; {there}")
 
 

@@ -40,7 +40,7 @@ class OwnSection(Section):
     """A class in a Python file, ``type = "FILE.py:ClassName"``, or in an installed module, ``"module:ClassName"``.
 
     ``parameters`` are the keyword arguments of the class. They are taken as they are, but where its annotations have
-    a :class:`Unit`.
+    a :class:`Unit` or a :class:`Form`.
     """
 
     type: Annotated[str, PlainValidator(_own_type)]
@@ -106,7 +106,7 @@ def section_of(target: Callable[..., Any], base: type[Section] = Section, given:
 def fields_of(target: Callable[..., Any], given: Container[str] = ()) -> dict[str, Any]:
     """Return the annotation and the default of a field for each parameter of a class or function, but the ``given``."""
     return {
-        name: (_annotation(parameter), ... if parameter.required else None)
+        name: (annotation_of(parameter), ... if parameter.required else None)
         for name, parameter in parameters_of(target).items()
         if name not in given
     }
@@ -117,7 +117,7 @@ def table_for(place: str, given: tuple[str, ...] = (), base: type[Section] = Sec
     return PlainValidator(lambda value: section_of(load(place), base, given).model_validate(value))
 
 
-def _annotation(parameter: Parameter) -> Any:
+def annotation_of(parameter: Parameter) -> Any:
     """Return the annotation of a field for a parameter."""
     literals = [value for kind in parameter.types if get_origin(kind) is Literal for value in get_args(kind)]
     forms = [parameter.form] if parameter.form else [_FORMS[kind] for kind in parameter.types if kind in _FORMS]

@@ -20,7 +20,7 @@ from pathcontrol.experiments.schema.validators import expected, show_value
 Units = Mapping[str, tuple[str, ...]]
 Finder = Callable[[str], type["Section"] | None]
 _EXPLAINED = "explained"
-_MOST_TOLD = 21  # errors of a section: one more than a message has
+_MOST_LISTED = 21  # errors of a section: one more than a message has
 _Wrong = dict[tuple[int | str, ...], InitErrorDetails]
 
 
@@ -54,8 +54,8 @@ class Section(BaseModel):
         try:
             made = handler(value)
         except ValidationError as error:
-            errors = [e for e in error.errors(include_url=False) if not _told(e["loc"], wrong)]
-            found = [_detail(cls, e) for e in errors[:_MOST_TOLD]]
+            errors = [e for e in error.errors(include_url=False) if not _is_listed(e["loc"], wrong)]
+            found = [_detail(cls, e) for e in errors[:_MOST_LISTED]]
             raise ValidationError.from_exception_data(cls.__name__, [*wrong.values(), *found]) from None
         if wrong:
             raise ValidationError.from_exception_data(cls.__name__, [*wrong.values()])
@@ -105,7 +105,7 @@ def read_quantities(at: tuple[int | str, ...], value: Any, units: tuple[str, ...
         return {key: read_quantities((*at, key), item, units, wrong) for key, item in value.items()}
     if isinstance(value, str) and is_quantity(value):
         try:
-            if len(wrong) > _MOST_TOLD:
+            if len(wrong) > _MOST_LISTED:
                 return value
             return parse_quantity(value, *units)
         except InputError as error:
@@ -113,7 +113,7 @@ def read_quantities(at: tuple[int | str, ...], value: Any, units: tuple[str, ...
     return value
 
 
-def _told(at: tuple[int | str, ...], wrong: _Wrong) -> bool:
+def _is_listed(at: tuple[int | str, ...], wrong: _Wrong) -> bool:
     """Return whether something is wrong at a key that is ``at``, in it, or around it."""
     return any(all(a == b for a, b in zip(at, other, strict=False)) for other in wrong)
 
@@ -125,7 +125,7 @@ def convert_angles(value: Any, units: tuple[str, ...], to_radians: Callable[[flo
 
 def convert_numbers(value: Any, function: Callable[[float], float]) -> Any:
     """Return ``value`` with ``function`` applied to each number in it that was given without a unit."""
-    if isinstance(value, Quantity | bool):
+    if isinstance(value, Quantity | bool | str):
         return value
     if isinstance(value, dict):
         return {key: convert_numbers(item, function) for key, item in value.items()}

@@ -16,7 +16,7 @@ from pathcontrol.toolpaths.notes import Notes
 
 #: the ways to name columns
 Chosen = Sequence[str] | Mapping[str, int | str]
-_MOST_TOLD = 8
+_MOST_LISTED = 8
 _ANGLES = ({"roll", "pitch", "yaw"}, {"rx", "ry", "rz"}, {"a", "b", "c"}, {"w", "p", "r"})
 _ANGLES_UNREAD = (
     ": of angles nothing is read, as programs differ in their order and unit; orientations are read as i j k, the "
@@ -158,7 +158,7 @@ def _note_unused(texts: Sequence[str], places: Mapping[str, int], passed: Notes)
     """Note the columns that are passed over."""
     unread = [text for k, text in enumerate(texts) if k not in places.values()]
     if unread:
-        listed = ", ".join(map(reprlib.repr, unread[:_MOST_TOLD])) + (", …" if len(unread) > _MOST_TOLD else "")
+        listed = ", ".join(map(reprlib.repr, unread[:_MOST_LISTED])) + (", …" if len(unread) > _MOST_LISTED else "")
         many = len(unread) > 1
         stems = {re.split(r"[\s_(\[]", text.lower())[0] for text in unread}
         why = _ANGLES_UNREAD if any(angles <= stems for angles in _ANGLES) else ""
