@@ -79,7 +79,7 @@ class Scenario:
     event: tuple[float, float] | None = None
     gains: Gains = field(default_factory=Gains)
     override: Override | None = None
-    acceleration: float = 2.0
+    acceleration: float = 10.0
     engine: Engine = "auto"
     undisturbed: Scenario | None = None
     laws: Mapping[str, Law] = field(default_factory=dict)

@@ -9,6 +9,7 @@ import pathcontrol as pc
 
 START = np.deg2rad([40.0, 70.0])
 PERIOD = 2.5e-3
+ACCELERATION = 10.0  # 1/s, of an override
 LAWS = ("extended_motion_plan", "projection")
 
 
@@ -79,9 +80,10 @@ def static_error(arm, task):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_a_hold_adds_nothing_where_there_is_no_dry_friction(arm, name):
+def test_a_hold_adds_only_what_sampling_does_where_there_is_no_dry_friction(arm, name):
+    """The torque for a changing speed keeps its direction for a tick h, in which the path turns by ϑh: aϑ·ϑh/k_p."""
     plain, held = hold_everywhere(make(arm, name), arm, plant=arm.with_friction(pc.Viscous(arm.friction.viscous)))
-    assert late_contour(held) < 1.005 * late_contour(plain) + 1e-5
+    assert late_contour(held) < late_contour(plain) + ACCELERATION * 2.0**2 * PERIOD / 800.0
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -97,7 +99,7 @@ def test_with_dry_friction_a_hold_adds_no_more_than_a_slow_pace_would(arm, name)
     law = make(arm, name)
     plain, held = hold_everywhere(law, arm)
     assert late_contour(held) < static_error(arm, law.task)
-    assert late_contour(held) < 1.1 * late_contour(plain)
+    assert late_contour(held) < 1.05 * late_contour(plain)
 
 
 def test_in_a_sequence_each_law_counts_the_time_from_the_begin_of_its_path(arm):

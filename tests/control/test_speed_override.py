@@ -143,7 +143,7 @@ def test_holding_and_resuming_does_not_leave_the_path(arm, which):
     without, within = (pc.contour_error(one)[0, late].max() for one in (plain, held))
     assert within < 1.02 * without  # at other moments a joint may stick a little longer
     jumps = [np.abs(np.diff(one.array("tau_demand")[0, late], axis=0)).max() for one in (plain, held)]
-    largest = 2 * 2.0 * 2.5e-3 / 0.02 * np.abs(arm.mass_matrix(np.zeros(2))).sum(1).max() * 2.0  # 2a h/T M r
+    largest = 2 * 10.0 * 2.5e-3 / 0.02 * np.abs(arm.mass_matrix(np.zeros(2))).sum(1).max() * 2.0  # 2a h/T M r
     assert jumps[1] < jumps[0] + largest
 
 

@@ -75,7 +75,7 @@ class OverrideRule(SpeedRule):
     size = 2
     relative = True
 
-    def __init__(self, override: Override = 1.0, acceleration: float = 2.0) -> None:
+    def __init__(self, override: Override = 1.0, acceleration: float = 10.0) -> None:
         self.acceleration = as_scalar("acceleration", acceleration, positive=True)
         self._value = _make_function(override)
         self._given: Any = override if callable(override) else np.asarray(override).tolist()

@@ -25,8 +25,8 @@ class SpeedOverride(LawWrapper):
         law: any law that is to be overridden.
         override: u from −2 to 2: a number, one for each rollout (N,), a function of the time since the law took over,
             in seconds, that returns either, or steps [[t, u], …], (m, 2), with u = 1 before the first.
-        acceleration: largest |ẇ| [1/s]: at 2 the full speed is left, or reached from rest, in half a second. The
-            acceleration along the path is ẇ‖q_d'ϑ‖ [rad/s²].
+        acceleration: largest |ẇ| [1/s], 10 by default: from full speed to rest in a tenth of a second. The acceleration
+            along the path is ẇ‖q_d'ϑ‖ [rad/s²], and M(q)q_d'ϑẇ the torque for it [N m].
 
     Raises:
         InputError: u is not from −2 to 2, also while the law runs, or an argument has the wrong shape.
@@ -36,6 +36,6 @@ class SpeedOverride(LawWrapper):
         self,
         law: Controller,
         override: Annotated[Override, Form.ARRAY] = 1.0,
-        acceleration: Annotated[float, Form.POSITIVE, Unit("1/s")] = 2.0,
+        acceleration: Annotated[float, Form.POSITIVE, Unit("1/s")] = 10.0,
     ) -> None:
         super().__init__(law, OverrideRule(override, acceleration))
