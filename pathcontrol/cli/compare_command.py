@@ -136,10 +136,12 @@ def _tell(compared: Comparison, written: dict[str, str], as_json: bool) -> None:
         return
     from rich.console import Console
 
-    from pathcontrol.cli.tables import comparison_table
+    from pathcontrol.cli.tables import comparison_tables
     from pathcontrol.comparison.comparison_table import describe_comparison
 
-    Console().print(comparison_table(compared))
+    console = Console()
+    for table in comparison_tables(compared, console.width):
+        console.print(table)
     for line in describe_comparison(compared):
         click.echo(line)
     for name, path in written.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from pathcontrol.simulation.run import Run
 
 _MOST_ROWS = 50
+_BORDER = 3  # letters of a column beside its text: the line and a space on both sides
 
 
 def peaks_table(summary: dict[str, Any]) -> Table:
@@ -60,15 +62,39 @@ def remark_lines(run: Run) -> list[str]:
     return [red(printable(sentence)) for sentence in remarks(run)]
 
 
-def comparison_table(compared: Comparison) -> Table:
-    """Return the table of a comparison: a row for each measure, a column for each law."""
+def comparison_tables(compared: Comparison, width: int) -> list[Table]:
+    """Return the table of a comparison, a row for each measure and a column for each law.
+
+    Where the columns are more than ``width`` letters of a terminal can show, the laws are dealt out to several tables.
+    """
     from pathcontrol.comparison.comparison_table import tabulate
 
-    heads, *rows = tabulate(compared)
-    table = Table(title=Text(printable(f"{compared.scenario.name}: {compared.scenario.sentence}")))
-    for i, head in enumerate(heads):
-        table.add_column(Text(printable(head)), justify="right" if i else "left")
-    for row in rows:
+    labels, *laws = zip(*tabulate(compared), strict=True)
+    tables, room = [], 0
+    for law in laws:
+        room -= _longest_word(law) + _BORDER
+        if room < 0 or not tables:
+            tables.append([labels])
+            room = width - 1 - sum(_longest_word(column) + _BORDER for column in (labels, law))
+        tables[-1].append(law)
+    title = Text(printable(f"{compared.scenario.name}: {compared.scenario.sentence}"))
+    return [_make_table(columns, None if i else title, width) for i, columns in enumerate(tables)]
+
+
+def _longest_word(column: Sequence[str]) -> int:
+    """Return the length of the longest word, the least width of a column."""
+    return max(len(word) for cell in column for word in cell.split())
+
+
+def _make_table(columns: Sequence[Sequence[str]], title: Text | None, width: int) -> Table:
+    """Return a table of columns, heads first, which share what ``width`` leaves beside their longest words."""
+    least = [_longest_word(column) for column in columns]
+    spare = max(width - 1 - sum(least) - _BORDER * len(columns), 0) // len(columns)
+    table = Table(title=title)
+    for i, (column, word) in enumerate(zip(columns, least, strict=True)):
+        needed = min(max(map(len, column)), word + spare)
+        table.add_column(Text(printable(column[0])), justify="right" if i else "left", width=needed)
+    for row in list(zip(*columns, strict=True))[1:]:
         table.add_row(*map(Text, row))
     return table
 
