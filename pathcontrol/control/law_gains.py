@@ -64,6 +64,18 @@ def refuse_several_gains(law: Controller) -> None:
             )
 
 
+def count_gain_rows(law: Controller) -> dict[str, int]:
+    """Return how many rollouts a gain of a law has a row for, of those gains that have several, by their names."""
+    inner = unwrap(law)
+    rows: dict[str, int] = {}
+    for name in inner.gains:
+        gain: Any = getattr(inner, name, None)
+        shape = np.shape(gain)
+        if (len(shape) == 2 or (len(shape) == 1 and name in _NUMBERS)) and shape[0] > 1:
+            rows[name] = shape[0]
+    return rows
+
+
 def unit_of_gain(law: Controller, name: str) -> str:
     """Return the unit of a gain, for joints that turn; empty where the law does not say it."""
     unit = parameters_of(type(unwrap(law)))[name].unit if name in parameters_of(type(unwrap(law))) else None

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_joint_array, check_finite
 from pathcontrol.control.base import Controller, ControlOutput
+from pathcontrol.control.law_gains import count_gain_rows
 from pathcontrol.control.wrappers.wrapper import LawWrapper, unwrap
 from pathcontrol.errors import InputError, PathControlError
 from pathcontrol.robot.batch import RobotBatch
@@ -150,7 +151,7 @@ def start_law(
     Raises:
         InputError: the law fails there, or does not give what :class:`ControlOutput` says.
     """
-    z = _call_law(controller, q, controller.start, q, qd)
+    q, qd, z = _start_rows(controller, q, qd)
     if len(q) == 1 and len(z) > 1:  # an observer or a wrapper with rows
         q, qd = q.repeat(len(z), axis=0), qd.repeat(len(z), axis=0)
     out = _call_law(controller, q, controller.law, 0.0, q, qd, z)
@@ -161,6 +162,21 @@ def start_law(
         z = z if len(z) == rows else np.repeat(z, rows, axis=0)
         out = out if rows == 1 else _call_law(controller, q, controller.law, 0.0, q, qd, z)
     _check_output(controller, out, q, z)
+    return q, qd, z
+
+
+def _start_rows(controller: Controller, q: Array, qd: Array) -> tuple[Array, Array, Array]:
+    """Return q, q̇ and the law's state z at the start, for each row of gains where the law takes no other number."""
+    try:
+        z = _call_law(controller, q, controller.start, q, qd)
+        _call_law(controller, q, controller.law, 0.0, q, qd, z)
+    except InputError:
+        rows = set(count_gain_rows(controller).values())
+        if len(q) > 1 or len(rows) != 1:
+            raise
+        (several,) = rows
+        q, qd = q.repeat(several, axis=0), qd.repeat(several, axis=0)
+        z = _call_law(controller, q, controller.start, q, qd)
     return q, qd, z
 
 
@@ -181,12 +197,13 @@ def _count_rows(torque: Any) -> int:
     return max(1, shape[0]) if len(shape) == 2 else 1
 
 
-def check_law(controller: Controller, q: Array, qd: Array, z: Array) -> None:
-    """Check what the law returns at the initial states.
+def check_law(controller: Controller, q: Array, qd: Array) -> None:
+    """Check what the law returns at the initial states, (N, n) each, of as many rollouts.
 
     Raises:
         InputError: the law fails there, or does not give what :class:`ControlOutput` says.
     """
+    z = _call_law(controller, q, controller.start, q, qd)
     _check_output(controller, _call_law(controller, q, controller.law, 0.0, q, qd, z), q, z)
 
 
@@ -205,8 +222,9 @@ def _check_output(controller: Controller, out: Any, q: Array, z: Array) -> None:
         shape, value = wanted.get(field, q.shape[:1]), getattr(out, field)
         if np.shape(value) != shape:
             raise InputError(
-                f"{name}.law gives {field} of shape {np.shape(value)} for initial states of shape {q.shape}, expected "
-                f"{shape}; gains that differ between rollouts need one row for each, and as many initial states or one"
+                _explain_rows(controller, len(q))
+                or f"{name}.law gives {field} of shape {np.shape(value)} for initial states of shape {q.shape}, "
+                f"expected {shape}"
             )
         sound = np.isfinite(np.reshape(value, (len(q), -1))).all(-1)
         if not sound.any():  # if only some are not finite, those rollouts diverge
@@ -220,8 +238,25 @@ def _call_law(controller: Controller, q: Array, function: Callable[..., Any], *a
     except (ValueError, IndexError, TypeError) as error:
         if isinstance(error, PathControlError):
             raise
-        name = f"{_name_law(controller)}.law"
-        raise InputError(f"{name} fails at the initial states, of shape {q.shape}: {error}") from error
+        raise InputError(_explain_rows(controller, len(q)) or _explain(controller, q, error)) from error
+
+
+def _explain(controller: Controller, q: Array, error: Exception) -> str:
+    """Return what an error says of a law that fails."""
+    return f"{_name_law(controller)}.law fails at the initial states, of shape {q.shape}: {error}"
+
+
+def _explain_rows(controller: Controller, rollouts: int) -> str:
+    """Return what an error says of gains that have rows for another number of rollouts; empty if all fit."""
+    wrong = {name: rows for name, rows in count_gain_rows(controller).items() if rows != rollouts}
+    if not wrong:
+        return ""
+    shapes = " and ".join(f"{name} of shape {np.shape(getattr(unwrap(controller), name))}" for name in wrong)
+    counts = list(dict.fromkeys(wrong.values()))
+    expected = f"a row for each of {rollouts} rollouts" if rollouts > 1 else "the gains of one rollout"
+    expected = expected if len(counts) == 1 else "as many rows of each"
+    more = f"; give {counts[0]} initial states, or one" if rollouts > 1 and len(counts) == 1 else ""
+    return f"{_name_law(controller)} has {shapes}, expected {expected}, or one value for all{more}"
 
 
 def _name_law(controller: Controller) -> str:

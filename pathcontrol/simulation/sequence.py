@@ -115,7 +115,7 @@ def simulate_sequence(
     whole = _make_sequence(laws, laps, gaps) if task is None else _check_sequence(task, laws, laps)
     for law in laws:
         check_joints(law, robot)
-        check_law(law, q0, qd0, law.start(q0, qd0))
+        check_law(law, q0, qd0)
     ready = prepare(laws, whole, robot, loop, q0, qd0, Outside(disturbance), float(durations.sum()), engine)
     arm, legs = ready.arm, []
     for law, longest, finish in zip(laws, durations, ends, strict=True):

@@ -83,7 +83,10 @@ def test_rollouts_with_gains_of_their_own_do_not_know_of_each_other(kind, task, 
 
 
 def test_gains_of_another_number_of_rollouts_are_refused(circle):
-    with pytest.raises(InputError, match="fails at the initial states, of shape"):
+    with pytest.raises(
+        InputError,
+        match=r"K_p of shape \(9, 2\) and .* a row for each of 4",
+    ):
         simulate(law("plan", circle, slice(0, N)), circle.q_d(np.zeros(4)), duration=0.1, progress=False)
 
 

@@ -301,7 +301,7 @@ def test_other_versions_are_noted(tmp_path):
         (
             {"build": lambda p, i: circle(p, i) | {"q": [[0.7, 1.2]] * 2}},
             InputError,
-            r"samples 0 to 13: .*fails at the initial states, of shape \(2, 2\)",
+            r"samples 0 to 13: .*K_p of shape \(14, 1\) .*expected a row for each of 2",
         ),
         ({"build": lambda p, i: line({"K_p": p["K_p"][:2]}, i[:2])}, InputError, "2 rollouts for 14 samples"),
     ],
