@@ -70,7 +70,8 @@ def comparison_tables(compared: Comparison, width: int) -> list[Table]:
     from pathcontrol.comparison.comparison_table import tabulate
 
     labels, *laws = zip(*tabulate(compared), strict=True)
-    tables, room = [], 0
+    tables: list[list[Sequence[str]]] = []
+    room = 0
     for law in laws:
         room -= _longest_word(law) + _BORDER
         if room < 0 or not tables:
