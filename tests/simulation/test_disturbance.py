@@ -10,14 +10,20 @@ from pathcontrol import (
     ComputedTorque,
     ContinuousTime,
     Disturbance,
+    Dropout,
     ExtendedMotionPlan,
     FrameForce,
+    FrictionChange,
     Harmonic,
     InputError,
+    JammedJoint,
     Line,
+    PickUp,
     Push,
     SampledLoop,
+    TorqueLimitDrop,
     UnknownNameError,
+    Wall,
     load_robot,
     simulate,
     simulate_sequence,
@@ -156,6 +162,37 @@ def test_the_record_says_what_pushed(arm, circle):
         "disturbance": "Push", "start": 0.1, "duration": 0.2, "magnitude": {"shape": [500, 2], "min": 1.0, "max": 1.0}
     }  # fmt: skip
     assert second["frame"] == "tool"
+
+
+def test_arguments_for_another_number_of_rollouts_are_told_at_once(arm):
+    for make, words in (
+        (lambda: Push([[1.0, 2.0]] * 2, [0.0, 0.1, 0.2]), "start is for 3 rollouts and magnitude for 2"),
+        (lambda: Push([1.0], [0.0] * 2, [0.1] * 3), "start is for 2 rollouts and duration for 3"),
+        (lambda: Harmonic([1.0], [1.0] * 2, [0.0] * 3), "frequency is for 2 rollouts and phase for 3"),
+        (lambda: FrameForce(arm, "tool", np.ones((2, 3)), [0.0] * 3), "start is for 3 rollouts and force for 2"),
+        (lambda: JammedJoint([0, 1], [0.0] * 3), "start is for 3 rollouts and joint for 2"),
+        (lambda: JammedJoint(["a", "b"], 0.0, [1.0] * 3), "duration is for 3 rollouts and joint for 2"),
+        (lambda: TorqueLimitDrop([[0.5]] * 3, [0.0] * 2), "start is for 2 rollouts and factor for 3"),
+        (lambda: FrictionChange([[2.0]] * 3, coulomb=[[1.0]] * 2), "factor is for 3 rollouts and coulomb for 2"),
+        (lambda: Dropout([0.0] * 2, probability=[0.5] * 3), "start is for 2 rollouts and probability for 3"),
+        (lambda: PickUp([1.0] * 2, "tool", [0.1] * 3), "time is for 3 rollouts and mass for 2"),
+        (lambda: PickUp(1.0, "tool", [0.1] * 3, [0.1] * 2), "time is for 3 rollouts and duration for 2"),
+        (lambda: Wall("tool", [[1.0, 0.0, 0.0]] * 2, [-1.0, 0.0, 0.0], [1e4] * 3), "point is for 2 rollouts and stiff"),
+    ):
+        with pytest.raises(InputError, match=words):
+            make()
+    for name, make in (("start", lambda t: JammedJoint(0, t)), ("time", lambda t: PickUp(1.0, "tool", t))):
+        with pytest.raises(InputError, match=f"{name} is nan"):
+            make(np.nan)
+
+
+def test_a_disturbance_of_ones_own_that_cannot_say_what_it_holds_is_named():
+    class Grip(Push):
+        def held_joints(self, t, q):
+            return np.ones(3, dtype=bool) & np.ones(2, dtype=bool)
+
+    with pytest.raises(InputError, match=r"Grip\.held_joints fails for 1 rollouts of 1 joints"):
+        slide(Grip([1.0]))
 
 
 def test_disturbances_that_cannot_be(arm, circle):

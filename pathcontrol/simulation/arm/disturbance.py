@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from functools import reduce
 from typing import Annotated, Any
 
@@ -130,13 +131,17 @@ class _Sum(Disturbance):
 
 
 class TimedDisturbance(Disturbance):
-    """A disturbance from ``start`` for ``duration`` [s], each a number or one for each rollout, (N,)."""
+    """A disturbance from ``start`` for ``duration`` [s], each a number or one for each rollout, (N,).
 
-    def __init__(self, start: ArrayLike, duration: ArrayLike) -> None:
-        self.start, length = _check_each("start", start), as_array("duration", duration)
+    Its argument for the start may have another ``name``.
+    """
+
+    def __init__(self, start: ArrayLike, duration: ArrayLike, name: str = "start") -> None:
+        self.start, length = _check_each(name, start), as_array("duration", duration)
         if length.ndim > 1 or not (length > 0).all():
             raise InputError(f"duration = {length.tolist()}, expected times greater than 0 [s], one or (N,)")
         self.duration = freeze(length)
+        check_rollouts(**{name: self.start.shape}, duration=length.shape)
 
     def share(self, t: float) -> Array:
         """Return 1 while it acts and 0 else, (), or (N, 1)."""
@@ -162,6 +167,7 @@ class Push(TimedDisturbance):
     def __init__(self, magnitude: Torques, start: Begin = 0.0, duration: Span = np.inf) -> None:
         super().__init__(start, duration)
         self.magnitude = freeze(check_finite("magnitude", as_array("magnitude", magnitude)))
+        check_rollouts(start=self.start.shape, duration=self.duration.shape, magnitude=self.magnitude.shape[:-1])
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
         return self.share(t) * self.magnitude
@@ -188,6 +194,7 @@ class TorqueLimitDrop(TimedDisturbance):
         self.factor = freeze(check_finite("factor", as_array("factor", factor)))
         if not ((self.factor >= 0) & (self.factor <= 1)).all():
             raise InputError(f"factor = {self.factor.tolist()}, expected numbers from 0 to 1", argument="factor")
+        check_rollouts(start=self.start.shape, duration=self.duration.shape, factor=self.factor.shape[:-1])
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
         """Return zeros: it takes torque away and adds none."""
@@ -209,6 +216,8 @@ class Harmonic(Disturbance):
     def __init__(self, amplitude: Torques, frequency: Frequency, phase: Phase = 0.0) -> None:
         self.amplitude = freeze(check_finite("amplitude", as_array("amplitude", amplitude)))
         self.frequency, self.phase = _check_each("frequency", frequency), _check_each("phase", phase)
+        counts = {"frequency": self.frequency.shape, "phase": self.phase.shape}
+        check_rollouts(amplitude=self.amplitude.shape[:-1], **counts)
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
         wave = np.sin(2 * np.pi * self.frequency * t + self.phase)
@@ -241,6 +250,7 @@ class FrameForce(TimedDisturbance):
         robot.frame_pose(np.zeros(robot.n), frame)  # raises where there is no such frame
         self._robot, self.frame = robot, frame
         self.force = check_vectors("force", force)
+        check_rollouts(start=self.start.shape, duration=self.duration.shape, force=self.force.shape[:-1])
 
     @property
     def robot(self) -> RobotModel:
@@ -285,20 +295,26 @@ def check_disturbance(disturbance: Any, q: Array, qd: Array) -> None:
 def _check_term(disturbance: Disturbance, q: Array, qd: Array) -> None:
     """Check the torques and the jumps of one disturbance."""
     name = type(disturbance).__name__
-    try:
-        torque = np.asarray(disturbance.torque(0.0, q, qd), dtype=np.float64)
-    except (TypeError, ValueError, IndexError) as error:
-        raise InputError(
-            f"{name}.torque fails for {len(q)} rollouts of {q.shape[1]} joints: {error}", argument=name
-        ) from error
+    torque = np.asarray(_try(name, "torque", q, lambda: np.array(disturbance.torque(0.0, q, qd), dtype=np.float64)))
     if torque.shape not in ((), q.shape[1:], (1, q.shape[1]), q.shape):
         raise InputError(f"{name}.torque has shape {torque.shape}, expected {q.shape}: rollouts and joints")
-    held = disturbance.held_joints(0.0, q)
+    held = _try(name, "held_joints", q, lambda: disturbance.held_joints(0.0, q))
     if held is not None and np.shape(held) not in (q.shape[1:], (1, q.shape[1]), q.shape):
         raise InputError(f"{name}.held_joints has shape {np.shape(held)}, expected {q.shape}: rollouts and joints")
     if not np.isfinite(torque).all():
         raise InputError(f"{name}.torque gives {torque.tolist()} at the start, expected numbers", argument=name)
     jump_times(disturbance)
+
+
+def _try(name: str, method: str, q: Array, call: Callable[[], Any]) -> Any:
+    """Return what a method of a disturbance gives for the rollouts at q (N, n); raise where it fails."""
+    try:
+        return call()
+    except (TypeError, ValueError, IndexError) as error:
+        raise InputError(
+            f"{name}.{method} fails for {len(q)} rollouts of {q.shape[1]} joints: {error}",
+            argument=name,
+        ) from error
 
 
 def jump_times(disturbance: Disturbance) -> Array:
@@ -315,6 +331,26 @@ def jump_times(disturbance: Disturbance) -> Array:
     except (TypeError, ValueError) as error:
         name = type(disturbance).__name__
         raise InputError(f"{name}.jumps cannot be used: {error}; expected times [s], (k,)", argument=name) from error
+
+
+def check_rollouts(**axes: tuple[int, ...]) -> None:
+    """Check that arguments with a value for each rollout have equally many.
+
+    Args:
+        axes: of each argument, by its name, the axes before those of joints or space, () or (N,).
+
+    Raises:
+        InputError: they have not.
+    """
+    several = {name: shape[0] for name, shape in axes.items() if shape and shape[0] != 1}
+    for name, count in several.items():
+        first = next(iter(several))
+        if count != several[first]:
+            raise InputError(
+                f"{first} is for {several[first]} rollouts and {name} for {count}, expected as many of both, or one "
+                "for all rollouts",
+                argument=name,
+            )
 
 
 def check_vectors(name: str, value: ArrayLike) -> Array:

@@ -12,7 +12,14 @@ from pathcontrol._arrays import Array, as_array, check_whole, freeze
 from pathcontrol._expect import expect_choice
 from pathcontrol.arguments import Form
 from pathcontrol.errors import InputError
-from pathcontrol.simulation.arm.disturbance import Begin, Disturbance, Span, TimedDisturbance, list_terms
+from pathcontrol.simulation.arm.disturbance import (
+    Begin,
+    Disturbance,
+    Span,
+    TimedDisturbance,
+    check_rollouts,
+    list_terms,
+)
 
 Lost = Literal["ticks", "measurements"]
 Fallback = Literal["hold", "zero"]
@@ -63,6 +70,7 @@ class Dropout(TimedDisturbance):
             )
         self.what, self.fallback, self.probability = what, fallback, freeze(chance)
         self.seed = check_whole("seed", seed, 0)
+        check_rollouts(start=self.start.shape, duration=self.duration.shape, probability=chance.shape)
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
         """Return zeros: it pushes nothing."""

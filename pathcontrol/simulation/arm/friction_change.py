@@ -14,7 +14,7 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.robot.scaled_friction import ScaledFriction
-from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance
+from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance, check_rollouts
 
 
 class FrictionChange(TimedDisturbance):
@@ -45,6 +45,12 @@ class FrictionChange(TimedDisturbance):
     ) -> None:
         super().__init__(start, duration)
         self.factor, self.coulomb = _check_amount("factor", factor), _check_amount("coulomb", coulomb)
+        check_rollouts(
+            start=self.start.shape,
+            duration=self.duration.shape,
+            factor=self.factor.shape[:-1],
+            coulomb=self.coulomb.shape[:-1],
+        )
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
         """Return zeros: it changes friction and pushes nothing."""

@@ -12,7 +12,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance
+from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance, check_rollouts
 
 Joint = Annotated[str | int | Sequence[str | int], Form.JOINT]
 
@@ -41,6 +41,7 @@ class JammedJoint(TimedDisturbance):
             raise InputError(f"joint = {joint!r}, expected the name of a joint or its number from 0, or one a rollout")
         self.joint = joint if isinstance(joint, str | int) else names.tolist()
         self._index = names.astype(np.intp) if whole else None
+        check_rollouts(start=self.start.shape, duration=self.duration.shape, joint=names.shape)
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
         """Return zeros: what holds the joint is no torque that is known before."""

@@ -12,7 +12,7 @@ from pathcontrol.arguments import Form, Point, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance, check_vectors
+from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance, check_rollouts, check_vectors
 
 
 class PickUp(TimedDisturbance):
@@ -44,7 +44,7 @@ class PickUp(TimedDisturbance):
         offset: Point = (0.0, 0.0, 0.0),
         velocity: Annotated[ArrayLike, Form.NUMBERS, Unit("m/s")] = (0.0, 0.0, 0.0),
     ) -> None:
-        super().__init__(time, duration)
+        super().__init__(time, duration, "time")
         self.time = self.start
         if not isinstance(frame, str):
             raise InputError(f"frame = {frame!r}, expected the name of a frame, such as 'tool'", argument="frame")
@@ -55,6 +55,8 @@ class PickUp(TimedDisturbance):
                 f"mass = {self.mass.tolist()}, expected numbers above 0 [kg], one or (N,)", argument="mass"
             )
         self.offset, self.velocity = check_vectors("offset", offset), check_vectors("velocity", velocity)
+        places = {"offset": self.offset.shape[:-1], "velocity": self.velocity.shape[:-1]}
+        check_rollouts(time=self.start.shape, duration=self.duration.shape, mass=self.mass.shape, **places)
         self._robot: RobotModel | None = None
         self._carried: dict[tuple[RobotModel, int], RobotModel] = {}
 

@@ -12,7 +12,7 @@ from pathcontrol.arguments import Direction, Form, Point, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.contact import Meeting
-from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance, check_vectors
+from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance, check_rollouts, check_vectors
 
 _RELAXATION = 1e-3  # s, damping over stiffness by default
 
@@ -73,6 +73,15 @@ class Wall(TimedDisturbance):
         self.damping = None if damping is None else _check_each("damping", damping)
         if self.stiffness is not None and (self.stiffness == 0).any():
             raise InputError(f"stiffness = {self.stiffness.tolist()}, expected numbers greater than 0 [N/m]")
+        numbers = {"stiffness": self.stiffness, "friction": self.friction, "damping": self.damping}
+        counts = {name: value.shape for name, value in numbers.items() if value is not None}
+        check_rollouts(
+            start=self.start.shape,
+            duration=self.duration.shape,
+            point=self.point.shape[:-1],
+            normal=self.normal.shape[:-1],
+            **counts,
+        )
         self._axes = _axes_of(self.normal / length)
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
