@@ -236,7 +236,7 @@ def test_laws_with_a_speed_input_can_be_sent_to_other_processes(arm):
 
 def test_bad_overrides_are_told(arm):
     law = path_laws(arm, pc.Circle(1.0, 2.0))[0]
-    for bad in (2.1, -3.0, np.nan, [[0.0, 5.0]], [[1.0, 0.0], [0.5, 1.0]], [[0.0, 1.0, 2.0]], "fast", [0.5, 9.0]):
+    for bad in (2.1, -3.0, np.nan, [[0.0, 5.0]], [[1.0, 0.0], [0.5, 1.0]], [[0.0, 1.0, 2.0]], "fast", [0.5, 9.0], []):
         with pytest.raises(pc.InputError, match="override"):
             pc.SpeedOverride(law, bad)
         with pytest.raises(pc.InputError, match="override"):

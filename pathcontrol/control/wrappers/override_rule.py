@@ -196,7 +196,7 @@ def check_one_speed(value: Override, t: float) -> None:
 def _check_range(name: str, u: ArrayLike) -> Array:
     """Return u as an array, (), or (N,); check its range."""
     array = as_array(name, u)
-    if array.ndim > 1 or not (np.abs(array) <= MOST).all():  # NaN is refused too
+    if array.ndim > 1 or not array.size or not (np.abs(array) <= MOST).all():  # NaN is refused too
         raise InputError(
             f"{name} = {array.tolist()}, expected factors of the speed from {-MOST:g} to {MOST:g}, one for all "
             "rollouts or one for each: 1 is the profile itself, 0 holds, and less goes back"
