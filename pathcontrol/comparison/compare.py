@@ -123,7 +123,7 @@ def compare(
     Args:
         laws: names of known laws, laws for ``scenario.robot`` and ``scenario.task``, or functions (robot, task) that
             make one; one, several, or by names of your own. By default the five known ones and those of the scenario,
-            ``"all"`` for those of other sources too.
+            ``"all"`` for those of other sources too, also beside other laws.
         scenario: a name of :func:`known_scenarios`, or a :class:`Scenario`.
         rollouts: how many starts: that of the scenario, and others near the path, see :meth:`Scenario.starts`.
         seed: of these starts.
@@ -142,7 +142,7 @@ def compare(
     if engine is not None:
         check_engine(engine)
     starts = scenario.starts(rollouts, seed)
-    calm = scenario if scenario.undisturbed is None else scenario.undisturbed
+    calm = scenario.calm
     runs = {name: _run(law, scenario, starts, engine, progress) for name, law in made.items()}
     others = runs if calm is scenario else {n: _run(law, calm, starts, engine, progress) for n, law in made.items()}
     end = None if scenario.event is None or scenario.event[1] >= scenario.duration else scenario.event[1]

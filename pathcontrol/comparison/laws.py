@@ -139,13 +139,14 @@ def make_laws(
     for name in ("K_p", "K_v"):
         diagonal_gain(name, getattr(gains, name), robot.n, robot.joint_names)
     made: dict[str, Controller] = {}
-    if laws is None or laws == ALL_LAWS:
-        laws = list(dict.fromkeys([*KNOWN_LAWS, *(FAMILY if laws == ALL_LAWS else ()), *more]))
-    for name, law in _list_laws(laws):
+    if laws is None:
+        laws = list(dict.fromkeys([*KNOWN_LAWS, *more]))
+    for name, law in _list_laws(laws, more):
         one = _make_law(law, robot, task, gains, more, pattern)
         key = name or (law if isinstance(law, str) else type(one).__name__)
         if key in made:
-            raise InputError(f"two laws are called {key!r}; give them names: {{'first': …, 'second': …}}")
+            advice = "name it once" if isinstance(law, str) else "give them names: {'first': …, 'second': …}"
+            raise InputError(f"two laws are called {key!r}; {advice}")
         made[key] = one
     if not made:
         known = ", ".join([*_MAKERS, *FAMILY, *_WRAPPED])
@@ -153,16 +154,20 @@ def make_laws(
     return made
 
 
-def _list_laws(laws: Laws) -> list[tuple[str, Law]]:
-    """Return laws with their names, empty where none is given."""
+def _list_laws(laws: Laws, more: Mapping[str, Law]) -> list[tuple[str, Law]]:
+    """Return laws with their names, empty where none is given; in place of ``"all"`` all of them, with ``more``."""
     if isinstance(laws, Mapping):
         return [(str(name), law) for name, law in laws.items()]
     if isinstance(laws, str | Controller) or callable(laws):
-        return [("", laws)]
+        laws = [laws]
     try:
-        return [("", law) for law in laws]
+        given = list(laws)
     except TypeError as error:
         raise InputError(f"laws = {laws!r:.80}, expected names, control laws, or a table of them by name") from error
+    names = [law for law in given if isinstance(law, str)]
+    rest = [name for name in dict.fromkeys([*KNOWN_LAWS, *FAMILY, *more]) if name not in names]
+    listed = [rest if isinstance(law, str) and law == ALL_LAWS else [law] for law in given]
+    return [("", law) for several in listed for law in several]
 
 
 def _make_law(
@@ -181,7 +186,7 @@ def _make_law(
         inside, options = _make_like(pattern, name), _options_of(pattern, task)
         made = makers[name](robot, task, gains, options) if inside is None else inside
         return made if wrapper is None else _wrap_like(pattern, wrapper, made)
-    made = law(robot, task) if callable(law) else law
+    made = _call(law, robot, task) if callable(law) else law
     check_controller("laws", made)
     if made.robot.joint_names != robot.joint_names:
         raise InputError(f"{type(made).__name__} is for the joints {made.robot.joint_names}, not {robot.joint_names}")
@@ -214,6 +219,18 @@ def _wrap_like(pattern: Controller | None, wrapper: type[EventPlan | Paced], law
     """Return a wrapper around a law, with the settings of the one of its kind around the ``pattern``."""
     found = [] if pattern is None else [one for one in wrappers_of(pattern) if type(one) is wrapper]
     return found[0].around(law) if found else wrapper(law)
+
+
+def _call(make: Maker, robot: RobotModel, task: PathTask) -> Controller:
+    """Return the law that a function makes; tell a class that needs more than arm and task."""
+    try:
+        return make(robot, task)
+    except TypeError as error:
+        if not isinstance(make, type):
+            raise
+        raise InputError(
+            f"{make.__name__}(robot, task) makes no law: {error}; give a law, or a function of robot and task"
+        ) from error
 
 
 def _is_same(one: PathTask, other: PathTask) -> bool:

@@ -57,14 +57,14 @@ class Scenario:
         override: an operator's input to the speed of all laws, as for :class:`SpeedOverride`, or ``None``.
         acceleration: largest rate of the factor of the speed that follows it [1/s].
         engine: which engine runs it, see :func:`simulate`.
-        undisturbed: the scenario without what happens in it; ``None`` if nothing does.
+        undisturbed: the scenario without what happens in it; ``None`` if nothing does. It is run for ``duration``, too.
         laws: laws beside the known ones, by name: names of others, or functions of arm and task.
         pattern: a law whose ``friction`` and ``observer_hz``, and ``start`` on an open path, all known laws have; the
             one of its own kind is that law itself. By default they have those of their classes, and on a closed path
             they begin at the nearest point.
 
     Raises:
-        InputError: the event does not begin within the run.
+        InputError: the event does not begin within the run, or the undisturbed one has samples at other times.
     """
 
     name: str
@@ -91,6 +91,18 @@ class Scenario:
                 f"event = {self.event}, expected begin and end [s] with a begin in the run of {self.duration:g} s"
             )
 
+        if self.undisturbed is not None and (own := _sampling(self.loop)) != (
+            other := _sampling(self.undisturbed.loop)
+        ):
+            raise InputError(
+                f"undisturbed.loop has samples each {other:g} s and loop each {own:g} s, expected the same times"
+            )
+
+    @property
+    def calm(self) -> Scenario:
+        """The undisturbed scenario for the same time; itself where nothing happens."""
+        return self if self.undisturbed is None else replace(self.undisturbed, duration=self.duration)
+
     @property
     def window(self) -> tuple[float, float]:
         """The time that counts [s]: from the event on; without one the second half, on an open path all of the run."""
@@ -113,6 +125,11 @@ class Scenario:
         begin, end = self.task.one_traverse if self.task.closed else (self.task.s0, self.task.s0)
         s = begin + (share % 1.0) * (end - begin)
         return np.asarray(self.task.q_d(np.array(s)) + random.normal(0.0, _NEAR, self.robot.n))
+
+
+def _sampling(loop: SampledLoop | ContinuousTime) -> float:
+    """Return the time between recorded samples [s]."""
+    return loop.period if isinstance(loop, SampledLoop) else loop.output_period
 
 
 def known_scenarios() -> dict[str, str]:

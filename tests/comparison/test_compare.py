@@ -171,6 +171,11 @@ def test_all_laws_are_compared_where_all_are_asked_for():
         assert every.mean(law, "contour_peak") < np.deg2rad(3)
 
 
+def test_all_laws_may_be_named_beside_others(arm, circle):
+    made = make_laws(["event_plan", "all", "projection"], arm, circle, Gains(), {"mine": "projection"})
+    assert sorted(made) == sorted({"event_plan", *KNOWN_LAWS, *FAMILY, "mine"})
+
+
 # --- laws and scenarios of one's own ------------------------------------------------------------------------------
 
 
@@ -182,6 +187,14 @@ def test_laws_of_ones_own_are_objects_or_functions():
     assert both.mean("a", "contour_peak") == pytest.approx(theirs.mean("computed_torque", "contour_peak"))
     assert list(pc.compare(law, scenario, rollouts=1).measures) == ["Mine"]
     assert both.mean("b", "contour_peak") != both.mean("a", "contour_peak")
+
+
+def test_the_undisturbed_run_lasts_as_long_whatever_its_scenario_says():
+    scenario = shortened("jammed-joint")
+    longer = replace(scenario, undisturbed=pc.make_scenario("undisturbed"))
+    same, other = (compared("projection", scenario=one, rollouts=1) for one in (scenario, longer))
+    assert same.measures["projection"] == other.measures["projection"]
+    assert len(other.undisturbed["projection"].time) == len(other.runs["projection"].time)
 
 
 def test_an_open_path_in_a_scenario_of_ones_own(arm):
@@ -201,11 +214,14 @@ def test_an_open_path_in_a_scenario_of_ones_own(arm):
 @pytest.mark.parametrize(
     ("laws", "said"),
     [
-        (["projection", "projection"], "two laws are called 'projection'"),
+        (["projection", "projection"], "two laws are called 'projection'; name it once"),
+        (["all", "projektion"], "did you mean 'projection'"),
         ([], "no law to compare"),
         ("projektion", "did you mean 'projection'"),
         (3, "laws = 3"),
         ([None], "expected a Controller"),
+        (pc.Projection, r"Projection\(robot, task\) makes no law: .*k_p.*; give a law, or a function"),
+        (lambda robot, task: pc.Projection, "laws is the class Projection"),
     ],
 )
 def test_laws_that_are_none(laws, said):
@@ -224,6 +240,8 @@ def test_what_does_not_fit_is_refused(arm, circle):
         pc.compare(None, "undisturbed", rollouts=0)
     with pytest.raises(pc.InputError, match="event"):
         pc.Scenario("late", "Too late.", arm, circle, np.zeros(2), 1.0, event=(2.0, 3.0))
+    with pytest.raises(pc.InputError, match=r"samples each 0\.0025 s and loop each 0\.001 s"):
+        replace(pc.make_scenario("jammed-joint"), loop=pc.SampledLoop(1e-3))
     with pytest.raises(pc.InputError, match="expected a Scenario"):
         pc.compare(None, 7)
 
