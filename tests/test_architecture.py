@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import re
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
@@ -33,6 +35,51 @@ FLOORS = [
     "experiments",
     "cli",
 ]
+#: modules that import parts of the package inside functions, as these load what few calls need; commands all do
+LATE = {
+    "analysis.contours": 2,
+    "analysis.tool_metrics": 1,
+    "cartesian.recognition": 1,
+    "experiments.outputs": 4,
+    "experiments.reproduce": 4,
+    "experiments.sensitivity_page": 3,
+    "robot.loading": 1,
+    "simulation.context": 5,
+    "simulation.run": 1,
+    "simulation.storage.run_file": 4,
+    "sweeps.cluster.connection": 1,
+    "sweeps.cluster.dispatch": 1,
+    "tasks.spline": 1,
+    "view.animation.animation": 1,
+    "view.animation.scene.desired_path": 1,
+    "view.bodies.body_visuals": 1,
+    "view.report.pictures": 13,
+    "view.report.report": 3,
+    "view.video": 1,
+}
+#: libraries that are imported inside functions: extras, and those that take long to load
+HEAVY = {
+    "casadi",
+    "distributed",
+    "example_robot_data",
+    "ezdxf",
+    "imageio_ffmpeg",
+    "lxml",
+    "mcap",
+    "mujoco",
+    "numpy",
+    "playwright",
+    "pyarrow",
+    "pylibfranka",
+    "pymoo",
+    "rich",
+    "rtde_control",
+    "rtde_receive",
+    "scipy",
+    "sympy",
+    "xarray",
+}
+QUESTIONS = ("What ", "Which ", "Where ", "How ", "Whether ")
 
 
 def names() -> dict[str, Path]:
@@ -104,3 +151,51 @@ def test_saved_runs_find_classes_by_the_registry():
 def test_only_robot_knows_pinocchio():
     knowing = {name.split(".")[1] for name, path in MODULES.items() if "import pinocchio" in path.read_text("utf-8")}
     assert knowing == {"robot"}
+
+
+def imports_in_functions(name: str) -> Iterator[ast.Import | ast.ImportFrom]:
+    """The import statements inside the functions of a module."""
+    tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    found = {node for function in functions for node in ast.walk(function)}
+    yield from (node for node in found if isinstance(node, ast.Import | ast.ImportFrom))
+
+
+def test_imports_inside_functions_are_counted():
+    late: Counter[str] = Counter()
+    libraries = set()
+    for name in MODULES:
+        short = name.removeprefix("pathcontrol.")
+        for node in imports_in_functions(name):
+            whole = [alias.name for alias in node.names] if isinstance(node, ast.Import) else [str(node.module)]
+            libraries |= {one.split(".")[0] for one in whole} - {"pathcontrol"}
+            late[short] += any(imported(node))
+    commands = [name for name in late if name.startswith("cli.")]
+    assert {name: count for name, count in late.items() if count and name not in commands} == LATE
+    assert libraries - sys.stdlib_module_names == HEAVY
+
+
+def docstrings() -> Iterator[tuple[str, str]]:
+    """All docstrings of the package, each with its place."""
+    for name, path in MODULES.items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
+                yield f"{name}: {getattr(node, 'name', '')}", text
+
+
+def test_docstrings_begin_with_a_sentence_on_one_line():
+    for place, text in docstrings():
+        first, *more = text.split("\n")
+        assert not first.startswith(QUESTIONS), f"{place}: {first}"
+        assert not more or not more[0], f"{place}: its first sentence goes on"
+
+
+def test_the_recipes_of_contributing_name_what_there_is():
+    text = (ROOT.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    flat = re.sub(r"\s+", " ", text)
+    for place in set(re.findall(r"`([\w/.]+(?:/|\.pyi?|\.hpp|\.md))`", flat)) - {"src/", "reader.py", "base.py"}:
+        assert any((root / place).exists() for root in (ROOT, ROOT.parent)), place
+    named = re.findall(r"`(\w+)` (?:in|of) `([\w/.]+\.(?:pyi?|hpp))`", flat)
+    assert len(named) > 10
+    for name, place in named:
+        assert re.search(rf"\b{name}\b", (ROOT / place).read_text(encoding="utf-8")), f"{name} in {place}"

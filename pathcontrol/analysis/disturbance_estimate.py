@@ -71,9 +71,9 @@ def momentum_observer(
     known, dt = enumerate(zip(q, qd, _mean_torque(run, time), strict=True)), np.diff(time)[:, None]
     means = [_mean_disturbance(select_friction(arm, i), friction, dt, *rollout) for i, rollout in known]
     if measured:
-        means = [spread_over_gaps(one, dt, lost) for one, lost in zip(means, _lost(run), strict=True)]
+        means = [spread_over_gaps(one, dt, lost) for one, lost in zip(means, _find_lost_samples(run), strict=True)]
     r = _low_pass(np.stack(means), np.diff(time), rate, np.where(np.isfinite(q[:, 0]), 0.0, np.nan))
-    return hold_at_end(r, _lost(run)) if measured else r
+    return hold_at_end(r, _find_lost_samples(run)) if measured else r
 
 
 def _find_arm(run: Run, robot: RobotModel | None) -> RobotModel:
@@ -121,10 +121,10 @@ def motion_of(run: Run, measured: bool) -> tuple[Array, Array, Array]:
     age = np.full(len(run.time), _velocity_age(run))
     age[0] = 0.0  # the first velocity is that of the start
     time = run.time - age
-    return time, *bridge(time, position - age[:, None] * qd, qd, _lost(run))
+    return time, *bridge(time, position - age[:, None] * qd, qd, _find_lost_samples(run))
 
 
-def _lost(run: Run) -> NDArray[np.bool_]:
+def _find_lost_samples(run: Run) -> NDArray[np.bool_]:
     """Return the samples at which no new measurement came, (rollout, time)."""
     return find_lost(run, filtered=loop_number(run, "filter_hz") > 0)
 
@@ -150,27 +150,27 @@ def _mean_torque(run: Run, time: Array) -> Array:
     impulse, area = np.zeros(tau.shape), np.zeros(tau.shape)  # ∫τdt, and ∫∫τdt dt
     np.cumsum(tau[:, :-1] * dt, axis=1, out=impulse[:, 1:])
     np.cumsum((impulse[:, :-1] + 0.5 * tau[:, :-1] * dt) * dt, axis=1, out=area[:, 1:])
-    since = _since(begin, time)
+    since = _find_held_torques(begin, time)
     until = impulse[:, since.held] + tau[:, since.held] * since.time
     if (late := time < run.time).any():
-        now = _since(begin, run.time)
+        now = _find_held_torques(begin, run.time)
         areas = area[:, now.held] + (impulse[:, now.held] + 0.5 * tau[:, now.held] * now.time) * now.time
         means = np.diff(areas, axis=1) / np.diff(run.time)[:, None]
         until[:, 1:] = np.where(late[1:, None], means, until[:, 1:])
     return np.diff(until, axis=1) / np.diff(time)[:, None]
 
 
-class _Since(NamedTuple):
+class _HeldTorques(NamedTuple):
     """The torque, by its number, that is held at some times, (k,), and for how long it has been [s], (k, 1)."""
 
     held: NDArray[np.intp]
     time: Array
 
 
-def _since(begin: Array, time: Array) -> _Since:
+def _find_held_torques(begin: Array, time: Array) -> _HeldTorques:
     """Return which torque is held at some times, where each begins to act at ``begin``, and since when."""
     held = np.searchsorted(begin, time, side="right") - 1
-    return _Since(held, (time - begin[held])[:, None])
+    return _HeldTorques(held, (time - begin[held])[:, None])
 
 
 def _torque_lead(run: Run) -> float:
@@ -190,7 +190,7 @@ def _mean_disturbance(arm: RobotModel, friction: KnownFriction, dt: Array, q: Ar
     """Return the mean of d between the samples of one rollout, (time − 1, n)."""
     if friction == "full":
         return split_unexplained(arm, dt, q, qd, tau)[1]
-    unexplained = _unexplained(arm, dt, q, qd, tau)
+    unexplained = _unexplained_torque(arm, dt, q, qd, tau)
     return unexplained if friction == "none" else unexplained + viscous_of(arm.friction) * _between(qd)
 
 
@@ -199,12 +199,12 @@ def split_unexplained(arm: RobotModel, dt: Array, q: Array, qd: Array, tau: Arra
 
     The motion is q [rad] and q̇ [rad/s], (time, n), under mean torques τ [N m], (time − 1, n), over dt [s].
     """
-    smooth = _unexplained(arm, dt, q, qd, tau) + viscous_of(arm.friction) * _between(qd)
+    smooth = _unexplained_torque(arm, dt, q, qd, tau) + viscous_of(arm.friction) * _between(qd)
     dry = _dry_friction(arm.friction, qd, -smooth)
     return dry, smooth + dry
 
 
-def _unexplained(arm: RobotModel, dt: Array, q: Array, qd: Array, tau: Array) -> Array:
+def _unexplained_torque(arm: RobotModel, dt: Array, q: Array, qd: Array, tau: Array) -> Array:
     """Return what τ does not explain of Δp, over dt, (time − 1, n)."""
     rate = arm.momentum_rate(q, qd, np.zeros(arm.n))
     return np.diff(arm.momentum(q, qd), axis=0) / dt - tau - _between(rate)

@@ -66,7 +66,7 @@ def _find_ends(s: Array, time: Array, task: PathTask) -> Array:
         return time[:1]
     s, time = np.maximum.accumulate(s[known]), time[known]
     laps = (s - s[0]) / task.period
-    # with more laps than samples their times cannot be told
+    # with more laps than samples their times are not known
     whole = np.arange(int(min(laps[-1] + _ROUNDING, len(s))) + 1)
     after = np.minimum(np.searchsorted(laps, whole - _ROUNDING), len(laps) - 1)
     before = np.maximum(after - 1, 0)

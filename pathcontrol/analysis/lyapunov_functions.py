@@ -47,7 +47,9 @@ def extended_motion_plan_lyapunov(controller: ExtendedMotionPlan, s: Array, e_p:
         e_p: position error [rad], (*batch, n).
         e_v: velocity error [rad/s], (*batch, n).
     """
-    return _extended(controller.K_p, controller.K_v, controller.plan_gain(s), e_p, e_v, controller.point(s).dq_d)
+    return _evaluate_extended(
+        controller.K_p, controller.K_v, controller.plan_gain(s), e_p, e_v, controller.point(s).dq_d
+    )
 
 
 def state_to_reference_lyapunov(
@@ -68,7 +70,7 @@ def state_to_reference_lyapunov(
     """
     point = controller.point(s)
     gains = controller.K_p, controller.K_v, controller.metric
-    return _referred(gains, e_p, e_v, point.dq_d * (sdot - point.theta)[..., None])
+    return _evaluate_referred(gains, e_p, e_v, point.dq_d * (sdot - point.theta)[..., None])
 
 
 def projection_lyapunov(controller: Projection, e_p: Array, e_v: Array) -> Lyapunov:
@@ -81,7 +83,7 @@ def projection_lyapunov(controller: Projection, e_p: Array, e_v: Array) -> Lyapu
         e_p: position error [rad], (*batch, n).
         e_v: velocity error [rad/s], (*batch, n).
     """
-    return _projected(controller.k_p, controller.K_v, e_p, e_v)
+    return _evaluate_projected(controller.k_p, controller.K_v, e_p, e_v)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # numbers from a file may be huge
@@ -101,9 +103,9 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
         # the errors of a diverged rollout are NaN, so that any s will do there; laws take the rollouts last in s
         tangent = controller.point(np.where(np.isfinite(s), s, controller.task.s0)).dq_d.swapaxes(0, 1)
         k = np.broadcast_to(controller.plan_gain(s), s.shape).T
-        return _extended(K_p, K_v, k, e_p, e_v, tangent)
+        return _evaluate_extended(K_p, K_v, k, e_p, e_v, tangent)
     if isinstance(controller, Projection):
-        return _projected(_add_time_axis(controller.k_p), _add_time_axis(controller.K_v), e_p, e_v)
+        return _evaluate_projected(_add_time_axis(controller.k_p), _add_time_axis(controller.K_v), e_p, e_v)
     if isinstance(controller, StateToReferenceProjection):
         s, sdot = (
             np.where(np.isfinite(part), part, controller.task.s0) for part in (run.array("s").T, run.array("sdot").T)
@@ -111,7 +113,7 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
         point = controller.point(s)
         lead = (point.dq_d * (sdot - point.theta)[..., None]).swapaxes(0, 1)
         gains = [_add_time_axis(gain) for gain in (controller.K_p, controller.K_v, controller.metric)]
-        return _referred(gains, e_p, e_v, lead)
+        return _evaluate_referred(gains, e_p, e_v, lead)
     if isinstance(controller, ManeuverRegulation):
         metric = StateMetric(*map(_add_time_axis, controller.metric))
         by_e_p, by_e_v = metric.apply(e_p, e_v)
@@ -120,7 +122,7 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     if isinstance(controller, TransverseLinearization):
         s = run.array("s").T
         tangent = controller.point(np.where(np.isfinite(s), s, controller.task.s0)).dq_d.swapaxes(0, 1)
-        return _beside(controller.k_p, controller.k_v, e_p, e_v, tangent)
+        return _evaluate_transverse(controller.k_p, controller.k_v, e_p, e_v, tangent)
     raise InputError(
         f"no Lyapunov function of e_p and e_v is given for {type(controller).__name__}; the laws that have one are "
         "ExtendedMotionPlan (with k = 0 computed torque), StateToReferenceProjection, Projection, ManeuverRegulation "
@@ -128,27 +130,27 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     )
 
 
-def _extended(K_p: Array, K_v: Array, k: Array, e_p: Array, e_v: Array, dq_d: Array) -> Lyapunov:
+def _evaluate_extended(K_p: Array, K_v: Array, k: Array, e_p: Array, e_v: Array, dq_d: Array) -> Lyapunov:
     """Return V and V̇ of the extended motion plan for given gains and errors."""
     along = (e_p * dq_d).sum(-1)
     V = 0.5 * (e_p**2).sum(-1) + 0.5 * (e_v**2 / K_p).sum(-1)
     return Lyapunov(V, -(e_v**2 * (K_v / K_p)).sum(-1) - k * along**2)
 
 
-def _referred(gains: Sequence[Array], e_p: Array, e_v: Array, lead: Array) -> Lyapunov:
+def _evaluate_referred(gains: Sequence[Array], e_p: Array, e_v: Array, lead: Array) -> Lyapunov:
     """Return V and V̇ of a state-to-reference projection for K_p, K_v and P, errors, and q_d'(ṡ − ϑ) [rad/s]."""
     K_p, K_v, P = gains
     V = 0.5 * (P * (e_p**2 + e_v**2 / K_p)).sum(-1)
     return Lyapunov(V, (P * (e_p * lead - e_v**2 * (K_v / K_p))).sum(-1))
 
 
-def _projected(k_p: Array, K_v: Array, e_p: Array, e_v: Array) -> Lyapunov:
+def _evaluate_projected(k_p: Array, K_v: Array, e_p: Array, e_v: Array) -> Lyapunov:
     """Return V and V̇ of control by projection for given gains and errors."""
     V = 0.5 * (e_v**2).sum(-1) + 0.5 * (k_p * e_p**2).sum(-1)
     return Lyapunov(V, -(K_v * e_v**2).sum(-1))
 
 
-def _beside(k_p: Array, k_v: Array, e_p: Array, e_v: Array, dq_d: Array) -> Lyapunov:
+def _evaluate_transverse(k_p: Array, k_v: Array, e_p: Array, e_v: Array, dq_d: Array) -> Lyapunov:
     """Return V and V̇ of what is beside the path for gains () or (N, 1), errors, and q_d' [rad].
 
     V = ½Nq̇ᵀNq̇ + ½k_p e_pᵀe_p and V̇ = −k_v Nq̇ᵀNq̇, where Nq̇ = −Ne_v is the part of q̇ that is normal to the path.

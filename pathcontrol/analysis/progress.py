@@ -36,11 +36,11 @@ def is_unfinished(run: Run) -> NDArray[np.bool_]:
         return np.zeros(run.rollouts, dtype=bool)
     short = np.zeros(run.rollouts, dtype=bool)
     for part, own, rows in split_by_task(run, run.task):
-        short[rows] = ~got_there(progress(part, own))
+        short[rows] = ~has_arrived(progress(part, own))
     return short & (run.status == "running")
 
 
-def got_there(progress: Array) -> Array:
+def has_arrived(progress: Array) -> Array:
     """Return which rollouts have enough ``progress``; unknown progress counts as enough."""
     return ~(progress < ENOUGH)
 

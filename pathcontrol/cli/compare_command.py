@@ -76,7 +76,7 @@ def command(
     found = _load(source)
     compared = compare("all" if laws == ("all",) else laws or None, found, rollouts=rollouts, seed=seed, engine=engine)
     written = {} if out is None else _write(compared, out)
-    _tell(compared, written, as_json)
+    _print_results(compared, written, as_json)
     if opened and out is not None:
         open_page(Path(written["html"]))
 
@@ -129,7 +129,7 @@ def _write(compared: Comparison, out: Path) -> dict[str, str]:
     return {name: str(path) for name, path in files.items()}
 
 
-def _tell(compared: Comparison, written: dict[str, str], as_json: bool) -> None:
+def _print_results(compared: Comparison, written: dict[str, str], as_json: bool) -> None:
     """Print the results."""
     if as_json:
         click.echo(json.dumps(compared.to_dict() | {"written": written}, allow_nan=False))

@@ -99,13 +99,13 @@ def printable(message: str) -> str:
 @contextlib.contextmanager
 def warnings_in_one_line(command: Callable[[], click.Command | None] = lambda: None) -> Iterator[None]:
     """Print each of the library's warnings once, as one line on stderr without the line of code that raised it."""
-    before, told = warnings.showwarning, set()
+    before, shown = warnings.showwarning, set()
 
     def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
-        if issubclass(category, PathControlWarning) and str(message) in told:
+        if issubclass(category, PathControlWarning) and str(message) in shown:
             return  # of another origin
         if issubclass(category, PathControlWarning):
-            told.add(str(message))
+            shown.add(str(message))
             click.echo(f"warning: {printable(in_options(str(message), command()))}", err=True)
         else:
             before(message, category, *where, **more)

@@ -55,7 +55,7 @@ def command(
     if as_json:
         click.echo(json.dumps(estimate.to_dict() | {"written": written}, allow_nan=False))
         return
-    _tell(estimate)
+    _print_results(estimate)
     for name, path in written.items():
         click.echo(f"  {name}: {path}")
 
@@ -72,7 +72,7 @@ def _write(estimate: FrictionEstimate, out: Path) -> dict[str, str]:
     return {"figure-svg": str(svg), "figure-png": str(png), "numbers": str(numbers)}
 
 
-def _tell(estimate: FrictionEstimate) -> None:
+def _print_results(estimate: FrictionEstimate) -> None:
     """Print a table of coefficients with their standard errors."""
     from rich.console import Console
     from rich.table import Table

@@ -11,7 +11,7 @@ import click
 
 from pathcontrol.cli.group import import_all, json_option, open_option, open_page
 from pathcontrol.cli.saved import check_out, check_runs, load_runs, robot_option, runs_argument, sweep_of, worst_option
-from pathcontrol.cli.view_command import layout_option, one_or_all, tell
+from pathcontrol.cli.view_command import layout_option, one_or_all, print_results
 
 if TYPE_CHECKING:
     from pathcontrol.simulation.run import Run
@@ -59,9 +59,9 @@ def command(
     different = layout if layout != "beside" else None
     for option, value in (("--title", title), ("--layout", different), ("--worst", worst), ("--robot", robot)):
         words += [option, str(value)] if value is not None else []
-    told = {"title": title, "command": shlex.join(words), "sweep": sweep_of(runs)}
-    page = report(one_or_all(loaded), out, layout=layout, **told)  # type: ignore[arg-type]
-    tell(loaded, {"report": page}, as_json, _analyse(loaded) if as_json else {})
+    details = {"title": title, "command": shlex.join(words), "sweep": sweep_of(runs)}
+    page = report(one_or_all(loaded), out, layout=layout, **details)  # type: ignore[arg-type]
+    print_results(loaded, {"report": page}, as_json, _analyse(loaded) if as_json else {})
     if opened:
         open_page(page)
 

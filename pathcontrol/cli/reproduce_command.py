@@ -37,7 +37,7 @@ def command(out: Path, sensitivity: bool, samples: int | None, opened: bool, as_
 
     summary = run_both(out)
     if not as_json:
-        _tell(summary, out)
+        _print_results(summary, out)
     if sensitivity:
         summary |= {"sensitivity": _vary(out, samples, as_json)}
     if as_json:
@@ -65,7 +65,7 @@ def _vary(out: Path, samples: int | None, as_json: bool) -> dict[str, Any]:
     return summary
 
 
-def _tell(summary: dict[str, Any], out: Path) -> None:
+def _print_results(summary: dict[str, Any], out: Path) -> None:
     """Print the summary."""
     from rich.console import Console
 

@@ -42,7 +42,7 @@ def command(
     done = run_experiment(file, out, engine=engine)
     if opened and "html" not in done.written:  # requested by the option, not by the file
         done.written["html"] = _animation(done, out)
-    _tell(done, as_json)
+    _print_results(done, as_json)
     if opened:
         open_page(done.written["html"])
 
@@ -54,7 +54,7 @@ def _animation(done: Outcome, out: Path) -> Path:
     return record(done.run).save(out / "run.html")
 
 
-def _tell(done: Outcome, as_json: bool) -> None:
+def _print_results(done: Outcome, as_json: bool) -> None:
     """Print the results."""
     from rich import print as rich_print
 

@@ -80,7 +80,7 @@ def command(
         values |= {"left_out": left_out, "map": stability and _describe(stability), "written": written}
         click.echo(json.dumps(values, allow_nan=False))
         return
-    _tell(own, left_out)
+    _print_results(own, left_out)
     for name, value in found.items():
         click.echo(f"largest {name}: " + (f"{value:.6g}" if math.isfinite(value) else "none, however large"))
     for point in [] if stability is None else _describe(stability)["boundary"]:
@@ -117,7 +117,7 @@ def _write(stability: StabilityMap, out: Path) -> dict[str, str]:
     return {"figure-svg": str(svg), "figure-png": str(png)}
 
 
-def _tell(own: Floquet, left_out: list[str]) -> None:
+def _print_results(own: Floquet, left_out: list[str]) -> None:
     """Print how fast errors decay with the experiment's own gains."""
     what = f"{'decays' if own.stable else 'grows'} at {abs(own.decay_rate):.4g} 1/s"
     if abs(own.decay_rate) * own.period < _NEUTRAL:

@@ -68,10 +68,10 @@ def command(
     except KeyboardInterrupt:
         click.echo(f"--resume goes on with what is in {folder}", err=True)
         raise
-    _tell(result, as_json)
+    _print_results(result, as_json)
 
 
-def _tell(result: SweepResult, as_json: bool) -> None:
+def _print_results(result: SweepResult, as_json: bool) -> None:
     """Print the results."""
     from pathcontrol.analysis.readable import describe_outcomes
     from pathcontrol.analysis.run_metrics import UNITS
@@ -83,8 +83,8 @@ def _tell(result: SweepResult, as_json: bool) -> None:
     if as_json:
         count = {status: statuses.count(status) for status in sorted(set(statuses))}
         histories = {str(i): str(result.history(i)) for i in result.kept}
-        told = {"out": str(result.folder), "samples": result.samples, "status": count, "metrics": spread}
-        click.echo(json.dumps(told | {"histories": histories}))
+        content = {"out": str(result.folder), "samples": result.samples, "status": count, "metrics": spread}
+        click.echo(json.dumps(content | {"histories": histories}))
         return
     click.echo(f"{result!r}: {describe_outcomes(statuses)}")
     click.echo(f"  {'':22} {'least':>12} {'median':>12} {'largest':>12}")

@@ -92,7 +92,7 @@ def command(
         from pathcontrol.view.video import save_video
 
         written["video"] = save_video(animation, mp4)
-    tell(loaded, written, as_json)
+    print_results(loaded, written, as_json)
     if opened:
         open_page(written["html"])
 
@@ -110,7 +110,7 @@ def _default(runs: tuple[Path, ...]) -> Path:
     return first.with_suffix(".html") if len(runs) == 1 else first.with_name("comparison.html")
 
 
-def tell(
+def print_results(
     runs: Mapping[str, Run], written: Mapping[str, Path], as_json: bool, numbers: Mapping[str, Any] = _NONE
 ) -> None:
     """Print which runs were shown, what must not be overlooked in them, and which files were written.
@@ -123,8 +123,8 @@ def tell(
     if as_json:
         files = {kind: str(path) for kind, path in written.items()}
         said = {name: found for name, run in runs.items() if (found := remarks(run))}
-        told = {"runs": {name: repr(run) for name, run in runs.items()}, "written": files, **numbers}
-        click.echo(json.dumps(told | ({"remarks": said} if said else {})))
+        content = {"runs": {name: repr(run) for name, run in runs.items()}, "written": files, **numbers}
+        click.echo(json.dumps(content | ({"remarks": said} if said else {})))
         return
     for name, run in runs.items():
         click.echo(printable(f"{name}: {run!r}"))

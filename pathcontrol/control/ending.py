@@ -69,24 +69,24 @@ class Ending(NamedTuple):
 
     def brake(self, point: PathPoint, s: Array, factor: Array | float = 1.0) -> PathPoint:
         """Return ``point``, the task at s, with ϑ and ϑ' of the plan that goes at a ``factor`` and comes to rest."""
-        left, back = self._left(s), self._back(s)
+        left, back = self._largest_factor_forward(s), self._largest_factor_back(s)
         share = np.minimum(np.maximum(factor, -np.maximum(back, 0.0)), np.maximum(left, 0.0))
         slope = np.where(left < factor, -1.0 / self.braking, np.where(-back > factor, -1.0 / self.braking_back, 0.0))
         return point._replace(theta=point.theta * share, dtheta=point.dtheta * share + point.theta * slope)
 
     def follows(self, s: Array, factor: Array) -> NDArray[np.bool_]:
         """Return where a plan goes at its ``factor``, and is not braked at an end, (*batch,)."""
-        return (self._left(s) >= factor) & (-self._back(s) <= factor)
+        return (self._largest_factor_forward(s) >= factor) & (-self._largest_factor_back(s) <= factor)
 
     def timed(self, s: Array, factor: Array | float = 1.0) -> NDArray[np.bool_]:
         """Return where a plan with a ``factor`` is timed at the end that it goes to, (*batch,)."""
         return (s >= self.begin) | (s <= self.begin_back) & (np.asarray(factor) < 0)
 
-    def _left(self, s: Array) -> Array:
+    def _largest_factor_forward(self, s: Array) -> Array:
         """Return the largest factor at s with which the plan comes to rest on s_end, negative beyond it."""
         return np.asarray((self.s_end - s) / self.braking)
 
-    def _back(self, s: Array) -> Array:
+    def _largest_factor_back(self, s: Array) -> Array:
         """Return the largest factor at s with which the plan comes to rest on s0, negative before it."""
         return np.asarray((s - self.s0) / self.braking_back)
 

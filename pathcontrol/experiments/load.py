@@ -1,4 +1,4 @@
-"""From an experiment file to a validated :class:`Experiment`."""
+"""The loading of an experiment file as a validated :class:`Experiment`."""
 
 from __future__ import annotations
 

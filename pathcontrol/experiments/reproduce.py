@@ -79,7 +79,7 @@ class Experiment:
 
 
 def paper_experiment(name: str, robot: RobotModel, progress: bool = True, engine: Engine = "pinocchio") -> Experiment:
-    """Run one of the two, by its name in :data:`PAPER`; on the reference engine unless told otherwise."""
+    """Run one of the two, by its name in :data:`PAPER`; on the reference engine by default."""
     controller = paper_controllers(robot)[name]
     start = np.deg2rad(START_DEG)
     run = simulate(controller, start, duration=DURATION, loop=paper_loop(), engine=engine, progress=progress)
@@ -87,7 +87,7 @@ def paper_experiment(name: str, robot: RobotModel, progress: bool = True, engine
 
 
 class Part(NamedTuple):
-    """What is said of one experiment when its files have been written.
+    """The numbers of one experiment whose files have been written.
 
     Attributes:
         peaks: as :attr:`Experiment.peaks`.
@@ -110,12 +110,12 @@ def reproduce(out: str | Path) -> dict[str, Any]:
         What ``summary.json`` holds.
     """
     out, began = refuse_suffix(out, "a folder"), time.perf_counter()
-    with _without_collection(), progress_bar("reproducing", 2 * len(PAPER)) as update:
-        with _mapped() as apply:
+    with _pause_collection(), progress_bar("reproducing", 2 * len(PAPER)) as update:
+        with _open_map() as apply:
             simulated = apply(_simulate_one, PAPER)
             load_writers()
             runs = _collect(simulated, update)
-        with _mapped() as apply:
+        with _open_map() as apply:
             parts = _collect(apply(_write_one, runs.items(), repeat(out)), lambda done: update(len(PAPER) + done))
     summary = summarise(parts) | {"seconds": round(time.perf_counter() - began, 2)}
     with whole_file(out / "summary.json") as temporary:
@@ -132,7 +132,7 @@ def load_writers() -> None:
 
 
 @contextmanager
-def _without_collection() -> Iterator[None]:
+def _pause_collection() -> Iterator[None]:
     """Collect no garbage inside: what is loaded stays, and a round would copy all pages into each process."""
     collecting = gc.isenabled()
     gc.disable()
@@ -153,7 +153,7 @@ def _collect(results: Iterable[T], update: Callable[[int], None]) -> dict[str, T
 
 
 @contextmanager
-def _mapped() -> Iterator[Callable[..., Iterable[Any]]]:
+def _open_map() -> Iterator[Callable[..., Iterable[Any]]]:
     """Give ``map``, or one that computes in processes, which know all that has been loaded here."""
     if threading.active_count() > 1 or len(os.sched_getaffinity(0)) < len(PAPER):
         yield map
@@ -220,7 +220,7 @@ def compare_engines(reference: Experiment, robot: RobotModel) -> dict[str, Any]:
 
 
 def _write(experiment: Experiment, robot: RobotModel, out: Path) -> None:
-    """Data, figures and animation of one experiment."""
+    """Write data, figures and animation of one experiment."""
     from pathcontrol.view.animation.record import record
     from pathcontrol.view.figures.error_figures import error_figure
     from pathcontrol.view.figures.path_figures import path_figure
@@ -235,7 +235,7 @@ def _write(experiment: Experiment, robot: RobotModel, out: Path) -> None:
 
 
 def summarise(parts: Mapping[str, Part]) -> dict[str, Any]:
-    """Measured peaks beside the paper's, the versions, the settings, and how far the compiled engine is from them."""
+    """Return measured peaks beside the paper's, versions, settings, and how far the compiled engine is from them."""
     peaks = {name: part.peaks | {"paper": PAPER[name]} for name, part in parts.items()}
     configs = {name: dict(part.config) for name, part in parts.items()}
     versions = [config.pop("versions") for config in configs.values()]  # the same for both

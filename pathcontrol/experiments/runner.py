@@ -19,7 +19,7 @@ from pathcontrol.tasks.joined.path_sequence import PathSequence
 
 
 class Outcome(NamedTuple):
-    """What came of an experiment.
+    """The results of an experiment.
 
     Attributes:
         run: the run; ``run.config["experiment"]`` is the text of the file.
@@ -51,13 +51,13 @@ def run_experiment(
     """
     setup, text, out_dir = load_setup(path), read_text(path), Path(out_dir)
     check_folder(out_dir, setup.output)
-    run = _simulated(setup if engine is None else setup._replace(engine=engine), progress)
+    run = _simulate(setup if engine is None else setup._replace(engine=engine), progress)
     run.config["experiment"] = text
     numbers = measure_run(run, setup)
     return Outcome(run, numbers, write_outputs(run, numbers, setup, out_dir))
 
 
-def _simulated(setup: Setup, progress: bool) -> Run:
+def _simulate(setup: Setup, progress: bool) -> Run:
     options: dict[str, Any] = {"plant": setup.plant, "loop": setup.loop, "disturbance": setup.disturbance}
     options |= {"engine": setup.engine, "progress": progress}
     if isinstance(setup.task, PathSequence):

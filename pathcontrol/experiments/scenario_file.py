@@ -1,4 +1,4 @@
-"""From an experiment file to a scenario, in which its law is replaced by each of a comparison."""
+"""The scenario of an experiment file, in which each law of a comparison takes the place of its own."""
 
 from __future__ import annotations
 

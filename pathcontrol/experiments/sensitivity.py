@@ -1,4 +1,4 @@
-"""How sure the reproduction is: the paper's two experiments under what the paper leaves unsaid."""
+"""The sensitivity of the reproduction: the paper's two experiments under what the paper leaves unsaid."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class EulerPlan(ExtendedMotionPlan):
         return (out.s + period * out.sdot)[..., None]
 
 
-def unsaid(samples: int) -> Space:
+def make_space(samples: int) -> Space:
     """Return the space of what the paper leaves unsaid, each value as likely as any other of its setting."""
     from scipy import stats
 
@@ -93,15 +93,15 @@ def unsaid(samples: int) -> Space:
     return Space.latin_hypercube(settings, samples)
 
 
-def combinations(samples: int, seed: int = 0) -> dict[str, Array]:
-    """Return the settings of the nominal experiment, of :data:`SINGLE`, and of ``samples`` of :func:`unsaid`."""
-    cloud = unsaid(samples).design(seed)
+def make_combinations(samples: int, seed: int = 0) -> dict[str, Array]:
+    """Return the settings of the nominal experiment, of :data:`SINGLE`, and of ``samples`` of :func:`make_space`."""
+    cloud = make_space(samples).design(seed)
     first = [NOMINAL | change for _, _, change in (("", "", {}), *SINGLE)]
     return {name: np.concatenate([np.array([row[name] for row in first]), values]) for name, values in cloud.items()}
 
 
-def both_experiments(settings: Mapping[str, Array]) -> Space:
-    """Every combination with each of the two experiments; those that run in one batch are neighbours."""
+def combine_experiments(settings: Mapping[str, Array]) -> Space:
+    """Return every combination with each of the two experiments; those that run in one batch are neighbours."""
     count = len(settings["window"])
     columns = {name: np.concatenate([values] * len(PAPER)) for name, values in settings.items()}
     columns |= {"experiment": np.repeat(list(PAPER), count), "combination": np.tile(np.arange(count), len(PAPER))}
@@ -110,7 +110,7 @@ def both_experiments(settings: Mapping[str, Array]) -> Space:
 
 
 class Combinations:
-    """What builds the rollouts of the sweep: the arm of the paper, and what differs of it and of the loop."""
+    """The builder of the rollouts of the sweep: the arm of the paper, and what differs of it and of the loop."""
 
     @cached_property
     def robot(self) -> RobotModel:
@@ -124,30 +124,30 @@ class Combinations:
         batches = {key: np.array([i for i, other in enumerate(keys) if other == key]) for key in dict.fromkeys(keys)}
         return [(rows, self._arguments(dict(zip(_ALIKE, key, strict=True)), p, rows)) for key, rows in batches.items()]
 
-    def _arguments(self, alike: dict[str, Any], p: Mapping[str, Array], rows: NDArray[np.intp]) -> dict[str, Any]:
-        """Return the arguments of :func:`simulate` for some rows, which have the settings ``alike`` in common."""
+    def _arguments(self, common: dict[str, Any], p: Mapping[str, Array], rows: NDArray[np.intp]) -> dict[str, Any]:
+        """Return the arguments of :func:`simulate` for some rows, which have the ``common`` settings."""
         loop = SampledLoop(
             period=PERIOD,
-            encoders=alike["encoders"],
+            encoders=common["encoders"],
             velocity="difference",
-            filter_hz=alike["filter_hz"] or None,
+            filter_hz=common["filter_hz"] or None,
             torque_limits=True,
-            delay=alike["delay"],
+            delay=common["delay"],
         )
         return {
-            "controller": self._controller(alike),
+            "controller": self._controller(common),
             "q": np.tile(np.deg2rad(START_DEG), (len(rows), 1)),
             "duration": DURATION,
             "plant": self._arm(p["viscous"][rows], p["coulomb"][rows]),
             "loop": loop,
         }
 
-    def _controller(self, alike: dict[str, Any]) -> Controller:
+    def _controller(self, common: dict[str, Any]) -> Controller:
         task = paper_task()
-        if alike["experiment"] == "projection":
+        if common["experiment"] == "projection":
             return Projection(self.robot, task, K_P, K_V)
-        law = EulerPlan if alike["plan"] == "euler" else ExtendedMotionPlan
-        return law(self.robot, task, K_P, K_V, K, start=alike["start"])
+        law = EulerPlan if common["plan"] == "euler" else ExtendedMotionPlan
+        return law(self.robot, task, K_P, K_V, K, start=common["start"])
 
     def _arm(self, viscous: Array, coulomb: Array) -> RobotModel:
         """Return the arm with its friction times factors (k, n)."""
@@ -171,5 +171,5 @@ def window_peaks(run: Run) -> dict[str, Array]:
 
 def run_combinations(out: Path, samples: int = SAMPLES, progress: bool = True) -> SweepResult:
     """Simulate both experiments in every combination; what a folder ``out`` has of that already is kept."""
-    space = both_experiments(combinations(samples))
+    space = combine_experiments(make_combinations(samples))
     return sweep(Combinations(), space, out, metrics=window_peaks, chunk=_CHUNK, resume=True, progress=progress)

@@ -99,7 +99,7 @@ def sentences(summary: dict[str, Any]) -> list[str]:
 
 
 def _range(summary: dict[str, Any], setting: str, value: str) -> str:
-    """From what to what the peaks change by a setting, in words."""
+    """Return the range over which the peaks change by a setting, in words."""
     changes = [
         change
         for effect in summary["effects"]

@@ -1,4 +1,4 @@
-"""What the combinations say: how often the paper's peaks come out, and what each setting alone does to them."""
+"""The summary of the combinations: how often the paper's peaks come out, and what each setting alone does to them."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def velocity_ratio(peaks: Peaks) -> Array:
 
 
 def summarise(peaks: Peaks) -> dict[str, Any]:
-    """Fractions, spreads and effects of single settings, as JSON has them."""
+    """Return fractions, spreads and effects of single settings, as JSON has them."""
     cloud = cloud_of(peaks)
     apart, ratio = furthest(cloud), velocity_ratio(cloud)
     paper_ratio = PAPER["projection"]["e_v_peak_deg_s"] / PAPER["extended_motion_plan"]["e_v_peak_deg_s"]

@@ -1,4 +1,4 @@
-"""What software in the loop drives: the paper's experiment, a contour of the tool, or an experiment file."""
+"""The tasks of software in the loop: the paper's experiment, a contour of the tool, or an experiment file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _FAST = 30.0  # rad/s, of arms whose URDF has no limit of velocity
 
 
 class SilTask(NamedTuple):
-    """What is driven.
+    """The law, arm and start of a session of software in the loop.
 
     Attributes:
         law: the law with its task.

@@ -32,10 +32,10 @@ def example_text() -> str:
     text = resources.files("pathcontrol.experiments").joinpath("template.toml").read_text(encoding="utf-8")
     made: list[str] = []
     before = ""
-    for block in [_explained(block, text) for block in (*text.rstrip("\n").split("\n\n"), "")]:
+    for block in [_explain_block(block, text) for block in (*text.rstrip("\n").split("\n\n"), "")]:
         section = _section(block)
         if before in _KINDS and section != before:
-            made += [_of_class(before, name) for name in _left_out(before, "\n".join(made))]
+            made += [_make_table(before, name) for name in _list_left_out(before, "\n".join(made))]
         made.append(block)
         before = section
     return "\n\n".join(made[:-1]) + "\n"
@@ -47,18 +47,18 @@ def _section(block: str) -> str:
     return match["section"] if match else ""
 
 
-def _left_out(section: str, text: str) -> Iterator[str]:
+def _list_left_out(section: str, text: str) -> Iterator[str]:
     """Yield the names of the classes that the text does not show."""
     yield from (name for name in _KINDS[section].members if f' = "{name}"' not in text)
 
 
-def _of_class(section: str, name: str) -> str:
+def _make_table(section: str, name: str) -> str:
     """Return a table for a class that the file does not show, turned off."""
     key = "mode" if section == "loop" else "type"
-    return _explained(f'#[{section}]\n#{key} = "{name}"', "")
+    return _explain_block(f'#[{section}]\n#{key} = "{name}"', "")
 
 
-def _explained(block: str, text: str) -> str:
+def _explain_block(block: str, text: str) -> str:
     """Return a block with comments, and with the arguments of its class that are nowhere in the ``text``, or needed."""
     head, lines = _HEAD.match(block), block.split("\n")
     kind = _KINDS.get(head["section"]) if head else None
@@ -72,10 +72,10 @@ def _explained(block: str, text: str) -> str:
         missing = name not in (*shown, *kind.given) and (parameter.required or f"{name} = " not in text)
         if missing and (value := _value(parameter)):
             lines.append(f"#{name} = {value}")
-    return "\n".join(_commented(line, target) for line in lines)
+    return "\n".join(_add_comment(line, target) for line in lines)
 
 
-def _commented(line: str, target: Callable[..., Any]) -> str:
+def _add_comment(line: str, target: Callable[..., Any]) -> str:
     """Return a line with what it means behind it, unless it has a comment."""
     match = _KEY.fullmatch(line)
     if match is None or match["comment"]:

@@ -24,7 +24,7 @@ _FAR = 2.0  # tubes from the path, from which holding on it is no help
 
 
 class Mode(IntEnum):
-    """What the loop does, the more the later."""
+    """The modes of a control loop, the gravest last."""
 
     RUN = 0
     HOLD = 1
@@ -120,12 +120,12 @@ class ControlLoop:
 
     @property
     def status(self) -> Status:
-        """What the loop does, and why."""
+        """The state of the loop: its mode, and the reason for it."""
         return Status(self._mode, self._reason, dict(self._faults), self._saturated, self._ticks, self._plan.s)
 
     @property
     def outcome(self) -> dict[str, Array]:
-        """What the law has to say up to now, (1,) each, see :meth:`Controller.outcome`."""
+        """The outcome of the law up to now, (1,) each, see :meth:`Controller.outcome`."""
         return self._plan.outcome
 
     @property

@@ -41,7 +41,7 @@ class HeldPlan:
 
     @property
     def outcome(self) -> dict[str, Array]:
-        """What the law has to say up to now, see :meth:`Controller.outcome`."""
+        """The outcome of the law up to now, see :meth:`Controller.outcome`."""
         return {} if self._tick is self._free else self._wrapper.outcome(self._held.state[None])
 
     def start(self, q: Array, qd: Array) -> None:

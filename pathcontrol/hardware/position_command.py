@@ -134,7 +134,7 @@ class PositionCommand:
 
         The array is a new one each time.
         """
-        self._watch(self._servo.expect(self.q).see(q))
+        self._watch(self._servo.expect(self.q).update(q))
         self._pace = self._choose_pace()
         self._passed += self._pace
         if self._passed > 1.0 + _WHOLE:

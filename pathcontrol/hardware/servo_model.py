@@ -39,7 +39,7 @@ class ServoModel:
         self._expected = self._expected + self._share * (command - self._expected)
         return self
 
-    def see(self, q: Any) -> bool:
+    def update(self, q: Any) -> bool:
         """Take measured positions (n,); return whether they are numbers, else nothing changes."""
         try:
             position = np.asarray(q, dtype=np.float64).reshape(-1)

@@ -104,11 +104,11 @@ def _distinct_bodies(robots: Sequence[RobotModel]) -> tuple[list[RobotModel], ND
     """Return the distinct rigid bodies, and the index of the one that each arm has, (N,)."""
     found: list[RobotModel] = []
     known: dict[int, int] = {}  # by the identity of a model
-    alike: dict[Hashable, list[int]] = defaultdict(list)  # by where it comes from
+    by_origin: dict[Hashable, list[int]] = defaultdict(list)
     for robot in robots:
         model = robot.pinocchio_model
         if id(model) not in known:
-            same = alike[robot.source, json.dumps(robot.steps, sort_keys=True)]
+            same = by_origin[robot.source, json.dumps(robot.steps, sort_keys=True)]
             which = next((k for k in same if found[k].pinocchio_model == model), len(found))
             if which == len(found):
                 found.append(robot)

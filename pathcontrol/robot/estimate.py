@@ -67,9 +67,9 @@ def _warn_of_guesses(balls: list[str], unread: dict[str, str]) -> None:
         _warn(f"the mass of {', '.join(light)} lacks shapes that cannot be read: {unread[light[0]]}")
 
 
-def _warn(told: str) -> None:
+def _warn(sentence: str) -> None:
     """Warn about an estimate, in the name of the caller of ``load_robot``."""
-    warn(f"estimated_inertia: {told}")
+    warn(f"estimated_inertia: {sentence}")
 
 
 def has_mass(inertial: object) -> bool:

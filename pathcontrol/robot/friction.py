@@ -225,10 +225,10 @@ class FrictionOfGroups(FrictionLaw):
 
     @property
     def viscous(self) -> Array:
-        together = np.empty((self.rows, self.n))
+        merged = np.empty((self.rows, self.n))
         for law, rows in self.parts:
-            together[rows] = viscous_of(law)
-        return together
+            merged[rows] = viscous_of(law)
+        return merged
 
     def levels(self, qd: Array) -> tuple[Array, Array]:
         qd = np.broadcast_to(qd, (self.rows, self.n))

@@ -22,7 +22,7 @@ from pathcontrol.robot.urdf.checks.extension import extension_values
 from pathcontrol.robot.urdf.locking import locked_angles, locked_beyond_limits
 from pathcontrol.robot.urdf.xml.parse import Parsed, parse_and_mend
 
-TOLD = ("inertia-negative",)  # codes of the findings that become warnings, beside those of the XML
+WARNED_OF = ("inertia-negative",)  # codes of the findings that become warnings, beside those of the XML
 _UNLIMITED = LARGEST  # some URDFs write 1.8e308 for "no limit"
 
 
@@ -66,10 +66,10 @@ def load_robot(
         density = DENSITY if estimated_inertia is True else estimated_inertia
         urdf = with_estimated_inertia(urdf, as_quantity("estimated_inertia", density))
     report = _check(urdf, label, tuple(locked))
-    for finding in (*mended, *(finding for finding in report.warnings if finding.code in TOLD)):
+    for finding in (*mended, *(finding for finding in report.warnings if finding.code in WARNED_OF)):
         warn(f"{label}: {finding.where}: {finding.message}")
-    for told in locked_beyond_limits(root, locked, lock or ()):
-        warn(f"{label}: {told}")
+    for sentence in locked_beyond_limits(root, locked, lock or ()):
+        warn(f"{label}: {sentence}")
     robot = _build(urdf, threads)
     return lock_joints(robot, locked) if locked else robot
 

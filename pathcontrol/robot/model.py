@@ -172,8 +172,8 @@ class RobotModel(ArmDynamics):
         moving = None if tip is None else self.pinocchio_model.names[self._support(tip)]
         root = parse_urdf(self.source.text)
         angles = {j: at for j, at in locked_angles(root, lock, keep, moving).items() if j in self.joint_names}
-        for told in locked_beyond_limits(root, angles, lock or ()):
-            warn(told)
+        for sentence in locked_beyond_limits(root, angles, lock or ()):
+            warn(sentence)
         return lock_joints(self, angles)
 
     def _with_model(self, model: Any, method: str, arguments: dict[str, Any]) -> RobotModel:

@@ -28,7 +28,7 @@ class LossyLine:
         self._silent, self._tau = self._missed, np.zeros_like(reading.q)
         self._said: ControlOutput | None = None
 
-    def see(self, tick: int, reading: Reading) -> Reading:
+    def receive(self, tick: int, reading: Reading) -> Reading:
         """Return what the law sees at a tick of the loop: the measurement, or the last one that came."""
         if not self._dropouts.any:
             return reading
@@ -38,7 +38,7 @@ class LossyLine:
         self._seen = Reading(*(np.where(away, old, new) for old, new in zip(self._seen, reading, strict=True)))
         return self._seen
 
-    def say(self, out: ControlOutput, begins: bool) -> ControlOutput:
+    def send(self, out: ControlOutput, begins: bool) -> ControlOutput:
         """Return the output in use: that of the law, or where it misses the tick, the last one.
 
         A law that ``begins`` with a tick that it misses has said nothing before but its state; the torque is that of

@@ -147,8 +147,8 @@ class SampledArm:
                 if lost.any:
                     self._hold_lost(lost)
                     z = lost.replace_lost(z, first)
-                reading = self._line.see(self._ticks, self._reading)
-                out = self._line.say(controller.law(t, reading.q, reading.qd, z), begins=tick == 0)
+                reading = self._line.receive(self._ticks, self._reading)
+                out = self._line.send(controller.law(t, reading.q, reading.qd, z), begins=tick == 0)
                 lost.check_torque(t, out.tau)
                 tau = self._actuator.clip(out.tau)
                 if lost.any:

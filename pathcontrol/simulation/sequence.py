@@ -157,7 +157,7 @@ def _join(
     lost.time += begins[-1]
     if lost.any:
         status[len(legs) - 1] = "diverged"
-    return arrays, lost.outcome() | _join_said(legs, begins) | {
+    return arrays, lost.outcome() | _join_outcomes(legs, begins) | {
         "finish_time": times[-1:],
         "path_index": np.repeat(np.arange(len(legs)), kept),
         "path_status": status,
@@ -166,7 +166,7 @@ def _join(
     }
 
 
-def _join_said(legs: Sequence[_PathRecord], begins: Array) -> dict[str, Array]:
+def _join_outcomes(legs: Sequence[_PathRecord], begins: Array) -> dict[str, Array]:
     """Return what the laws have to say of paths that begin at some times [s], as one outcome of the whole."""
     said = [(leg.said, begin) for leg, begin in zip(legs, begins, strict=True) if "forgotten" in leg.said]
     if not said:

@@ -107,7 +107,7 @@ def basin(
     loop: SampledLoop | ContinuousTime | None = None,
     progress: bool = True,
 ) -> Basin:
-    """Return the basin of attraction of a path: a law is let go from many states, and it is told which return.
+    """Return the basin of attraction of a path: the law starts from many states, of which some return.
 
     An arm has returned where it is within ``tolerance`` of its desired position, and within half the planned speed of
     its desired velocity, over the last tenth of the ``duration``. The starts are simulated in chunks, so that 10⁵ of

@@ -44,12 +44,12 @@ class Chunk(NamedTuple):
     Attributes:
         columns: their numbers and texts by name, (k,) or (k, d) each.
         runs: the histories that may have to be kept, by sample.
-        told: warnings of a period or of steps that are too long.
+        warnings: warnings of a period or of steps that are too long.
     """
 
     columns: dict[str, Array]
     runs: dict[int, Run]
-    told: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 class Job(NamedTuple):
@@ -109,13 +109,13 @@ def _compute(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int6
     """Simulate and measure samples, as :class:`Job` does."""
     measured: dict[str, Array] = {}
     runs: dict[int, Run] = {}
-    told: list[str] = []
+    warnings: list[str] = []
     try:
         built = job.build(parameters, samples)
         parts = [(np.arange(len(samples)), built)] if isinstance(built, Mapping) else built
         for rows, arguments in parts:
             run = _simulate(job.engine, samples[rows], arguments)
-            told += find_step_warnings(arguments, samples[rows])
+            warnings += find_step_warnings(arguments, samples[rows])
             values = _measure(run, job.measure)
             _put(measured, values, rows, len(samples))
             for row in _candidates(values, samples[rows], job.keep, job.at_random):
@@ -129,7 +129,7 @@ def _compute(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int6
     clash = set(parameters) & set(measured) | {"sample"} & set(measured)
     if clash:
         raise InputError(f"{', '.join(sorted(clash))}: both a parameter and a metric; call one of them otherwise")
-    return Chunk({"sample": samples, **parameters, **measured}, runs, tuple(told))
+    return Chunk({"sample": samples, **parameters, **measured}, runs, tuple(warnings))
 
 
 def _simulate(engine: Engine, samples: NDArray[np.int64], arguments: Arguments) -> Run:

@@ -176,8 +176,8 @@ class Space:
         if self.method == "grid":
             return math.prod(sizes)
         if len(set(sizes)) > 1:
-            told = ", ".join(f"{name}: {size}" for name, size in zip(self.names, sizes, strict=True))
-            raise InputError(f"the parameters have different numbers of samples ({told}), expected the same")
+            listed = ", ".join(f"{name}: {size}" for name, size in zip(self.names, sizes, strict=True))
+            raise InputError(f"the parameters have different numbers of samples ({listed}), expected the same")
         return sizes[0]
 
 

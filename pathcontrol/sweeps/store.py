@@ -27,7 +27,7 @@ from pathcontrol.sweeps.parquet import decode_table, encode_table, join_tables, 
 _HEX = "[0-9a-f]" * 8
 _UNFINISHED = (f".manifest-{_HEX}.json", f"chunks/.*-{_HEX}.parquet", f"runs/.*-{_HEX}.nc")  # as whole_file has them
 _RESUME = "resume the sweep to make it again"
-_TOLD = 5  # damaged files that a message names
+_LISTED = 5  # damaged files that a message names
 
 
 class Store:
@@ -211,7 +211,7 @@ class Store:
     def tidy(self, keep: Keep, at_random: NDArray[np.intp]) -> None:
         """Remove histories that need not be kept, and the remains of a killed process.
 
-        Chunks of a complete sweep that lack a history to be kept are told, and forgotten to be made again.
+        Chunks of a complete sweep that lack a history to be kept are warned of, and forgotten to be made again.
         """
         for unfinished in _UNFINISHED:
             for left in self.folder.glob(unfinished):
@@ -232,7 +232,9 @@ class Store:
         for place in gone:
             del self.manifest.files[place]
         if gone:
-            warn(f"the sweep in {str(self.folder)!r} lacks histories, which are made again: {', '.join(gone[:_TOLD])}")
+            warn(
+                f"the sweep in {str(self.folder)!r} lacks histories, which are made again: {', '.join(gone[:_LISTED])}"
+            )
 
     def _remove(self, places: Iterable[str]) -> None:
         """Remove files."""
@@ -338,6 +340,6 @@ def _samples(place: str) -> range:
 
 def _describe_files(bad: Mapping[str, str]) -> str:
     """Return the damaged files in words."""
-    told = [f"{place} ({what})" for place, what in list(bad.items())[:_TOLD]]
-    more = len(bad) - len(told)
-    return ", ".join(told) + (f" and {more} more" if more else "")
+    listed = [f"{place} ({what})" for place, what in list(bad.items())[:_LISTED]]
+    more = len(bad) - len(listed)
+    return ", ".join(listed) + (f" and {more} more" if more else "")

@@ -104,7 +104,7 @@ def sweep(
             with closing(computed(pieces)) as chunks, progress_bar("sweep", sum(map(len, missing)), progress) as update:
                 for finished in chunks:
                     store.write(finished, keep, job.at_random)
-                    tell(finished.told)
+                    tell(finished.warnings)
                     done += len(finished.columns["sample"])
                     update(done)
     return SweepResult(out)

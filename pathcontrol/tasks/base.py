@@ -169,7 +169,7 @@ class Task(ABC):
         return self.s0, end if np.isfinite(end) else self.s0 + 2 * np.pi
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(f'{k}={_short(v)}' for k, v in plain_attributes(self).items())})"
+        return f"{type(self).__name__}({', '.join(f'{k}={_shorten(v)}' for k, v in plain_attributes(self).items())})"
 
     def describe(self) -> dict[str, Any]:
         """Return the name and the public parameters, for the record of a run."""
@@ -178,7 +178,9 @@ class Task(ABC):
     def keep_tool(self, *paths: Task) -> None:
         """Take over the frame of ``paths``, and the tool pose in it, if these are the same for all."""
         frame, pose = paths[0].frame, paths[0].tool_pose
-        if isinstance(frame, str) and all(path.frame == frame and _same(path.tool_pose, pose) for path in paths):
+        if isinstance(frame, str) and all(
+            path.frame == frame and _is_same_pose(path.tool_pose, pose) for path in paths
+        ):
             self.frame, self.tool_pose = frame, pose
             self.rotations = min(path.rotations for path in paths)
 
@@ -216,12 +218,12 @@ def refuse_batch(name: str, task: Task) -> None:
         raise InputError(f"{name} is a TaskBatch of {task.rollouts} tasks, expected one task; take them one by one")
 
 
-def _same(a: Array | None, b: Array | None) -> bool:
+def _is_same_pose(a: Array | None, b: Array | None) -> bool:
     """Return whether two poses are the same, or both missing."""
     return a is b or (a is not None and b is not None and np.array_equal(a, b))
 
 
-def _short(value: Any) -> str:
+def _shorten(value: Any) -> str:
     """Write a number, a text or a small array in full, and of a large array its shape."""
     shape = np.shape(value)
     return f"<{' × '.join(map(str, shape))} values>" if np.size(value) > _MOST_SHOWN else str(value)

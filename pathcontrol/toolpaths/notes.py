@@ -23,7 +23,7 @@ class Notes:
     """A collector of notes on what a reader passes over or assumes, for :attr:`Toolpath.notes`.
 
     Args:
-        unknown: ``"refuse"``, what is not understood is an error; ``"warn"``, it is passed over and told.
+        unknown: ``"refuse"``, what is not understood is an error; ``"warn"``, it is passed over and noted.
 
     Raises:
         InputError: ``unknown`` is neither.
@@ -36,7 +36,7 @@ class Notes:
         self._kinds: dict[tuple[str, str], _Kind] = {}
         self._sentences: dict[str, None] = {}
 
-    def over(self, kind: str, place: int | str, fate: str = "was passed over") -> None:
+    def pass_over(self, kind: str, place: int | str, fate: str = "was passed over") -> None:
         """Count a thing of a kind that was passed over in a line, given by its number, or at another place.
 
         Where something else became of it than being passed over, ``fate`` says so.
@@ -57,9 +57,9 @@ class Notes:
         """
         if not self.lenient:
             raise ToolpathError(f"{reason}, or pass it over with unknown='warn'")
-        self.over(kind, place)
+        self.pass_over(kind, place)
 
-    def tell(self, sentence: str) -> None:
+    def add(self, sentence: str) -> None:
         """Add another sentence to the notes, once."""
         self._sentences[sentence] = None
 

@@ -38,7 +38,7 @@ def read_toolpath(path: str | Path, **options: Any) -> Toolpath:
         options: what the reader for such files takes besides, see :func:`read_csv`, :func:`read_gcode`,
             :func:`read_svg` and :func:`read_dxf`. All take ``feed`` [m/s], for contours without one, and ``unknown``:
             ``"refuse"``, what is not understood is an error, or ``"warn"``, where it cannot change what is cut it is
-            passed over, and each kind is told once with its count and lines.
+            passed over, and each kind is noted once with its count and lines.
 
     What a reader passes over or takes for granted is warned of by :class:`PathControlWarning`, and is in
     :attr:`Toolpath.notes`.

@@ -50,7 +50,7 @@ class Cases:
 
     def _part(self, values: Mapping[str, Array], samples: NDArray[np.int64], rows: slice) -> dict[str, Array]:
         """Return the rows of some samples, recorded or simulated."""
-        known = self._known(samples[rows])
+        known = self._find_recorded(samples[rows])
         if known is not None:
             return known
         parameters = {name: each[rows] for name, each in values.items()}
@@ -59,7 +59,7 @@ class Cases:
             self.store.write(found, self.job.keep, self.job.at_random)
         return found.columns
 
-    def _known(self, samples: NDArray[np.int64]) -> dict[str, Array] | None:
+    def _find_recorded(self, samples: NDArray[np.int64]) -> dict[str, Array] | None:
         """Return the rows of samples if all of them were recorded before."""
         noted = self.known.get("sample", samples[:0])
         if not np.isin(samples, noted).all():

@@ -111,7 +111,7 @@ def test_errors_of_this_process_are_told_in_one_sentence(tmp_path, thread, monke
 
 
 def test_a_program_with_threads_is_not_forked(thread):
-    with module._mapped() as apply:
+    with module._open_map() as apply:
         assert apply is map
 
 

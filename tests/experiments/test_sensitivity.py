@@ -22,8 +22,8 @@ from pathcontrol.experiments.sensitivity import (
     WINDOWS,
     Combinations,
     EulerPlan,
-    both_experiments,
-    combinations,
+    combine_experiments,
+    make_combinations,
     window_peaks,
 )
 from pathcontrol.experiments.sensitivity_summary import NEAR, furthest, summarise
@@ -64,7 +64,7 @@ def test_windows_end_with_the_run_and_a_longer_one_has_no_smaller_peak():
 
 
 def test_a_single_change_changes_one_setting_and_the_cloud_stays_around_what_is_published():
-    design = combinations(60)
+    design = make_combinations(60)
     for i, (_, _, change) in enumerate(SINGLE):
         differing = [name for name in NOMINAL if not np.array_equal(design[name][1 + i], NOMINAL[name])]
         assert differing == list(change)
@@ -80,7 +80,7 @@ def test_a_single_change_changes_one_setting_and_the_cloud_stays_around_what_is_
 
 
 def test_every_combination_is_simulated_with_both_laws_and_batches_share_what_they_must():
-    design = both_experiments(combinations(7)).design()
+    design = combine_experiments(make_combinations(7)).design()
     pairs = sorted(zip(design["combination"].tolist(), design["experiment"].tolist(), strict=True))
     assert pairs == [(i, name) for i in range(1 + len(SINGLE) + 7) for name in sorted(PAPER)]
     parts = Combinations()(design, np.arange(len(pairs)))

@@ -15,9 +15,9 @@ def test_each_kind_is_one_sentence_with_its_count_and_lines():
     passed = Notes("warn")
     for line in (3, 5, 5):
         passed.unless_refused("M62", line, "M62 is not understood")
-    passed.over("TEXT", "layer 'NOTES'")
-    passed.tell("the layer 'Defpoints' is left out")
-    passed.tell("the layer 'Defpoints' is left out")
+    passed.pass_over("TEXT", "layer 'NOTES'")
+    passed.add("the layer 'Defpoints' is left out")
+    passed.add("the layer 'Defpoints' is left out")
     assert passed.notes == (
         "the layer 'Defpoints' is left out",
         "M62 was passed over 3 times: lines 3, 5",
@@ -28,7 +28,7 @@ def test_each_kind_is_one_sentence_with_its_count_and_lines():
 def test_a_million_things_are_a_short_text():
     passed = Notes("warn")
     for number in range(20_000):
-        passed.over(f"M{number % 2000}", number)
+        passed.pass_over(f"M{number % 2000}", number)
     assert len(passed.notes) == 51
     assert max(map(len, passed.notes)) < 200
     assert passed.notes[-1] == "1950 more kinds were passed over"

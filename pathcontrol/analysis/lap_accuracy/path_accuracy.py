@@ -56,7 +56,7 @@ _VECTORS = ("orientation_accuracy", "orientation_repeatability")
 
 @dataclass(frozen=True, eq=False)
 class PathAccuracy:
-    """How exactly and how repeatably an arm went along a path: n cycles at m sections, in d coordinates.
+    """The accuracy and repeatability of an arm along a path: n cycles at m sections, in d coordinates.
 
     Attributes:
         s: the sections, (m,).
@@ -136,7 +136,7 @@ class PathAccuracy:
 
     @property
     def notes(self) -> list[str]:
-        """What cannot be said, and why, in sentences."""
+        """The reasons why criteria are missing, in sentences."""
         return ["one cycle says nothing of repeatability; go round more often"] if self.cycles == 1 else []
 
     def to_dict(self) -> dict[str, Any]:
@@ -256,7 +256,7 @@ class _Cycle(NamedTuple):
 
     @property
     def crossed(self) -> NDArray[np.bool_]:
-        """Which sections it crosses, (m,)."""
+        """The mask of the sections that it crosses, (m,)."""
         return np.isfinite(self.speed)
 
 

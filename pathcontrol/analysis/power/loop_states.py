@@ -28,13 +28,13 @@ def states_of(controller: Controller, record: LawRecord, q: Array, qd: Array) ->
         qd: true joint velocities [rad/s], (k, N, n).
     """
     law, task = unwrap(controller), controller.task
-    w = _factor(task.at(_inside(law, record.s)), record.velocity)
+    w = _factor(task.at(_clip_to_path(law, record.s)), record.velocity)
     law = law.at_speed(w)
     s, reference = record.s, None
     if isinstance(law, ReferenceLaw):
         reference, timed = law.project(q, qd, record.s), law.timed(record.s)
         s = np.where(timed, record.s, reference.s)
-    point = task.at(_inside(law, s))
+    point = task.at(_clip_to_path(law, s))
     e_p, e_v = point.q_d - q, w[..., None] * point.velocity - qd
     rate, gain = w * point.theta, np.zeros(s.shape)
     if isinstance(law, ExtendedMotionPlan):
@@ -51,7 +51,7 @@ def states_of(controller: Controller, record: LawRecord, q: Array, qd: Array) ->
     return LoopState(q, qd, e_p, e_v, point.dq_d, point.velocity, slope, sdot, rate, gain), s, w
 
 
-def _inside(law: Controller, s: Array) -> Array:
+def _clip_to_path(law: Controller, s: Array) -> Array:
     """Return parameters within an open path."""
     return s if law.task.closed else np.clip(s, law.task.s0, law.task.s_end)
 

@@ -138,7 +138,7 @@ def power_balance(run: Run, controller: Controller | None = None, *, plant: Robo
             follows a sequence of paths or another path than the law, or does not know its arm.
     """
     expect("run", run, Run)
-    law, theorem = _checked(run, controller)
+    law, theorem = _find_checked_law(run, controller)
     record = record_of(run, law)
     q, qd = (run.array(name).swapaxes(0, 1) for name in ("q", "qd"))
     known = np.isfinite(np.concatenate([q, qd, record.s[..., None]], axis=-1)).all(-1)
@@ -157,7 +157,7 @@ def power_balance(run: Run, controller: Controller | None = None, *, plant: Robo
     return balance
 
 
-def _checked(run: Run, controller: Controller | None) -> tuple[Controller, Theorem]:
+def _find_checked_law(run: Run, controller: Controller | None) -> tuple[Controller, Theorem]:
     """Return the law of a run with its theorem, after a check that the run has what the balance needs."""
     if missing := [name for name in _NEEDED if name not in run or np.isnan(run.array(name)).all()]:
         raise InputError(f"the run has no {', '.join(missing)}; a power balance needs {', '.join(_NEEDED)}")

@@ -61,7 +61,7 @@ class TorqueAccount(NamedTuple):
         arms = list(run.robots) if plant is None else [select_friction(plant, i) for i in range(run.rollouts)]
         for arm in {id(arm): arm for arm in arms}.values():
             _check_arm(arm, run)
-        acting, dt = _acting(run), np.diff(run.time)[:, None]
+        acting, dt = _acting_torque(run), np.diff(run.time)[:, None]
         mean = 0.5 * (acting[0] + acting[1])
         motion = zip(arms, *(part.swapaxes(0, 1) for part in (states.q, states.qd, mean)), strict=True)
         found = [split_unexplained(arm, dt, *rest) for arm, *rest in motion]
@@ -71,15 +71,17 @@ class TorqueAccount(NamedTuple):
 
     def shares(self, theorem: Theorem, states: LoopState, energy: Energy, wdot: Array) -> dict[str, Array]:
         """Return the rate of V that each cause supplies, (k − 1, N), by its name; ``wdot`` (k − 1, N) is ẇ."""
-        y = self._each(lambda arm, q, g: np.linalg.solve(arm.mass_matrix(q), g[..., None])[..., 0], states.q, energy[2])
-        viscous = self._each(lambda arm, qd: viscous_of(arm.friction) * qd, states.qd) - self.compensated
+        y = self._apply_each(
+            lambda arm, q, g: np.linalg.solve(arm.mass_matrix(q), g[..., None])[..., 0], states.q, energy[2]
+        )
+        viscous = self._apply_each(lambda arm, qd: viscous_of(arm.friction) * qd, states.qd) - self.compensated
         sampling, model, saturation = np.zeros((3, *wdot.shape))
         for end, demand, acting in zip(_ENDS, self.demand, self.acting, strict=True):
             torque, acceleration = theorem.demand(states.part(end), wdot)
             sampling += 0.5 * np.vecdot(y[end], torque + self.compensated[end] - demand)
             saturation += 0.5 * np.vecdot(y[end], demand - acting)
             if any(arm is not self.law.robot for arm in self.arms):
-                needed = self._each(RobotModel.inverse_dynamics, states.q[end], states.qd[end], acceleration)
+                needed = self._apply_each(RobotModel.inverse_dynamics, states.q[end], states.qd[end], acceleration)
                 model += 0.5 * np.vecdot(y[end], needed - torque)
         middle = 0.5 * (y[1:] + y[:-1])
         smooth = np.vecdot(y, viscous)
@@ -91,7 +93,7 @@ class TorqueAccount(NamedTuple):
             "disturbance": -np.vecdot(middle, self.outside),
         }
 
-    def _each(self, function: Callable[..., Array], *values: Array) -> Array:
+    def _apply_each(self, function: Callable[..., Array], *values: Array) -> Array:
         """Apply a function of an arm to values (k, N, n) of its rollouts; one call does for rollouts of one arm."""
         if all(arm is self.arms[0] for arm in self.arms):
             return function(self.arms[0], *values)
@@ -114,7 +116,7 @@ def _may_be_pushed(run: Run) -> bool:
     return table(run.config, "loop").get("loop") not in _SIMULATED or "disturbance" in run.config
 
 
-def _acting(run: Run) -> tuple[Array, Array]:
+def _acting_torque(run: Run) -> tuple[Array, Array]:
     """Return the torque that acts after each sample and before the next one, (k − 1, N, n) each; means where held."""
     tau, late = run.array("tau").swapaxes(0, 1), _split_delay(run)[1]
     if not is_sampled(run):
@@ -136,8 +138,8 @@ def _demand(run: Run, record: LawRecord, acting: tuple[Array, Array]) -> tuple[A
         return held, held
     if not is_sampled(run):
         return demand[:-1], demand[1:]
-    held = _later(demand, whole)
-    held = (late * _later(demand, whole + 1) + (1 - late) * held if late else held)[:-1]
+    held = _delay(demand, whole)
+    held = (late * _delay(demand, whole + 1) + (1 - late) * held if late else held)[:-1]
     return held, held
 
 
@@ -153,6 +155,6 @@ def _split_delay(run: Run) -> tuple[int, float]:
     return whole, late / period if late else 0.0
 
 
-def _later(values: Array, ticks: int) -> Array:
+def _delay(values: Array, ticks: int) -> Array:
     """Return values (k, …) some ticks later, 0 before the first."""
     return values if not ticks else np.concatenate([np.zeros_like(values[:ticks]), values[:-ticks]])[: len(values)]

@@ -75,7 +75,7 @@ def follow_laps(
     counts = [count for _, count in orbits]
     states = np.concatenate([each[:count] for each, count in orbits])
     steps = _differentiate(TickMap(laws(np.repeat(every, counts)), loop), states)
-    ways = [_way(tick, task, each)[count] for each, count in orbits]
+    ways = [_count_laps(tick, task, each)[count] for each, count in orbits]
     durations = [tick.period * count for count in counts]
     each_lap = zip(np.split(steps, np.cumsum(counts)[:-1]), durations, ways, strict=True)
     return [Lap(one, duration / way, duration) for one, duration, way in each_lap]
@@ -130,10 +130,10 @@ def _check_orbit(rates: Array, wanted: Array, rounding: float) -> None:
 
 def _cut_lap(tick: TickMap, task: PathTask, states: Array) -> tuple[Array, int]:
     """Return the states of a sampled loop from the begin of a lap on, (k, D), and the ticks that come nearest to it."""
-    return states, int(np.abs(_way(tick, task, states) - 1).argmin())
+    return states, int(np.abs(_count_laps(tick, task, states) - 1).argmin())
 
 
-def _way(tick: TickMap, task: PathTask, states: Array) -> Array:
+def _count_laps(tick: TickMap, task: PathTask, states: Array) -> Array:
     """Return how many laps states (k, D) are after the first of them, (k,)."""
     assert task.period is not None
     return (tick.parameter(states) - tick.parameter(states[:1])) / task.period

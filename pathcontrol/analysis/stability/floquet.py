@@ -52,7 +52,7 @@ class Floquet:
 
     @property
     def stable(self) -> bool:
-        """Whether all deviations decay, but a shift along the orbit.
+        """True if all deviations but a shift along the orbit decay.
 
         It is False for :class:`AdaptiveSlotineLi`: parameters that do not show on the path stay as wrong as they are,
         with multipliers of 1, of which ``along`` is any.

@@ -51,18 +51,18 @@ class GainGrowth:
         if isinstance(loop, SampledLoop):
             s = np.linspace(*self._task.one_traverse, 64, endpoint=False)
             ticks = float(np.ptp(self._task.one_traverse) * np.mean(1 / self._task.theta(s)) / loop.period)
-        self._together = int(np.clip(_NUMBERS / ticks / (6 * law.robot.n + 3) ** 2, 1, 256))
+        self._batch = int(np.clip(_NUMBERS / ticks / (6 * law.robot.n + 3) ** 2, 1, 256))
 
     def __call__(self, values: Array, update: Callable[[float], None] = lambda done: None) -> tuple[Array, Array]:
         """Return the growth rates [1/s] and the multipliers |μ|, (N,) each, for gains (N, names).
 
         Args:
             values: the gains.
-            update: told how many are done.
+            update: called with the number of those that are done.
         """
         parts = []
-        for begin in range(0, len(values), self._together):
-            some = values[begin : begin + self._together]
+        for begin in range(0, len(values), self._batch):
+            some = values[begin : begin + self._batch]
             parts.append(self._grow(some))
             update(begin + len(some))
         rates, multipliers = np.concatenate(parts, axis=1)

@@ -64,9 +64,9 @@ def _multiply(factors: Array, zero: float) -> Array:
     with np.errstate(divide="ignore"):
         spread = np.log(largest / smallest).mean(-1).max()
     count = factors.shape[1]
-    together = int(np.clip(np.log(_APART) / max(spread, 1e-3), 1, count))
+    size = int(np.clip(np.log(_APART) / max(spread, 1e-3), 1, count))
     parts = []
-    for group in np.array_split(factors, -(-count // together), axis=1):
+    for group in np.array_split(factors, -(-count // size), axis=1):
         product = group[:, 0]
         for i in range(1, group.shape[1]):
             product = group[:, i] @ product

@@ -48,7 +48,7 @@ class StabilityMap:
 
     @property
     def stable(self) -> NDArray[np.bool_]:
-        """Where all transverse deviations decay, of the shape of ``growth``."""
+        """The mask of the gains with which all transverse deviations decay, of the shape of ``growth``."""
         return self.growth < 0
 
     @property

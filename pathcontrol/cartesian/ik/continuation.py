@@ -68,7 +68,7 @@ def follow(
     for _ in range(_TRIES):
         if not walk.advance():
             return walk.trails
-    return walk.given_up()
+    return walk.give_up()
 
 
 class _Walk:
@@ -103,13 +103,13 @@ class _Walk:
         drift = np.abs(found.q - guess).max(-1)
         far = (drift > _DRIFT) | (np.abs(found.q - self.q[rows]).max(-1) > _LEAP)
         beyond = self.branch.rows(rows).differs(found.branch)
-        reasons = np.select([far, beyond], [Stop.LOST, Stop.SINGULAR], verdicts(self.constraint, found))
+        reasons = np.select([far, beyond], [Stop.LOST, Stop.SINGULAR], find_faults(self.constraint, found))
         good = reasons == Stop.NONE
         self._accept(rows[good], s[good], found.rows(good), drift[good])
         self._refuse(rows[~good], reasons[~good], found.q[~good])
         return True
 
-    def given_up(self) -> list[Trail]:
+    def give_up(self) -> list[Trail]:
         """Return the trails as they are, with those still going marked as lost."""
         for row in np.flatnonzero(self.going):
             self.trails[row].stop, self.trails[row].beyond = Stop.LOST, self.q[row]
@@ -123,7 +123,7 @@ class _Walk:
         return PostureCost(self.q[rows], self.start[rows], weight, limits)
 
     def _accept(self, rows: Array, s: Array, found: Corrected, drift: Array) -> None:
-        comfort = comforts(self.constraint, found)
+        comfort = rate_comfort(self.constraint, found)
         self.slope[rows] = (found.q - self.q[rows]) / (s - self.s[rows])[:, None]
         self.s[rows], self.q[rows] = s, found.q
         self.branch.left[rows], self.branch.right[rows] = found.branch
@@ -142,14 +142,14 @@ class _Walk:
             self.trails[row].stop, self.trails[row].beyond = Stop(reason), posture
 
 
-def verdicts(constraint: ToolConstraint, found: Corrected) -> Array:
+def find_faults(constraint: ToolConstraint, found: Corrected) -> Array:
     """Return the fault of each corrected posture, an array of :class:`Stop`, (N,)."""
     beyond = is_outside(constraint.tool.robot, found.q)
     conditions = [~found.converged, beyond, found.conditioning < SINGULAR]
     return np.select(conditions, [Stop.LOST, Stop.LIMIT, Stop.SINGULAR], Stop.NONE)
 
 
-def comforts(constraint: ToolConstraint, found: Corrected) -> Array:
+def rate_comfort(constraint: ToolConstraint, found: Corrected) -> Array:
     """Return the conditioning of postures, (N,), lowered in proportion where a joint is near a limit."""
     share = share_to_limits(constraint.tool.robot, found.q)
     return found.conditioning * np.clip(share / _TIGHT, 0.1, 1.0)

@@ -79,7 +79,7 @@ def _reason(constraint: ToolConstraint, trail: Trail) -> str:
     """Return the reason why a trail stops, with advice."""
     if trail.stop is Stop.LIMIT:
         return _limit(constraint, trail.beyond)
-    return _out_of_reach(constraint, trail) or _stuck(constraint, trail)
+    return _find_out_of_reach(constraint, trail) or _explain_stop(constraint, trail)
 
 
 def _passed_limit(robot: RobotModel, beyond: Array) -> tuple[int, str, float]:
@@ -108,7 +108,7 @@ def _limit(constraint: ToolConstraint, beyond: Array) -> str:
     )
 
 
-def _stuck(constraint: ToolConstraint, trail: Trail) -> str:
+def _explain_stop(constraint: ToolConstraint, trail: Trail) -> str:
     """Write why no posture continues a trail: a jump, or a singularity, with advice."""
     robot, rank = constraint.tool.robot, constraint.rank
     _, slope = constraint.at(trail.q[-1][None], np.array([trail.s[-1]]))
@@ -133,7 +133,7 @@ def _advise_freedom(constraint: ToolConstraint) -> str:
     return free if constraint.orientation.rows == 3 else ""
 
 
-def _out_of_reach(constraint: ToolConstraint, trail: Trail) -> str | None:
+def _find_out_of_reach(constraint: ToolConstraint, trail: Trail) -> str | None:
     """Return what is out of reach ahead of a trail, if that ended it, else None."""
     curve = constraint.curve
     ahead = np.unique(np.minimum(trail.s[-1] + _AHEAD * curve.length, curve.s_end))
@@ -147,11 +147,11 @@ def _out_of_reach(constraint: ToolConstraint, trail: Trail) -> str | None:
 
 def _gap(constraint: ToolConstraint, seeds: Array, s: float) -> str:
     """Write how near the tool gets to the curve at s, and what would close the gap."""
-    position, angle = _miss(constraint, seeds, s)
+    position, angle = _find_miss(constraint, seeds, s)
     turned = f" and {angle:.3g} rad" if constraint.orientation.rows else ""
     text = f"the nearest it gets is {np.linalg.norm(position):.3g} m{turned} away"
     if constraint.orientation.rows:
-        position, _ = _miss(replace(constraint, orientation=FreeOrientation()), seeds, s)
+        position, _ = _find_miss(replace(constraint, orientation=FreeOrientation()), seeds, s)
         if np.linalg.norm(position) <= constraint.tolerance[0]:
             return (
                 f"{text}, but the position alone is in reach: {_advise_frozen(constraint)}turn the tool, leave its "
@@ -174,7 +174,7 @@ def _advise_frozen(constraint: ToolConstraint) -> str:
     return f"{' and '.join(held)}: give room between lower and upper, or " if held else ""
 
 
-def _miss(constraint: ToolConstraint, seeds: Array, s: float) -> tuple[Array, float]:
+def _find_miss(constraint: ToolConstraint, seeds: Array, s: float) -> tuple[Array, float]:
     """Return the vector [m] from the curve at s to the tool in the nearest posture, and the remaining angle [rad]."""
     places = np.array([s])
     f, _ = constraint.at(nearest_postures(constraint, seeds, places), places)

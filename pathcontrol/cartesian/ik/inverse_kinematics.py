@@ -11,7 +11,7 @@ from scipy.interpolate import PchipInterpolator
 
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
-from pathcontrol.cartesian.ik.continuation import Stop, follow, verdicts
+from pathcontrol.cartesian.ik.continuation import Stop, find_faults, follow
 from pathcontrol.cartesian.ik.correction import branch_at, correct
 from pathcontrol.cartesian.ik.failure import trail_error
 from pathcontrol.cartesian.ik.redundancy import PostureCost
@@ -52,7 +52,7 @@ class InverseKinematics:
         found = correct(self.constraint, cost, guess, s)
         near = np.abs(found.q - guess).max(-1) < _NEAR
         hops = found.branch.differs(branch_at(self.constraint, known.q[before], known.s[before]))
-        return found.q, near & ~hops & (verdicts(self.constraint, found) == Stop.NONE)
+        return found.q, near & ~hops & (find_faults(self.constraint, found) == Stop.NONE)
 
     def fill(self, known: Samples, s: Array) -> Samples:
         """Return postures at the increasing parameters s (N,), between ``known`` postures.

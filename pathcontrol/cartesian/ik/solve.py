@@ -8,7 +8,7 @@ from scipy.interpolate import BSpline
 
 from pathcontrol._arrays import Array, as_joint_array, check_finite
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
-from pathcontrol.cartesian.ik.continuation import SINGULAR, Stop, Trail, follow, verdicts
+from pathcontrol.cartesian.ik.continuation import SINGULAR, Stop, Trail, find_faults, follow
 from pathcontrol.cartesian.ik.correction import correct
 from pathcontrol.cartesian.ik.failure import closing_error, trail_error
 from pathcontrol.cartesian.ik.inverse_kinematics import InverseKinematics, Samples
@@ -117,7 +117,7 @@ def close_lap(constraint: ToolConstraint, s: Array, q: Array) -> Array | None:
         closing, times = q, int(np.ceil(size / _PACE))
         for i in range(1, times + 1):
             found = correct(constraint, PostureCost.nearest(q - i / times * share * left, limits), closing, s)
-            if (verdicts(constraint, found) != Stop.NONE).any():
+            if (find_faults(constraint, found) != Stop.NONE).any():
                 return None
             closing = found.q
         q = closing

@@ -6,7 +6,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
-from pathcontrol.cartesian.ik.continuation import Stop, Trail, comforts, verdicts
+from pathcontrol.cartesian.ik.continuation import Stop, Trail, find_faults, rate_comfort
 from pathcontrol.cartesian.ik.correction import KEPT, Corrected, correct
 from pathcontrol.cartesian.ik.failure import first_point_error, trail_error
 from pathcontrol.cartesian.ik.joint_range import distance_to_limits, unwind
@@ -33,11 +33,11 @@ def search_starts(constraint: ToolConstraint) -> Array:
     """
     reached = _approach(constraint, constraint.seeds(_SEEDS))
     found = _correct_nearby(constraint, unwind(constraint.tool.robot, reached))
-    stops = verdicts(constraint, found)
+    stops = find_faults(constraint, found)
     fit = stops == Stop.NONE
     if not fit.any():
         raise _no_start(constraint, found)
-    comfort = comforts(constraint, found) * np.where(above_base(constraint, found.q), 1.0, _BELOW)
+    comfort = rate_comfort(constraint, found) * np.where(above_base(constraint, found.q), 1.0, _BELOW)
     return found.q[_select_diverse(found.q, np.where(fit, comfort, 0.0))]
 
 
@@ -70,7 +70,7 @@ def move_start(constraint: ToolConstraint, start: Array) -> Array:
         TaskError: it does not get there, or is singular.
     """
     found = _correct_nearby(constraint, _approach(constraint, start[None]))
-    stop = Stop(verdicts(constraint, found)[0])
+    stop = Stop(find_faults(constraint, found)[0])
     if stop is Stop.LOST:
         raise _no_start(constraint, found, start)
     if stop is not Stop.NONE:

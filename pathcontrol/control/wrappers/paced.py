@@ -58,13 +58,13 @@ class Paced(LawWrapper):
             raise InputError(f"torque_margin = {margin:g}, expected a share of the torque limits, 0 ≤ margin < 1")
         torque = joint_values("torque_limits", torque_limits, law.robot.limits.effort, law.robot)
         if not np.isfinite(torque).any():
-            raise InputError(_say_no_limits(law.robot, torque_limits), argument="torque_limits")
+            raise InputError(_describe_missing_limits(law.robot, torque_limits), argument="torque_limits")
         limits = torque_limits if isinstance(torque_limits, bool) else torque.tolist()
         settings = {"torque_margin": margin, "torque_limits": limits}
         super().__init__(law, PaceRule(FastestPlan(law.robot, law.task, torque, margin), torque, settings))
 
 
-def _say_no_limits(robot: RobotModel, given: LimitChoice) -> str:
+def _describe_missing_limits(robot: RobotModel, given: LimitChoice) -> str:
     """Return what an error says where no joint has a torque limit."""
     give = "give torque_limits = [...] in N m, one per joint"
     if given is True:

@@ -1,4 +1,4 @@
-"""From ``[robot]`` and ``[plant]`` to the controller's model and the simulated arm."""
+"""The controller's model and the simulated arm, made of ``[robot]`` and ``[plant]``."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def build_models(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, Ro
         ExperimentError: a robot, joint or frame does not exist, or a value is out of range.
     """
     bare = _with_tool(_load(experiment, base_dir), experiment)
-    model = _carrying("robot.payload", bare, experiment.robot.payload)
+    model = _add_payload("robot.payload", bare, experiment.robot.payload)
     if not model.has_mass:
         raise ExperimentError(
             f"robot: no link of {model.name} has a mass, so there are kinematics and no dynamics; give "
@@ -61,7 +61,7 @@ def build_plant(experiment: Experiment, bare: RobotModel, model: RobotModel, bas
         ExperimentError: a frame does not exist, or a value is out of range.
     """
     plant = experiment.plant
-    carrier = model if plant.payload is None else _carrying("plant.payload", bare, plant.payload)
+    carrier = model if plant.payload is None else _add_payload("plant.payload", bare, plant.payload)
     return with_friction(carrier, plant.friction, Place(base_dir, experiment.to_radians))
 
 
@@ -118,7 +118,7 @@ def _refuse_degrees(robot: RobotModel, sliding: set[str]) -> None:
         )
 
 
-def _carrying(key: str, robot: RobotModel, payload: Section | None) -> RobotModel:
+def _add_payload(key: str, robot: RobotModel, payload: Section | None) -> RobotModel:
     if payload is None:
         return robot
     given = payload.arguments(float)

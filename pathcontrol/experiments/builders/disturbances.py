@@ -1,4 +1,4 @@
-"""From ``[disturbance]`` to what pushes the simulated arm."""
+"""The disturbances of the simulated arm, made of ``[disturbance]``."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def build_disturbance(
         ExperimentError: one cannot be made, or gives no torques for the arm.
     """
     made: list[Disturbance] = []
-    for i, sections in enumerate(zip(*map(_listed, experiments), strict=True)):
+    for i, sections in enumerate(zip(*map(_list_sections, experiments), strict=True)):
         key = f"disturbance[{i}]" if isinstance(experiments[0].disturbance, list) else "disturbance"
         values = [arguments_of(key, section, DISTURBANCES, place) for section in sections]
         differ = {name for one in values for name in one if one[name] != values[0].get(name)}
@@ -62,12 +62,12 @@ def _stack(section: Any, name: str, values: list[Any]) -> Array:
 def varies_together(key: str, experiment: Experiment) -> bool:
     """Return whether a key sets numbers of a disturbance of the library, which may differ between rollouts."""
     match = _ARGUMENT.fullmatch(key)
-    if match is None or isinstance(section := _listed(experiment)[int(match[1] or 0)], OwnSection):
+    if match is None or isinstance(section := _list_sections(experiment)[int(match[1] or 0)], OwnSection):
         return False
     target = type(section).target
     return DISTURBANCES.has(target.__name__) and parameters_of(target)[match[2]].form in _NUMBERS
 
 
-def _listed(experiment: Experiment) -> list[Any]:
+def _list_sections(experiment: Experiment) -> list[Any]:
     given = experiment.disturbance
     return given if isinstance(given, list) else [] if given is None else [given]

@@ -1,4 +1,4 @@
-"""Errors of the library told as errors of an experiment file."""
+"""The translation of errors of the library into errors of an experiment file."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _LISTS = str.maketrans("()", "[]")  # of Python and of TOML
 def report_by_key(key: str, fields: Iterable[str] | Mapping[str, str] = ()) -> Iterator[None]:
     """Turn errors inside the block into ExperimentErrors whose message begins with the key path.
 
-    A message that begins with one of the ``fields`` of the section ``key``, as ``K_v = -1.0, expected …``, is
-    told as ``controller.K_v = …``; advice to give one of them, as ``unit='mm'``, is told as a line of the file. Where a
+    A message that begins with one of the ``fields`` of the section ``key``, as ``K_v = -1.0, expected …``,
+    becomes ``controller.K_v = …``; advice to give one of them, as ``unit='mm'``, becomes a line of the file. Where a
     field has another name there than the argument, ``fields`` is a mapping from this to that.
     """
     names = dict(fields) if isinstance(fields, Mapping) else {name: name for name in fields}
@@ -72,5 +72,5 @@ def refuse_unit(key: str, value: Any, unit: str) -> None:
 
 
 def describe_error(error: BaseException) -> str:
-    """Kind and message of an exception of the user's code."""
+    """Return kind and message of an exception of the user's code."""
     return f"{type(error).__name__}: {error}"

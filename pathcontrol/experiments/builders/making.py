@@ -1,4 +1,4 @@
-"""From a section of an experiment file to the object that it names."""
+"""The making of the object that a section of an experiment file names."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class Place(NamedTuple):
-    """Where and how an experiment file is read.
+    """The folder and the angles of an experiment file.
 
     Attributes:
         folder: the folder that paths in it are relative to.

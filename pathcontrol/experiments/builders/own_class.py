@@ -23,7 +23,7 @@ def find_own_class(folder: Path, source: str, name: str, kind: Kind) -> type:
         InputError: the file is missing or fails, or has no such class; the message lists those it has.
     """
     base = load(kind.base)
-    module = _of_file(folder / source) if source.endswith(".py") else _installed(source)
+    module = _load_file(folder / source) if source.endswith(".py") else _import_module(source)
     found = getattr(module, name, None)
     if isinstance(found, type) and issubclass(found, base):
         return found
@@ -36,13 +36,13 @@ def find_own_class(folder: Path, source: str, name: str, kind: Kind) -> type:
     raise InputError(f"{name!r} in {where} is not a subclass of pathcontrol.{base.__name__}; {there}")
 
 
-def _of_file(file: Path) -> ModuleType:
+def _load_file(file: Path) -> ModuleType:
     if not file.is_file():
         raise InputError(f"there is no Python file {str(file)!r}; the path is relative to the TOML file")
     return _run(file, file.read_bytes())
 
 
-def _installed(name: str) -> ModuleType:
+def _import_module(name: str) -> ModuleType:
     try:
         return importlib.import_module(name)
     except (Exception, SystemExit) as error:

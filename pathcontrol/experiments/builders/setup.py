@@ -1,4 +1,4 @@
-"""From a validated experiment to the objects it names."""
+"""The objects that a validated experiment names, and their checks with one another."""
 
 from __future__ import annotations
 

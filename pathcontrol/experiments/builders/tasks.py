@@ -1,4 +1,4 @@
-"""From ``[task]`` to a checked :class:`PathTask`."""
+"""The checked :class:`PathTask` made of ``[task]``."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def build_toolpath(section: ToolpathSection, robot: RobotModel, place: Place) ->
 
 
 def build_duration(experiment: Experiment, task: PathTask) -> tuple[float | Array, int | None]:
-    """Longest simulated time [s], one for each path of a sequence, and the laps of a closed path.
+    """Return the longest simulated time [s], one for each path of a sequence, and the laps of a closed path.
 
     Raises:
         ExperimentError: the path has no end that a duration would follow from, or laps are asked of an open one.
@@ -68,13 +68,13 @@ def build_duration(experiment: Experiment, task: PathTask) -> tuple[float | Arra
     if experiment.duration is not None:
         return float(experiment.duration), laps
     if isinstance(task, PathSequence):
-        return np.array([_generous(path) for path in task.paths]), None
+        return np.array([_generous_duration(path) for path in task.paths]), None
     if laps is None and not np.isfinite(task.s_end):
         raise ExperimentError(f"duration: missing; {type(task).__name__} does not end by itself; give it or laps")
-    return _generous(task, laps or 1), laps
+    return _generous_duration(task, laps or 1), laps
 
 
-def _generous(task: PathTask, laps: int = 1) -> float:
-    """Twice the time that the path takes by ϑ, and 5 s [s]."""
+def _generous_duration(task: PathTask, laps: int = 1) -> float:
+    """Return twice the time that the path takes by ϑ, and 5 s more [s]."""
     s = np.linspace(*task.one_traverse, _SAMPLES)
     return 2.0 * laps * float(np.trapezoid(1 / (task.theta(s) + np.zeros_like(s)), s)) + 5.0

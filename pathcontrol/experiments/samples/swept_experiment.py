@@ -82,14 +82,14 @@ class SweptExperiment:
         files = {str(path.relative_to(home)): path.read_bytes() for path in paths}
         moved = {name: make_relative(name, base) for name, _ in self._files() if os.path.isabs(name)}
         return PackedBuilder(
-            home, files, partial(_unpacked, make_relative(self._data, base), moved, base.relative_to(home))
+            home, files, partial(_unpack, make_relative(self._data, base), moved, base.relative_to(home))
         )
 
     def _files(self) -> Iterator[tuple[str, Path]]:
         return find_files([self._data, self._varied], self._base_dir)
 
     def check(self, design: Mapping[str, Array]) -> None:
-        """No key is a part of another, every sample is valid with gains greater than 0, and the first can be built.
+        """Check that no key is a part of another, all samples are valid, gains above 0, and the first can be built.
 
         Raises:
             ExperimentError: one is not.
@@ -106,7 +106,7 @@ class SweptExperiment:
         """Return the rows that fit in one batch, and the arguments of simulate() for them."""
         experiments = [self._experiment(parameters, row, int(i)) for row, i in enumerate(samples)]
         gains = set.intersection(*(set(self._gains(experiment)) for experiment in experiments))
-        apart = [name for name in parameters if not self._together(name, gains, experiments)]
+        apart = [name for name in parameters if not self._may_share_batch(name, gains, experiments)]
         varied = {section_of_key(name) for name in parameters.keys() - apart}
         groups: dict[str, list[int]] = {}
         for row in range(len(samples)):
@@ -138,11 +138,11 @@ class SweptExperiment:
                 arguments["disturbance"] = build_disturbance(chosen, setup.plant, *state, place)
             yield rows[some], {"controller": law, "plant": plant} | arguments
 
-    def _together(self, name: str, gains: set[str], experiments: list[Experiment]) -> bool:
+    def _may_share_batch(self, name: str, gains: set[str], experiments: list[Experiment]) -> bool:
         """Return whether samples that differ in a key may be rollouts of one batch."""
         if section_of_key(name) == "disturbance":
             return all(varies_together(name, experiment) for experiment in experiments)
-        return section_of_key(name) in _TOGETHER or _named(name) in gains
+        return section_of_key(name) in _TOGETHER or _find_argument(name) in gains
 
     def _law(self, model: RobotModel, experiments: list[Experiment], task: PathTask) -> Controller:
         """Return the law of some samples, with a row for each of them of the gains that differ."""
@@ -181,8 +181,8 @@ class SweptExperiment:
         try:
             return Experiment.model_validate(data)
         except ValidationError as error:
-            told = "; ".join(map(describe_finding, error.errors(include_url=False)))
-            raise ExperimentError(f"{self._where}: in sample {sample}: {told}") from None
+            findings = "; ".join(map(describe_finding, error.errors(include_url=False)))
+            raise ExperimentError(f"{self._where}: in sample {sample}: {findings}") from None
 
     def _of_group(self, key: str, experiment: Experiment) -> tuple[Setup, RobotModel, RobotModel]:
         if key not in self._built:
@@ -194,11 +194,11 @@ class SweptExperiment:
         return self._built[key]
 
 
-def _unpacked(data: dict[str, Any], moved: Mapping[str, str], inside: Path, folder: Path) -> SweptExperiment:
+def _unpack(data: dict[str, Any], moved: Mapping[str, str], inside: Path, folder: Path) -> SweptExperiment:
     return SweptExperiment(data, folder / inside, moved=moved)
 
 
-def _named(key: str) -> str:
+def _find_argument(key: str) -> str:
     """Return the argument of the law that a dotted key sets, or an empty text."""
     match = _GAIN.fullmatch(key)
     return match[1] if match else ""

@@ -126,7 +126,7 @@ def annotation_of(parameter: Parameter) -> Any:
         return list[Text]  # its errors name the entry
     if literals and not forms and table is None:
         return Literal[tuple(literals)]
-    validate = check_forms(*forms) if forms else _anything
+    validate = check_forms(*forms) if forms else _accept
     words = [form.value for form in forms]
     if table is not None:
         validate, words = partial(_table_or, table, validate), [*words, "a table with the key 'type'"]
@@ -144,10 +144,10 @@ def _table_of(kind: Any) -> Callable[[Any], Any] | None:
 
 def _table_or(table: Callable[[Any], Any], validate: Callable[[Any], Any], value: Any) -> Any:
     """Return the section that a table is, or what ``validate`` makes of any other value."""
-    return table(value) if isinstance(value, dict | Section) or validate is _anything else validate(value)
+    return table(value) if isinstance(value, dict | Section) or validate is _accept else validate(value)
 
 
-def _anything(value: Any) -> Any:
+def _accept(value: Any) -> Any:
     """Return what its class has to check."""
     return value
 

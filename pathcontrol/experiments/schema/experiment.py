@@ -20,7 +20,7 @@ from pathcontrol.registry import DISTURBANCES, LAWS, LOOPS
 
 
 class Start(Section):
-    """``[start]``: the initial state, in ``angle_unit``; at rest at the beginning of the path unless told."""
+    """``[start]``: the initial state, in ``angle_unit``; at rest at the beginning of the path by default."""
 
     q: Annotated[Numbers | None, Unit("rad", "m")] = None
     qd: Annotated[Numbers | None, Unit("rad/s", "m/s")] = None
@@ -37,7 +37,7 @@ _LOOP = make_chooser(LOOPS, LoopSection, None, key="mode", default="sampled")
 
 
 def _file(*suffixes: str) -> PlainValidator:
-    """Names of files below the output folder that end as the format asks."""
+    """Return a validator of names of files below the output folder that end as the format asks."""
     wanted = " or ".join(suffix or "no suffix" for suffix in suffixes)
 
     def check(value: Any) -> str:
@@ -50,7 +50,7 @@ def _file(*suffixes: str) -> PlainValidator:
     return PlainValidator(check)
 
 
-def _pair(value: Any) -> list[int]:
+def _check_pair(value: Any) -> list[int]:
     """Check that a value is two different joints, counted from 0; return them."""
     whole = isinstance(value, list | tuple) and all(type(index) is int and 0 <= index < 2**31 for index in value)
     if not whole or len(value) != 2 or value[0] == value[1]:
@@ -72,7 +72,7 @@ class Output(Section):
     data: Annotated[str, _file(".nc")] = "run.nc"
     html: Annotated[str, _file(".html")] | None = None
     figure: Annotated[str, _file("", ".svg", ".png", ".pdf")] | None = None
-    figure_joints: Annotated[list[int], PlainValidator(_pair)] | None = None
+    figure_joints: Annotated[list[int], PlainValidator(_check_pair)] | None = None
     summary: Annotated[str, _file(".json")] | None = None
 
 

@@ -37,7 +37,7 @@ class Section(BaseModel):
     not_arguments: ClassVar[tuple[str, ...]] = ("type", "mode")
 
     def arguments(self, to_radians: Callable[[float], float]) -> dict[str, Any]:
-        """Keyword arguments in SI units; what the file leaves out is left to the defaults."""
+        """Return keyword arguments in SI units; what the file leaves out is left to the defaults."""
         names = [name for name in type(self).model_fields if name not in self.not_arguments]
         given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         units = self.units_of(given)

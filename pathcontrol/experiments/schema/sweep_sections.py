@@ -16,7 +16,7 @@ _EXAMPLE = '"controller.k" = { uniform = [1.0, 50.0] }'
 
 
 def _parameters(value: Any) -> dict[str, dict[str, list[Any]]]:
-    """Dotted keys, in quotes or as tables in tables, each with one kind and its list."""
+    """Check dotted keys, in quotes or as tables in tables, each with one kind and its list."""
     if not isinstance(value, dict) or not value:
         raise expected(f"a table of keys of this file that vary, such as {_EXAMPLE}")
     return dict(_leaves(value, ""))
@@ -55,7 +55,7 @@ _OF_THE_CALL = ("build", "space", "out", "chunk", "resume", "progress", "cluster
 
 
 class SweepSection(Section):
-    """What ``[sweep]`` says in words of its own: the space, by other keys of the file, in the units of the file.
+    """``[sweep]``: the space, by other keys of the file, in the units of the file.
 
     Attributes:
         parameters: by dotted key, as ``controller.k`` or ``start.q[0]``, its values ``grid = [...]``, or a
@@ -77,7 +77,7 @@ Sweep = Annotated[SweepSection, table_for("sweeps.sweep:sweep", _OF_THE_CALL, Sw
 
 
 def _objectives(value: Any) -> Any:
-    """Names of metrics, or what is to become of each; which ones there are, :func:`pathcontrol.tune` knows."""
+    """Check names of metrics, or what is to become of each; which ones there are, :func:`pathcontrol.tune` knows."""
     texts = [*value, *value.values()] if isinstance(value, dict) else value if isinstance(value, list) else [value]
     if not texts or not all(isinstance(text, str) for text in texts):
         raise expected('the name of a metric, a list of them, or { name = "min" } or "max"')
@@ -85,7 +85,7 @@ def _objectives(value: Any) -> Any:
 
 
 class TuneSection(Section):
-    """What ``[tune]`` says in words of its own; values of other keys of the file are in the units of the file.
+    """``[tune]``: parameters, objectives and limits; values of other keys of the file are in the units of the file.
 
     Attributes:
         parameters: by dotted key, as ``controller.k``, what is searched: ``uniform = [a, b]``, ``log_uniform = [a, b]``

@@ -15,7 +15,7 @@ from pathcontrol.registry import PROFILES, TASKS, load
 
 
 class TaskSection(Section):
-    """What every task but a toolpath takes: another velocity profile than its own."""
+    """The section of every task but a toolpath: it may have another velocity profile than its own."""
 
     not_arguments: ClassVar[tuple[str, ...]] = ("type", "profile")
     profile: Annotated[Any, PlainValidator(make_chooser(PROFILES))] = None
@@ -45,7 +45,7 @@ class ToolpathSection(Section):
 
     @property
     def reading(self) -> dict[str, Any]:
-        """What the reader of the file is told."""
+        """The arguments of the reader of the file."""
         given = {name.removeprefix("tool_"): getattr(self, name) for name in (*self.reader_options, "feed")}
         return {name: value for name, value in given.items() if value is not None}
 

@@ -98,13 +98,13 @@ class Machine:
 
     def run(self) -> None:
         """Wait for a loop, and move until it says goodbye or is not heard any more."""
-        if not self._meet():
+        if not self._wait_for_hello():
             return
         self._line.setblocking(False)
         period, longest = self._settings.period, round(_PATIENCE / self._settings.period)
         due = time.perf_counter()
         while self._tick - max(self._heard, 0) < longest:
-            self._tell()
+            self._send_state()
             due += period
             if (left := due - time.perf_counter()) > 0:
                 time.sleep(left)
@@ -121,7 +121,7 @@ class Machine:
         state = {"q": self._data.qpos.tolist(), "qd": self._data.qvel.tolist()}
         return {"ticks": self._tick, "packets": dict(self.count)} | state
 
-    def _meet(self) -> bool:
+    def _wait_for_hello(self) -> bool:
         """Wait for the first hello; return whether it came."""
         self._line.settimeout(0.1)
         until = time.monotonic() + _PATIENCE
@@ -137,7 +137,7 @@ class Machine:
             self.count["foreign"] += 1
         return False
 
-    def _tell(self) -> None:
+    def _send_state(self) -> None:
         """Send the state."""
         numbers = np.concatenate([[self._tick * self._settings.period], self._data.qpos, self._data.qvel])
         data = write_packet(Packet(Kind.STATE, self._session, self._tick, numbers), self._key)

@@ -86,7 +86,7 @@ class MachineProcess:
 
     @property
     def running(self) -> bool:
-        """Whether the machine has not ended yet."""
+        """True while the machine has not ended."""
         return self._process.poll() is None
 
     def kill(self) -> None:

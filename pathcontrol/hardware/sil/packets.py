@@ -39,7 +39,7 @@ class Packet(NamedTuple):
 
     Attributes:
         kind: what it says.
-        session: random bytes by which packets of an earlier session are told, (8,).
+        session: random bytes by which packets of an earlier session are known, (8,).
         number: a count that grows from packet to packet.
         numbers: (k,).
     """

@@ -105,8 +105,8 @@ def finish_session(
     """Drive the machine at the end of a ``line`` to the end, and return the numbers."""
     patient = _Patient(loop, line)
     record = drive(loop, patient, duration)
-    told = {} if machine is None else machine.wait()
-    counted = dict(told.get("packets", {}))
+    summary = {} if machine is None else machine.wait()
+    counted = dict(summary.get("packets", {}))
     status, late = record.status, line.arrivals[: line.count["taken"]]
     away = np.abs(np.diff(late) - loop.period)
     jitter = {name: float(np.percentile(away, share)) if len(away) else 0.0 for name, share in _SHARES.items()}

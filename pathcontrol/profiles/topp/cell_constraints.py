@@ -31,11 +31,11 @@ class Cells(NamedTuple):
         own = self.A * x[:-1, None] + self.B * y[:-1, None]
         return own + self.A_next * x[1:, None] + self.B_next * y[1:, None] + self.C + 1
 
-    def swapped(self) -> Cells:
+    def swap_ends(self) -> Cells:
         """Return the same cells with their two ends exchanged."""
         return Cells(self.A_next, self.B_next, self.A, self.B, self.C)
 
-    def some(self, index: Array | int) -> Cells:
+    def select(self, index: Array | int) -> Cells:
         """Return the cells at an index."""
         return Cells(*(array[index] for array in self))
 

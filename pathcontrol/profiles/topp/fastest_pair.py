@@ -35,7 +35,7 @@ def fastest_pair(cells: Cells, top: Array) -> tuple[Array, Array]:
     left = np.arange(len(top))
     for _ in range(_TRIALS):
         x_next = trial[left]
-        most, least = bounds(cells.some(left), x_next)
+        most, least = bounds(cells.select(left), x_next)
         gap = most.x - least.x
         slower = most.slope < -np.sqrt(np.maximum(most.x, 0.0) / x_next)
         good = (gap >= 0) & ~slower

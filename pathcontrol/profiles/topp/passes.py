@@ -40,9 +40,9 @@ def traverse_open(allowed: Allowed, widths: Array, start: float | None, end: flo
     rest in a first instant, 2.5 ms, of the acceleration it is then capable of.
     """
     cells = allowed.cells
-    last = _rate_from_rest(cells.some(-1), widths[-1]) if end is None else end
+    last = _rate_from_rest(cells.select(-1), widths[-1]) if end is None else end
     largest = _sweep_backwards(allowed, min(last**2, allowed.leave[-1]))
-    first = _rate_from_rest(cells.swapped().some(0), widths[0]) if start is None else start
+    first = _rate_from_rest(cells.swap_ends().select(0), widths[0]) if start is None else start
     return largest, _sweep_forwards(allowed, largest, min(first**2, largest[0]))
 
 
@@ -70,7 +70,7 @@ def _sweep_backwards(allowed: Allowed, last: float) -> Array:
 def _sweep_forwards(allowed: Allowed, largest: Array, first: float) -> Array:
     """Return the fastest ṡ² at the knots that begins with ``first`` and stays below ``largest``."""
     scale = np.minimum(largest[1:], allowed.leave)
-    return sweep(steps_of(allowed.cells.swapped(), largest[:-1], scale), first, largest[1:])
+    return sweep(steps_of(allowed.cells.swap_ends(), largest[:-1], scale), first, largest[1:])
 
 
 def _repeat_laps(lap: Callable[[float], Array], first: float) -> Array:

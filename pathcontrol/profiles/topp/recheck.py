@@ -61,7 +61,7 @@ def tighten(allowed: Allowed, cells: Cells, over: Excess, x: Array) -> Allowed:
     slowed = speed < allowed.speed
     changed = np.flatnonzero((C > allowed.cells.C).any(-1) | slowed[:-1] | slowed[1:])
     tighter, leave, enter = cells._replace(A=A, C=C), allowed.leave.copy(), allowed.enter.copy()
-    leave[changed], enter[changed] = fastest_pair(tighter.some(changed), speed[1:][changed])
+    leave[changed], enter[changed] = fastest_pair(tighter.select(changed), speed[1:][changed])
     return Allowed(tighter, speed, leave, enter)
 
 

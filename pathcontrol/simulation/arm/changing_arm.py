@@ -33,7 +33,7 @@ class ChangingArm:
 
     @property
     def changes(self) -> bool:
-        """Whether the arm changes at all."""
+        """True if the arm changes at all."""
         return bool(self._times.size)
 
     def at(self, tick: int) -> Arm:

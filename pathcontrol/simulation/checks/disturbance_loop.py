@@ -14,7 +14,7 @@ from pathcontrol.simulation.run_arguments import Loop
 
 
 class Misfit(NamedTuple):
-    """What of a disturbance a loop cannot do, in words, and what the loop lacks for it."""
+    """The part of a disturbance that a loop cannot do, in words, and what the loop lacks for it."""
 
     problem: str
     lacks: Literal["sampling", "torque_limits"]

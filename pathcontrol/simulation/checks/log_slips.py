@@ -10,7 +10,7 @@ from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.checks.position_range import describe_range
 
 _SLOWEST = 0.5  # s between samples from which times are probably no seconds
-_GAP = 5.0  # median steps from which a gap is told
+_GAP = 5.0  # median steps from which a gap is reported
 _LIKE, _SAME = 1.15, 2.0  # factors within which a ratio is like a known one, or taken for 1
 _AWAY = 0.5  # rad, from which an arm that is never nearer is not on its path
 _BEYOND = 1.2  # torque limits

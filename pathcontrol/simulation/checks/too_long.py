@@ -72,10 +72,10 @@ def warn_of_steps(
     Returns:
         The warnings in one text, or an empty text; if the arm diverges, they are the likely cause.
     """
-    told = find_steps_too_long(controllers, loop, robot, q, qd, disturbance, duration)
-    for sentence in told:
+    sentences = find_steps_too_long(controllers, loop, robot, q, qd, disturbance, duration)
+    for sentence in sentences:
         warn(sentence, StepWarning)
-    return "; ".join(told)
+    return "; ".join(sentences)
 
 
 def find_steps_too_long(

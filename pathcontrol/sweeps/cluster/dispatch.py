@@ -65,7 +65,7 @@ class Dispatcher:
 
         self._client, self._shipped = client, ShippedJob.of(job, expected_versions())
         self._direct = _can_reach_workers(client)
-        self._there: Future | None = None  # the parcel, on the workers
+        self._there: Future | None = None  # the shipped job, on the workers
         self._known: dict[str, None] = {}  # workers by their address, those that have been there longest first
         self._out: dict[Any, tuple[Future, Piece]] = {}  # by key
         self._kills: Counter[int] = Counter()  # by the first sample of a piece

@@ -68,21 +68,21 @@ def check_same_kind(tasks: Sequence[PathTask]) -> None:
 
 def summarize(every: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Merge several descriptions: equal values are kept, numbers that differ become shape, min and max."""
-    first, told = every[0], {}
+    first, merged = every[0], {}
     for name in first:
         values = [one[name] for one in every if name in one]
         if len(values) < len(every):
             continue
         if all(value == values[0] for value in values):
-            told[name] = values[0]
+            merged[name] = values[0]
         elif all(isinstance(value, dict) for value in values):
-            told[name] = summarize(values)
+            merged[name] = summarize(values)
         else:
             with suppress(ValueError):  # values that are no numbers, or have several shapes
                 array = np.array(values)
                 if array.dtype.kind in "iuf":
-                    told[name] = {"shape": list(array.shape), "min": array.min().item(), "max": array.max().item()}
-    return told
+                    merged[name] = {"shape": list(array.shape), "min": array.min().item(), "max": array.max().item()}
+    return merged
 
 
 def classify_end(task: PathTask) -> str:

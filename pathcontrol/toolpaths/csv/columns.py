@@ -39,7 +39,7 @@ class Columns:
         Args:
             rows: the lines of the table.
             chosen: which columns are what, or None for what the file says.
-            passed: columns that are passed over are told there.
+            passed: columns that are passed over are noted there.
             flat: whether z is given by the caller.
 
         Raises:
@@ -162,4 +162,4 @@ def _note_unused(texts: Sequence[str], places: Mapping[str, int], passed: Notes)
         many = len(unread) > 1
         stems = {re.split(r"[\s_(\[]", text.lower())[0] for text in unread}
         why = _ANGLES_UNREAD if any(angles <= stems for angles in _ANGLES) else ""
-        passed.tell(f"column{'s' * many} {listed} {'are' if many else 'is'} passed over{why}")
+        passed.add(f"column{'s' * many} {listed} {'are' if many else 'is'} passed over{why}")

@@ -42,7 +42,7 @@ def read_csv(
     - ``qx qy qz qw``: the orientation of the tool's frame as a unit quaternion in the order of ROS, w last. Of it the
       axis is kept, against which the tool's z axis points; how the tool is turned about it is not.
     - ``contour``: the name of the contour, a text; another value begins a new contour, and so does an empty line.
-    - Columns with other names are passed over, and told in :attr:`Toolpath.notes`.
+    - Columns with other names are passed over, and noted in :attr:`Toolpath.notes`.
 
     A contour without a name is called by its first line. A point that repeats the one before it is left out. A contour
     is closed if its last point, and tool axis, repeat the first.
@@ -57,7 +57,7 @@ def read_csv(
             number from 0 or the name in the file, as ``{"x": 0, "y": "Pos Y", "z": 2}``; or either as a text:
             ``"x,y,z"`` or ``"x=0,y=Pos Y,z=2"``.
         decimal: ``"."`` or ``","``, the mark in the numbers. By default it is found out: a comma is one only where
-            nothing else can be meant, and that is told.
+            nothing else can be meant, and that is noted.
         z: height of all points [m], for tables of x and y alone.
         unknown: ``"refuse"`` or ``"warn"``, as for the other readers; a table has nothing that makes a difference.
 
@@ -80,7 +80,7 @@ def read_csv(
     except ToolpathError as error:
         raise ToolpathError(f"{os.fspath(path)}: {error}", **error.details_with(file=os.fspath(path))) from None
     if "qx" in found.places:
-        passed.tell("of the orientations qx qy qz qw the tool's z axis is kept, not how it is turned about that")
+        passed.add("of the orientations qx qy qz qw the tool's z axis is kept, not how it is turned about that")
     return Toolpath(tuple(contours), os.fspath(path), unit, passed.notes)
 
 
@@ -93,7 +93,7 @@ def _assume_metres(rows: Rows, passed: Notes) -> str:
     """Return metres, with a note if a comment hints at another unit."""
     for line, comment in rows.comments:
         if (word := hint_of_unit(comment)) is not None:
-            passed.tell(
+            passed.add(
                 f"line {line} speaks of {word!r}, but the coordinates are taken for metres: give unit= if they are not"
             )
             break
@@ -104,7 +104,7 @@ def _decimal(rows: Rows, columns: Columns, passed: Notes) -> str:
     """Return the decimal mark of the numbers."""
     mark = decimal_mark(rows, columns)
     if mark == ",":
-        passed.tell("the numbers have a decimal comma")
+        passed.add("the numbers have a decimal comma")
     return mark
 
 

@@ -104,12 +104,14 @@ def _join_within(tolerance: float, strands: Sequence[Strand], passed: Notes) -> 
         apart = float(np.linalg.norm(end - start))
         extent = strand.extent if apart <= tolerance else np.inf
         if extent <= min(tolerance, _NEAR):
-            passed.over(f"a curve shorter than {1e6 * min(tolerance, _NEAR):.3g} µm", strand.name, "was left out")
+            passed.pass_over(f"a curve shorter than {1e6 * min(tolerance, _NEAR):.3g} µm", strand.name, "was left out")
         elif apart > NOTHING and extent > tolerance:
             loose.setdefault(strand.layer, []).append(strand)
         else:
             if apart > NOTHING:
-                passed.over(f"a curve shorter than the gap of {1e6 * tolerance:.3g} µm", strand.name, "stays alone")
+                passed.pass_over(
+                    f"a curve shorter than the gap of {1e6 * tolerance:.3g} µm", strand.name, "stays alone"
+                )
             done.append(strand)
     chains = [chain for layer in loose.values() for chain in _chains(layer, tolerance)]
     return sorted([*done, *chains], key=lambda strand: strand.place)
@@ -126,7 +128,7 @@ def _note_gaps(chains: Sequence[Strand], tolerance: float, passed: Notes) -> Non
     if gaps:
         unit = 10.0 ** np.floor(np.log10(max(gaps)) - 1)
         suffices = float(f"{unit * np.ceil(1.001 * max(gaps) / unit):.2g}")
-        passed.tell(
+        passed.add(
             f"{len(gaps)} gap{'s' * (len(gaps) > 1)} between ends of contours, of up to {1e6 * max(gaps):.3g} µm, "
             f"stay{'s' * (len(gaps) == 1)} open: gap={suffices:g} closes gaps up to {1e6 * suffices:.3g} µm"
         )

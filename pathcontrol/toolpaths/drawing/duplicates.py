@@ -30,7 +30,7 @@ def note_doubled(contours: Sequence[Contour], passed: Notes) -> None:
     _, drawn_first = np.unique(mark[order], return_index=True)
     again = np.delete(owner[order], drawn_first)
     for index in again.tolist():
-        passed.over("an edge that was drawn before, and is cut again,", contours[index].name, "was found")
+        passed.pass_over("an edge that was drawn before, and is cut again,", contours[index].name, "was found")
 
 
 def _features(contours: Sequence[Contour]) -> Iterator[tuple[Array, Array, Array, Array]]:

@@ -49,7 +49,7 @@ class Lines:
         return Lines(_map(self.points, matrix))
 
     def segments(self) -> list[Segment]:
-        points = drop_repeated(_near(self.points))
+        points = drop_repeated(_check_bounded(self.points))
         return [Polyline(points)] if len(points) > 1 else []
 
 
@@ -64,7 +64,7 @@ class Curve:
         return replace(self, points=_map(self.points, matrix))
 
     def segments(self) -> list[Segment]:
-        straight = straight_turns(_near(self.points), self.weights, NOTHING)
+        straight = straight_turns(_check_bounded(self.points), self.weights, NOTHING)
         if straight is not None:
             return Lines(straight).segments()
         return [Bezier(*part) for part in without_cusps(self.points, self.weights)]
@@ -80,7 +80,7 @@ class Curves:
         return Curves(_map(self.points, matrix))
 
     def segments(self) -> list[Segment]:
-        plain = is_plain(_near(self.points), NOTHING)
+        plain = is_plain(_check_bounded(self.points), NOTHING)
         found: list[Segment] = list(Bezier.of_each(self.points[plain]))
         if plain.all():
             return found
@@ -107,8 +107,8 @@ class EllipticArc:
         return replace(self, center=_map(self.center, matrix), x=x, y=y)
 
     def segments(self) -> list[Segment]:
-        _near(self.at(self.start + self.sweep * np.linspace(0.0, 1.0, 9)))
-        vectors = _near(np.stack([self.x, self.y]), _LARGEST_RADIUS, "a radius of")
+        _check_bounded(self.at(self.start + self.sweep * np.linspace(0.0, 1.0, 9)))
+        vectors = _check_bounded(np.stack([self.x, self.y]), _LARGEST_RADIUS, "a radius of")
         directions, axes, _ = np.linalg.svd(vectors.T, full_matrices=False)
         if axes[0] * abs(self.sweep) <= NOTHING or axes[1] <= NOTHING:
             return Lines(self.at(self._turns(directions[:, 0]))).segments()
@@ -197,7 +197,7 @@ def _map(points: Array, matrix: Array) -> Array:
         return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def _near(values: Array, most: float = MAX_COORDINATE, what: str = "a coordinate of") -> Array:
+def _check_bounded(values: Array, most: float = MAX_COORDINATE, what: str = "a coordinate of") -> Array:
     """Check that values are finite and bounded."""
     largest = np.abs(values).max()
     if not largest <= most:

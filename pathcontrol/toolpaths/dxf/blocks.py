@@ -67,7 +67,7 @@ class Entities:
             if entity.dxftype() == "ATTDEF" and depth:
                 continue
             if common(entity, "invisible", 0):
-                self._passed.over("an invisible entity", f"{entity.dxftype()} on layer {layer!r}")
+                self._passed.pass_over("an invisible entity", f"{entity.dxftype()} on layer {layer!r}")
                 continue
             if entity.dxftype() != "INSERT":
                 yield Drawn(entity, layer, matrix)

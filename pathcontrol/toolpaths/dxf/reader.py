@@ -164,14 +164,14 @@ def _strands(entities: Entities, layers: Layers, skip: frozenset[str], scale: Ar
             segments = _segments(entity, scale @ matrix, budget)
         name = f"{layer}: {entity.dxftype()} {entity.dxf.get('handle') or ''}".strip()
         if segments is None and passed.lenient:
-            passed.over(entity.dxftype(), f"layer {layer!r}")
+            passed.pass_over(entity.dxftype(), f"layer {layer!r}")
         elif segments is None:
             refused[entity.dxftype(), layer] += 1
         elif not segments:
-            passed.over("a curve without length", name)
+            passed.pass_over("a curve without length", name)
         else:
             if linetype := layers.dashes(entity, layer):
-                passed.over(f"a curve of line type {linetype}, which is cut solid,", name, "was found")
+                passed.pass_over(f"a curve of line type {linetype}, which is cut solid,", name, "was found")
             strands.append(Strand(name, layer.lower(), len(strands), segments))
     if refused:
         what = ", ".join(f"{count} {kind} on layer {layer!r}" for (kind, layer), count in refused.most_common(8))

@@ -51,7 +51,7 @@ def interpolate(points: Array, tangents: tuple[Array, Array] | None, closed: boo
     if not (chords.size and chords.min() > _SHORTEST_CHORD * chords.sum()):
         raise ToolpathError(
             f"its fit points are {chords.tolist()[:3]} … apart, on a length of {chords.sum():g}: expected finite "
-            "distances that can be told from rounding"
+            "distances larger than rounding"
         )
     if len(ring) == 2 and tangents is None:
         return [Lines(ring)]

@@ -61,7 +61,7 @@ class Layers:
             return layer.lower() in self._chosen
         reason = self._unseen(layer.lower())
         if reason:
-            self._passed.over(f"an entity on layer {layer!r}, which {reason},", "layers= reads it if it is named")
+            self._passed.pass_over(f"an entity on layer {layer!r}, which {reason},", "layers= reads it if it is named")
         return not reason
 
     def dashes(self, entity: Any, layer: str) -> str:

@@ -41,7 +41,7 @@ def arcs(
     a, b, normal = PLANES[modes.plane]
     first, last = (start[a], start[b]), (end[a], end[b])
     by_radius = "R" in words
-    center = (_by_radius if by_radius else _by_offsets)(first, last, words, modes, clockwise)
+    center = (_center_by_radius if by_radius else _center_by_offsets)(first, last, words, modes, clockwise)
     if not all(abs(coordinate) <= MAX_COORDINATE for coordinate in center):  # false for NaN too
         raise ToolpathError(f"the arc's centre is further than {MAX_COORDINATE:g} m from the origin; write a line, G1")
     if not by_radius:
@@ -91,7 +91,7 @@ def _sweep(first: Sequence[float], last: Sequence[float], center: Sequence[float
     return -sweep if clockwise else sweep
 
 
-def _by_offsets(
+def _center_by_offsets(
     first: Sequence[float], last: Sequence[float], words: Mapping[str, float], modes: Modes, clockwise: bool
 ) -> tuple[float, float]:
     """Return the centre of an arc given by I J K."""
@@ -119,14 +119,14 @@ def _check_radii(
     radii = math.dist(first, center), math.dist(last, center)
     if min(radii) < _LEAST_RADIUS:
         raise ToolpathError("the arc's centre is its start or its end, expected a radius greater than 0")
-    if not _equal(*radii, modes):
+    if not _are_equal(*radii, modes):
         other = _center(first, words, modes, not modes.absolute_centers)
         raise ToolpathError(
-            _unequal(*radii, modes, meant=_equal(math.dist(first, other), math.dist(last, other), modes))
+            _explain_unequal(*radii, modes, meant=_are_equal(math.dist(first, other), math.dist(last, other), modes))
         )
 
 
-def _equal(first: float, last: float, modes: Modes) -> bool:
+def _are_equal(first: float, last: float, modes: Modes) -> bool:
     """Return whether the radii at the ends of an arc [m] are the same up to rounding."""
     error, unit = abs(first - last), modes.known_unit("the arc")
     if error <= max(unit.tolerance, modes.arc_tolerance or 0.0):
@@ -134,13 +134,13 @@ def _equal(first: float, last: float, modes: Modes) -> bool:
     return error <= 100 * unit.tolerance and error <= 1e-3 * max(first, last)
 
 
-def _unequal(first: float, last: float, modes: Modes, *, meant: bool) -> str:
+def _explain_unequal(first: float, last: float, modes: Modes, *, meant: bool) -> str:
     """Return advice about radii [m] that differ, and whether the centre may be meant the other way."""
     unit, error = modes.known_unit("the arc"), abs(first - last)
     if meant:
         advice = "as a centre relative to the start, G91.1, or an absolute one, G90.1, it would be: say which before it"
     elif error <= 0.1 * max(first, last):
-        advice = _if_rounded(error, unit)
+        advice = _advise_rounding(error, unit)
     else:
         advice = "are its centre, I J K, and its end those of one arc?"
     return (
@@ -149,14 +149,14 @@ def _unequal(first: float, last: float, modes: Modes, *, meant: bool) -> str:
     )
 
 
-def _if_rounded(length: float, unit: Unit) -> str:
+def _advise_rounding(length: float, unit: Unit) -> str:
     """Return the advice to allow for rounding by a length [m], which is rounded up to two digits."""
     step = 10.0 ** (math.floor(math.log10(length)) - 1)
     most = math.ceil(1.001 * length / step) * step
     return f"if the program's numbers are rounded, by up to {unit.text(most)}, read it with arc_tolerance={most:.3g}"
 
 
-def _by_radius(
+def _center_by_radius(
     first: Sequence[float], last: Sequence[float], words: Mapping[str, float], modes: Modes, clockwise: bool
 ) -> tuple[float, float]:
     """Return the centre of an arc given by R."""
@@ -171,7 +171,7 @@ def _by_radius(
     if missing > max(_LEAST_RADIUS, modes.arc_tolerance or 0.0):
         raise ToolpathError(
             f"an arc of radius {unit.text(abs(radius))} between points {unit.text(chord)} apart, expected a radius of "
-            f"at least half of that{f'; {_if_rounded(missing, unit)}' if missing < 0.1 * half else ''}"
+            f"at least half of that{f'; {_advise_rounding(missing, unit)}' if missing < 0.1 * half else ''}"
         )
     height = math.sqrt((abs(radius) - half) * (abs(radius) + half)) / chord
     left = -height if clockwise == (radius > 0) else height

@@ -46,7 +46,7 @@ class Frame:
                 "in the file: refer the program to one origin"
             )
         self._system = system
-        self._passed.tell(f"the coordinates are those of {_SYSTEMS[system]}")
+        self._passed.add(f"the coordinates are those of {_SYSTEMS[system]}")
 
     def shift(self, here: Sequence[float], place: Sequence[float], begun: bool) -> None:
         """Name the position ``here`` [m], (3,), where axes may be NaN, ``place`` by G92.
@@ -87,5 +87,5 @@ class Frame:
                 raise ToolpathError(
                     f"{letter}{value:g} turns {letter} from {stays:g}: only X, Y and Z are supported, others must stay"
                 )
-            self._passed.over(f"{letter}, an axis that stays where it is,", line)
+            self._passed.pass_over(f"{letter}, an axis that stays where it is,", line)
         return block._replace(words={letter: value for letter, value in block.words.items() if letter not in found})

@@ -37,7 +37,7 @@ def without_codes(block: Block, turning: bool, line: int, passed: Notes) -> Bloc
     letters: set[str] = set()
     for code in block.g:
         if code in _SMOOTHING and _smooths(code, block):
-            passed.over(f"G{code / 10:g}", line)
+            passed.pass_over(f"G{code / 10:g}", line)
             letters |= {*_SMOOTHING[code]}
     for code in block.m:
         if code not in KNOWN_M:
@@ -87,7 +87,7 @@ def _shows_progress(code: int, block: Block) -> bool:
 def _of_m(code: int, block: Block, line: int, passed: Notes) -> set[str]:
     """Return the letters that belong to an M code which is passed over."""
     if code in _OUTPUTS:
-        passed.over(f"M{code}", line)
+        passed.pass_over(f"M{code}", line)
         return {*_OUTPUTS[code]}
     if (reason := reason_to_refuse(code)) is not None and not _shows_progress(code, block):
         raise ToolpathError(f"M{code} is not understood: {reason}")

@@ -108,7 +108,7 @@ class Program:
         """Return the motion in force; before the first, coordinates are rapids, as grbl and others begin."""
         motion = self.modes.motion
         if motion is None and not self.modes.stopped and not block.words.keys().isdisjoint("XYZ"):
-            self._passed.tell(f"line {line}: it moves before G0 or G1 is said; that is taken for rapids, as grbl does")
+            self._passed.add(f"line {line}: it moves before G0 or G1 is said; that is taken for rapids, as grbl does")
             self.modes.motion = motion = _RAPID
         return motion
 

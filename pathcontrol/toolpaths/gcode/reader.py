@@ -42,7 +42,7 @@ def read_gcode(
       F is per minute. At the beginning G17, G90 and G91.1 are in force.
     - No effect here: G4, G15, G40, G43, G49, G61, G61.1, G64, G67, G69, G97, M0, M1, M3-M9, S, T, comments, line
       numbers, program numbers and %. Smoothing (G5 P, G5.1 Q, G187, …), outputs and overrides (M62-M68, M48-M53, …) and
-      rotary axes that stay where they are have none either, and are told in :attr:`Toolpath.notes`.
+      rotary axes that stay where they are have none either, and are noted in :attr:`Toolpath.notes`.
     - The coordinates are those of the tool's tip in one workpiece frame, one of G54 to G59.3; G92 before the first move
       says where the tool is.
     - M2, M30 and the second % end the program; what follows is not read.

@@ -41,7 +41,7 @@ def read_svg(
     Lengths are those on the page, by its width and height (mm, cm, in, pt, pc, Q, px) and its viewBox. The drawing
     stands upright, x to the right and y up from the page's lower left corner, z = 0. Everything that is seen is cut,
     be it stroke or fill, of whatever colour, and also beyond the edges of the page. What is hidden, only defined, or
-    painted with neither fill nor stroke, is not; it is told in the notes. Dashed strokes are cut solid, and told.
+    painted with neither fill nor stroke, is not; the notes say so. Dashed strokes are cut solid, and noted.
     Bézier curves and elliptic arcs stay what they are.
 
     Args:

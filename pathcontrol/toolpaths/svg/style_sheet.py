@@ -29,7 +29,7 @@ _DECIDES = re.compile(
     rf"(?<![\w-])(?:(?:{'|'.join(sorted(KNOWN | REFUSED | _CLIPS))})\s*:"
     rf"|(?:{'|'.join(sorted(PAINT))})\s*:\s*(?:none|transparent|0))"
 )
-_PLAIN = re.compile(r"[^\"'\\(){}\[\]@!/]*")  # declarations that need no parser to be told apart
+_PLAIN = re.compile(r"[^\"'\\(){}\[\]@!/]*")  # declarations that can be split without a parser
 _EMBEDDED = re.compile(r"url\(\s*[\"']?data:[^)]*\)")
 _SLOW = re.compile("has|nth|of-type|only|last")  # pseudo-classes that look at all siblings or descendants
 _LONGEST, _MOST_SELECTORS, _MOST_STEPS, _MOST_FOR_SLOW = 500_000, 10_000, 20_000_000, 2_000
@@ -46,7 +46,7 @@ class StyleSheet:
     """The rules of all style elements that affect the geometry.
 
     Raises:
-        ToolpathError: a rule cannot be told to apply or not, or stands in a sheet to be fetched; there is too much.
+        ToolpathError: it is not known whether a rule applies, or stands in a sheet to be fetched; there is too much.
     """
 
     def __init__(self) -> None:

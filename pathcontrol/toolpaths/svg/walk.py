@@ -105,7 +105,7 @@ class Walk:
         if not place.chosen and (not group or tag == "use"):
             return []
         if place.chosen and style.get("display") == "none" and not self._chosen.named(element):
-            self._passed.over("a hidden element", self._where(element))
+            self._passed.pass_over("a hidden element", self._where(element))
             return []
         if tag not in SHAPES and not group:
             if place.visible and (_has_words(element, place) if tag in _WORDS else place.paint.opacity > 0):
@@ -146,11 +146,13 @@ class Walk:
     def _is_painted(self, element: Any, place: _Place) -> bool:
         """Return whether a shape is visible; one that is not, or is dashed, is noted."""
         if not place.visible:
-            self._passed.over("a hidden element", self._where(element))
+            self._passed.pass_over("a hidden element", self._where(element))
         elif not place.paint.seen:
-            self._passed.over("a shape that paints nothing (no fill, no stroke, or transparent)", self._where(element))
+            self._passed.pass_over(
+                "a shape that paints nothing (no fill, no stroke, or transparent)", self._where(element)
+            )
         elif place.paint.dashed:
-            self._passed.over("a dashed outline, which is cut solid,", self._where(element), "was found")
+            self._passed.pass_over("a dashed outline, which is cut solid,", self._where(element), "was found")
         return place.visible and place.paint.seen
 
     def _use(self, element: Any, place: _Place) -> list[Strand]:
@@ -190,7 +192,7 @@ class Walk:
                 self._count += 1
                 found.append(Strand(f"{name}/{k}" if len(drawn) > 1 else name, place.layer, self._count, segments))
         if not found:
-            self._passed.over("a shape without length", self._where(element))
+            self._passed.pass_over("a shape without length", self._where(element))
         if not all(region.holds(strand.segments) for region in place.clips for strand in found):
             raise ToolpathError(
                 "a clip path or mask cuts part of it off: apply that in the drawing program, or take it away"

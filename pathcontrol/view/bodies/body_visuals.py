@@ -82,8 +82,8 @@ def _visuals(
     except (UrdfError, LookupError, TypeError, ValueError) as error:
         mesh = element.find("geometry/mesh")
         what = "a visual" if mesh is None else f"mesh {mesh.get('filename')!r}"
-        told = f"{what} of link {link!r} is left out of the picture: {error}"
-        warn(told)
+        sentence = f"{what} of link {link!r} is left out of the picture: {error}"
+        warn(sentence)
         return
     for shape, own_color in shapes:
         yield LinkVisual(link, element.get("name", ""), np.eye(4) if pose is None else pose, shape, own_color or color)

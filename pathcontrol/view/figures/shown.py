@@ -78,12 +78,12 @@ def shown(run: Runs, task: PathTask | None = None, rollout: int | None = None) -
         expect("task", task, PathTask)
     if rollout is not None and task is not None:
         task = select_rows(task, np.array([rollout]))
-    chosen = {name: one if rollout is None else _alone(one, rollout) for name, one in named.items()}
+    chosen = {name: one if rollout is None else _cut_at_finish(one, rollout) for name, one in named.items()}
     return [
         Shown(
             str(name) if several else "",
             one,
-            _fitting(one, task),
+            _find_fitting_task(one, task),
             RUN_COLOURS[i % len(RUN_COLOURS)],
             _DASHES[i // len(RUN_COLOURS) % len(_DASHES)],
         )
@@ -91,7 +91,7 @@ def shown(run: Runs, task: PathTask | None = None, rollout: int | None = None) -
     ]
 
 
-def _alone(run: Run, rollout: int) -> Run:
+def _cut_at_finish(run: Run, rollout: int) -> Run:
     """Return a rollout until it finished, without the time in which it is held while others go on."""
     part = run.rollout(rollout)
     if run.rollouts == 1 or part.status[0] != "finished":
@@ -158,7 +158,7 @@ def _unit_of_joint(run: Run, unit: str, joint: int) -> str:
     return unit.split(" or ")[0 if robot.position_units[joint] == "rad" else 1]
 
 
-def _fitting(run: Run, task: PathTask | None) -> PathTask | None:
+def _find_fitting_task(run: Run, task: PathTask | None) -> PathTask | None:
     """Return the task if it fits the run."""
     task = run.task if task is None else task
     if task is not None and task.n != len(run.joints):

@@ -92,7 +92,7 @@ def tool_figure(
         UnknownNameError: the robot has no frame ``tool``.
     """
     runs = shown(run, task, rollout)
-    ways = [_way(one, robot, tool) for one in runs]
+    ways = [_tool_path(one, robot, tool) for one in runs]
     points = [p for way in ways for p in (way.taken, *(piece for piece, _ in way.desired))]
     i, j = wide_axes(points)
     limits = equal_plane([1e3 * p[:, i] for p in points], [1e3 * p[:, j] for p in points])
@@ -152,7 +152,7 @@ def wide_axes(points: Sequence[Array]) -> tuple[int, int]:
     return int(i), int(j)
 
 
-def _way(one: Shown, robot: RobotModel | None, tool: str | None) -> ToolPositions:
+def _tool_path(one: Shown, robot: RobotModel | None, tool: str | None) -> ToolPositions:
     """Return the positions of the tool of a run."""
     robot = one.run.robot if robot is None else robot
     expect("robot", robot, RobotModel)

@@ -111,13 +111,13 @@ def _script_of_sequence(law: str, config: Mapping[str, Any], more: Mapping[str, 
 def _is_known(several: Sequence[Mapping[str, Any]], loop: Mapping[str, Any]) -> bool:
     """Return whether the laws are one with the same gains, and the loop is one of this package."""
     first = several[0]
-    alike = all(_without(law, ["robot", "task"]) == _without(first, ["robot", "task"]) for law in several)
+    is_same_law = all(_without(law, ["robot", "task"]) == _without(first, ["robot", "task"]) for law in several)
     noise = loop.get("noise", {})
     if not isinstance(noise, Mapping):
         return False
     names = [*first, *loop, *noise]  # names of arguments from a file may be anything
     return (
-        alike
+        is_same_law
         and all(is_whole(_without(law, ["robot", "task"])) for law in several)
         and is_whole(loop)
         and loop.get("loop") in list(_LOOPS)

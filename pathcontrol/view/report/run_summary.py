@@ -12,7 +12,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.limit_shares import RATIOS, is_passed, limit_ratios
-from pathcontrol.analysis.progress import got_there
+from pathcontrol.analysis.progress import has_arrived
 from pathcontrol.analysis.readable import count_words, reading, unit_of, without_rounding
 from pathcontrol.analysis.run_metrics import LABELS, metrics
 from pathcontrol.analysis.torque import torque_metrics
@@ -160,7 +160,7 @@ def _row(key: str, unit: str, runs: Mapping[str, Run], numbers: Mapping[str, Map
 
 def _has_arrived(numbers: Mapping[str, list[float]]) -> bool:
     """Return whether all rollouts of a run got there: one that stands still has the smallest errors."""
-    return bool(got_there(np.array(numbers.get("progress", [np.nan]))).all())
+    return bool(has_arrived(np.array(numbers.get("progress", [np.nan]))).all())
 
 
 def _text(values: Array, endless: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-_ELSEWHERE = ("versions", "experiment")  # told where it says how to make the run again
+_ELSEWHERE = ("versions", "experiment")  # shown where the page says how to make the run again
 _MOST_VALUES, _MOST_LETTERS, _MOST_KINDS = 12, 160, 3
 _ABSENT = "–"
 

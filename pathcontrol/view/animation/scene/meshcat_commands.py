@@ -28,7 +28,7 @@ class Scene:
     comes again is not sent again, but copied by the page.
 
     Attributes:
-        commands: what the page is told, in order.
+        commands: the commands to the page, in order.
     """
 
     def __init__(self) -> None:
