@@ -19,6 +19,7 @@ Until = Literal["end", "duration"]
 
 _AT_REST = 1e-2  # rad/s (or m/s), the speed ‖q̇‖ of an arm at rest
 _REST = 0.05  # s at rest; a shorter one may be the turning point of an oscillation
+_MOST_LAPS = 2.0**62  # that a whole number of 64 bits may be
 
 
 class Finish(ABC):
@@ -84,8 +85,13 @@ class AfterLaps(Finish):
 
 
 def count_laps(task: PathTask, start: Array, s: Array) -> Array:
-    """Return how many laps lie between ``start`` and ``s``, negative backwards, integers (*batch,)."""
-    return np.trunc((s - start) / task.period).astype(np.int64)
+    """Return how many laps lie between ``start`` and ``s``, negative backwards, integers (*batch,).
+
+    They are 0 where s is not finite, and at most 2⁶² in size, which an arm that diverges may pass.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        laps = np.trunc((s - start) / task.period)
+    return np.clip(np.where(np.isfinite(laps), laps, 0.0), -_MOST_LAPS, _MOST_LAPS).astype(np.int64)
 
 
 def first_and_last(s: Array) -> tuple[Array, Array]:

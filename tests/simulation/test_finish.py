@@ -32,6 +32,7 @@ from pathcontrol import (
 from pathcontrol.analysis.lyapunov_functions import projection_lyapunov
 from pathcontrol.analysis.run_metrics import UNITS, end_error
 from pathcontrol.control.ending import Ending
+from pathcontrol.simulation.finish import count_laps
 
 T = 0.1  # s, the time constant of the end
 REMAINING, AT_REST = 1e-4, 1e-2  # rad, rad/s
@@ -311,6 +312,21 @@ def test_laps_are_counted_from_the_start_of_the_plan(ideal_arm, task, laps, s):
         assert run.status[0] == "finished"
         assert run.finish_time[0] == run.time[-1]
         assert gone[-2] < laps <= gone[-1]
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("laps", [None, 3])
+def test_laps_of_a_plan_that_runs_away_are_counted_in_silence(ideal_arm, laps):
+    class Racing(ComputedTorque):
+        def law(self, t, q, qd, z):
+            out = super().law(t, q, qd, z)
+            return out._replace(sdot=1e22 + out.sdot, zdot=1e22 + out.zdot, slope=0.0 * out.slope)
+
+    law = Racing(ideal_arm, Circle(0.5, 1.0), 100.0, 20.0)
+    run = simulate(law, [0.5, 0.0], duration=0.01, laps=laps, engine="pinocchio", progress=False)
+    assert run.laps[0] > 1e18
+    s = np.array([1e300, -1e300, np.inf, np.nan, 7.0])
+    assert count_laps(law.task, np.zeros(5), s).tolist() == [2**62, -(2**62), 0, 0, 1]
 
 
 @pytest.mark.parametrize("clockwise", [False, True])
