@@ -47,6 +47,20 @@ class ClosedLoop:
         out = self.controller.law(t, *self.split(y))
         return out, out.tau if self._limits is None else np.clip(out.tau, -self._limits, self._limits)
 
+    def absolute_tolerance(self, y: Array) -> Array:
+        """Return the absolute tolerance of each number of states, (N, 2n + m), which begin at y.
+
+        The memory of an observer is torques, r₁ − Kp of a size that makes an error of ``rtol`` of it larger by orders
+        than ``atol``; to follow that error with the smaller tolerance of r would take a hundred times the steps. So
+        both are kept to ``rtol`` of K diag M at 1 rad/s, which is an acceleration of K ``rtol``.
+        """
+        tolerance = np.full(y.shape, self.mode.atol)
+        if (observer := self.controller.observer) is not None:
+            n, mass = self.robot.n, observer.robot.mass_matrix(self.split(y)[0])
+            torque = np.maximum(self.mode.rtol * observer.gain * np.diagonal(mass, axis1=-2, axis2=-1), self.mode.atol)
+            tolerance[..., 2 * n + 1 : 4 * n + 1] = np.concatenate([torque, torque], axis=-1)
+        return tolerance
+
     def rate(self, t: float, y: Array) -> Array:
         """Return dy/dt of states (N, 2n + m)."""
         q, qd, _ = self.split(y)
@@ -146,7 +160,7 @@ class _Solution:
         self._odd = lost.lost  # rows whose rate was not finite in the last step
         # the integrator's norm averages over rollouts: tighten it so that each one alone keeps the tolerance
         share, band = np.sqrt(max(1, len(start))), start.shape[1] - 1
-        rtol, atol = max(loop.mode.rtol / share, 1e-13), loop.mode.atol / share
+        rtol, atol = max(loop.mode.rtol / share, 1e-13), loop.absolute_tolerance(start).reshape(-1) / share
         self._settings = {"rtol": rtol, "atol": atol, "lband": band, "uband": band}
 
     def at(self, time: Array, update: Callable[[float], None]) -> Iterator[Array]:
