@@ -183,6 +183,11 @@ def copy_vectors(array: Array) -> Array:
     return copy
 
 
+def average_neighbours(values: Array) -> Array:
+    """Return the means of neighbours along the first axis, (k − 1, …) from (k, …)."""
+    return 0.5 * (values[1:] + values[:-1])
+
+
 def norms(vectors: Array) -> Array:
     """Return Euclidean norms over the last axis; inf beyond 1e154."""
     with np.errstate(over="ignore"):

@@ -57,24 +57,19 @@ LATE = {
     "view.report.report": 3,
     "view.video": 1,
 }
-#: libraries that are imported inside functions: extras, and those that take long to load
+#: libraries that are imported inside functions, as they take long to load or are extras; others load by ``load_extra``
 HEAVY = {
-    "casadi",
     "distributed",
     "example_robot_data",
     "ezdxf",
     "imageio_ffmpeg",
     "lxml",
     "mcap",
-    "mujoco",
     "numpy",
     "playwright",
     "pyarrow",
-    "pylibfranka",
     "pymoo",
     "rich",
-    "rtde_control",
-    "rtde_receive",
     "scipy",
     "sympy",
     "xarray",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import sys
 
 import numpy as np
@@ -83,16 +82,9 @@ def test_a_task_for_two_joints_on_a_six_joint_arm():
 
 
 def test_a_missing_extra_is_named(monkeypatch):
-    real_import = builtins.__import__
-
-    def without_robots(name, *arguments, **options):
-        if name.startswith("example_robot_data"):
-            raise ImportError(name)
-        return real_import(name, *arguments, **options)
-
-    for module in [name for name in sys.modules if name.startswith("example_robot_data")]:
+    for module in [name for name in sys.modules if name.startswith("example_robot_data.")]:
         monkeypatch.delitem(sys.modules, module)
-    monkeypatch.setattr(builtins, "__import__", without_robots)
+    monkeypatch.setitem(sys.modules, "example_robot_data", None)
     with pytest.raises(UnknownNameError, match=r"pip install 'pathcontrol\[robots\]'") as error:
         load_robot("ur5")
     assert isinstance(error.value.__cause__, MissingExtraError)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.simulation.config import laws
+from pathcontrol.simulation.config import first_rollout, laws
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.summaries import is_whole
 
@@ -31,7 +30,7 @@ def asked_factor(run: Run) -> Array | None:
         steps = np.append(1.0, values[:, 1])[np.searchsorted(values[:, 0], run.time, side="right")]
         values = _follow(steps, run.time, law.get("acceleration"))
     elif values.ndim == 1 and len(values):
-        values = values[(run.array("rollout").astype(int) - _first(run.config)) % len(values), None]
+        values = values[(run.array("rollout").astype(int) - first_rollout(run.config)) % len(values), None]
     return np.abs(values) if values.ndim < 3 and values.size else None
 
 
@@ -42,9 +41,3 @@ def _follow(u: Array, time: Array, acceleration: Any) -> Array:
     for i, reach in enumerate(most * np.diff(time)):
         w[i + 1] = w[i] + min(max(u[i] - w[i], -reach), reach)
     return w
-
-
-def _first(config: Mapping[str, Any]) -> int:
-    """Return the number of the first rollout."""
-    first = config.get("first_rollout", 0)
-    return first if isinstance(first, int) else 0

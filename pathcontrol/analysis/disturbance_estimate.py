@@ -7,7 +7,7 @@ from typing import NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pathcontrol._arrays import Array, as_array
+from pathcontrol._arrays import Array, as_array, average_neighbours
 from pathcontrol._expect import expect, expect_choice
 from pathcontrol.analysis.lost_samples import bridge, find_lost, hold_at_end, spread_over_gaps
 from pathcontrol.control.base import KnownFriction
@@ -191,7 +191,7 @@ def _mean_disturbance(arm: RobotModel, friction: KnownFriction, dt: Array, q: Ar
     if friction == "full":
         return split_unexplained(arm, dt, q, qd, tau)[1]
     unexplained = _unexplained_torque(arm, dt, q, qd, tau)
-    return unexplained if friction == "none" else unexplained + viscous_of(arm.friction) * _between(qd)
+    return unexplained if friction == "none" else unexplained + viscous_of(arm.friction) * average_neighbours(qd)
 
 
 def split_unexplained(arm: RobotModel, dt: Array, q: Array, qd: Array, tau: Array) -> tuple[Array, Array]:
@@ -199,7 +199,7 @@ def split_unexplained(arm: RobotModel, dt: Array, q: Array, qd: Array, tau: Arra
 
     The motion is q [rad] and q̇ [rad/s], (time, n), under mean torques τ [N m], (time − 1, n), over dt [s].
     """
-    smooth = _unexplained_torque(arm, dt, q, qd, tau) + viscous_of(arm.friction) * _between(qd)
+    smooth = _unexplained_torque(arm, dt, q, qd, tau) + viscous_of(arm.friction) * average_neighbours(qd)
     dry = _dry_friction(arm.friction, qd, -smooth)
     return dry, smooth + dry
 
@@ -207,7 +207,7 @@ def split_unexplained(arm: RobotModel, dt: Array, q: Array, qd: Array, tau: Arra
 def _unexplained_torque(arm: RobotModel, dt: Array, q: Array, qd: Array, tau: Array) -> Array:
     """Return what τ does not explain of Δp, over dt, (time − 1, n)."""
     rate = arm.momentum_rate(q, qd, np.zeros(arm.n))
-    return np.diff(arm.momentum(q, qd), axis=0) / dt - tau - _between(rate)
+    return np.diff(arm.momentum(q, qd), axis=0) / dt - tau - average_neighbours(rate)
 
 
 def _dry_friction(law: FrictionLaw, qd: Array, wanted: Array) -> Array:
@@ -220,12 +220,7 @@ def _dry_friction(law: FrictionLaw, qd: Array, wanted: Array) -> Array:
     dry = np.where(qd > 0, plus, 0.0) - np.where(qd < 0, minus, 0.0)
     most, least = np.maximum(plus[1:], plus[:-1]), -np.maximum(minus[1:], minus[:-1])
     turns = np.sign(qd[1:]) * np.sign(qd[:-1]) <= 0
-    return np.where(turns, np.clip(wanted, least, most), _between(dry))
-
-
-def _between(values: Array) -> Array:
-    """Return the means of neighbouring samples, (time − 1, n) from (time, n)."""
-    return 0.5 * (values[1:] + values[:-1])
+    return np.where(turns, np.clip(wanted, least, most), average_neighbours(dry))
 
 
 def _low_pass(means: Array, dt: Array, rate: Array, start: Array) -> Array:

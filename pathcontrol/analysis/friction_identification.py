@@ -10,6 +10,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array, as_scalar
 from pathcontrol._expect import expect_choice
+from pathcontrol._json import to_json
 from pathcontrol.analysis.disturbance_estimate import momentum_observer, motion_of
 from pathcontrol.errors import InputError
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Stribeck, Viscous
@@ -94,13 +95,10 @@ class FrictionEstimate:
     def to_dict(self) -> dict[str, Any]:
         """Return all numbers by joint, None where they are not known."""
 
-        def number(value: float) -> float | None:
-            return float(value) if np.isfinite(value) else None
-
         def of_joint(i: int) -> dict[str, Any]:
-            values = {name: number(value[i]) for name, value in self.coefficients.items()}
-            errors = {name: number(value[i]) for name, value in self.errors.items()}
-            more = {"residual_rms": number(self.residual[i]), "windows": len(self.windows[i].torque)}
+            values = {name: to_json(value[i]) for name, value in self.coefficients.items()}
+            errors = {name: to_json(value[i]) for name, value in self.errors.items()}
+            more = {"residual_rms": to_json(self.residual[i]), "windows": len(self.windows[i].torque)}
             return values | {"standard_errors": errors} | more | {"excited": self.joints[i] not in self.remarks}
 
         joints = {name: of_joint(i) for i, name in enumerate(self.joints)}

@@ -9,6 +9,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
+from pathcontrol._json import to_json
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.geometry.closest_point.curve import Curve, Interval
 from pathcontrol.geometry.reach import least_radius, narrowest_bottleneck
@@ -51,7 +52,7 @@ class Reach:
     def to_dict(self) -> dict[str, Any]:
         """Return all values by their names, as JSON takes them: what is not finite is ``None``."""
         names = ("value", "s", "other", "radius", "radius_s", "bottleneck")
-        numbers = {name: float(v) if np.isfinite(v := getattr(self, name)) else None for name in names}
+        numbers = to_json({name: getattr(self, name) for name in names})
         tool = {} if self.tool is None else {"tool": self.tool.to_dict()}
         return {"limit": self.limit, "unit": self.unit} | numbers | tool
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pathcontrol._json import to_json
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.cli.files import check_file
 from pathcontrol.cli.group import import_all, json_option
@@ -76,7 +77,7 @@ def command(
     written = {} if stability is None or out is None else _write(stability, out)
     if as_json:
         values: dict[str, Any] = {"decay_rate": own.decay_rate, "stable": own.stable, "lap": own.period}
-        values |= {"largest": {name: value if math.isfinite(value) else None for name, value in found.items()}}
+        values |= {"largest": to_json(found)}
         values |= {"left_out": left_out, "map": stability and _describe(stability), "written": written}
         click.echo(json.dumps(values, allow_nan=False))
         return

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pathcontrol._interrupts import delay_interrupt
+from pathcontrol._json import to_json
 from pathcontrol.cli.files import check_file
 from pathcontrol.cli.group import engine_option, json_option
 from pathcontrol.cli.sweep_command import chunk_option, out_option, resume_option
@@ -55,17 +56,15 @@ def _content(tuning: Tuning) -> dict[str, Any]:
     return {
         "candidates": tuning.table().sizes["sample"],
         "feasible": tuning.feasible().sizes["sample"],
-        "best": {name: _plain(tuning.best(name)) for name in tuning.objectives},
-        "nearest": _plain(tuning.nearest()),
-        "front": [_plain(tuning.candidate(int(i))) for i in front],
+        "best": {name: _describe(tuning.best(name)) for name in tuning.objectives},
+        "nearest": _describe(tuning.nearest()),
+        "front": [_describe(tuning.candidate(int(i))) for i in front],
         "activity": {name: active._asdict() for name, active in tuning.activity().items()},
     }
 
 
-def _plain(one: Candidate | None) -> dict[str, Any] | None:
+def _describe(one: Candidate | None) -> dict[str, Any] | None:
     """Return a candidate as JSON has it; values that are not finite are null."""
     if one is None:
         return None
-    parameters = {name: value.tolist() for name, value in one.parameters.items()}
-    metrics = {name: value if abs(value) < float("inf") else None for name, value in one.metrics.items()}
-    return {"number": one.number, "parameters": parameters, "metrics": metrics}
+    return to_json({"number": one.number, "parameters": one.parameters, "metrics": one.metrics})

@@ -10,6 +10,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array, check_whole
 from pathcontrol._expect import expect
+from pathcontrol._json import to_json
 from pathcontrol.comparison.laws import Laws, make_laws
 from pathcontrol.comparison.measures import MEASURES, measure
 from pathcontrol.comparison.scenarios import Scenario, make_scenario
@@ -65,7 +66,7 @@ class Comparison:
             "scenario": scenario.name,
             "sentence": scenario.sentence,
             "duration": scenario.duration,
-            "event": None if scenario.event is None else [_plain(t) for t in scenario.event],
+            "event": to_json(scenario.event),
             "window": list(scenario.window),
             "units": dict(MEASURES),
             "controllers": {law: self._law_to_dict(law) for law in self.measures},
@@ -75,9 +76,9 @@ class Comparison:
         """Return the numbers of one law."""
         values = self.measures[law]
         gains = {name: np.asarray(getattr(self.laws[law], name)).tolist() for name in self.laws[law].gains}
-        return {name: _plain(self.mean(law, name)) for name in values} | {
-            "spread": {name: _plain(self.spread(law, name)) for name in values},
-            "rollouts": {name: [_plain(one) for one in value.tolist()] for name, value in values.items()},
+        return to_json({name: self.mean(law, name) for name in values}) | {
+            "spread": to_json({name: self.spread(law, name) for name in values}),
+            "rollouts": to_json(values),
             "diverged": int((self.runs[law].status == "diverged").sum()),
             "gains": gains,
         }
@@ -179,8 +180,3 @@ def _reduce(function: Any, values: Array) -> float:
     """Return a statistic of values; what is infinite makes the mean infinite, and the spread NaN."""
     with np.errstate(invalid="ignore"):
         return float(function(values))
-
-
-def _plain(value: float) -> float | None:
-    """Return a number as JSON can hold it: null where it is not finite."""
-    return float(value) if np.isfinite(value) else None

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from pathlib import Path
 from typing import Any
 
 from pathcontrol._files import whole_file
+from pathcontrol._json import to_json
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.run_metrics import UNITS, metrics
@@ -41,8 +41,8 @@ def check_folder(out_dir: Path, output: Output) -> None:
 def measure_run(run: Run, setup: Setup) -> dict[str, Any]:
     """Return the metrics of a run as JSON can hold them: those of a toolpath, or the usual ones."""
     if isinstance(setup.task, ToolpathTask):
-        return _plain(toolpath_metrics(run, setup.plant, setup.task))
-    return _plain(metrics(run, setup.task))
+        return to_json(toolpath_metrics(run, setup.plant, setup.task))
+    return to_json(metrics(run, setup.task))
 
 
 def write_outputs(run: Run, numbers: dict[str, Any], setup: Setup, out_dir: Path) -> dict[str, Path]:
@@ -89,14 +89,3 @@ def _write_html(run: Run, setup: Setup, path: Path) -> Path:
 
     record(run, setup.plant, task=setup.task).save(path)
     return path
-
-
-def _plain(value: Any) -> Any:
-    """Return ``value`` as JSON can hold it: not finite, as the settling time of what never settles, is null."""
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    return None if isinstance(value, float) and not math.isfinite(value) else value

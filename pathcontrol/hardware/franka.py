@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import ArmError, MissingExtraError
+from pathcontrol._extras import load_extra
+from pathcontrol.errors import ArmError
 from pathcontrol.hardware.arm import Measurement
 from pathcontrol.hardware.envelope import Envelope
 
@@ -133,10 +133,6 @@ def _limit_step(tau: Array, had: Array, sent: Array | None) -> Array:
     return np.minimum(np.maximum(tau, middle - half), middle + half)
 
 
-def _load_library() -> ModuleType:
+def _load_library() -> Any:
     """Return ``pylibfranka``."""
-    try:
-        import pylibfranka
-    except ImportError as error:
-        raise MissingExtraError("pylibfranka", "franka", "driving a Franka arm") from error
-    return pylibfranka
+    return load_extra("pylibfranka", "franka", "driving a Franka arm")

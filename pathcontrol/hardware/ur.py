@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array, as_scalar
-from pathcontrol.errors import ArmError, MissingExtraError
+from pathcontrol._extras import load_extra
+from pathcontrol.errors import ArmError
 from pathcontrol.hardware.arm import Measurement
 
 _VARIABLES = ["timestamp", "actual_q", "actual_qd", "robot_status_bits", "safety_status_bits"]
@@ -124,11 +125,8 @@ class UR:
                 return Measurement(q, qd, t)
 
 
-def _load_library() -> tuple[ModuleType, ModuleType]:
+def _load_library() -> tuple[Any, Any]:
     """Return the modules of ``ur_rtde``."""
-    try:
-        import rtde_control
-        import rtde_receive
-    except ImportError as error:
-        raise MissingExtraError("ur_rtde", "ur", "driving an arm of Universal Robots") from error
-    return rtde_control, rtde_receive
+    names = ("rtde_control", "rtde_receive")
+    control, receive = (load_extra(name, "ur", "driving an arm of Universal Robots", "ur_rtde") for name in names)
+    return control, receive

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pathcontrol._expect import did_you_mean
+from pathcontrol._extras import load_extra
 from pathcontrol._files import read_bounded
 from pathcontrol.errors import MissingExtraError, UnknownNameError, UrdfError
 from pathcontrol.robot.arm_dynamics import UrdfSource
@@ -123,11 +124,8 @@ def _own_name(text: str) -> str:
 
 def _example_robots() -> dict[str, Any]:
     """Return the loaders of example-robot-data."""
-    try:
-        from example_robot_data.robots_loader import ROBOTS
-    except ImportError as error:
-        raise MissingExtraError("example-robot-data-loaders", "robots", "loading other robots by name") from error
-    return ROBOTS
+    place, package = "example_robot_data.robots_loader", "example-robot-data-loaders"
+    return load_extra(place, "robots", "loading other robots by name", package).ROBOTS
 
 
 def _bundled_dir() -> Path:

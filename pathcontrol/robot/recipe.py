@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array, freeze
+from pathcontrol._json import to_json
 from pathcontrol.errors import InputError, MissingExtraError, PathControlError, UnknownNameError, warn
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.arm_dynamics import UrdfSource
@@ -36,7 +37,7 @@ def recipe_of(robot: RobotModel) -> dict[str, Any]:
         "base_dir": None if source.base_dir is None else str(source.base_dir),
         "package_dirs": [str(folder) for folder in source.package_dirs],
         "steps": [list(step) for step in robot.steps],
-        "limits": {name: _values(getattr(robot.limits, name)) for name in _LIMITS},
+        "limits": {name: to_json(getattr(robot.limits, name)) for name in _LIMITS},
         "friction": robot.friction.describe(),
         "encoder_counts": None if counts is None else counts.tolist(),
     }
@@ -98,11 +99,6 @@ def _friction(description: Mapping[str, Any], n: int) -> FrictionLaw:
     if law.n != n:
         raise InputError(f"the recorded friction law is for {law.n} joints, the robot has {n}")
     return law
-
-
-def _values(array: Array) -> list[float | None]:
-    """Convert numbers for JSON: those that are not finite become null."""
-    return [float(value) if np.isfinite(value) else None for value in array]
 
 
 def _array(values: Sequence[float | None], n: int, missing: float) -> Array:

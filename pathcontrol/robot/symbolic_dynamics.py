@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import MissingExtraError
+from pathcontrol._extras import load_extra
 from pathcontrol.robot.model import RobotModel
 
 
@@ -18,11 +18,7 @@ def load_casadi() -> Any:
     Raises:
         MissingExtraError: it is not installed.
     """
-    try:
-        import casadi
-    except ImportError as error:
-        raise MissingExtraError("casadi", "mpc", "predictive control") from error
-    return casadi
+    return load_extra("casadi", "mpc", "predictive control")
 
 
 def symbolic_inverse_dynamics(robot: RobotModel) -> Any:

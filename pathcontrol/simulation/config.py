@@ -12,6 +12,12 @@ def table(config: Any, name: str) -> Mapping[str, Any]:
     return found if isinstance(found, Mapping) else {}
 
 
+def first_rollout(config: Any) -> int:
+    """Return the number of the first rollout of a run."""
+    first = config.get("first_rollout", 0) if isinstance(config, Mapping) else 0
+    return first if isinstance(first, int) else 0
+
+
 def laws(config: Any) -> Sequence[Mapping[str, Any]]:
     """Return the sections of the control laws, one after another: those of a sequence, or one."""
     law = table(config, "controller")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_joint_array, as_scalar, check_finite, check_whole
+from pathcontrol._json import to_json
 from pathcontrol._progress import progress_bar
 from pathcontrol.analysis.path_reach import Reach, reach
 from pathcontrol.control.base import Controller, check_controller
@@ -87,11 +88,11 @@ class Basin:
         among = {"returned": self.returned, "diverged": self.diverged, "guaranteed": self.guaranteed}
         among["guaranteed_not_returned"] = self.guaranteed & ~self.returned
         counts: dict[str, Any] = {"starts": len(self.q)} | {name: int(rows.sum()) for name, rows in among.items()}
-        ball = self.ball if np.isfinite(self.ball) else None
         edges, _, started = self.share_by_distance()
         back = np.histogram(self.distance[self.returned], edges)[0]
         counts |= {"edges": edges.tolist(), "starts_between": started.tolist(), "returned_between": back.tolist()}
-        return {"law": self.law} | counts | {"ball": ball, "reach": self.reach.to_dict(), "tolerance": self.tolerance}
+        counts |= {"ball": to_json(self.ball), "reach": self.reach.to_dict(), "tolerance": self.tolerance}
+        return {"law": self.law} | counts
 
 
 def basin(

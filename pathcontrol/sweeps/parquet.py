@@ -4,27 +4,22 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import InputError, MissingExtraError
+from pathcontrol._extras import load_extra
+from pathcontrol.errors import InputError
 
 
-def load_parquet() -> ModuleType:
+def load_parquet() -> Any:
     """Return the module that reads and writes Parquet.
 
     Raises:
         MissingExtraError: it is not installed.
     """
-    try:
-        import pyarrow.parquet
-    except ImportError as error:
-        raise MissingExtraError("pyarrow", "sweep", "the table of a sweep") from error
-    parquet: ModuleType = pyarrow.parquet
-    return parquet
+    return load_extra("pyarrow.parquet", "sweep", "the table of a sweep")
 
 
 def encode_table(columns: Mapping[str, Array]) -> memoryview:

@@ -10,7 +10,7 @@ from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import MissingExtraError
+from pathcontrol._extras import load_extra
 from pathcontrol.sweeps.space import unit_cube
 
 _STREAM = 0x74756E65  # a random stream apart from those of designs and of sensors
@@ -48,16 +48,15 @@ class Search:
     """
 
     def __init__(self, width: int, goals: tuple[int, int], population: int, seed: int) -> None:
-        try:
-            from pymoo.algorithms.moo.nsga2 import NSGA2
-            from pymoo.algorithms.soo.nonconvex.de import DE
-            from pymoo.core.problem import Problem
-            from pymoo.core.termination import NoTermination
-        except ImportError as error:
-            raise MissingExtraError("pymoo", "tune", "tuning") from error
+        nsga2 = load_extra("pymoo.algorithms.moo.nsga2", "tune", "tuning")
+        from pymoo.algorithms.soo.nonconvex.de import DE
+        from pymoo.core.problem import Problem
+        from pymoo.core.termination import NoTermination
+
         first, later = SeedSequence(seed, spawn_key=(_STREAM,)).generate_state(2).tolist()
         problem = Problem(n_var=width, n_obj=goals[0], n_ieq_constr=goals[1], xl=0.0, xu=1.0)
-        kind = NSGA2 if goals[0] > 1 else partial(DE, variant="DE/best/1/bin", CR=0.9)  # gains depend on one another
+        single = partial(DE, variant="DE/best/1/bin", CR=0.9)  # gains depend on one another
+        kind = nsga2.NSGA2 if goals[0] > 1 else single
         self._algorithm: Any = kind(pop_size=population, sampling=unit_cube("lhs", population, width, first))
         self._algorithm.setup(problem, termination=NoTermination(), seed=later)
         self._asked: Any = None

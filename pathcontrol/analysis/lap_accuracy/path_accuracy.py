@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, check_whole
+from pathcontrol._json import to_json
 from pathcontrol.analysis.compared_space import ComparedSpace
 from pathcontrol.analysis.crossings import Crossings, Motion, find_crossings
 from pathcontrol.analysis.lap_accuracy.cornering import Corner, find_corners, measure_corner, place_corners
@@ -141,17 +142,17 @@ class PathAccuracy:
 
     def to_dict(self) -> dict[str, Any]:
         """Return all criteria by their names, in SI units, as JSON takes them: what is unknown is ``None``."""
-        scalars = {name: _number(getattr(self, name)) for name in _SCALARS}
-        vectors = {name: list(map(_number, getattr(self, name))) for name in _VECTORS if self.rotation is not None}
+        scalars = {name: to_json(getattr(self, name)) for name in _SCALARS}
+        vectors = {name: to_json(getattr(self, name)) for name in _VECTORS if self.rotation is not None}
         counts = {"cycles": self.cycles, "sections": len(self.s), "unit": self.unit}
-        bends = {name: _number(getattr(self, name)) for name in _AT_CORNERS} | {"corners": self._list_corners()}
+        bends = {name: to_json(getattr(self, name)) for name in _AT_CORNERS} | {"corners": self._list_corners()}
         return counts | scalars | vectors | bends | {"notes": self.notes}
 
     def _list_corners(self) -> list[dict[str, Any]]:
         """Return point, turn [rad], round-off and overshoot of each corner, as JSON takes them."""
         numbers = zip(self.corners, self.round_off, self.overshoot, strict=True)
         return [
-            {"point": one.point.tolist(), "turn": one.turn, "round_off": _number(near), "overshoot": _number(far)}
+            {"point": one.point.tolist(), "turn": one.turn, "round_off": to_json(near), "overshoot": to_json(far)}
             for one, near, far in numbers
         ]
 
@@ -363,8 +364,3 @@ def _largest(values: Array) -> float:
     """Return the largest of some values; NaN without any that is known."""
     known = values[np.isfinite(values)]
     return float(known.max()) if known.size else np.nan
-
-
-def _number(value: float) -> float | None:
-    """Return a number as JSON takes it."""
-    return None if np.isnan(value) else float(value)

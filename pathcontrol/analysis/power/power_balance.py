@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array, as_scalar
+from pathcontrol._arrays import Array, as_scalar, average_neighbours
 from pathcontrol._expect import expect
+from pathcontrol._json import to_json
 from pathcontrol.analysis.metric_helpers import is_along
 from pathcontrol.analysis.power.closed_loop_theorems import Energy, LoopState, Theorem, theorem_of
 from pathcontrol.analysis.power.law_of_run import LawRecord, find_law, has_demand, record_of
@@ -98,13 +99,8 @@ class PowerBalance:
         """Return the means over all the time and over its second half, for each rollout, as JSON takes them."""
         half = 0.5 * (self.time[0] + self.time[-1])
         parts = {"whole": self.means(), "second_half": self.means(begin=half)}
-        plain = {part: {name: _numbers(value) for name, value in one.items()} for part, one in parts.items()}
-        return {
-            "unit": self.unit,
-            "rate_unit": self.rate_unit,
-            "V_begin": _numbers(self.V[:, 0]),
-            "V_end": _numbers(self.V[:, -1]),
-        } | plain
+        ends = {"V_begin": self.V[:, 0], "V_end": self.V[:, -1]}
+        return {"unit": self.unit, "rate_unit": self.rate_unit} | to_json(ends | parts)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # numbers from a file may be huge
@@ -177,13 +173,13 @@ def _balance(
     h = np.diff(run.time)[:, None]
     sdot, wdot = (np.diff(values, axis=0) / h for values in plan)
     energy = theorem.energy(states)
-    measured, predicted = np.diff(energy.V, axis=0) / h, _between(energy.rate)
+    measured, predicted = np.diff(energy.V, axis=0) / h, average_neighbours(energy.rate)
     supply = account.shares(theorem, states, energy, wdot)
     if own_plan:  # of any other law σ̇ is that of the theorem, but for the error of a difference
         supply["sampling"] = supply["sampling"] + _plan_error(energy, states, sdot)
     residual = measured - predicted - sum(supply.values())
     rows = {name: np.ascontiguousarray(value.T) for name, value in supply.items()}
-    middle = 0.5 * (run.time[1:] + run.time[:-1])
+    middle = average_neighbours(run.time)
     rates = {"predicted": predicted.T.copy(), "measured": measured.T.copy(), "residual": residual.T.copy()}
     unit = theorem.unit.replace("rad", "m") if run.unit("q") == "m" else theorem.unit
     return PowerBalance(run.time, energy.V.T.copy(), middle, **rates, **rows, unit=unit)
@@ -211,19 +207,9 @@ def _plan_error(energy: Energy, states: LoopState, sdot: Array) -> Array:
     return 0.5 * (along[0] + along[1])
 
 
-def _between(values: Array) -> Array:
-    """Return the means of neighbouring samples."""
-    return 0.5 * (values[1:] + values[:-1])
-
-
 def _mean(values: Array, widths: Array) -> Array:
     """Return the means of values (N, k) over times of some widths (k,), (N,); of those that are numbers."""
     known = np.isfinite(values)
     weights = np.where(known, widths, 0.0)
     total = np.where(known, values * widths, 0.0).sum(1)
     return np.divide(total, weights.sum(1), out=np.full(len(values), np.nan), where=weights.sum(1) > 0)
-
-
-def _numbers(values: Array) -> list[float | None]:
-    """Return numbers as JSON takes them, ``None`` where they are not finite."""
-    return [float(value) if np.isfinite(value) else None for value in values]

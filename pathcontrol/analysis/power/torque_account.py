@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, average_neighbours
 from pathcontrol.analysis.disturbance_estimate import loop_number, split_unexplained
 from pathcontrol.analysis.power.closed_loop_theorems import Energy, LoopState, Theorem
 from pathcontrol.analysis.power.law_of_run import LawRecord, has_demand
@@ -83,10 +83,10 @@ class TorqueAccount(NamedTuple):
             if any(arm is not self.law.robot for arm in self.arms):
                 needed = self._apply_each(RobotModel.inverse_dynamics, states.q[end], states.qd[end], acceleration)
                 model += 0.5 * np.vecdot(y[end], needed - torque)
-        middle = 0.5 * (y[1:] + y[:-1])
+        middle = average_neighbours(y)
         smooth = np.vecdot(y, viscous)
         return {
-            "friction": 0.5 * (smooth[1:] + smooth[:-1]) + np.vecdot(middle, self.dry),
+            "friction": average_neighbours(smooth) + np.vecdot(middle, self.dry),
             "saturation": saturation,
             "sampling": sampling,
             "model": model,

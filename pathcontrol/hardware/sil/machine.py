@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import MissingExtraError
+from pathcontrol._extras import load_extra
 from pathcontrol.hardware.real_time import real_time
 from pathcontrol.hardware.sil.packets import LONGEST, Kind, Packet, read_packet, write_packet
 
@@ -60,11 +60,7 @@ def load_mujoco() -> Any:
     Raises:
         MissingExtraError: it is not installed.
     """
-    try:
-        import mujoco
-    except ImportError as error:
-        raise MissingExtraError("mujoco", "mujoco", "a simulated machine") from error
-    return mujoco
+    return load_extra("mujoco", "mujoco", "a simulated machine")
 
 
 class Machine:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, average_neighbours
 from pathcontrol.robot.friction import FrictionLaw, levels_of, levels_vary, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance, jump_times
@@ -103,7 +103,7 @@ def _sample_times(disturbance: Disturbance, duration: float) -> Iterator[float]:
     """Yield times [s] at which a disturbance is evaluated: evenly spread, and between its jumps."""
     jumps = jump_times(disturbance)
     ends = np.concatenate([[0.0], jumps[(jumps > 0) & (jumps < duration)], [duration]])
-    between = 0.5 * (ends[1:] + ends[:-1])
+    between = average_neighbours(ends)
     yield from np.union1d(np.linspace(0.0, duration, _TIMES), between[:_TIMES]).tolist()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, average_neighbours
 from pathcontrol.errors import warn
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.checks.position_range import describe_range
@@ -58,7 +58,7 @@ def _check_times(time: Array) -> str:
 
 def _check_rate(time: Array, q: Array, qd: Array) -> str:
     """Return the sentence about velocities that are not the rate of the positions."""
-    rate, mean = np.diff(q, axis=0) / np.diff(time)[:, None], 0.5 * (qd[1:] + qd[:-1])
+    rate, mean = np.diff(q, axis=0) / np.diff(time)[:, None], average_neighbours(qd)
     if np.sqrt(np.mean(mean**2)) < _REST:
         return ""
     ratio = float(np.vdot(rate, mean) / np.vdot(mean, mean))

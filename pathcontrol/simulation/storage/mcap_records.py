@@ -8,7 +8,8 @@ import zlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pathcontrol.errors import InputError, MissingExtraError
+from pathcontrol._extras import load_extra
+from pathcontrol.errors import InputError
 
 if TYPE_CHECKING:
     from mcap.records import Chunk
@@ -41,11 +42,7 @@ def load_mcap() -> Any:
     Raises:
         MissingExtraError: it is not installed.
     """
-    try:
-        import mcap.writer
-    except ImportError as error:
-        raise MissingExtraError("mcap", "mcap", "a log in MCAP") from error
-    return mcap.writer
+    return load_extra("mcap.writer", "mcap", "a log in MCAP")
 
 
 def read_content(data: bytes) -> Content:

@@ -13,7 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pathcontrol.errors import ClusterError, InputError, MissingExtraError, warn
+from pathcontrol._extras import load_extra
+from pathcontrol.errors import ClusterError, InputError, warn
 from pathcontrol.sweeps.manifest import PACKAGES, versions
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 _PATIENCE = 5.0  # s, for an answer that is immediate if there is any
 _ANSWER = 30.0  # s, for the answer of a worker that may be busy
 _LOOK = 0.2  # s
+_EXTRA = "cluster", "a sweep on a cluster"
 
 
 class NoAnswerError(TimeoutError):
@@ -49,11 +51,7 @@ def connect(cluster: Any, security: Security | None = None) -> Iterator[Client |
             raise InputError("security is given without a cluster; give cluster=, as 'tls://host:8786'")
         yield None
         return
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise MissingExtraError("distributed", "cluster", "a sweep on a cluster") from error
-    if isinstance(cluster, Client):
+    if isinstance(cluster, load_extra("distributed", *_EXTRA).Client):
         _check_workers(cluster)
         yield cluster
         return
@@ -89,12 +87,8 @@ def load_security(ca: str | Path | None, cert: str | Path | None, key: str | Pat
             raise InputError(
                 f"{name} = {None if file is None else str(file)!r}, expected a file; TLS needs {', '.join(given)}"
             )
-    try:
-        from distributed.security import Security
-    except ImportError as error:
-        raise MissingExtraError("distributed", "cluster", "a sweep on a cluster") from error
     files = {"tls_ca_file": str(ca), "tls_client_cert": str(cert), "tls_client_key": str(key)}
-    return Security(require_encryption=True, **files)
+    return load_extra("distributed.security", *_EXTRA).Security(require_encryption=True, **files)
 
 
 def _open_client(address: Any, security: Security | None) -> Client:

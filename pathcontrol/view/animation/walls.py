@@ -11,7 +11,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.arm.wall import Wall
-from pathcontrol.simulation.config import table
+from pathcontrol.simulation.config import first_rollout, table
 from pathcontrol.simulation.summaries import is_whole
 from pathcontrol.view.animation.rollout import Recording
 
@@ -57,7 +57,7 @@ def find_plates(recording: Recording, body: Array) -> list[Plate]:
         recording: the rollout; its configuration tells of its walls.
         body: where the arm gets to in the base frame [m], (k, 3).
     """
-    row = int(recording.run.array("rollout")[0] - _first_rollout(recording.run.config))
+    row = int(recording.run.array("rollout")[0] - first_rollout(recording.run.config))
     walls = _find_walls(table(recording.run.config, "disturbance"))
     plates = [_place(wall, row, body, float(recording.run.time[0])) for wall in walls]
     return [plate for plate in plates if plate is not None and plate.end > 0.0 and plate.begin < recording.duration]
@@ -90,12 +90,6 @@ def _find_walls(described: Mapping[str, Any], depth: int = 0) -> Iterator[Wall]:
         yield Wall(**{name: value for name, value in described.items() if name != "disturbance"})
     except (InputError, TypeError):
         return
-
-
-def _first_rollout(config: Mapping[str, Any]) -> int:
-    """Return the number of the first rollout of a run."""
-    first = config.get("first_rollout", 0)
-    return first if isinstance(first, int) else 0
 
 
 def _of_rollout(values: Array, row: int, axes: int) -> Array:

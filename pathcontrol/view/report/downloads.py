@@ -6,13 +6,12 @@ import base64
 import csv
 import io
 import json
-import math
 import re
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from pathcontrol._json import to_json
 from pathcontrol.simulation.run import Run
 
 _MOST_ROWS = 501
@@ -29,16 +28,7 @@ class Download(NamedTuple):
 
 def json_file(name: str, value: Any) -> Download:
     """Return a file with a value as JSON."""
-    return text_file(name, json.dumps(plain(value), indent=2, ensure_ascii=False) + "\n", "application/json")
-
-
-def plain(value: Any) -> Any:
-    """Return ``value`` for JSON; numbers that are not finite are null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return text_file(name, json.dumps(to_json(value), indent=2, ensure_ascii=False) + "\n", "application/json")
 
 
 def text_file(name: str, text: str, kind: str = "text/plain") -> Download:
