@@ -136,6 +136,11 @@ def test_a_module_is_found_by_its_name():
     assert {name for name, times in count.items() if times > 1} <= {"__init__.py", "base.py", "reader.py"}
 
 
+def test_no_module_is_too_long():
+    lengths = {name: path.read_text(encoding="utf-8").count("\n") for name, path in MODULES.items()}
+    assert {name: length for name, length in lengths.items() if length > 400} == {}
+
+
 def test_saved_runs_find_classes_by_the_registry():
     storage = [name for name in MODULES if name.startswith("pathcontrol.simulation.storage")]
     used = {".".join(target.split(".")[:2]) for name in storage for target in imports_of(name)}

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import ControlOutput
-from pathcontrol.control.gains import diagonal_gain, rollout_gain
+from pathcontrol.control.gains import joint_gains, rollout_gain
 from pathcontrol.control.plan_feedback import Plan, PlanFeedback
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
@@ -68,10 +68,7 @@ class AdaptiveSlotineLi(PlanFeedback):
         **options: Any,
     ) -> None:
         super().__init__(robot, task, k, **options)
-        self.Lambda, self.K_d = (
-            diagonal_gain("Lambda", Lambda, robot.n, robot.joint_names),
-            diagonal_gain("K_d", K_d, robot.n, robot.joint_names),
-        )
+        self.Lambda, self.K_d = joint_gains(robot, Lambda=Lambda, K_d=K_d)
         self.adaptation = rollout_gain("adaptation", adaptation)
         if (self.adaptation < 0).any():
             raise InputError(

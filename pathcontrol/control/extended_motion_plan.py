@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import ControlOutput
-from pathcontrol.control.gains import diagonal_gain
+from pathcontrol.control.gains import joint_gains
 from pathcontrol.control.plan_feedback import PlanFeedback
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask
@@ -51,10 +51,7 @@ class ExtendedMotionPlan(PlanFeedback):
         **options: Any,
     ) -> None:
         super().__init__(robot, task, k, **options)
-        self.K_p, self.K_v = (
-            diagonal_gain("K_p", K_p, robot.n, robot.joint_names),
-            diagonal_gain("K_v", K_v, robot.n, robot.joint_names),
-        )
+        self.K_p, self.K_v = joint_gains(robot, K_p=K_p, K_v=K_v)
 
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         s = z[..., 0]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, check_finite, freeze, strip_labels
 from pathcontrol.errors import InputError
+from pathcontrol.robot.model import RobotModel
 
 
 def diagonal_gain(name: str, value: ArrayLike, n: int, joints: Sequence[str] | None = None) -> Array:
@@ -34,6 +35,11 @@ def diagonal_gain(name: str, value: ArrayLike, n: int, joints: Sequence[str] | N
             value=value,
         )
     return _check_positive(name, array)
+
+
+def joint_gains(robot: RobotModel, **gains: ArrayLike) -> Iterator[Array]:
+    """Yield the diagonals of gain matrices for the joints of an arm, by :func:`diagonal_gain`, in their order."""
+    yield from (diagonal_gain(name, value, robot.n, robot.joint_names) for name, value in gains.items())
 
 
 def scalar_gain(name: str, value: ArrayLike) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import Controller, ControlOutput
-from pathcontrol.control.gains import diagonal_gain
+from pathcontrol.control.gains import joint_gains
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask
 
@@ -62,10 +62,7 @@ class ProportionalDerivative(MotionController):
 
     def __init__(self, robot: RobotModel, task: PathTask, K_p: ArrayLike, K_v: ArrayLike, **options: Any) -> None:
         super().__init__(robot, task, **options)
-        self.K_p, self.K_v = (
-            diagonal_gain("K_p", K_p, robot.n, robot.joint_names),
-            diagonal_gain("K_v", K_v, robot.n, robot.joint_names),
-        )
+        self.K_p, self.K_v = joint_gains(robot, K_p=K_p, K_v=K_v)
 
     def correction(self, ref: Tracking) -> Array:
         """Return K_v dq̃/dt + K_p q̃, (*batch, n)."""
@@ -120,10 +117,7 @@ class SlotineLi(MotionController):
         **options: Any,
     ) -> None:
         super().__init__(robot, task, **options)
-        self.Lambda, self.K_d = (
-            diagonal_gain("Lambda", Lambda, robot.n, robot.joint_names),
-            diagonal_gain("K_d", K_d, robot.n, robot.joint_names),
-        )
+        self.Lambda, self.K_d = joint_gains(robot, Lambda=Lambda, K_d=K_d)
 
     def torque(self, q: Array, qd: Array, ref: Tracking) -> Array:
         velocity = ref.velocity + self.Lambda * ref.position_error

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.control.base import Controller, ControlOutput
-from pathcontrol.control.gains import diagonal_gain
+from pathcontrol.control.gains import joint_gains
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.base import PathPoint
 from pathcontrol.tasks.task import PathTask
@@ -144,10 +144,7 @@ class TrackingReferenceLaw(ReferenceLaw):
         **options: Any,
     ) -> None:
         super().__init__(robot, task, **options)
-        self.K_p, self.K_v = (
-            diagonal_gain("K_p", K_p, robot.n, robot.joint_names),
-            diagonal_gain("K_v", K_v, robot.n, robot.joint_names),
-        )
+        self.K_p, self.K_v = joint_gains(robot, K_p=K_p, K_v=K_v)
 
 
 def differentiate_along(function: Callable[[Array], Array], task: PathTask, s: Array) -> Array:

@@ -1,9 +1,11 @@
-"""Look-ups in a run's configuration that never fail: a missing or malformed section reads as an empty one."""
+"""The configuration of a run, looked up without fail: a missing or malformed section reads as an empty one."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
+
+from pathcontrol.simulation.described_disturbance import move_described
 
 
 def table(config: Any, name: str) -> Mapping[str, Any]:
@@ -25,3 +27,11 @@ def laws(config: Any) -> Sequence[Mapping[str, Any]]:
     if isinstance(sequence, list) and sequence and all(isinstance(each, Mapping) for each in sequence):
         return sequence
     return [law]
+
+
+def config_of_path(config: Mapping[str, Any], index: int, begin: float) -> dict[str, Any]:
+    """Return the configuration of one path of a sequence, as a run whose time 0 is at ``begin`` [s]."""
+    own = dict(config) | {"controller": dict(enumerate(laws(config))).get(index, {})}
+    if "disturbance" in own:
+        own["disturbance"] = move_described(own["disturbance"], begin)
+    return own

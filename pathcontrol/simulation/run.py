@@ -13,9 +13,8 @@ from pathcontrol._arrays import Array, check_index, norms
 from pathcontrol.errors import InputError, UnknownNameError
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.config import laws, table
+from pathcontrol.simulation.config import config_of_path, table
 from pathcontrol.simulation.context import RunContext, StoredContext, check_sequence
-from pathcontrol.simulation.described_disturbance import move_described
 from pathcontrol.simulation.samples import Samples, complete_outcome, label_outcome
 from pathcontrol.simulation.storage.run_file import read_file, write_file
 from pathcontrol.simulation.trajectory import Trajectory, interpolate_motion
@@ -256,11 +255,8 @@ class Run:
         check_index("rollout", index)
         if not -self.rollouts <= index < self.rollouts:
             raise InputError(f"rollout {index} does not exist: the run has {self.rollouts}, counted from 0")
-        if self._samples is not None:
-            alone = self._samples.alone(index)
-            return Run(alone, self.config, self._origin.rollout(int(alone.rollout[0])))
-        part = self.data.isel(rollout=[index])
-        return Run(part, self.config, self._origin.rollout(int(part["rollout"][0])))
+        part = self.data.isel(rollout=[index]) if self._samples is None else self._samples.alone(index)
+        return Run(part, self.config, self._origin.rollout(int(self.array("rollout")[index])))
 
     def path(self, index: int) -> Run:
         """Return one path of a sequence as a run of its own, which begins at 0 s, where the path before finished.
@@ -284,14 +280,11 @@ class Run:
         data["s"].attrs = s.attrs
         data = data.drop_vars(name for name in OUTCOMES if name in data.coords)
         data = data.assign_coords(time=("time", data["time"].to_numpy() - begin, data["time"].attrs))
-        config = self.config | {"controller": dict(enumerate(laws(self.config))).get(index, {})}
-        if "disturbance" in config:
-            config["disturbance"] = move_described(config["disturbance"], float(begin))
         outcome = {"finish_time": ends[[index]] - begin}
         if status[index] == "diverged":
             outcome |= {"diverged_time": self.diverged_time - begin, "reason": self.reason}
         data = data.assign_coords(label_outcome(complete_outcome(1, outcome)))
-        return Run(data, config, self._origin.path(index))
+        return Run(data, config_of_path(self.config, index, float(begin)), self._origin.path(index))
 
     def excerpt(self, rows: NDArray[np.intp], stop: int, start: int = 0) -> Run:
         """Return the samples from ``start`` to ``stop`` of the rollouts in some ``rows`` (k,) as a run of their own.
@@ -377,7 +370,7 @@ class Run:
     ) -> Run:
         """Make a run of the log of any arm: times [s], (k,), and q [rad], q̇ [rad/s] and τ [N m], (k, n) each.
 
-        Times may be irregular. What a log lacks is derived or NaN, and what looks like a slip of units is told by a
+        Times may be irregular. What a log lacks is derived or NaN, and what looks like a slip of units brings a
         warning: see :func:`~pathcontrol.simulation.log_arrays.make_log_run`, which raises InputError and TaskError.
         """
         from pathcontrol.simulation.log_arrays import make_log_run

@@ -181,12 +181,12 @@ def _let_go(
                 run = error.run
             if run.rollouts != len(q[part]):
                 raise InputError("the gains of the law differ from rollout to rollout; give one law at a time")
-            yield _measure(run, controller.task, tolerance)
+            yield _measure(run, tolerance)
             update(min(first + rows, len(q)))
             warnings.simplefilter("ignore", PathControlWarning)  # said of the first chunk
 
 
-def _measure(run: Run, task: PathTask, tolerance: float) -> tuple[Array, Array, Array]:
+def _measure(run: Run, tolerance: float) -> tuple[Array, Array, Array]:
     """Return which rollouts return, which diverge, and from when on they are on the path [s], NaN where never."""
     time, desired = run.time, run.array("e_v") + run.array("qd_measured")
     with np.errstate(invalid="ignore", over="ignore"):
