@@ -13,8 +13,8 @@ ACCELERATION = 10.0  # 1/s, of an override
 LAWS = ("extended_motion_plan", "projection")
 
 
-def make(arm, name, **options):
-    task = pc.Circle(1.0, 2.0)
+def make(arm, name, task=None, **options):
+    task = task or pc.Circle(1.0, 2.0)
     if name == "projection":
         return pc.Projection(arm, task, 800.0, [45.0, 100.0], **options)
     return pc.ExtendedMotionPlan(arm, task, 800.0, [45.0, 100.0], 20.0, **options)
@@ -100,6 +100,22 @@ def test_with_dry_friction_a_hold_adds_no_more_than_a_slow_pace_would(arm, name)
     plain, held = hold_everywhere(law, arm)
     assert late_contour(held) < static_error(arm, law.task)
     assert late_contour(held) < 1.05 * late_contour(plain)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_where_motors_cannot_hold_and_resume_as_fast_a_pace_keeps_the_path(arm, name):
+    """At 8 rad/s Mq_d'ϑẇ is beyond the limits at 10 1/s; the pace lets w follow as the motors can."""
+    task = pc.Circle(1.0, 8.0)
+    law = make(arm, name, task)
+    begins = 1.0 + 2 * np.pi / 8.0 * np.arange(24) / 24
+    held = pc.SpeedOverride(law, lambda t: np.where((t >= begins) & (t < begins + 0.5), 0.0, 1.0), ACCELERATION)
+    starts = np.repeat(task.q_d(np.array(0.0))[None], 24, axis=0)
+    peaks = []  # at last that of a slow passage, which is what dry friction does
+    for one in (held, pc.Paced(held), make(arm, name, pc.Circle(1.0, 1.0))):
+        loop, duration = pc.SampledLoop(PERIOD, torque_limits=True), 8.0 if len(peaks) == 2 else 2.8
+        run = pc.simulate(one, starts, duration=duration, loop=loop, progress=False)
+        peaks.append(pc.contour_error(run)[:, run.time > 1.0].max())
+    assert peaks[1] < peaks[2] < peaks[0]
 
 
 def test_in_a_sequence_each_law_counts_the_time_from_the_begin_of_its_path(arm):
