@@ -14,8 +14,10 @@ from hypothesis import strategies as st
 import pathcontrol as pc
 from pathcontrol._units import parse_quantity
 from pathcontrol.errors import ExperimentError
+from pathcontrol.experiments.builders.setup import build
 from pathcontrol.experiments.load import load_experiment
 from pathcontrol.experiments.runner import load_setup
+from pathcontrol.experiments.schema.experiment import Experiment
 
 ANGLE = {"deg": math.pi / 180, "rad": 1.0, "mrad": 1e-3, "rev": 2 * math.pi}
 LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
@@ -189,3 +191,28 @@ def test_units_of_files_that_are_only_read_are_checked_too(tmp_path):
     file.write_text(SI.format(angle_unit="rad").replace("period = 0.002", 'period = "2 furlong"'), encoding="utf-8")
     with pytest.raises(ExperimentError, match="unknown unit 'furlong'"):
         load_experiment(file)
+
+
+@pytest.mark.parametrize(
+    ("section", "change", "key"),
+    [
+        ("controller", {"torque_limits": ["100 N m", "12 N"]}, "controller.torque_limits[1]"),
+        ("profile", {"velocity": ["2 m/s", 2.0]}, "task.profile.velocity[0]"),
+        ("profile", {"torque": [100.0, "12 N"]}, "task.profile.torque[1]"),
+        ("loop", {"torque_limits": ["150 N", "15 N"]}, "loop.torque_limits[0]"),
+        ("threshold", "5 N", "controller.threshold"),
+    ],
+)
+def test_a_joint_that_turns_has_no_quantity_of_one_that_slides(tmp_path, section, change, key):
+    inner = {"type": "projection", "k_p": 400.0, "K_v": 40.0}
+    law = {"type": "paced", "law": inner} if section == "controller" else inner
+    if section == "threshold":
+        law = {"type": "event_plan", "threshold": change, "law": inner}
+    parts = {"controller": law, "profile": {"type": "time_optimal"}, "loop": {}}
+    if section != "threshold":
+        parts[section] = parts[section] | change
+    task = {"type": "line", "start": [0.7, 1.2], "end": [0.0, 0.3], "speed": 1.0, "profile": parts["profile"]}
+    content = {name: parts[name] for name in ("controller", "loop")} | {"task": task}
+    with pytest.raises(ExperimentError) as error:
+        build(Experiment.model_validate(content | {"robot": {"source": "cicese_2dof"}}), tmp_path)
+    assert str(error.value).startswith(f"{key} was given in ")

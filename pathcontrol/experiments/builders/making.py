@@ -14,12 +14,14 @@ from pathcontrol._expect import did_you_mean
 from pathcontrol._units import list_units
 from pathcontrol.arguments import Parameter, parameters_of
 from pathcontrol.errors import ExperimentError
-from pathcontrol.experiments.builders.file_errors import report_by_key, report_users_code
+from pathcontrol.experiments.builders.file_errors import refuse_unit, report_by_key, report_users_code
 from pathcontrol.experiments.builders.own_class import find_own_class
 from pathcontrol.experiments.load import describe_finding
 from pathcontrol.experiments.schema.derived import OwnSection, annotation_of
 from pathcontrol.experiments.schema.section import Section, convert_angles, read_quantities, units_of
 from pathcontrol.registry import Kind, find_kind
+from pathcontrol.robot.batch import RobotBatch
+from pathcontrol.robot.model import RobotModel
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
@@ -62,12 +64,32 @@ def make(
     needed = {name: one for name, one in given.items() if name in parameters_of(target)}
     needed = {name: one for name, one in needed.items() if parameters_of(target)[name].required} | arguments
     where = f"{key}.parameters" if isinstance(section, OwnSection) else key
+    if "robot" in given:
+        check_joint_units(where, target, arguments, given["robot"])
     try:
         inspect.signature(target).bind(**needed)
     except TypeError as error:
         raise ExperimentError(f"{where}: {error}; it is {_call_of(target)}") from error
     with report_users_code(where, target.__name__, [name for name in parameters_of(target) if name not in given]):
         return target(**needed)
+
+
+def check_joint_units(
+    key: str, target: Callable[..., Any], arguments: Mapping[str, Any], robot: RobotModel | RobotBatch
+) -> None:
+    """Check that each quantity of a joint has the unit in which that moves, as N where it slides.
+
+    Raises:
+        ExperimentError: one has another.
+    """
+    for name, parameter in parameters_of(target).items():
+        if parameter.unit is None or len(parameter.unit.names) != 2 or name not in arguments:
+            continue
+        value, turning_and_sliding = arguments[name], parameter.unit.names
+        for i, kind in enumerate(robot.position_units):
+            place, entry = (f"{name}[{i}]", value[i : i + 1]) if isinstance(value, list) else (name, [value])
+            for one in entry:
+                refuse_unit(f"{key}.{place}", one, turning_and_sliding[kind == "m"])
 
 
 def _call_of(target: Callable[..., Any]) -> str:

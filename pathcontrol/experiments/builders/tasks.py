@@ -10,7 +10,7 @@ from pathcontrol._arrays import Array
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.builders.file_errors import report_by_key, report_users_code
-from pathcontrol.experiments.builders.making import Place, arguments_of, make
+from pathcontrol.experiments.builders.making import Place, arguments_of, check_joint_units, make
 from pathcontrol.experiments.builders.poses import pose_of
 from pathcontrol.experiments.schema.experiment import Experiment
 from pathcontrol.experiments.schema.task_sections import ToolpathSection
@@ -51,6 +51,7 @@ def build_toolpath(section: ToolpathSection, robot: RobotModel, place: Place) ->
     with report_by_key("task.file", keys):
         toolpath = read_toolpath(place.folder / section.file, **section.reading)
     arguments = arguments_of("task", section, None, place)
+    check_joint_units("task", ToolpathTask, arguments, robot)
     with report_by_key("task", type(section).model_fields):
         return ToolpathTask(robot, arguments.pop("frame"), toolpath, workpiece, **arguments)
 
