@@ -12,12 +12,14 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pathcontrol import load_robot
 from pathcontrol.robot.arm_dynamics import UrdfSource
 from pathcontrol.view.bodies.body_links import reach
 from pathcontrol.view.bodies.body_meshes import round_vertices, thin
 from pathcontrol.view.bodies.body_shapes import Box, Cylinder, Mesh, Sphere
 from pathcontrol.view.bodies.body_visuals import leaf_links, link_visuals
 from pathcontrol.view.bodies.sticks import stick_figure
+from pathcontrol.view.bodies.tool_rods import tool_rods
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -266,3 +268,30 @@ def test_the_bundled_arm_is_shown_without_warnings(arm) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert {v.link for v in link_visuals(arm.source)} == {"base", "link_1", "link_2"}
+
+
+@given(seeds)
+@settings(max_examples=10)
+def test_an_added_frame_is_shown_by_a_rod_from_its_parent(seed: int) -> None:
+    """The ends of the rod are the origins of both frames, in any posture; on a frame that was added, too."""
+    rng = np.random.default_rng(seed)
+    arm = load_robot("cicese_2dof")
+    end, (first, second) = arm.frame_names[-1], rng.uniform(-0.2, 0.2, (2, 3))
+    arm = arm.with_frame("holder", end, first).with_frame("cutter", "holder", second)
+    rods = {rod.name: rod for rod in tool_rods(arm)}
+    for name, parent, position in (("tool holder", end, first), ("tool cutter", "holder", second)):
+        rod = rods[name]
+        assert rod.link == parent
+        axis = 0.5 * rod.shape.length * rod.origin[:3, 2]
+        np.testing.assert_allclose(
+            [rod.origin[:3, 3] - axis, rod.origin[:3, 3] + axis], [np.zeros(3), position], atol=1e-12
+        )
+        assert rod.shape.radius < 0.1 * rod.shape.length
+
+
+def test_no_rod_without_a_tool_or_its_length() -> None:
+    """A frame at the origin of its parent has no rod, and one that stands still is no tool."""
+    arm = load_robot("cicese_2dof")
+    assert tool_rods(arm) == []
+    assert tool_rods(arm.with_frame("here", arm.frame_names[-1], [0, 0, 0])) == []
+    assert tool_rods(arm.with_frame("workpiece", arm.frame_names[0], [0.3, 0, 0])) == []

@@ -18,6 +18,7 @@ from pathcontrol.view.animation.rollout import Recording
 from pathcontrol.view.animation.scene.palette import run_color
 from pathcontrol.view.bodies.body_visuals import LinkVisual, link_visuals
 from pathcontrol.view.bodies.sticks import stick_figure
+from pathcontrol.view.bodies.tool_rods import tool_rods
 from pathcontrol.view.default_tool import with_tool
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def make_recordings(
             looks[arm.source] = link_visuals(arm.source, FINENESS) or stick_figure(arm.source)
         path = path if "s" in one else None  # the desired position on it is unknown
         arm, frame = with_tool(arm, path, tool)
-        part, visuals = _cut_at_divergence(part), looks[arm.source]
+        part, visuals = _cut_at_divergence(part), [*looks[arm.source], *tool_rods(arm)]
         recordings.append(Recording(str(name), part, arm, path, frame, visuals, run_color(i), one.rollouts))
     return recordings
 

@@ -38,9 +38,9 @@ def stick_figure(source: UrdfSource) -> list[LinkVisual]:
     visuals = []
     for joint, x in ends.items():
         parent, child = joint.find("parent").get("link"), joint.find("child").get("link")
-        visuals += _stick(parent, "stick", np.zeros(3), x, radius)
+        visuals += stick(parent, "stick", np.zeros(3), x, radius)
         if joint in rails:
-            visuals += _stick(parent, "rail", *rails[joint], _RAIL * radius)
+            visuals += stick(parent, "rail", *rails[joint], _RAIL * radius)
             visuals.append(LinkVisual(child, "block", np.eye(4), Box(np.full(3, 3.2 * radius)), KNOB))
         elif joint.get("type") != "fixed":
             visuals.append(LinkVisual(child, "knob", np.eye(4), Sphere(1.6 * radius), KNOB))
@@ -65,7 +65,7 @@ def _limit(joint: Any, name: str) -> float:
     return 0.0 if values is None else float(np.clip(values[0], -_LONGEST_RAIL, _LONGEST_RAIL))
 
 
-def _stick(link: str, name: str, start: Array, end: Array, radius: float) -> list[LinkVisual]:
+def stick(link: str, name: str, start: Array, end: Array, radius: float) -> list[LinkVisual]:
     """Return a stick between two points [m], or none where they coincide up to rounding."""
     length = float(np.linalg.norm(end - start))
     if length <= radius / 10:
