@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -337,3 +338,19 @@ def test_labels_of_arms_in_one_place_stand_apart(arm: RobotModel, circle: Circle
 def test_a_path_that_fills_the_picture_needs_no_view_from_near(film: Opened) -> None:
     assert not film.tab.locator("#near").is_visible()
     press(film, "c")
+
+
+def test_numbers_of_a_table_stay_whole_on_a_telephone(animation: Animation, tmp_path: Path) -> None:
+    """Each number and each word is on one line, however many columns there are; the table scrolls inside its card."""
+    cells = ["line 8", "rapid", "not finished", "1.234e-05 m", "−17.25", "100 %", "8.886e+04", "12.3 deg/s", "0.4567"]
+    table = {"title": "Contours", "columns": ["contour", *["mean speed [mm/s]"] * 8], "rows": [cells] * 3}
+    film = dataclasses.replace(animation.film, header=animation.film.header | {"tables": [table]})
+    with opened(saved(page(film, animation.title), tmp_path), **PHONE) as phone:
+        lines = phone("""() => [...document.querySelectorAll("#tables td")].map((cell) => {
+            const range = document.createRange();
+            range.selectNodeContents(cell);
+            return [cell.textContent, new Set([...range.getClientRects()].map((box) => box.top)).size];
+        })""")
+        assert {text for text, count in lines if count > 1} <= {"not finished"}  # at the space
+        assert max(count for _, count in lines) <= 2
+        assert phone("document.documentElement.scrollWidth <= innerWidth")

@@ -1,6 +1,7 @@
 // Metrics and settings. Long ones begin closed.
 
 const LONG = 14; // rows
+const NUMBER = /^[+\u2212-]?[\d.]\S*( \S+)?$/; // with its unit, if it has one
 
 function tables(film) {
   const found = film.header.tables || [];
@@ -28,6 +29,7 @@ function rowOf(cells, [first, other], scope) {
   cells.forEach((text, i) => {
     const cell = textElement(i === 0 ? first : other, text);
     if (cell.tagName === "TH") cell.scope = i === 0 ? scope : "col";
+    else if (NUMBER.test(text)) cell.className = "number";
     row.append(cell);
   });
   return row;
