@@ -54,7 +54,7 @@ def load_runs(
 ) -> dict[str, Run]:
     """Load the runs by the shortest names that tell them apart: of their files, or of the folders of ``run.nc``.
 
-    Of a sweep, alone, its ``worst`` histories, by their samples and parameters. A URDF, with ``package_dirs``, the
+    Of a sweep, alone, its ``worst`` histories, by their samples. A URDF, with ``package_dirs``, the
     folders of its meshes, or a known robot may take the place of a run: its joints move in turn.
 
     Raises:

@@ -35,3 +35,14 @@ def config_of_path(config: Mapping[str, Any], index: int, begin: float) -> dict[
     if "disturbance" in own:
         own["disturbance"] = move_described(own["disturbance"], begin)
     return own
+
+
+def sample_parameters(config: Any) -> dict[str, Any]:
+    """Return the parameters of the sample of a sweep that a run is the history of: numbers, lists of them, texts."""
+    found = {str(name): value for name, value in table(config, "sweep").items() if name != "sample"}
+    return {name: value for name, value in found.items() if isinstance(value, str) or _are_numbers(value)}
+
+
+def _are_numbers(value: Any) -> bool:
+    """Return whether a value is a number, or a list of numbers."""
+    return all(isinstance(item, int | float) for item in (value if isinstance(value, list) else [value]))

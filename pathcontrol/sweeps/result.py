@@ -10,7 +10,6 @@ import numpy as np
 import xarray as xr
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.readable import readable_parameters
 from pathcontrol.analysis.run_metrics import LABELS, UNITS
 from pathcontrol.errors import InputError, warn
 from pathcontrol.simulation.run import Run
@@ -71,7 +70,7 @@ class SweepResult:
         return self._store.run_file(sample)
 
     def histories(self, worst: int | None = None) -> dict[str, Run]:
-        """Return the kept histories by number and parameters of their samples, the worst first.
+        """Return the kept histories by the names of their samples, ``"sample 12"``, the worst first.
 
         What diverged comes first, then the largest values of the metric by which histories were kept. Histories whose
         files are damaged or missing are left out, with a warning.
@@ -104,8 +103,7 @@ class SweepResult:
             if len(found) == most:
                 break
             try:
-                name, run = self._name_history(sample)
-                found[name] = run
+                found[f"sample {sample}"] = self.run(sample)
             except InputError as error:
                 lost.append(str(error))
         if not found:
@@ -118,12 +116,6 @@ class SweepResult:
     def kept_by(self) -> str:
         """The metric whose largest values are the worst ones."""
         return str(self.definition.get("keep", {}).get("by", Keep.by))
-
-    def _name_history(self, sample: int) -> tuple[str, Run]:
-        """Return the name and the history of a sample."""
-        run = self.run(sample)
-        values = {name: value for name, value in run.config["sweep"].items() if name != "sample"}
-        return f"{sample}: {readable_parameters(values, 3)}", run
 
     def table(self) -> xr.Dataset:
         """Return the numbers of all finished samples, over ``sample``.

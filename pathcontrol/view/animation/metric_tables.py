@@ -11,11 +11,11 @@ from pathcontrol.analysis.contours import contour_table
 from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.lap_table import lap_table
 from pathcontrol.analysis.limit_shares import RATIOS, is_passed
-from pathcontrol.analysis.readable import readable_number, unit_of
+from pathcontrol.analysis.readable import readable_number, readable_parameters, unit_of
 from pathcontrol.analysis.run_metrics import LABELS, metrics
 from pathcontrol.analysis.run_remarks import remarks
 from pathcontrol.analysis.window import describe_window
-from pathcontrol.simulation.config import laws, table
+from pathcontrol.simulation.config import laws, sample_parameters, table
 from pathcontrol.view.animation.rollout import Recording
 
 _NEEDED = {"qd", "s", "e_p", "e_v", "sdot", "tau_demand"}
@@ -129,6 +129,7 @@ def settings(recording: Recording) -> dict[str, str]:
     chosen = {name: value for name, value in laws(config)[0].items() if name not in _ELSEWHERE}
     versions = ", ".join(f"{name} {number}" for name, number in table(config, "versions").items())
     found: dict[str, Any] = {
+        "parameters of the sample": readable_parameters(sample_parameters(config), 3) or None,
         "robot": recording.robot.name,
         "controller": table(config, "controller").get("controller"),
         "task": None if recording.task is None else table({"of": recording.task.describe()}, "of").get("task"),

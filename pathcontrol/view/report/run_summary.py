@@ -13,12 +13,12 @@ from pathcontrol._arrays import Array
 from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.limit_shares import RATIOS, is_passed, limit_ratios
 from pathcontrol.analysis.progress import has_arrived
-from pathcontrol.analysis.readable import count_words, reading, unit_of, without_rounding
+from pathcontrol.analysis.readable import count_words, readable_parameters, reading, unit_of, without_rounding
 from pathcontrol.analysis.run_metrics import LABELS, metrics
 from pathcontrol.analysis.torque import torque_metrics
 from pathcontrol.analysis.window import samples_of
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
-from pathcontrol.simulation.config import table
+from pathcontrol.simulation.config import sample_parameters, table
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.joined.path_sequence import PathSequence
@@ -90,6 +90,8 @@ def facts(runs: Mapping[str, Run]) -> list[Row]:
         "time simulated": lambda run: f"{run.time[-1] - run.time[0]:.4g} s",
         "outcome": _outcome,
     }
+    if any("sweep" in run.config for run in runs.values()):
+        said["parameters of the sample"] = lambda run: readable_parameters(sample_parameters(run.config), 3) or "–"
     return [Row(label, "", tuple(Cell(say(run)) for run in runs.values())) for label, say in said.items()]
 
 

@@ -17,6 +17,7 @@ RUNS: tuple[Color, ...] = (
     (0.337, 0.706, 0.914, 1.0),
     (0.941, 0.894, 0.259, 1.0),
 )
+_DARKER = 0.6
 DESIRED: Color = (0.53, 0.56, 0.6, 1.0)
 RAPID: Color = (0.6, 0.63, 0.67, 0.6)
 DESIRED_POINT: Color = (0.45, 0.48, 0.53, 0.6)
@@ -41,5 +42,7 @@ def scale_colors(share: Array) -> Array:
 
 
 def run_color(index: int) -> Color:
-    """Return the colour of a run, counted from 0."""
-    return RUNS[index % len(RUNS)]
+    """Return the colour of a run, counted from 0; where they are used up, they come again darker."""
+    red, green, blue, opacity = RUNS[index % len(RUNS)]
+    shade = _DARKER ** (index // len(RUNS))
+    return red * shade, green * shade, blue * shade, opacity
