@@ -19,6 +19,7 @@ from pathcontrol.hardware.held_plan import HeldPlan
 from pathcontrol.hardware.loop_log import LoopLog
 from pathcontrol.hardware.measurements import Screen
 from pathcontrol.hardware.sample_ring import SampleRing
+from pathcontrol.hardware.start_check import find_start_fault
 
 _FAR = 2.0  # tubes from the path, from which holding on it is no help
 
@@ -39,8 +40,8 @@ class Status(NamedTuple):
         mode: ``RUN`` follows the path; ``HOLD`` stays on it; ``DAMP`` brakes all joints, τ = g(q) − Dq̇; ``GRAVITY``
             carries the weight of the arm at its last known posture, τ = g(q).
         reason: why, in a sentence; empty while it runs.
-        faults: how often each kind of fault occurred: ``measurement``, ``deadline``, ``motion``, ``tube``, ``law``;
-            ``operator`` and ``arm`` where it was held, or stopped by the arm.
+        faults: how often each kind of fault occurred: ``measurement``, ``deadline``, ``motion``, ``tube``, ``law``,
+            ``start``; ``operator`` and ``arm`` where it was held, or stopped by the arm.
         saturated: whether the last torque was limited, by itself or by its rate.
         ticks: number of steps.
         s: path parameter of the plan.
@@ -71,6 +72,7 @@ class ControlLoop:
     - Out of the tube around the path the plan is held; at twice the distance the arm is damped.
     - A joint beyond its velocity limit, or too near to a position limit to be braked before it, is damped.
     - A law that raises, or returns no numbers, is damped.
+    - An arm that starts, or goes on, out of the tube or beyond a position limit is damped: no law draws it from afar.
 
     Args:
         law: the law, with one task and one set of gains.
@@ -94,9 +96,14 @@ class ControlLoop:
         n = law.robot.n
         posture = law.task.q_d(np.array(law.task.s0, dtype=np.float64))
         self.start(np.asarray(posture, dtype=np.float64).reshape(n))
+        self._started, self._mode, self._reason = False, Mode.DAMP, "it has not been started"
+        self._faults.clear()
 
     def start(self, q: ArrayLike, qd: ArrayLike | None = None, t: float = 0.0, tau: ArrayLike | None = None) -> None:
         """Start again with an arm at q [rad] and q̇ [rad/s], each (n,), at time t [s].
+
+        Out of the tube around the path, or beyond a position limit, the arm is damped, and :attr:`status` says why.
+        Without a start, the first good measurement is one.
 
         Args:
             q: joint positions.
@@ -116,7 +123,9 @@ class ControlLoop:
         self._screen = Screen(self.envelope, position, velocity, begin - self.period)
         self._tau = np.minimum(np.maximum(acting, -self.envelope.torque), self.envelope.torque)
         self._mode, self._reason, self._faults = Mode.RUN, "", Counter[str]()
-        self._bad, self._ticks, self._saturated, self._inside = 0, 0, False, False
+        self._bad, self._ticks, self._saturated, self._started = 0, 0, False, True
+        if fault := self._find_start_fault():
+            self._react(Mode.DAMP, "start", fault)
 
     @property
     def status(self) -> Status:
@@ -138,6 +147,8 @@ class ControlLoop:
 
         The array is a new one each time.
         """
+        if not self._started:
+            self._start_unasked(q, qd, t)
         self._ticks += 1
         plan = (self._plan.s, self._plan.factor) if self._rings else (0.0, 1.0)
         try:
@@ -187,20 +198,49 @@ class ControlLoop:
     def resume(self) -> None:
         """Go on along the path from where the arm is, from rest, after any reaction; it never raises.
 
-        Where the law cannot start there the arm is damped, or stays so, and :attr:`status` says why.
+        Where the law cannot start there the arm is damped, or stays so, and :attr:`status` says why. Out of the tube
+        around the path, or beyond a position limit, it stays as it is.
         """
+        if not self._started:
+            return
         try:
             if self._mode >= Mode.DAMP:
                 self._plan.restart(self._screen.q, self._screen.qd)
+            if fault := self._find_start_fault():
+                self._faults["start"] += 1
+                self._reason = fault if self._mode > Mode.RUN else ""
+                return
             self._plan.resume()
         except Exception as error:  # a loop that resumes on its own must not end, and the arm must not fall
             self._faults["law"] += 1
             self._mode = max(self._mode, Mode.DAMP)
             self._reason = f"the law cannot go on: {type(error).__name__}: {error}"
             return
-        self._mode, self._reason, self._bad, self._inside = Mode.RUN, "", 0, False
+        self._mode, self._reason, self._bad = Mode.RUN, "", 0
 
     # --- decisions ------------------------------------------------------------------------------------------
+
+    def _start_unasked(self, q: Any, qd: Any, t: Any) -> None:
+        """Start where a good measurement is, of an arm that nobody started; a hold or a stop from before lasts."""
+        if (measured := self._screen.read(q, qd, t)) is None:
+            return
+        before, reason = self._faults, self._reason
+        try:
+            self.start(*measured)
+        except Exception as error:  # step never raises
+            self._started, self._screen = True, Screen(self.envelope, *measured[:2], measured[2] - self.period)
+            self._react(Mode.DAMP, "law", "")
+            self._reason = f"the law cannot start: {type(error).__name__}: {error}"
+        if before["operator"]:
+            self.hold()
+        if before["arm"]:
+            self.stop(reason)
+
+    def _find_start_fault(self) -> str:
+        """Return the sentence on an arm that is where no law is to start, or ""."""
+        q, limits = self._screen.q, self.envelope
+        away = 0.0 if limits.tube == np.inf else self._plan.distance(q)
+        return find_start_fault(self.law.robot, q, limits.lower, limits.upper, away, limits.tube)
 
     def _decide(self, q: Any, qd: Any, t: Any) -> Array:
         """Return the torques that are wanted."""
@@ -244,8 +284,7 @@ class ControlLoop:
         if self.envelope.tube == np.inf:
             return
         away = self._plan.distance(self._screen.q)
-        self._inside = self._inside or away <= self.envelope.tube
-        if self._inside and away > self.envelope.tube:
+        if away > self.envelope.tube:
             mode = Mode.DAMP if away > _FAR * self.envelope.tube else Mode.HOLD
             self._react(mode, "tube", f"the arm is {away:.3g} rad from its path, its tube is {self.envelope.tube:g}")
 

@@ -75,7 +75,8 @@ def drive(loop: ControlLoop, arm: Arm, duration: float, settle: float = 0.7) -> 
         settle: time for coming to rest at the end [s].
 
     Raises:
-        ArmError: the arm gives no measurement to start with.
+        ArmError: the arm gives no measurement to start with, or is out of the tube around the path or beyond a position
+            limit; nothing is driven then.
         InputError: a time is not positive, or ``arm`` lacks a method of :class:`Arm`.
     """
     expect("loop", loop, ControlLoop)
@@ -136,6 +137,8 @@ class _Driver:
         """Drive for both times [s], and return why the arm stopped, or ""."""
         here = self._arm.locate()
         self._loop.start(here.q, here.qd)
+        if self._loop.status.faults:
+            raise ArmError(f"{self._loop.status.reason} (nothing was driven)")
         self._loop.fill(self._ring)
         first = self._read_first()
         self._start = first.t

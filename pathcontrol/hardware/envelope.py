@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, as_scalar, as_whole, freeze
 from pathcontrol.errors import InputError
+from pathcontrol.hardware.start_check import read_tube
 from pathcontrol.robot.model import RobotModel
 
 _FULL_TORQUE = 0.01  # s in which a torque may go from 0 to its limit
@@ -30,7 +31,7 @@ class Envelope:
         lower: least q [rad]; of the URDF.
         upper: largest q [rad]; of the URDF.
         deceleration: of a joint that is braked before a position limit [rad/s²]; from the velocity limit in 0.1 s.
-        tube: distance ‖q_d(s) − q‖ from the path [rad] that the arm must not leave once it is within; inf for none.
+        tube: distance ‖q_d(s) − q‖ from the path [rad] that the arm must not leave, nor start beyond; inf for none.
         jump: what a position may change beyond its velocity limit from one measurement to the next [rad].
         patience: number of bad measurements in a row that are bridged by the last torque.
         frozen: number of equal measurements in a row, while the arm moves, that count as bad.
@@ -63,8 +64,7 @@ class Envelope:
         for name in ("lower", "upper"):
             if (value := getattr(self, name)) is not None:
                 as_array(name, value)
-        if not self._as_number("tube") > 0:
-            raise InputError(f"tube = {self.tube!r}, expected a distance greater than 0 [rad], inf for none")
+        read_tube(self.tube)
         as_scalar("jump", self.jump, least=0.0)
         as_whole("patience", self.patience, 0, _MOST)
         as_whole("frozen", self.frozen, 2, _MOST)

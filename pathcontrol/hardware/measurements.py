@@ -25,18 +25,25 @@ class Screen:
 
     def take(self, q: Any, qd: Any, t: Any) -> str:
         """Take a measurement if it is good, and return "", or the sentence on what is wrong with it."""
-        position, velocity, time = self._as_numbers(q), self._as_numbers(qd), self._as_numbers(t, 1)
-        if position is None or velocity is None or time is None:
+        if (measured := self.read(q, qd, t)) is None:
             return "a measurement is no number, or has another shape"
-        gap = float(time[0]) - self.t
+        position, velocity, time = measured
+        gap = time - self.t
         if not gap > 0:
             return f"the time of a measurement is {gap:.3g} s after the one before: it is repeated or out of order"
         if fault := self._find_jump(position, velocity, gap):
             return fault
         if self._is_frozen(position, velocity):
             return f"{self._equal + 1} equal measurements of an arm that moves"
-        self.q[:], self.qd[:], self.t = position, velocity, float(time[0])
+        self.q[:], self.qd[:], self.t = position, velocity, time
         return ""
+
+    def read(self, q: Any, qd: Any, t: Any) -> tuple[Array, Array, float] | None:
+        """Return a measurement as finite numbers, q and q̇ (n,) and t, or None where it is something else."""
+        position, velocity, time = self._as_numbers(q), self._as_numbers(qd), self._as_numbers(t, 1)
+        if position is None or velocity is None or time is None:
+            return None
+        return position, velocity, float(time[0])
 
     def _as_numbers(self, value: Any, size: int | None = None) -> Array | None:
         """Return a measurement as finite numbers, None where it is something else."""

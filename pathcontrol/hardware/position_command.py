@@ -15,6 +15,7 @@ from pathcontrol.control.wrappers.pace_rule import rate_bounds
 from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.errors import InputError
 from pathcontrol.hardware.servo_model import ServoModel
+from pathcontrol.hardware.start_check import find_start_fault, read_tube
 from pathcontrol.hardware.wait_rule import WaitRule
 from pathcontrol.robot.friction import FrictionLaw, Viscous, no_friction
 from pathcontrol.robot.model import RobotModel
@@ -66,6 +67,7 @@ class PositionCommand:
         tolerance: ‖d‖ [rad] at which the plan rests; from half of it on it slows down. Choose it above what the arm
             deviates in free motion, because of noise or a lag that is not quite T.
         bandwidth: ω [rad/s], how stiffly the command stays by an arm that deviates.
+        tube: distance from the path [rad] beyond which no arm starts, as commands would bring it there; inf for any.
 
     Attributes:
         law: the law with its speed input.
@@ -87,6 +89,7 @@ class PositionCommand:
         acceleration: ArrayLike | None = None,
         tolerance: float = 0.01,
         bandwidth: float = 20.0,
+        tube: float = 0.5,
     ) -> None:
         check_controller("law", law)
         if isinstance(law.task, TaskBatch) or any(np.ndim(getattr(law, name)) > 1 for name in law.gains):
@@ -96,6 +99,7 @@ class PositionCommand:
         self.law = LawWrapper(law, self._wait)
         self.period, robot = as_scalar("period", period, positive=True), law.robot
         self._omega = as_scalar("bandwidth", bandwidth, positive=True)
+        self._tube = read_tube(tube)
         self._servo = ServoModel(_spread("lag", lag, robot.n, least=0.0), self.period)
         limit = np.where(
             (robot.limits.velocity > 0) & (robot.limits.velocity < _NO_LIMIT), robot.limits.velocity, np.inf
@@ -106,7 +110,8 @@ class PositionCommand:
         self._lower = np.where(limited, robot.limits.lower, -np.inf)
         self._upper = np.where(limited, robot.limits.upper, np.inf)
         self._plant = Plant(robot.with_friction(_compensated_friction(law)), self.period)
-        self.start(np.asarray(law.task.q_d(np.array(law.task.s0)), dtype=np.float64).reshape(robot.n))
+        self._start(np.asarray(law.task.q_d(np.array(law.task.s0)), dtype=np.float64).reshape(robot.n))
+        self._started = False
 
     @property
     def s(self) -> float:
@@ -119,21 +124,38 @@ class PositionCommand:
         return self.law.robot
 
     def start(self, q: ArrayLike, qd: ArrayLike | None = None) -> None:
-        """Start with an arm at q [rad] and q̇ [rad/s], each (n,); at rest by default."""
-        n = self.robot.n
-        self.q = as_joint_vector("q", q, n).copy()
-        self.qd = np.zeros(n) if qd is None else as_joint_vector("qd", qd, n).copy()
+        """Start with an arm at q [rad] and q̇ [rad/s], each (n,); at rest by default.
+
+        Without a start, the first measurement is one.
+
+        Raises:
+            InputError: the arm is out of the ``tube`` around the path, or beyond a position limit.
+        """
+        position = as_joint_vector("q", q, self.robot.n)
+        velocity = np.zeros(self.robot.n) if qd is None else as_joint_vector("qd", qd, self.robot.n)
+        s = float(np.atleast_2d(self.law.start(position, velocity))[0, 0])
+        away = float(np.linalg.norm(np.asarray(self.law.task.q_d(np.array(s))).reshape(-1) - position))
+        if fault := find_start_fault(self.robot, position, self._lower, self._upper, away, self._tube):
+            raise InputError(fault, argument="q", value=position.tolist())
+        self._start(position, velocity)
+
+    def _start(self, q: Array, qd: Array | None = None) -> None:
+        """Start at (q, q̇), (n,) each."""
+        self.q, self.qd = q.copy(), np.zeros_like(q) if qd is None else qd.copy()
         self._z = np.atleast_2d(self.law.start(self.q, self.qd))
         self._before = self._now = self.q.copy(), self.qd.copy()  # of the virtual arm, a period apart
         self._passed, self._pace, self._ticks = 1.0, 1.0, 0  # share of that period, λ, periods of the virtual arm
         self._servo.start(self.q)
-        self.faults, self._bad = 0, 0
+        self.faults, self._bad, self._started = 0, 0, True
 
     def step(self, q: Any) -> Array:
         """Return the position to be reached at the next period [rad], (n,), for the measured q [rad], (n,).
 
-        The array is a new one each time.
+        The array is a new one each time. The first step is a start where :meth:`start` was not called, and raises as
+        that does.
         """
+        if not self._started:
+            self.start(q)
         self._watch(self._servo.expect(self.q).update(q))
         self._pace = self._choose_pace()
         self._passed += self._pace

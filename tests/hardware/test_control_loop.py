@@ -201,12 +201,101 @@ def test_an_arm_that_leaves_the_tube_is_held_or_damped(away, mode):
     assert "from its path" in loop.status.reason
 
 
-def test_a_start_off_the_path_is_no_leaving():
+def test_a_start_off_the_path_within_the_tube_runs():
     law = law_of(2)
-    arm, loop = Simulated(law), ControlLoop(law, H, Envelope(tube=0.2))
+    arm, loop = Simulated(law), ControlLoop(law, H, Envelope(tube=0.6))
     arm.q = arm.q + 0.4
     loop.start(arm.q[0], arm.qd[0])
     arm.drive(loop, 500)
+    assert loop.status.mode == Mode.RUN
+
+
+AFAR = {
+    "elsewhere": (lambda q: q + np.array([0, 0, 0, 0, 2.09, 0]), "bring it there, or widen tube"),
+    "joints reversed": (lambda q: q[::-1], "bring it there, or widen tube"),
+    "degrees": (np.rad2deg, "did you mean degrees?"),
+    "beyond a limit": (lambda q: q + np.array([0, 0, 2.0, 0, 0, 0]), "outside its limits"),
+}
+
+
+@pytest.mark.parametrize("kind", LAWS)
+@pytest.mark.parametrize("where", AFAR)
+def test_an_arm_that_starts_far_from_its_path_is_damped_and_says_why(where, kind):
+    law = law_of(6, kind)
+    move, said = AFAR[where]
+    arm, loop = Simulated(law), ControlLoop(law, H)
+    begin = arm.q[0].copy()
+    arm.q = move(arm.q[0])[None].copy()
+    loop.start(arm.q[0])
+    assert (loop.status.mode, loop.status.faults) == (Mode.DAMP, {"start": 1})
+    assert said in loop.status.reason
+    loop.resume()
+    weight = law.robot.gravity(arm.q[0])
+    done = arm.drive(loop, 100)
+    assert loop.status.mode == Mode.DAMP
+    np.testing.assert_allclose(done["tau"][0], np.clip(weight, -loop.envelope.torque, loop.envelope.torque))
+    assert np.abs(done["qd"]).max() < 0.02  # it stays where it was put
+    arm.q = begin[None].copy()  # somebody brings it to its path
+    loop.start(arm.q[0], arm.qd[0], arm.t)
+    arm.drive(loop, 50)
+    assert (loop.status.mode, loop.status.faults) == (Mode.RUN, {})
+
+
+def test_a_start_beyond_a_limit_of_the_envelope_is_damped_also_where_there_is_no_tube():
+    law = law_of(2)
+    loop = ControlLoop(law, H, Envelope(tube=np.inf, lower=-1.0, upper=1.5))
+    loop.start([0.2, 1.6])
+    assert loop.status.mode == Mode.DAMP
+    assert "limits of -1 to 1.5 rad" in loop.status.reason
+    loop.start([0.2, 1.4])
+    assert loop.status.mode == Mode.RUN
+
+
+@pytest.mark.parametrize("n", [2, 6, 7])
+def test_a_step_without_a_start_starts_where_the_arm_is(n):
+    law = law_of(n)
+    (arm, loop), started = (Simulated(law), ControlLoop(law, H)), ControlLoop(law, H)
+    arm.t = 1234.5
+    assert loop.status.mode == Mode.DAMP
+    assert loop.status.reason == "it has not been started"
+    loop.step(None, None, None)
+    loop.resume()
+    assert loop.status.mode == Mode.DAMP
+    started.start(arm.q[0], arm.qd[0], arm.t)
+    tau = started.step(arm.q[0], arm.qd[0], arm.t)
+    assert (loop.step(arm.q[0], arm.qd[0], arm.t) == tau).all()
+    assert loop.status == started.status
+    afar = ControlLoop(law, H)
+    away = arm.q[0] + 1.0
+    np.testing.assert_allclose(
+        afar.step(away, np.zeros(n), 0.0),
+        np.clip(law.robot.gravity(away), -loop.envelope.torque, loop.envelope.torque),
+    )
+    assert afar.status.mode == Mode.DAMP
+
+
+def test_a_hold_or_a_stop_before_the_first_step_lasts():
+    law = law_of(2)
+    for act, mode in ((lambda loop: loop.hold(), Mode.HOLD), (lambda loop: loop.stop("not yet"), Mode.DAMP)):
+        arm, loop = Simulated(law), ControlLoop(law, H)
+        act(loop)
+        arm.drive(loop, 5)
+        assert loop.status.mode == mode
+
+
+def test_a_plan_that_is_held_outside_the_tube_goes_on_inside_only():
+    law = law_of(2, pc.ExtendedMotionPlan)
+    arm, loop = Simulated(law), ControlLoop(law, H, Envelope(tube=0.2, jump=10.0))
+    loop.start(arm.q[0], arm.qd[0])
+    arm.drive(loop, 50)
+    arm.q = arm.q + np.array([0.25, 0.0])
+    arm.drive(loop, 1)
+    assert loop.status.mode == Mode.HOLD
+    loop.resume()
+    assert loop.status.mode == Mode.HOLD
+    assert "bring it there" in loop.status.reason
+    arm.drive(loop, 300)  # the law brings it back to where the plan rests
+    loop.resume()
     assert loop.status.mode == Mode.RUN
 
 

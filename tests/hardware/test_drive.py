@@ -155,6 +155,14 @@ def test_an_arm_that_stops_by_itself_leaves_a_loop_that_only_carries_weight():
     assert loop.status.mode == Mode.RUN
 
 
+def test_a_drive_from_afar_is_refused_before_anything_moves():
+    arm = SimulatedArm(law_of())
+    arm.q = arm.q + 1.0
+    with pytest.raises(ArmError, match="from the path, the tube is"):
+        drive(ControlLoop(law_of(), H), arm, 1.0)
+    assert (arm.reads, arm.sent, arm.finished) == (0, [], 1)
+
+
 def test_an_arm_that_gives_no_measurement_is_an_error_and_torque_control_is_ended():
     arm = SimulatedArm(law_of(), **{f"tick{k}": lambda arm: "lost" for k in range(1, 101)})
     with pytest.raises(ArmError, match="no measurement"):

@@ -182,6 +182,24 @@ def test_bad_measurements_are_bridged_and_many_hold_the_plan():
     assert np.abs(command.qd).max() > 0.3
 
 
+@pytest.mark.parametrize("kind", [pc.Projection, pc.ExtendedMotionPlan])
+def test_an_arm_far_from_its_path_is_refused_also_by_a_step_without_a_start(kind):
+    law = law_of(6, kind)
+    begin = start_of(law)
+    for q, said in (
+        (begin + 0.5, "widen tube"),
+        (begin[::-1], "widen tube"),
+        (np.rad2deg(begin), "did you mean degrees"),
+    ):
+        for act in (pc.PositionCommand(law, H).start, pc.PositionCommand(law, H).step):
+            with pytest.raises(InputError, match=said):
+                act(q)
+    pc.PositionCommand(law, H, tube=2.0).start(begin + 0.5)
+    one, other = pc.PositionCommand(law, H), pc.PositionCommand(law, H)
+    one.start(begin + 0.1)
+    assert (one.step(begin + 0.1) == other.step(begin + 0.1)).all()
+
+
 def test_commands_are_the_same_again_from_the_same_measurements():
     law = law_of(2)
     command, q = pc.PositionCommand(law, H, lag=0.05), start_of(law)
@@ -193,7 +211,8 @@ def test_commands_are_the_same_again_from_the_same_measurements():
 
 
 @pytest.mark.parametrize(
-    "options", [{"period": 0.0}, {"lag": -1.0}, {"velocity": 0.0}, {"acceleration": [1.0]}, {"tolerance": 0.0}]
+    "options",
+    [{"period": 0.0}, {"lag": -1.0}, {"velocity": 0.0}, {"acceleration": [1.0]}, {"tolerance": 0.0}, {"tube": 0.0}],
 )
 def test_wrong_arguments_are_told(options):
     with pytest.raises(InputError, match=next(iter(options))):

@@ -145,7 +145,7 @@ class _Patient:
         self._calm = self._calm + 1 if held else 0
         if self._calm * self._loop.period > _CALM:
             self._loop.resume()
-            self._calm, self.resumed = 0, self.resumed + 1
+            self._calm, self.resumed = 0, self.resumed + (self._loop.status.mode == Mode.RUN)
 
     def finish(self) -> None:
         self._line.finish()
