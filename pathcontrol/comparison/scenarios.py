@@ -55,7 +55,7 @@ class Scenario:
         event: from when to when something happens [s]; ``None`` where all of the run is as it is.
         gains: what all laws share.
         override: an operator's input to the speed of all laws, as for :class:`SpeedOverride`, or ``None``.
-        acceleration: largest rate of the factor of the speed that follows it [1/s].
+        acceleration: largest rate of the factor of the speed that follows it [1/s], or ``None`` for what motors allow.
         engine: which engine runs it, see :func:`simulate`.
         undisturbed: the scenario without what happens in it; ``None`` if nothing does. It is run for ``duration``, too.
         laws: laws beside the known ones, by name: names of others, or functions of arm and task.
@@ -79,7 +79,7 @@ class Scenario:
     event: tuple[float, float] | None = None
     gains: Gains = field(default_factory=Gains)
     override: Override | None = None
-    acceleration: float = 10.0
+    acceleration: float | None = None
     engine: Engine = "auto"
     undisturbed: Scenario | None = None
     laws: Mapping[str, Law] = field(default_factory=dict)

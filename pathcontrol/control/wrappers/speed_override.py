@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Annotated
 
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.control.base import Controller
+from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.control.wrappers.override_rule import Override, OverrideRule
+from pathcontrol.control.wrappers.stopping_rate import stopping_rate
 from pathcontrol.control.wrappers.wrapper import LawWrapper
 
 
@@ -25,8 +26,9 @@ class SpeedOverride(LawWrapper):
         law: any law that is to be overridden.
         override: u from −2 to 2: a number, one for each rollout (N,), a function of the time since the law took over,
             in seconds, that returns either, or steps [[t, u], …], (m, 2), with u = 1 before the first.
-        acceleration: largest |ẇ| [1/s], 10 by default: from full speed to rest in a tenth of a second. The acceleration
-            along the path is ẇ‖q_d'ϑ‖ [rad/s²], and M(q)q_d'ϑẇ the torque for it [N m].
+        acceleration: largest |ẇ| [1/s]. At 10 the plan comes from full speed to rest in a tenth of a second; the
+            acceleration along the path is ẇ‖q_d'ϑ‖ [rad/s²], the torque for it M(q)q_d'ϑẇ [N m]. By default it is what
+            the torque limits of the law's model leave beside the motion everywhere on the path, from 2 to 10.
 
     Raises:
         InputError: u is not from −2 to 2, also while the law runs, or an argument has the wrong shape.
@@ -36,6 +38,8 @@ class SpeedOverride(LawWrapper):
         self,
         law: Controller,
         override: Annotated[Override, Form.ARRAY] = 1.0,
-        acceleration: Annotated[float, Form.POSITIVE, Unit("1/s")] = 10.0,
+        acceleration: Annotated[float, Form.POSITIVE, Unit("1/s")] | None = None,
     ) -> None:
-        super().__init__(law, OverrideRule(override, acceleration))
+        check_controller("law", law)
+        rate = stopping_rate(law.robot, law.task) if acceleration is None else acceleration
+        super().__init__(law, OverrideRule(override, rate))
