@@ -9,8 +9,7 @@ from pathcontrol.analysis.limit_shares import RATIOS, find_worst_shares, is_pass
 from pathcontrol.analysis.progress import ENOUGH, progress
 from pathcontrol.analysis.window import samples_of
 from pathcontrol.errors import InputError
-from pathcontrol.robot.friction import levels_of
-from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.checks.friction_knowledge import advise_on_dry_friction
 from pathcontrol.simulation.config import laws
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.batch.task_batch import TaskBatch
@@ -42,9 +41,7 @@ def stands_still(run: Run) -> bool:
 
 def remedy(run: Run) -> str:
     """Return advice for an arm that stands still."""
-    if _has_dry_friction(run) and not any(law.get("friction") in ("full", "observed") for law in laws(run.config)):
-        return 'dry friction that the law does not compensate holds it; give the controller friction="full"'
-    return "give the controller larger gains, or torque limits that hold and move the arm"
+    return _advise_on_friction(run) or "give the controller larger gains, or torque limits that hold and move the arm"
 
 
 def _find_faults(run: Run) -> dict[str, str]:
@@ -80,13 +77,14 @@ def _progress(run: Run) -> float:
     return 1.0 if np.isnan(done) else done
 
 
-def _has_dry_friction(run: Run) -> bool:
-    """Return whether the arm is known to have dry friction."""
+def _advise_on_friction(run: Run) -> str:
+    """Return why dry friction holds the arm, "" where it is not known to."""
     try:
-        robot: RobotModel = run.robot
+        arm, model = run.robot, run.model
     except InputError:
-        return False
-    return any(bool(np.any(level > 0)) for level in levels_of(robot.friction, np.zeros(robot.n)))
+        return ""
+    modes = [str(law.get("friction")) for law in laws(run.config)]
+    return advise_on_dry_friction(modes, model.friction, arm.friction)
 
 
 def _gather(rows: list[tuple[int, str]], rollouts: int) -> str:

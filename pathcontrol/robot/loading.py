@@ -10,6 +10,7 @@ import numpy as np
 from lxml import etree
 
 from pathcontrol._arrays import LARGEST, Array, as_quantity, freeze
+from pathcontrol._expect import expect
 from pathcontrol.arguments import Form
 from pathcontrol.errors import UrdfError, warn
 from pathcontrol.robot.actuation import Actuation, Limits
@@ -34,6 +35,7 @@ def load_robot(
     tip: str | None = None,
     estimated_inertia: bool | float = False,
     package_dirs: Annotated[str | Path | Sequence[str | Path], Form.TEXTS] = (),
+    friction: FrictionLaw | None = None,
     threads: int = 1,
 ) -> RobotModel:
     """Load the model of an arm.
@@ -49,13 +51,18 @@ def load_robot(
         estimated_inertia: give links that have a shape and no mass one from it, as solid bodies of 1300 kg/m³, or of
             the density given [kg/m³].
         package_dirs: folders in which ``package://`` mesh files are looked up: those that hold packages, or packages.
+        friction: the friction of the joints that are free, in place of that in the URDF, which is kept by default;
+            :meth:`RobotModel.with_friction` with ``None`` takes all of it away.
         threads: threads for batched calls.
 
     Raises:
         UrdfError: the URDF is missing or cannot be used; the message lists every reason found.
         UnknownNameError: no such robot, joint or tip; the message lists the known ones.
-        InputError: a joint is to be locked and kept, or a value is out of range.
+        InputError: a joint is to be locked and kept, a value is out of range, or ``friction`` is no friction law for as
+            many joints.
     """
+    if friction is not None:
+        expect("friction", friction, FrictionLaw)
     urdf = find_urdf(source, _folders(package_dirs))
     label = "this URDF" if str(source).lstrip().startswith("<") else repr(str(source))
     root, mended = _parse(urdf, label)
@@ -71,7 +78,8 @@ def load_robot(
     for sentence in locked_beyond_limits(root, locked, lock or ()):
         warn(f"{label}: {sentence}")
     robot = _build(urdf, threads)
-    return lock_joints(robot, locked) if locked else robot
+    robot = lock_joints(robot, locked) if locked else robot
+    return robot if friction is None else robot.with_friction(friction)
 
 
 def _parse(urdf: UrdfSource, label: str) -> Parsed:

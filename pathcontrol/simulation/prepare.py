@@ -10,6 +10,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
 from pathcontrol.simulation.checks.disturbance_loop import check_loop
+from pathcontrol.simulation.checks.friction_knowledge import warn_of_unknown_friction
 from pathcontrol.simulation.checks.idle_times import warn_of_idle_times
 from pathcontrol.simulation.checks.slips import warn_of_idle_changes, warn_of_slips, warn_of_walls
 from pathcontrol.simulation.checks.too_long import warn_of_steps
@@ -70,6 +71,7 @@ def prepare(
     warn_of_idle_changes(robot, disturbance)
     warn_of_idle_times(disturbance, loop, duration, first)
     warn_of_walls(disturbance, q, first)
+    warn_of_unknown_friction(controllers, robot, first)
     arm, said = choose_engine(engine, controllers, loop, robot, q, qd, Outside(disturbance, first))
     slow = "" if first else warn_of_steps(controllers, loop, robot, q, qd, disturbance, duration)
     return Prepared(arm, said, slip or slow)

@@ -117,5 +117,5 @@ def simulate(
     )
     arm.divergence.check(run)
     if not first:
-        warn_if_still(run, robot, controller.friction)
+        warn_if_still(run, robot, controller)
     return run

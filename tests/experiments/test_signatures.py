@@ -128,7 +128,7 @@ def test_an_argument_more_of_a_function_is_a_key_more(monkeypatch):
         """Load an arm, mirrored if asked."""
 
     monkeypatch.setattr("pathcontrol.robot.loading.load_robot", load)
-    assert keys_of("robot") == {"source", "lock", "estimated_inertia", "payload", "tool", "mirrored"}
+    assert keys_of("robot") == {"source", "friction", "lock", "estimated_inertia", "payload", "tool", "mirrored"}
     with pytest.raises(ValidationError) as error:
         Experiment.model_validate({"robot": {"source": "two_link", "mirrored": 1}})
     assert any(one["msg"] == " = 1, expected true or false" for one in error.value.errors())

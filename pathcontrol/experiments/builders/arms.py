@@ -25,8 +25,6 @@ from pathcontrol.robot.loading import load_robot
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.robot.urdf import parse_urdf
 
-_KEY = "plant.friction"
-
 
 def build_arms(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, RobotModel]:
     """Return the controller's model and the simulated arm.
@@ -39,13 +37,14 @@ def build_arms(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, Robo
 
 
 def build_models(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, RobotModel]:
-    """Return the arm without a payload, and the controller's model.
+    """Return the arm without a payload, with the friction of its URDF, and the controller's model.
 
     Raises:
         ExperimentError: a robot, joint or frame does not exist, or a value is out of range.
     """
     bare = _with_tool(_load(experiment, base_dir), experiment)
-    model = _add_payload("robot.payload", bare, experiment.robot.payload)
+    loaded, place = _add_payload("robot.payload", bare, experiment.robot.payload), _place(experiment, base_dir)
+    model = with_friction("robot.friction", loaded, experiment.robot.friction, place)
     if not model.has_mass:
         raise ExperimentError(
             f"robot: no link of {model.name} has a mass, so there are kinematics and no dynamics; give "
@@ -62,7 +61,16 @@ def build_plant(experiment: Experiment, bare: RobotModel, model: RobotModel, bas
     """
     plant = experiment.plant
     carrier = model if plant.payload is None else _add_payload("plant.payload", bare, plant.payload)
-    return with_friction(carrier, plant.friction, Place(base_dir, experiment.to_radians))
+    if plant.friction is None:
+        return carrier if carrier is model else carrier.with_friction(model.friction)
+    if plant.friction == "urdf":
+        return carrier.with_friction(bare.friction)
+    return with_friction("plant.friction", carrier, plant.friction, _place(experiment, base_dir))
+
+
+def _place(experiment: Experiment, base_dir: Path) -> Place:
+    """Return the place of an experiment."""
+    return Place(base_dir, experiment.to_radians)
 
 
 def _load(experiment: Experiment, base_dir: Path) -> RobotModel:
@@ -127,21 +135,21 @@ def _add_payload(key: str, robot: RobotModel, payload: Section | None) -> RobotM
         return robot.with_payload(**given)
 
 
-def with_friction(robot: RobotModel, section: Any, place: Place) -> RobotModel:
-    """Return ``robot`` with the friction of its URDF, with none, or with the laws of a section or of several.
+def with_friction(key: str, robot: RobotModel, section: Any, place: Place) -> RobotModel:
+    """Return ``robot`` with the friction that it has, with none, or with the laws of a section or of several.
 
     Raises:
         ExperimentError: a coefficient is negative, or there is not one for each joint.
     """
-    if isinstance(section, str):
-        return robot if section == "urdf" else robot.with_friction(None)
-    with report_by_key(_KEY, FrictionTable.model_fields):
+    if section is None or isinstance(section, str):
+        return robot.with_friction(None) if section == "none" else robot
+    with report_by_key(key, FrictionTable.model_fields):
         if isinstance(section, FrictionTable):
             laws = _laws(section, robot.n, place)
         elif isinstance(section, list):
-            laws = [make(f"{_KEY}[{i}]", one, FRICTION_LAWS, place) for i, one in enumerate(section)]
+            laws = [make(f"{key}[{i}]", one, FRICTION_LAWS, place) for i, one in enumerate(section)]
         else:
-            laws = [make(_KEY, section, FRICTION_LAWS, place)]
+            laws = [make(key, section, FRICTION_LAWS, place)]
         return robot.with_friction(reduce(add, laws))
 
 

@@ -42,24 +42,6 @@ def _density(value: Any) -> Any:
     return value
 
 
-class RobotSection(Section):
-    """The arm as the controller knows it: the arguments of :func:`pathcontrol.load_robot`, and what is mounted on it.
-
-    ``lock`` is in ``angle_unit``, and in metres for sliding joints.
-    """
-
-    not_arguments: ClassVar[tuple[str, ...]] = ("source", "payload", "tool")
-    source: Text
-    lock: Annotated[dict[str, Number] | None, Unit("rad", "m")] = None
-    estimated_inertia: Annotated[bool | float | None, PlainValidator(_density)] = None
-    payload: Payload = None
-    tool: ToolFrame | None = None
-
-
-#: a robot section with the rest of the arguments
-Robot = Annotated[RobotSection, table_for("robot.loading:load_robot", ("threads",), RobotSection)]
-
-
 class Directions(Section):
     """Coulomb levels [N m] by the direction of motion, one for each joint."""
 
@@ -107,8 +89,31 @@ def _friction(value: Any) -> Any:
     return value
 
 
+#: the friction of an arm, as it is or as the controller knows it
+Friction = Annotated[Any, PlainValidator(_friction)]
+
+
+class RobotSection(Section):
+    """The arm as the controller knows it: the arguments of :func:`pathcontrol.load_robot`, and what is mounted on it.
+
+    ``lock`` is in ``angle_unit``, and in metres for sliding joints.
+    """
+
+    not_arguments: ClassVar[tuple[str, ...]] = ("source", "payload", "tool", "friction")
+    source: Text
+    lock: Annotated[dict[str, Number] | None, Unit("rad", "m")] = None
+    estimated_inertia: Annotated[bool | float | None, PlainValidator(_density)] = None
+    friction: Friction = None
+    payload: Payload = None
+    tool: ToolFrame | None = None
+
+
+#: a robot section with the rest of the arguments
+Robot = Annotated[RobotSection, table_for("robot.loading:load_robot", ("threads",), RobotSection)]
+
+
 class Plant(Section):
     """The arm that is simulated: the controller's model, but for what is said here."""
 
-    friction: Annotated[Any, PlainValidator(_friction)] = "urdf"
+    friction: Friction = None
     payload: Payload = None

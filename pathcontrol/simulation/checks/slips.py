@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from pathcontrol._arrays import Array
+from pathcontrol.control.base import Controller
 from pathcontrol.errors import warn
 from pathcontrol.robot.batch import RobotBatch
-from pathcontrol.robot.friction import levels_of
 from pathcontrol.simulation.arm.disturbance import Disturbance, list_terms
 from pathcontrol.simulation.arm.friction_change import FrictionChange
 from pathcontrol.simulation.arm.wall import Wall
+from pathcontrol.simulation.checks.friction_knowledge import advise_on_dry_friction
 from pathcontrol.simulation.checks.position_range import describe_excess, describe_turns, find_excess
 from pathcontrol.simulation.checks.weight import PathPostures, check_weight
 from pathcontrol.simulation.loops import Arm
@@ -39,20 +40,17 @@ def warn_of_slips(robot: Arm, task: PathTask, q: Array, first: int = 0) -> str:
     return start
 
 
-def warn_if_still(run: Run, robot: Arm, friction: str) -> None:
+def warn_if_still(run: Run, robot: Arm, controller: Controller) -> None:
     """Warn of an arm that has not moved at all, held by dry friction that its law does not compensate."""
     arm = robot.robots[0] if isinstance(robot, RobotBatch) else robot
-    dry = any(bool(np.any(level > 0)) for level in levels_of(arm.friction, np.zeros(arm.n)))
-    if not dry or friction in ("full", "observed") or run.time[-1] < _LONG or (run.status != "running").any():
+    advice = advise_on_dry_friction([controller.friction], controller.robot.friction, arm.friction)
+    if not advice or run.time[-1] < _LONG or (run.status != "running").any():
         return
     q = run.array("q")
     if (np.abs(q[:, -1] - q[:, 0]) > _MOVED).any():  # as most do, found without a look at all samples
         return
     if (np.ptp(q, axis=1) <= _MOVED).all():
-        warn(
-            f"the arm did not move in {run.time[-1]:g} s: its dry friction holds it, which the law does not "
-            'compensate; give the controller friction="full"'
-        )
+        warn(f"the arm did not move in {run.time[-1]:g} s: {advice}")
 
 
 def warn_of_idle_changes(robot: Arm, disturbance: Disturbance | None) -> None:
