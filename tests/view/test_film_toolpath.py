@@ -17,7 +17,9 @@ from pathcontrol import (
     ToolpathTask,
     simulate_sequence,
     tool_deviation,
+    toolpath_metrics,
 )
+from pathcontrol.figures import error_figure, tool_figure
 from pathcontrol.toolpaths.segments.segment import Polyline
 from pathcontrol.view.animation.path_error import PathError, in_fitting_units
 from pathcontrol.view.animation.record import record
@@ -67,6 +69,41 @@ def test_cuts_are_lines_and_rapids_dashes_where_the_drawing_has_them(film: Reel,
     assert {"desired path": "line", "rapid": "dashed"}.items() <= {
         entry["label"]: entry["kind"] for entry in film.header["legend"]
     }.items()
+
+
+def test_rapids_that_were_made_are_dashed_in_planes(film: Reel, run: Run, task: ToolpathTask) -> None:
+    """Each kept sample of the film's plane says whether it is on a rapid; the figure draws both kinds apart."""
+    [trace] = film.header["plane"]["traces"]
+    times, rapid = film.block(trace["times"]), film.block(trace["rapid"]).astype(bool)
+    expected = np.array([contour.rapid for contour in task.contours])[run.array("path_index")]
+    at = np.abs(run.time[:, None] - run.time[0] - times).argmin(0)
+    assert (rapid == expected[at]).all()
+    assert rapid.any()
+    assert not rapid.all()
+    changes = np.flatnonzero(np.diff(expected))
+    assert np.isin(changes, at).all()  # no dash ends in a cut
+    axes = tool_figure(run).axes[0]
+    dashed, solid = (
+        [
+            line
+            for line in axes.lines
+            if len(line.get_xdata()) == len(expected) and (line.get_linestyle() == "--") == kind
+        ]
+        for kind in (True, False)
+    )
+    (made,) = (np.isfinite(line.get_xdata()) for line in dashed)
+    (cut,) = (np.isfinite(line.get_xdata()) for line in solid)
+    assert (cut == ~expected).all()
+    assert (made >= expected).all()
+    assert made.sum() <= expected.sum() + 2 * len(changes)
+
+
+def test_peaks_of_the_figure_are_those_of_the_table(run: Run) -> None:
+    """Both are of the cuts, however large the errors of the rapids are."""
+    numbers = toolpath_metrics(run)
+    for axes, name in zip(error_figure(run).axes, ("e_p_peak", "e_v_peak"), strict=True):
+        (words,) = (text.get_text() for text in axes.get_legend().get_texts())
+        assert words.startswith(f"peak of the cuts {np.rad2deg(numbers[name][0]):.3g} deg")
 
 
 def test_the_distance_is_that_of_the_cuts_in_a_fitting_unit(film: Reel, run: Run, task: ToolpathTask) -> None:

@@ -16,7 +16,7 @@ from pathcontrol.view.figures.inset import add_inset, later
 from pathcontrol.view.figures.lettering import legend
 from pathcontrol.view.figures.limits import extent, from_zero, over_time
 from pathcontrol.view.figures.lines import select_by_column, series
-from pathcontrol.view.figures.shown import Runs, Shown, readable, shown
+from pathcontrol.view.figures.shown import Runs, Shown, cutting, readable, shown
 from pathcontrol.view.figures.style import COLUMN, INK, PEAK_LOOK, SMALL, apply_style, new_figure, style
 
 _MOST_PEAKS = 3
@@ -26,7 +26,7 @@ _BANDS = ((0.0, 1.0, 0.15), (0.05, 0.95, 0.3))  # lower and upper quantile, and 
 def error_figure(run: Runs, rollout: int = 0) -> Figure:
     """Draw ‖e_p‖ [deg] and ‖e_v‖ [deg/s] over time, as in the paper's figures 8 and 10, with their late peaks.
 
-    The inset magnifies the second half, of which the peaks are.
+    The inset magnifies the second half, of which the peaks are; those of a toolpath are of its cuts, as in ``metrics``.
 
     Args:
         run: a run, or several by their names.
@@ -108,7 +108,7 @@ def _norms_figure(runs: Sequence[Shown], draw: _Draw, more: Mapping[str, Artist]
 
 
 def _draw_norms(axes: Axes, runs: Sequence[Shown], name: str, draw: _Draw) -> None:
-    """Draw one norm over the whole time, and an inset of the second half, with its peaks there."""
+    """Draw one norm over the whole time, and an inset of the second half, with its peaks."""
     found = [norms(one, name) for one in runs]
     values, times, unit = [v for v, _ in found], [one.run.time for one in runs], found[0][1]
 
@@ -119,23 +119,30 @@ def _draw_norms(axes: Axes, runs: Sequence[Shown], name: str, draw: _Draw) -> No
     draw_all(axes)
     axes.set_ylabel(norm_label(name, unit))
     from_zero(axes, values)
-    peaks = [extent([v[:, later(time)]])[1] for time, v in zip(times, values, strict=True)]
-    inset = add_inset(axes, times, values, draw_all)
-    _label_peaks(axes if inset is None else inset, runs, peaks, unit, "second-half peak" if inset is None else "peak")
+    cut = [None if (cuts := cutting(one)).all() else cuts for one in runs]
+    peaks = [extent([v[:, later(t) if c is None else c]])[1] for v, t, c in zip(values, times, cut, strict=True)]
+    inset = add_inset(axes, times, values, draw_all) if all(c is None for c in cut) else None
+    late = "second-half peak" if inset is None else "peak"
+    words = [late if c is None else "peak of the cuts" for c in cut]
+    _label_peaks(axes if inset is None else inset, runs, peaks, unit, words)
 
 
-def _label_peaks(axes: Axes, runs: Sequence[Shown], peaks: Sequence[float], unit: str, word: str) -> None:
-    """Draw a dashed line at each peak of the second half, with its number above the panel."""
+def _label_peaks(axes: Axes, runs: Sequence[Shown], peaks: Sequence[float], unit: str, words: Sequence[str]) -> None:
+    """Draw a dashed line at each peak, with its number above the panel after the word for what it is the peak of."""
     colours = [INK] if len(runs) == 1 else [one.colour for one in runs]
     lines = [
         axes.axhline(peak, color=colour, **PEAK_LOOK) for peak, colour in zip(peaks, colours, strict=True) if peak > 0
     ]
     if not lines or len(lines) > _MOST_PEAKS:
         return
-    numbers = [f"{peak:.3g}" for peak in peaks if peak > 0]
+    numbers = [(word, f"{peak:.3g}") for peak, word in zip(peaks, words, strict=True) if peak > 0]
+    told = ["", *(word for word, _ in numbers)]
     axes.legend(
         lines,
-        [f"{word} " * (k == 0) + number + f" {unit}" * (k == len(lines) - 1) for k, number in enumerate(numbers)],
+        [
+            f"{word} " * (word != told[k]) + number + f" {unit}" * (k == len(lines) - 1)
+            for k, (word, number) in enumerate(numbers)
+        ],
         loc="lower right",
         bbox_to_anchor=(1.0, 0.97),
         ncols=len(lines),

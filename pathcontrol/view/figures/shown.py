@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.analysis.window import own_samples
+from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
@@ -118,6 +120,14 @@ def own_robot(run: Run) -> RobotModel | None:
         return run.robot
     except InputError:
         return None
+
+
+def cutting(one: Shown) -> NDArray[np.bool_]:
+    """Return where the arm follows no rapid of a toolpath, (time,)."""
+    toolpath = as_toolpath(one.task) if "path_index" in one.run else None
+    if toolpath is None:
+        return np.ones(len(one.run.time), dtype=bool)
+    return ~np.array([contour.rapid for contour in toolpath.contours])[one.run.array("path_index")]
 
 
 def path_parameters(one: Shown) -> Array:

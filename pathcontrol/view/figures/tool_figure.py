@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
@@ -22,7 +23,7 @@ from pathcontrol.view.default_tool import with_tool
 from pathcontrol.view.figures.lettering import legend
 from pathcontrol.view.figures.limits import aspect, equal_plane, extent
 from pathcontrol.view.figures.lines import curve, drawable
-from pathcontrol.view.figures.shown import Runs, Shown, path_parameters, shown
+from pathcontrol.view.figures.shown import Runs, Shown, cutting, path_parameters, shown
 from pathcontrol.view.figures.style import (
     COLUMN,
     DESIRED_LOOK,
@@ -53,7 +54,7 @@ class ToolPositions(NamedTuple):
     """
 
     taken: Array
-    cutting: Array
+    cutting: NDArray[np.bool_]
     desired: list[tuple[Array, bool]]
 
     @property
@@ -110,11 +111,23 @@ def tool_figure(
             if bar and way.desired:
                 draw_coloured_line(figure, axes, taken, way.deviation, way.cutting)
             else:
-                curve(axes, *taken.T, **one.look)
+                _draw_taken(axes, taken, way.cutting, one)
                 entries[one.label or "tool"] = Line2D([], [], **one.look)
             axes.plot(*taken[:1].T, color=INK if bar else one.colour, **START_LOOK)
         legend(figure, entries | desired | {"start": Line2D([], [], color=INK, linestyle="", **START_LOOK)})
     return figure
+
+
+def _draw_taken(axes: Axes, taken: Array, cutting: NDArray[np.bool_], one: Shown) -> None:
+    """Draw the path taken (k, 2): rapids in dashes, with the steps that lead to them and from them."""
+    rapid = ~cutting
+    if not rapid.any():
+        curve(axes, *taken.T, **one.look)
+        return
+    rapid[:-1] |= ~cutting[1:]
+    rapid[1:] |= ~cutting[:-1]
+    curve(axes, *np.where(cutting[:, None], taken, np.nan).T, **one.look)
+    curve(axes, *np.where(rapid[:, None], taken, np.nan).T, color=one.colour, linewidth=0.7, linestyle=_RAPID)
 
 
 def draw_coloured_line(figure: Figure, axes: Axes, way: Array, deviation: Array, cutting: Array) -> None:
@@ -159,7 +172,7 @@ def _tool_path(one: Shown, robot: RobotModel | None, tool: str | None) -> ToolPo
     robot, frame = with_tool(robot, one.task, tool)
     q = drawable(one.run.array("q")[0])
     some = slice(None, None, -(-len(q) // _MOST_POSES))
-    return ToolPositions(_positions(robot, q[some], frame), _cutting(one)[some], _desired(one, robot, frame))
+    return ToolPositions(_positions(robot, q[some], frame), cutting(one)[some], _desired(one, robot, frame))
 
 
 def _positions(robot: RobotModel, q: Array, frame: str) -> Array:
@@ -167,13 +180,6 @@ def _positions(robot: RobotModel, q: Array, frame: str) -> Array:
     x, known = np.full((len(q), 3), np.nan), ~np.isnan(q).any(-1)
     x[known] = robot.frame_pose(q[known], frame)[:, :3, 3]
     return x
-
-
-def _cutting(one: Shown) -> Array:
-    """Return where the arm follows no rapid, (time,)."""
-    if "path_index" not in one.run or not isinstance(one.task, PathSequence):
-        return np.ones(len(one.run.time), dtype=bool)
-    return ~np.array(_rapids(one.task))[one.run.array("path_index")]
 
 
 def _rapids(task: PathSequence) -> list[bool]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.readable import in_degrees
@@ -147,7 +148,19 @@ def _moving(film: Film, run: int, recording: Recording, points: Array, fine: flo
     """Return a line that moves with the samples of a run, for the header."""
     while len(kept := line_keys(recording.time, points, fine)) > _MOST_POINTS:
         fine *= 1.5
-    return {"run": run, "times": film.block(recording.time[kept]), **_columns(film, points[kept])}
+    line: dict[str, Any] = {"run": run}
+    if (rapid := _on_rapids(recording)).any():
+        turns = np.flatnonzero(np.diff(rapid))  # the last sample of each cut and of each rapid
+        kept = np.union1d(kept, turns)
+        line["rapid"] = film.block(rapid[kept], "u1")
+    return {**line, "times": film.block(recording.time[kept]), **_columns(film, points[kept])}
+
+
+def _on_rapids(recording: Recording) -> NDArray[np.bool_]:
+    """Return at which samples the arm follows a rapid, (k,)."""
+    if recording.toolpath is None:
+        return np.zeros(len(recording.time), dtype=bool)
+    return np.array([contour.rapid for contour in recording.toolpath.contours])[recording.run.array("path_index")]
 
 
 def _columns(film: Film, points: Array) -> dict[str, Any]:

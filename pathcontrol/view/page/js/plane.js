@@ -1,13 +1,20 @@
 // The chart of a plane, with the same scale on both axes: the path, and what has been drawn of it by now.
 
 const REACH = 6; // px: as near as the nearest
+const DASH = [4, 4]; // px, of rapids
 
 class Plane {
   constructor(film, clock, plane) {
     Object.assign(this, { film, clock, plane, time: 0 });
-    const read = ({ times, x, y, ...rest }) => ({ ...rest, times: times && film.block(times), x: film.block(x), y: film.block(y) });
+    const read = ({ times, rapid, x, y, ...rest }) => ({
+      ...rest,
+      times: times && film.block(times),
+      rapid: rapid && film.block(rapid),
+      x: film.block(x),
+      y: film.block(y),
+    });
     this.desired = plane.desired.map(read);
-    this.traces = plane.traces.map((trace) => ({ ...read(trace), upTo: 0, guess: 0, drawnTo: null }));
+    this.traces = plane.traces.map((trace) => ({ ...read(trace), upTo: 0, guess: 0, drawnTo: null, length: 0 }));
     this.points = plane.points.map((point) => ({ ...read(point), guess: 0 }));
     this.moving = [...this.points, ...this.traces];
     this.box = boxOf([...this.desired, ...this.traces, ...this.points]);
@@ -63,7 +70,7 @@ class Plane {
       context.strokeStyle = cssColor("muted");
       context.globalAlpha = kind === "rapid" ? 0.6 : 0.5;
       context.lineWidth = kind === "rapid" ? 1 : 4;
-      context.setLineDash(kind === "rapid" ? [4, 4] : []);
+      context.setLineDash(kind === "rapid" ? DASH : []);
       this.line(context, x, y, 0, x.length - 1);
     }
   }
@@ -91,19 +98,32 @@ class Plane {
   // time went back, or the size is another: what was drawn goes
   clear() {
     this.drawn.getContext("2d").clearRect(0, 0, this.plot.clientWidth, this.plot.clientHeight);
-    for (const trace of this.traces) Object.assign(trace, { upTo: 0, drawnTo: null });
+    for (const trace of this.traces) Object.assign(trace, { upTo: 0, drawnTo: null, length: 0 });
   }
 
-  // on from where the line ends, to where the dot is
+  // on from where the line ends, to where the dot is; dashes go on where those of the last picture ended
   extend(trace) {
-    const { x, y, guess, upTo, tip, drawnTo } = trace;
+    const { x, y, rapid, guess, upTo, tip, drawnTo } = trace;
     if (guess < 0) return;
     const context = this.drawn.getContext("2d");
-    Object.assign(context, { strokeStyle: inked(this.film.header.runs[trace.run].color), lineWidth: 1.5, lineJoin: "round" });
-    context.beginPath();
-    context.moveTo(...(drawnTo ?? [this.map.x(x[0]), this.map.y(y[0])]));
-    for (let i = upTo + 1; i <= guess; i += 1) context.lineTo(this.map.x(x[i]), this.map.y(y[i]));
-    context.lineTo(...tip);
+    Object.assign(context, { strokeStyle: inked(this.film.header.runs[trace.run].color), lineJoin: "round" });
+    let last = drawnTo ?? [this.map.x(x[0]), this.map.y(y[0])];
+    let dashed = null;
+    for (let i = upTo + 1; i <= guess + 1; i += 1) {
+      const next = i <= guess ? [this.map.x(x[i]), this.map.y(y[i])] : tip;
+      const now = Boolean(rapid && rapid[Math.min(i, rapid.length - 1)]);
+      if (now !== dashed) {
+        if (dashed !== null) context.stroke();
+        context.beginPath();
+        context.moveTo(...last);
+        Object.assign(context, { lineWidth: now ? 1 : 1.5, lineDashOffset: trace.length });
+        context.setLineDash(now ? DASH : []);
+        dashed = now;
+      }
+      context.lineTo(...next);
+      trace.length += Math.hypot(next[0] - last[0], next[1] - last[1]);
+      last = next;
+    }
     context.stroke();
     Object.assign(trace, { upTo: guess, drawnTo: tip });
   }
