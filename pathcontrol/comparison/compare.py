@@ -22,6 +22,9 @@ from pathcontrol.simulation.engines import Engine, check_engine
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.simulate import simulate
 
+_ROUNDING = 1e-7  # rad, m, N m, …
+_BESIDE_OTHERS = 1e-6  # share of the largest mean
+
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
@@ -51,10 +54,22 @@ class Comparison:
 
     def best(self, measure: str) -> list[str]:
         """Return the laws whose mean of a measure is the least, within a thousandth; none where no mean is finite."""
-        means = {law: self.mean(law, measure) for law in self.measures}
-        known = {law: abs(mean) for law, mean in means.items() if np.isfinite(mean)}
+        known = self._sizes(measure)
         least = min(known.values(), default=0.0)
-        return [law for law, value in known.items() if value <= 1.001 * least + 1e-9]
+        return [law for law, value in known.items() if value <= max(1.001 * least, self.rounding(measure))]
+
+    def rounding(self, measure: str) -> float:
+        """Return the size below which a measure is 0 but for rounding, in SI units.
+
+        That is a millionth of the largest mean of all laws, or what a nearest point is known to if that is more: √ε of
+        a path of some radians.
+        """
+        return max(_ROUNDING, _BESIDE_OTHERS * max(self._sizes(measure).values(), default=0.0))
+
+    def _sizes(self, measure: str) -> dict[str, float]:
+        """Return the sizes of those means of a measure that are finite, by law."""
+        means = {law: self.mean(law, measure) for law in self.measures}
+        return {law: abs(mean) for law, mean in means.items() if np.isfinite(mean)}
 
     def to_dict(self) -> dict[str, Any]:
         """Return what JSON can hold: means by law and measure, ``spread``, ``rollouts`` and units; null for no number.

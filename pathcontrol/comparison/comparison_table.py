@@ -11,16 +11,20 @@ from pathcontrol.control.motion_control import MotionController
 from pathcontrol.control.wrappers.wrapper import unwrap
 
 _DIGITS = 3
-_NOTHING = 1e-9  # rad, m, N m, …: rounding of floats for an arm of usual size
+_WRITTEN = {"pd plus": "PD+", "slotine li": "Slotine–Li"}  # names that have more than letters
 
 
 def tabulate(compared: Comparison) -> list[list[str]]:
-    """Return the table of a comparison, heads first: a row for each measure, with ``*`` at its smallest mean."""
-    rows = [["", *(law.replace("_", " ") for law in compared.measures)]]
+    """Return the table of a comparison, heads first: a row for each measure, with ``*`` at its smallest mean.
+
+    Where the means of all laws are alike, there is none.
+    """
+    rows = [["", *map(law_title, compared.measures)]]
     for name, unit in MEASURES.items():
         factor, shown = reading(unit, np.zeros(0))
         label = f"{_in_words(name)} [{shown}]"
         best = compared.best(name)
+        best = [] if len(best) == len(compared.measures) else best
         rows.append([label, *(_cell(compared, law, name, factor, law in best) for law in compared.measures)])
     return rows
 
@@ -29,19 +33,28 @@ def describe_comparison(compared: Comparison) -> list[str]:
     """Return what the table is of, and in which measures motion control is the best, in sentences."""
     begin, end = compared.scenario.window
     count = len(next(iter(compared.runs.values())).status)
+    numbers = f"Mean ± standard deviation of {count} starts" if count > 1 else "The numbers of one start"
     lines = [
-        f"Mean ± standard deviation of {count} starts, from {begin:g} to {end:g} s; * is the smallest in size.",
+        f"{numbers}, from {begin:g} to {end:g} s; * is the smallest in size.",
         f"Recovered is an arm whose contour error stays below {RECOVERED:g} times its own undisturbed peak.",
     ]
     wins = [_in_words(name) for name in MEASURES if _is_won_by_motion(compared, name)]
     if wins:
         lines.append(f"Motion control is the best in: {', '.join(wins)}.")
     lines += [
-        f"{law}: {lost} of {count} diverged, so that it has no numbers here."
+        f"{law_title(law)}: {lost} of {count} diverged, so that it has no numbers here."
         for law, run in compared.runs.items()
         if (lost := int((run.status == "diverged").sum()))
     ]
     return lines
+
+
+def law_title(law: str) -> str:
+    """Return the name of a law as a reader has it: ``"extended motion plan"``, ``"PD+"``."""
+    title = law.replace("_", " ")
+    for letters, written in _WRITTEN.items():
+        title = title.replace(letters, written)
+    return title
 
 
 def _in_words(measure: str) -> str:
@@ -63,7 +76,7 @@ def _cell(compared: Comparison, law: str, measure: str, factor: float, best: boo
     if np.isinf(mean):
         values = compared.measures[law][measure]
         return f"never in {int(np.isinf(values).sum())} of {len(values)}"
-    mean, spread = (0.0 if abs(value) < _NOTHING else factor * value for value in (mean, spread))
+    mean, spread = (0.0 if abs(value) < compared.rounding(measure) else factor * value for value in (mean, spread))
     decimals = max(0, _DIGITS - 1 - int(np.floor(np.log10(abs(mean))))) if mean else 0
     spread_text = f"{spread:.{decimals}f}"
     return f"{mean:.{decimals}f}" + (f" ± {spread_text}" if float(spread_text) else "") + (" *" if best else "")

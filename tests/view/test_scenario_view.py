@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -78,3 +79,41 @@ def test_a_page_without_an_event_has_none_and_another_name_is_refused(tmp_path):
     with opened(pc.save_comparison(calm, tmp_path / "page.html"), (1000, 700), "#t=0") as film:
         assert film.tab.locator(".event").count() == 0
         assert film.complaints == []
+
+
+def with_measures(jam, **values):
+    """The comparison with other numbers of the measures, for each law one number."""
+    measures = {
+        law: dict(jam.measures[law]) | {name: np.full(2, numbers[k]) for name, numbers in values.items()}
+        for k, law in enumerate(jam.measures)
+    }
+    return dataclasses.replace(jam, measures=measures)
+
+
+def test_rounding_is_nothing_and_what_all_laws_share_is_not_the_best(jam):
+    """A number that is rounding beside those of others is 0, and a star is nowhere if it were everywhere."""
+    made = with_measures(jam, lag_peak=(0.5, 2e-7), energy_j=(120.0, 1e-4), saturated_s=(0.0, 0.0), recovery_s=(3, 3))
+    rows = {row[0].rpartition(" ")[0]: row[1:] for row in tabulate(made)}
+    assert [cell.split()[0] for cell in rows["lag peak"]] == ["28.6", "0"]
+    assert rows["energy"] == ["120", "0 *"]
+    assert rows["saturated"] == ["0", "0"]
+    assert rows["recovery"] == ["3.00", "3.00"]
+    assert with_measures(jam, lag_peak=(0.0, 1e-9)).best("lag_peak") == LAWS
+    apart = with_measures(jam, lag_peak=(1.0, 1e-3))
+    assert apart.best("lag_peak") == ["projection"]
+
+
+def test_names_and_counts_are_as_a_reader_has_them(jam):
+    one = pc.compare(["pd_plus", "adaptive_slotine_li"], "undisturbed", rollouts=1, progress=False)
+    assert tabulate(one)[0] == ["", "PD+", "adaptive Slotine–Li"]
+    assert [line for line in describe_comparison(one) if "one start" in line]
+    assert not any("deviation" in line for line in describe_comparison(one))
+    assert "of 2 starts" in describe_comparison(jam)[0]
+
+
+def test_the_figure_of_the_page_is_as_wide_as_the_page(jam):
+    wide, narrow = (pc.scenario_figure(jam, wide=wide) for wide in (True, False))
+    assert wide.get_figwidth() > 3 * narrow.get_figwidth()
+    for one, other in zip(wide.axes, narrow.axes, strict=True):
+        for line, same in zip(one.lines, other.lines, strict=True):
+            np.testing.assert_array_equal(line.get_xydata(), same.get_xydata())

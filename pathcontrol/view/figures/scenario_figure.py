@@ -16,6 +16,7 @@ from pathcontrol._expect import expect
 from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.analysis.run_metrics import contour_error, lag_error
 from pathcontrol.comparison.compare import Comparison
+from pathcontrol.comparison.comparison_table import law_title
 from pathcontrol.comparison.scenarios import Scenario
 from pathcontrol.simulation.run import Run
 from pathcontrol.view.figures.lettering import legend
@@ -25,10 +26,11 @@ from pathcontrol.view.figures.shown import Shown, shown
 from pathcontrol.view.figures.style import COLUMN, apply_style, new_figure, style
 
 _EVENT: dict[str, Any] = {"color": "#D9D9D9", "alpha": 0.6, "linewidth": 0}
+_SCREEN = 11.5  # inches
 _BEFORE, _AFTER = 0.5, 3.0  # lengths of the event that are shown around it
 
 
-def scenario_figure(compared: Comparison, rollout: int = 0) -> Figure:
+def scenario_figure(compared: Comparison, rollout: int = 0, *, wide: bool = False) -> Figure:
     """Draw contour error, lag and ‖q̇‖ of all laws of a comparison over time, with the event shaded.
 
     Where a scenario has an event, the time around it is shown, else all of the run.
@@ -36,23 +38,25 @@ def scenario_figure(compared: Comparison, rollout: int = 0) -> Figure:
     Args:
         compared: what :func:`compare` gives.
         rollout: which rollout of each run.
+        wide: the panels are beside each other, for the width of a screen, and not above each other.
 
     Raises:
         InputError: there is no such rollout.
     """
     expect("compared", compared, Comparison)
-    runs = shown({law.replace("_", " "): run for law, run in compared.runs.items()}, rollout=rollout)
+    runs = shown({law_title(law): run for law, run in compared.runs.items()}, rollout=rollout)
     first, last = choose_span(compared.scenario)
     with style():
-        figure = new_figure(COLUMN, 5.2)
-        panels = figure.subplots(3, 1, sharex=True)
+        figure = new_figure(_SCREEN, 2.9) if wide else new_figure(COLUMN, 5.2)
+        panels = figure.subplots(*((1, 3) if wide else (3, 1)), sharex=True)
         for axes, (label, measure) in zip(panels, _ROWS.items(), strict=True):
             _draw(apply_style(axes), runs, measure, (first, last))
             axes.set_ylabel(f"{label} [{_unit(runs[0].run, measure)}]")
             if compared.scenario.event is not None:
                 axes.axvspan(*compared.scenario.event, **_EVENT)
         panels[-1].set_xlim(first, last)
-        panels[-1].set_xlabel("time [s]")
+        for axes in panels if wide else panels[-1:]:
+            axes.set_xlabel("time [s]")
         figure.align_ylabels()
         event = {} if compared.scenario.event is None else {"event": Patch(**_EVENT)}
         legend(figure, {one.label: Line2D([], [], **one.look) for one in runs} | event)

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from pathcontrol._files import whole_file
 from pathcontrol._suffixes import check_suffix
 from pathcontrol.comparison.compare import Comparison
-from pathcontrol.comparison.comparison_table import describe_comparison, tabulate
+from pathcontrol.comparison.comparison_table import describe_comparison, law_title, tabulate
 from pathcontrol.view.animation.record import record
 from pathcontrol.view.figures.scenario_figure import scenario_figure
 from pathcontrol.view.page.html import Section, page
@@ -33,7 +33,7 @@ def save_comparison(compared: Comparison, out: str | Path, rollout: int = 0) -> 
     """
     out = check_suffix(out, "a comparison as a page", ".html", ".htm")
     scenario = compared.scenario
-    runs = {law.replace("_", " "): run for law, run in compared.runs.items()}
+    runs = {law_title(law): run for law, run in compared.runs.items()}
     film = record(runs, rollout=rollout).film
     events = [] if scenario.event is None else [[scenario.event[0], min(scenario.event[1], scenario.duration)]]
     film = dataclasses.replace(film, header=film.header | {"tables": [], "events": events})
@@ -46,5 +46,5 @@ def save_comparison(compared: Comparison, out: str | Path, rollout: int = 0) -> 
 def _body(compared: Comparison, rollout: int) -> Markup:
     """Return the table, its sentences and the figure."""
     template = templates().get_template("comparison.html")
-    shown = picture(scenario_figure(compared, rollout), f"Rollout {rollout} of each law")
+    shown = picture(scenario_figure(compared, rollout, wide=True), f"Rollout {rollout} of each law")
     return Markup(template.render(table=tabulate(compared), sentences=describe_comparison(compared), pictures=[shown]))
