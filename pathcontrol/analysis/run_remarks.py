@@ -29,9 +29,9 @@ _MOST = 3  # limit of rollouts that are named
 def remarks(run: Run) -> list[str]:
     """Return sentences on a run that a person must not overlook; none where all went well.
 
-    They are on limits that were passed, on plans that did not get there in the time, and on arms that did not: they were
-    still far from the end when the path ended, or came near to less than 95 % of it. Near is 2 deg, and on large paths
-    5 % of the largest range of a joint.
+    They are on limits that were passed, on plans that did not get there in the time, and on arms that did not: those
+    still far from the end when the path ended, or near to less than 95 % of it. Near is 2 deg, and on large paths 5 %
+    of the largest range of a joint.
 
     Of several rollouts with the same fault the first ones are named.
     """
