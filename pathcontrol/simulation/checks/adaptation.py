@@ -9,6 +9,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.control.adaptive_slotine_li import AdaptiveSlotineLi
 from pathcontrol.control.base import Controller
+from pathcontrol.simulation.checks.too_fast import TooFast
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 
 _SAMPLES = 17  # of a path
@@ -16,7 +17,7 @@ _MOST = 4096  # starts that are looked at
 _FAST = 2.0  # h times the rate from which on a loop may be unstable; it lost its path at 4 to 12 in simulations
 
 
-def check_adaptation(law: Controller, period: float, q: Array, qd: Array) -> Iterator[str]:
+def check_adaptation(law: Controller, period: float, q: Array, qd: Array) -> Iterator[TooFast]:
     """Yield the warning of an adaptation that is too fast for a ``period`` [s], for starts at q and q̇, (N, n) each.
 
     With θ̂ and x both advanced by Euler's method, x⁺ = x − hM⁻¹(K_d x − Yθ̃) and θ̃⁺ = θ̃ − hΓYᵀx for one joint, the
@@ -34,10 +35,12 @@ def check_adaptation(law: Controller, period: float, q: Array, qd: Array) -> Ite
     where = max(fastest, key=lambda place: fastest[place], default="")
     if where and (rate := fastest[where]) * period > _FAST:
         most = float(np.max(law.adaptation)) * _FAST / (rate * period)
-        yield (
+        yield TooFast(
+            "adaptation",
+            rate * period,
             f"adaptation = {np.max(law.adaptation):g} learns at {rate:.3g} 1/s {where}, too fast for a period of "
             f"{period:g} s: the loop may be unstable; take adaptation below {most:.2g}, shorten the period, or "
-            'begin nearer to the path, as with start="nearest"'
+            'begin nearer to the path, as with start="nearest"',
         )
 
 

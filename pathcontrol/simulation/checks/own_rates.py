@@ -10,6 +10,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.control.mpc.path_mpc import PathMPC
 from pathcontrol.control.passive_velocity_field import PassiveVelocityField
 from pathcontrol.control.transverse_linearization import TransverseLinearization
+from pathcontrol.simulation.checks.too_fast import TooFast
 
 #: the rates [1/s] of laws that feedback of position and velocity has no part in, and what each decays
 _RATES: dict[type[Controller], tuple[str, str]] = {
@@ -19,18 +20,22 @@ _RATES: dict[type[Controller], tuple[str, str]] = {
 _LONGEST = 2.0  # times the rate; an error that decays at the rate λ is multiplied by 1 − λh where λ's input is held
 
 
-def check_own_rates(law: Controller, period: float) -> Iterator[str]:
+def check_own_rates(law: Controller, period: float) -> Iterator[TooFast]:
     """Yield warnings of a rate of a law that is too fast for a ``period`` [s], and of intervals too short for it."""
     for kind, (name, what) in _RATES.items():
         rate = float(np.max(getattr(law, name))) if isinstance(law, kind) else 0.0
         if rate * period > _LONGEST:
-            yield (
+            yield TooFast(
+                f"{name} of {type(law).__name__}",
+                rate * period,
                 f"{name} = {rate:g} 1/s of {type(law).__name__} is too fast for a period of {period:g} s, in which "
                 f"{what} is held, and it is likely to be unstable; take {name} below {_LONGEST / period:.3g}, or "
-                "shorten the period"
+                "shorten the period",
             )
     if isinstance(law, PathMPC) and period > law.step * (1 + 1e-9):
-        yield (
+        yield TooFast(
+            "intervals of PathMPC",
+            period / law.step,
             f"the loop has a period of {period:g} s, longer than an interval of PathMPC, {law.step:.3g} s, of which it "
-            "then applies the first for too long; shorten the period, or take fewer intervals or a longer horizon"
+            "then applies the first for too long; shorten the period, or take fewer intervals or a longer horizon",
         )

@@ -8,6 +8,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.control.plan_feedback import PlanFeedback
+from pathcontrol.simulation.checks.too_fast import TooFast
 from pathcontrol.simulation.loops import SampledLoop
 from pathcontrol.tasks.task import PathTask
 
@@ -45,7 +46,7 @@ def velocity_lag(loop: SampledLoop) -> float:
     return lag
 
 
-def check_plan_gain(law: PlanFeedback, loop: SampledLoop, s: Array) -> Iterator[str]:
+def check_plan_gain(law: PlanFeedback, loop: SampledLoop, s: Array) -> Iterator[TooFast]:
     """Yield the warning of a gain k beyond the largest usable one, with that; of the worst rollout of a batch."""
     largest, every = np.broadcast_arrays(np.ravel(largest_plan_gain(law.task, loop, s)), np.ravel(law.k))
     row = int((every / largest).argmax())
@@ -53,9 +54,11 @@ def check_plan_gain(law: PlanFeedback, loop: SampledLoop, s: Array) -> Iterator[
         return
     where = f" (rollout {row})" if len(every) > 1 else ""
     seen = " with velocities that are late" if velocity_lag(loop) else ""
-    yield (
+    yield TooFast(
+        "k",
+        float(every[row] / largest[row]),
         f"k = {every[row]:g}{where} is beyond the largest usable k = {largest[row]:.3g} of this path and loop, whose "
         f"period is {loop.period:g} s{seen}: where the arm is off its path, the plan is likely to throw it further, "
         "without torque limits for ever; take a lower k, or Projection, which is k → ∞, or shorten the period (more "
-        "substeps do not help)"
+        "substeps do not help)",
     )

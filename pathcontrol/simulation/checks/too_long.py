@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
-from typing import NamedTuple
 
 import numpy as np
 
@@ -30,6 +29,7 @@ from pathcontrol.simulation.checks.fast_modes import (
 from pathcontrol.simulation.checks.held_gains import linearize_law, longest_period
 from pathcontrol.simulation.checks.own_rates import check_own_rates
 from pathcontrol.simulation.checks.plan_gain import check_plan_gain
+from pathcontrol.simulation.checks.too_fast import TooFast, gather_paths, select_worst
 from pathcontrol.simulation.loops import MOST_SUBSTEPS, Arm, ContinuousTime, SampledLoop
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.task import PathTask
@@ -110,15 +110,22 @@ def _find_warnings(
     """Yield the warnings of all laws, of the arm and of the disturbance."""
     rows = find_extreme_arms(robot, q[:1])
     felt = {row: add_damping(arm_of(robot, row), loop.period / loop.substeps) for row in rows}
-    for law in map(unwrap, controllers):
-        postures, speeds = _sample_states(law.task, q, qd)
-        yield from _check_gains(law, loop.period, robot, rows, postures)
-        yield from _check_plan(law, loop)
-        yield from check_adaptation(law, loop.period, q, qd)
-        yield from check_own_rates(law, loop.period)
-        yield from _select_worst(list(_check_arm(loop, arm, postures, speeds)) for arm in felt.values())
+    yield from gather_paths([list(_check_law(unwrap(law), loop, robot, felt, q, qd)) for law in controllers])
     if disturbance is not None:
-        yield from _select_worst(list(_check_disturbance(disturbance, loop, a, q, qd, duration)) for a in felt.values())
+        found = (one for arm in felt.values() for one in _check_disturbance(disturbance, loop, arm, q, qd, duration))
+        yield from (one.sentence for one in select_worst(found))
+
+
+def _check_law(
+    law: Controller, loop: SampledLoop, robot: Arm, felt: Mapping[int, DampedArm], q: Array, qd: Array
+) -> Iterator[TooFast]:
+    """Yield what is too fast of a law, and of the arms on its path."""
+    postures, speeds = _sample_states(law.task, q, qd)
+    yield from _check_gains(law, loop.period, robot, list(felt), postures)
+    yield from _check_plan(law, loop)
+    yield from check_adaptation(law, loop.period, q, qd)
+    yield from check_own_rates(law, loop.period)
+    yield from select_worst(one for arm in felt.values() for one in _check_arm(loop, arm, postures, speeds))
 
 
 def _sample_states(task: PathTask, q: Array, qd: Array) -> tuple[Array, Array]:
@@ -140,7 +147,7 @@ def _sample_paths(task: TaskBatch, samples: int) -> Array:
     return lower + np.linspace(0.0, 1.0, count)[:, None] * (upper - lower)
 
 
-def _check_gains(law: Controller, period: float, robot: Arm, rows: list[int], q: Array) -> Iterator[str]:
+def _check_gains(law: Controller, period: float, robot: Arm, rows: list[int], q: Array) -> Iterator[TooFast]:
     """Yield the warning of a period that is too long for the gains."""
     compensated, longest, worst = np.atleast_2d(law.compensated), np.inf, 0
     for one in linearize_law(law, q, rows if isinstance(robot, RobotBatch) else ()):
@@ -157,14 +164,16 @@ def _check_gains(law: Controller, period: float, robot: Arm, rows: list[int], q:
     )
     torques = isinstance(law, PDPlus | SlotineLi | AdaptiveSlotineLi)
     remedy = "K over inertia times h is below 2" if torques else "K_v h < 2 and K_p h < 2 K_v"
-    yield (
+    yield TooFast(
+        f"gains of {type(law).__name__}",
+        period / longest,
         f"gains {gains} of {type(law).__name__} need a period below {longest:.3g} s{where}, the loop has {period:g} s "
         f"and is likely to be unstable; shorten the period (more substeps do not help), or lower the gains so that "
-        f"{remedy}"
+        f"{remedy}",
     )
 
 
-def _check_plan(law: Controller, loop: SampledLoop) -> Iterator[str]:
+def _check_plan(law: Controller, loop: SampledLoop) -> Iterator[TooFast]:
     """Yield the warning of a gain k of the plan that is beyond what the loop bears."""
     if isinstance(law, PlanFeedback):
         task = law.task
@@ -172,22 +181,7 @@ def _check_plan(law: Controller, loop: SampledLoop) -> Iterator[str]:
         yield from check_plan_gain(law, loop, s)
 
 
-def _select_worst(found: Iterable[list[_TooLong]]) -> Iterator[str]:
-    """Yield the worst warning of each kind among those of several arms."""
-    every = [one for each in found for one in each]
-    for kind in dict.fromkeys(one.kind for one in every):
-        yield max((one for one in every if one.kind == kind), key=lambda one: one.rate).sentence
-
-
-class _TooLong(NamedTuple):
-    """A mode that is too fast for a step: its kind, its rate [1/s] and the sentence about it."""
-
-    kind: str
-    rate: float
-    sentence: str
-
-
-def _check_arm(loop: SampledLoop, damped: DampedArm, q: Array, qd: Array) -> Iterator[_TooLong]:
+def _check_arm(loop: SampledLoop, damped: DampedArm, q: Array, qd: Array) -> Iterator[TooFast]:
     """Yield the warnings of a step that is too long for the arm itself."""
     rate = rate_of_arm(damped, q, qd)
     yield from _check_rate(loop, rate, _OSCILLATION, "the arm under gravity at the speed of the task")
@@ -198,7 +192,7 @@ def _check_arm(loop: SampledLoop, damped: DampedArm, q: Array, qd: Array) -> Ite
 
 def _check_disturbance(
     disturbance: Disturbance, loop: SampledLoop, damped: DampedArm, q: Array, qd: Array, duration: float
-) -> Iterator[_TooLong]:
+) -> Iterator[TooFast]:
     """Yield the warnings of a step too long for a state-dependent disturbance that is held over it."""
     name = f"the disturbance {type(disturbance).__name__}".replace(" _Sum", "")
     damping, oscillation = rates_of_disturbance(disturbance, damped, q, qd, duration)
@@ -207,14 +201,14 @@ def _check_disturbance(
         yield from _check_rate(loop, oscillation, _SPRING, f"{name}, a spring that is held over a step")
 
 
-def _check_rate(loop: SampledLoop, rate: float, bound: float, what: str) -> Iterator[_TooLong]:
+def _check_rate(loop: SampledLoop, rate: float, bound: float, what: str) -> Iterator[TooFast]:
     """Yield the warning that a step is too long for a ``rate`` [1/s], with the substeps that would suffice."""
     step = loop.period / loop.substeps
     if rate * step <= bound:
         return
     substeps = ceil(loop.period * rate / bound)
     remedy = f"take substeps={substeps}" if substeps <= MOST_SUBSTEPS else "make it less stiff, or shorten the period"
-    yield _TooLong(
+    yield TooFast(
         what,
         rate,
         f"steps of {1e3 * step:.3g} ms are too long for {what}: its fastest mode has {rate:.3g} 1/s; {remedy} "
