@@ -73,7 +73,10 @@ def check_physical(name: str, array: Array) -> Array:
     if (np.abs(array) >= LARGEST).any():
         where = tuple(int(i) for i in np.argwhere(np.abs(array) >= LARGEST)[0])
         raise InputError(
-            f"{name}{list(where) if where else ''} = {array[where]:g}, expected SI units, below {LARGEST:g}"
+            f"{name}{list(where) if where else ''} = {array[where]:g}, expected SI units, below {LARGEST:g}",
+            argument=name,
+            value=float(array[where]),
+            limit=LARGEST,
         )
     return array
 
@@ -82,7 +85,7 @@ def as_joint_vector(name: str, value: Any, n: int) -> Array:
     """Convert ``value`` to finite numbers of one arm's joints, (n,)."""
     array = check_finite(name, as_joint_array(name, value, n))
     if array.size != n:
-        raise InputError(f"{name} has the shape {array.shape}, expected ({n},): one arm", argument=name)
+        raise InputError(f"{name} has the shape {array.shape}, expected ({n},): one arm", argument=name, value=value)
     return array.reshape(n)
 
 
@@ -93,7 +96,9 @@ def as_scalar(name: str, value: Any, *, positive: bool = False, least: float | N
         raise InputError(f"{name} = {value!r}, expected one finite number", argument=name, value=value)
     number = float(array)
     if positive and number <= 0:
-        raise InputError(f"{name} = {number:g}, expected a number greater than 0", argument=name, value=number)
+        raise InputError(
+            f"{name} = {number:g}, expected a number greater than 0", argument=name, value=number, limit=0.0
+        )
     if least is not None and number < least:
         raise InputError(
             f"{name} = {number:g}, expected a number not below {least:g}", argument=name, value=number, limit=least
@@ -163,11 +168,17 @@ def check_rigid(name: str, pose: ArrayLike, tolerance: float = 1e-9) -> Array:
     """Check that ``pose`` is a homogeneous transform (4, 4) of a rigid motion up to ``tolerance``; errors name it."""
     transform = check_finite(name, as_array(name, pose))
     if transform.shape != (4, 4):
-        raise InputError(f"{name} has shape {transform.shape}, expected (4, 4), a homogeneous transform")
+        raise InputError(
+            f"{name} has shape {transform.shape}, expected (4, 4), a homogeneous transform", argument=name, value=pose
+        )
     turn = transform[:3, :3]
     proper = np.allclose(turn @ turn.T, np.eye(3), atol=tolerance) and np.linalg.det(turn) > 0
     if not proper or not np.allclose(transform[3], [0, 0, 0, 1]):
-        raise InputError(f"{name} is no rigid motion: its rotation is not orthonormal, or its last row not 0 0 0 1")
+        raise InputError(
+            f"{name} is no rigid motion: its rotation is not orthonormal, or its last row not 0 0 0 1",
+            argument=name,
+            value=pose,
+        )
     return freeze(transform)
 
 

@@ -39,7 +39,12 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     target = Path(path).resolve()  # through a link, to the file that is meant
     with writing(target):
         if target.is_dir():
-            raise InputError(f"{str(path)!r} is a folder, expected the name of a file to write")
+            raise InputError(
+                f"{str(path)!r} is a folder, expected the name of a file to write",
+                argument="path",
+                value=str(path),
+                file=str(path),
+            )
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_left_parts(target)
         with _part_of(target) as temporary:
@@ -62,7 +67,9 @@ def writing(target: Path) -> Iterator[None]:
         yield
     except (FileExistsError, NotADirectoryError) as error:
         where = f"{str(target)!r} cannot be written"
-        raise InputError(f"{where}: {error.filename!r} is a file, expected a folder") from error
+        raise InputError(
+            f"{where}: {error.filename!r} is a file, expected a folder", value=error.filename, file=str(target)
+        ) from error
     except OSError as error:
         if error.errno not in _NOT_TAKEN or isinstance(error, PathControlError):
             raise

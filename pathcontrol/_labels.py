@@ -34,7 +34,11 @@ def read_labels(name: str, value: Any) -> Labelled | None:
         return _of_rows(name, value)
     found = _of_mapping(value) or _of_xarray(name, value) or _of_pandas(value)
     if found is not None and len(set(found.names)) < len(found.names):
-        raise InputError(f"{name} has a label twice ({_enumerate(found.names)}), expected each joint once")
+        raise InputError(
+            f"{name} has a label twice ({_enumerate(found.names)}), expected each joint once",
+            argument=name,
+            value=list(found.names),
+        )
     return found
 
 
@@ -47,7 +51,10 @@ def order_by_name(name: str, value: Labelled, joints: Sequence[str]) -> Any:
     if set(value.names) != set(joints):
         raise InputError(
             f"{name} is labelled {_enumerate(value.names)}, expected {_enumerate(joints)}; "
-            "give a value for each joint by its name, or plain numbers in that order"
+            "give a value for each joint by its name, or plain numbers in that order",
+            argument=name,
+            value=list(value.names),
+            choices=tuple(joints),
         )
     order = [value.names.index(joint) for joint in joints]
     return np.asarray(value.values)[..., order]
@@ -62,7 +69,9 @@ def refuse_labels(name: str, value: Any) -> None:
     if (found := read_labels(name, value)) is not None:
         raise InputError(
             f"{name} is labelled {_enumerate(found.names)}, but by which labels to order it is not known here; "
-            "put it in the order of robot.joint_names and give plain numbers (to_numpy)"
+            "put it in the order of robot.joint_names and give plain numbers (to_numpy)",
+            argument=name,
+            value=list(found.names),
         )
 
 
@@ -76,7 +85,11 @@ def _of_rows(name: str, rows: Sequence[Any]) -> Labelled | None:
         return None
     names = next(iter(named.values())).names
     if len(named) < len(rows):
-        raise InputError(f"{name} has rows with labels ({_enumerate(names)}) and rows without, expected all alike")
+        raise InputError(
+            f"{name} has rows with labels ({_enumerate(names)}) and rows without, expected all alike",
+            argument=name,
+            value=list(names),
+        )
     return Labelled(np.stack([order_by_name(f"{name}[{i}]", one, names) for i, one in named.items()]), names)
 
 
@@ -98,7 +111,9 @@ def _of_xarray(name: str, value: Any) -> Labelled | None:
         named = {axis: names for axis, names in named.items() if dims[axis] == _DIMENSION} or named
     if len(named) > 1:
         raise InputError(
-            f"{name} has labels along {', '.join(str(dims[axis]) for axis in named)}, expected joints only"
+            f"{name} has labels along {', '.join(str(dims[axis]) for axis in named)}, expected joints only",
+            argument=name,
+            value=[str(dims[axis]) for axis in named],
         )
     for axis, names in named.items():
         return Labelled(np.moveaxis(np.asarray(value.values), axis, -1), names)

@@ -86,9 +86,11 @@ def parse_quantity(text: str, *units: str) -> Quantity:
     """
     match = _QUANTITY.fullmatch(text) if len(text) <= _LONGEST else None
     if match is None:
-        raise InputError(f"expected a number with a unit, {list_units(units)}")
+        raise InputError(f"expected a number with a unit, {list_units(units)}", value=text)
     if not match[2]:
-        raise InputError(f"expected a unit after the number, {list_units(units)}, or the number without quotes")
+        raise InputError(
+            f"expected a unit after the number, {list_units(units)}, or the number without quotes", value=text
+        )
     given = _parse_unit(match[2], units)
     for unit in units:
         if _dimension(given) == _dimension(_parse_unit(unit, units)) or _without_angle(given, unit, units):
@@ -96,7 +98,7 @@ def parse_quantity(text: str, *units: str) -> Quantity:
             if not math.isfinite(value):
                 break
             return Quantity(value, unit)
-    raise InputError(f"expected a finite quantity in {list_units(units)}")
+    raise InputError(f"expected a finite quantity in {list_units(units)}", value=text)
 
 
 def _scale(value: float, factor: float) -> float:
@@ -128,7 +130,7 @@ def _parse_unit(text: str, wanted: Iterable[str]) -> _Unit:
         exponents = (a + power * b for a, b in zip(total[1:], unit[1:], strict=True))
         total, end = _Unit(total.factor * unit.factor**power, *exponents), term.end()
     if end != len(compact):
-        raise InputError(f"unknown unit {text!r}, expected {list_units(wanted)}")
+        raise InputError(f"unknown unit {text!r}, expected {list_units(wanted)}", value=text)
     return total
 
 

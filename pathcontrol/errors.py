@@ -6,25 +6,32 @@ Every message names the value, what was expected and what to try.
 from __future__ import annotations
 
 import copyreg
+import pickle
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 #: modules whose frames stand between a warning and the code that it is for
 _PASSED = frozenset({__name__.partition(".")[0], "abc", "contextlib", "functools"})
 
+#: numbers in an array that an error lists
+_MOST_LISTED = 100_000
+
 
 class PathControlError(Exception):
     """Root of all errors raised on purpose by :mod:`pathcontrol`.
 
-    What a program may want to know stands beside the message, ``None`` where the error is not about it.
+    What a program may want to know stands beside the message, ``None`` where the error is not about it. Arrays are
+    lists there.
 
     Args:
         message: for a person to read.
         **details: values of the attributes.
 
     Attributes:
-        argument: name of the argument that was refused.
+        argument: name of the argument that was refused, with an index where one part of it was, as ``paths[1]``.
         value: what was given, or what came out.
         limit: what the value is held to, a number or both ends.
         choices: the names that there are.
@@ -47,11 +54,24 @@ class PathControlError(Exception):
 
     def __init__(self, message: object = "", **details: Any) -> None:
         super().__init__(message)
-        vars(self).update(details)
+        vars(self).update((name, _plain(value)) for name, value in details.items())
 
     def details_with(self, **more: Any) -> dict[str, Any]:
         """Return what stands beside the message, and ``more``, for an error that says this one with its place."""
         return vars(self) | more
+
+    def __reduce__(self) -> tuple[Any, ...]:  # with what can be sent to another process
+        return type(self), self.args, {name: value for name, value in vars(self).items() if _is_pickled(value)}
+
+
+@contextmanager
+def about(**details: Any) -> Iterator[None]:
+    """Put ``details`` beside the message of an error that arises inside the block, where its place is known."""
+    try:
+        yield
+    except PathControlError as error:
+        vars(error).update(details)
+        raise
 
 
 class PathControlWarning(UserWarning):
@@ -127,9 +147,13 @@ class StorageError(PathControlError, OSError):
         errno: the operating system's number for the reason, as ``errno.ENOSPC``.
     """
 
-    def __init__(self, message: str, number: int | None = None) -> None:
-        super().__init__(message)
+    def __init__(self, message: str, number: int | None = None, **details: Any) -> None:
+        super().__init__(message, **details)
         self.errno = number
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        kind, args, details = super().__reduce__()
+        return kind, (*args, self.errno), details
 
 
 class SimulationError(PathControlError, RuntimeError):
@@ -143,6 +167,23 @@ class SimulationError(PathControlError, RuntimeError):
 
     def __init__(self, message: str, run: Any = None, **details: Any) -> None:
         super().__init__(message, run=run, **details)
+
+
+def _plain(value: Any) -> Any:
+    """Return numbers and arrays of NumPy as those of Python, and ranges of them; very large arrays stay as they are."""
+    if type(value) is tuple:
+        return tuple(map(_plain, value))
+    convert = getattr(value, "tolist", None)
+    return convert() if callable(convert) and hasattr(value, "ndim") and value.size <= _MOST_LISTED else value
+
+
+def _is_pickled(value: Any) -> bool:
+    """Return whether a value can be pickled, as a task with functions of a user often cannot."""
+    try:
+        pickle.dumps(value)
+    except Exception:  # whatever a user's object raises
+        return False
+    return True
 
 
 def warn(message: str, category: type[PathControlWarning] = PathControlWarning) -> None:

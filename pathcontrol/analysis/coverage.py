@@ -60,7 +60,11 @@ def even_points(at: Array) -> Points:
         TaskError: one of them is not finite, or too far away for its square to be.
     """
     if not (known := (np.abs(at) < FARTHEST).all(-1)).all():
-        raise TaskError(f"the curve passes {at[np.argmin(known)].tolist()}, expected numbers below {FARTHEST:g}")
+        raise TaskError(
+            f"the curve passes {at[np.argmin(known)].tolist()}, expected numbers below {FARTHEST:g}",
+            value=at[np.argmin(known)],
+            limit=FARTHEST,
+        )
     chord = np.linalg.norm(np.diff(at, axis=0), axis=-1)
     return Points(at, 0.5 * (np.append(chord, 0.0) + np.append(0.0, chord)))
 

@@ -203,5 +203,7 @@ def _rms(values: Array) -> float:
 def _find_tool(task: PathTask) -> tuple[str, Array]:
     """Return the frame that a path was made for, and the tip of the tool in it, homogeneous (4,)."""
     if task.frame is None:
-        raise InputError(f"the {type(task).__name__} of the run was not made for a frame of the arm; give frame=…")
+        raise InputError(
+            f"the {type(task).__name__} of the run was not made for a frame of the arm; give frame=…", argument="frame"
+        )
     return task.frame, (np.eye(4) if task.tool_pose is None else task.tool_pose)[:, 3]

@@ -81,7 +81,12 @@ def _find_arm(run: Run, robot: RobotModel | None) -> RobotModel:
     arm = run.model if robot is None else robot
     expect("robot", arm, RobotModel)
     if arm.n != len(run.joints):
-        raise InputError(f"{arm.name} has {arm.n} joints, the run {len(run.joints)}; expected as many")
+        raise InputError(
+            f"{arm.name} has {arm.n} joints, the run {len(run.joints)}; expected as many",
+            argument="robot",
+            value=arm.n,
+            limit=len(run.joints),
+        )
     return arm
 
 

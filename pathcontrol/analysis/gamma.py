@@ -51,7 +51,7 @@ def distance_to_gamma(
     w = as_scalar("weight", weight, least=0.0)
     q, qd = as_joint_array("q", q, task.n), as_joint_array("qd", qd, task.n)
     if q.shape != qd.shape:
-        raise InputError(f"q has shape {q.shape} and qd {qd.shape}, expected the same")
+        raise InputError(f"q has shape {q.shape} and qd {qd.shape}, expected the same", argument="qd", value=qd)
     if isinstance(task, TaskBatch):
         each = [_find_nearest(one, q[..., i, :], qd[..., i, :], w, braking) for i, one in enumerate(task)]
         distance, s = (np.stack(parts, axis=-1) for parts in zip(*each, strict=True))

@@ -32,11 +32,16 @@ def resolve_task(run: Run, task: PathTask | None) -> PathTask:
     expect("run", run, Run)
     task = run.task if task is None else task
     if task is None:
-        raise InputError("the run does not know its path, as it holds data only; give task=…")
+        raise InputError("the run does not know its path, as it holds data only; give task=…", argument="task")
     expect("task", task, PathTask)
     joints = len(run.array("joint"))
     if task.n != joints:
-        raise InputError(f"the task has {task.n} joints, the run {joints}; expected as many")
+        raise InputError(
+            f"the task has {task.n} joints, the run {joints}; expected as many",
+            argument="task",
+            value=task.n,
+            limit=joints,
+        )
     if isinstance(task, PathSequence):
         check_sequence(run.data, task)
     return task
@@ -61,7 +66,9 @@ def resolve_toolpath(run: Run, task: ToolpathTask | None) -> ToolpathTask:
     if toolpath is None:
         raise InputError(
             f"the run follows a {type(found).__name__}, expected a ToolpathTask; give task=…, or give "
-            "it to simulate_sequence(…, task=…)"
+            "it to simulate_sequence(…, task=…)",
+            argument="task",
+            value=found,
         )
     return toolpath
 
@@ -89,7 +96,12 @@ def split_by_task(run: Run, task: PathTask) -> Iterator[tuple[Run, PathTask, NDA
         yield run, task, np.arange(run.rollouts)
         return
     if len(task) != run.rollouts:
-        raise InputError(f"the TaskBatch has {len(task)} tasks, the run {run.rollouts} rollouts; expected as many")
+        raise InputError(
+            f"the TaskBatch has {len(task)} tasks, the run {run.rollouts} rollouts; expected as many",
+            argument="task",
+            value=len(task),
+            limit=run.rollouts,
+        )
     for own, rows in task.groups():
         yield run.with_data(run.data.isel(rollout=rows)), own, rows
 

@@ -23,7 +23,9 @@ def non_dominated(values: ArrayLike) -> NDArray[np.bool_]:
     """
     table = as_array("values", values)
     if table.ndim != 2 or not table.shape[1]:
-        raise InputError(f"values has shape {table.shape}, expected (N, d): a row for each choice")
+        raise InputError(
+            f"values has shape {table.shape}, expected (N, d): a row for each choice", argument="values", value=values
+        )
     found = np.zeros(len(table), dtype=bool)
     known = np.flatnonzero(np.isfinite(table).all(1))
     points, which = np.unique(table[known], axis=0, return_inverse=True)  # in lexicographic order

@@ -78,7 +78,11 @@ def reach(task: PathTask, robot: RobotModel | None = None, *, frame: str | None 
     expect("task", task, PathTask, error=TaskError)
     refuse_batch("task", task)
     if isinstance(task, PathSequence):
-        raise InputError("task is a sequence of paths, each with a reach of its own; give one of task.paths")
+        raise InputError(
+            "task is a sequence of paths, each with a reach of its own; give one of task.paths",
+            argument="task",
+            value=task,
+        )
     interval = Interval(*task.one_traverse, task.closed)
     tool = _tool_curve(task, _find_robot(task, robot, frame), frame)
     unit = (
@@ -110,7 +114,8 @@ def _check_moving(curve: Curve, interval: Interval) -> None:
     speed = np.linalg.norm(curve.dp(s), axis=-1)
     if not (speed > 1e-9 * speed.max()).all():
         raise TaskError(
-            f"the path does not move at s = {s[speed.argmin()]:.4g}, so it has no tangent, and no reach, there"
+            f"the path does not move at s = {s[speed.argmin()]:.4g}, so it has no tangent, and no reach, there",
+            s=float(s[speed.argmin()]),
         )
 
 
@@ -119,11 +124,16 @@ def _find_robot(task: PathTask, robot: RobotModel | None, frame: str | None) -> 
     if robot is not None:
         expect("robot", robot, RobotModel)
         if robot.n != task.n:
-            raise InputError(f"{robot.name} has {robot.n} joints, the task {task.n}; expected as many")
+            raise InputError(
+                f"{robot.name} has {robot.n} joints, the task {task.n}; expected as many",
+                argument="robot",
+                value=robot.n,
+                limit=task.n,
+            )
     own = getattr(task, "robot", None)
     found = own if robot is None and isinstance(own, RobotModel) else robot
     if frame is not None and found is None:
-        raise InputError(f"frame = {frame!r} is of an arm; give robot=load_robot(...)")
+        raise InputError(f"frame = {frame!r} is of an arm; give robot=load_robot(...)", argument="robot")
     known = task.frame is not None and found is not None and task.frame in found.frame_names
     return found if frame is not None or known else None
 

@@ -83,7 +83,12 @@ def samples_of(run: Run, window: Window | None = None, fraction: float = 0.5) ->
         return Samples(np.searchsorted(time, last - share * (last - time[0])), stop)
     begin, end = _seconds(window)
     if begin > time[-1] and not (run.status == "finished").any():
-        raise InputError(f"window = ({begin:g}, {end:g}), but the run ends at {time[-1]:g} s")
+        raise InputError(
+            f"window = ({begin:g}, {end:g}), but the run ends at {time[-1]:g} s",
+            argument="window",
+            value=window,
+            limit=time[-1],
+        )
     first = np.searchsorted(time, begin - _slack(run))
     return Samples(np.minimum(first, stop), np.minimum(stop, np.searchsorted(time, end + _slack(run), side="right")))
 
@@ -103,11 +108,21 @@ def _share(window: str | None, fraction: float) -> float:
     if window is None:
         fraction = as_scalar("fraction", fraction, positive=True)
         if fraction > 1:
-            raise InputError(f"fraction = {fraction:g}, expected a number from 0 to 1")
+            raise InputError(
+                f"fraction = {fraction:g}, expected a number from 0 to 1",
+                argument="fraction",
+                value=fraction,
+                limit=(0.0, 1.0),
+            )
         return fraction
     if window not in get_args(Choice):
         choices = ", ".join(map(repr, get_args(Choice)))
-        raise InputError(f"window = {window!r}, expected {choices}, or (from, to) in seconds")
+        raise InputError(
+            f"window = {window!r}, expected {choices}, or (from, to) in seconds",
+            argument="window",
+            value=window,
+            choices=get_args(Choice),
+        )
     return 1.0 if window == "all" else 0.5
 
 
@@ -119,7 +134,11 @@ def _seconds(window: object) -> tuple[float, float]:
         begin = end = np.nan
     if not begin < end:
         choices = ", ".join(map(repr, get_args(Choice)))
-        raise InputError(f"window = {window!r}, expected (from, to) in seconds with from < to, or {choices}")
+        raise InputError(
+            f"window = {window!r}, expected (from, to) in seconds with from < to, or {choices}",
+            argument="window",
+            value=window,
+        )
     return begin, end
 
 

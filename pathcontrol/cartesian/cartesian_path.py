@@ -138,7 +138,11 @@ class CartesianPath(SplinePath):
 
 def _is_closed(curve: ToolCurve, closed: bool | None) -> bool:
     if closed and not curve.closed:
-        raise InputError("closed = True, but the curve is open; close the curve, or leave closed out")
+        raise InputError(
+            "closed = True, but the curve is open; close the curve, or leave closed out",
+            argument="closed",
+            value=closed,
+        )
     return curve.closed if closed is None else closed
 
 
@@ -149,7 +153,10 @@ def _check_closing(curve: ToolCurve, orientation: Orientation, closed: bool) -> 
     if closed and angle > _SAME:
         raise InputError(
             f"the curve is closed, but the orientation at its end is {angle:.3g} rad from the one at its beginning; "
-            "closed=False makes one lap an open path"
+            "closed=False makes one lap an open path",
+            argument="closed",
+            value=angle,
+            limit=_SAME,
         )
 
 
@@ -161,8 +168,14 @@ def _orientation(orientation: Orientation | str | None, tool: Tool, start: Array
     if orientation != "keep":
         raise InputError(
             f"orientation = {orientation!r}, expected None, 'keep', or an Orientation: FixedOrientation, "
-            "TangentOrientation or NormalOrientation"
+            "TangentOrientation or NormalOrientation",
+            argument="orientation",
+            value=orientation,
         )
     if start is None:
-        raise InputError("orientation = 'keep' keeps that of the start posture; give start, or a FixedOrientation")
+        raise InputError(
+            "orientation = 'keep' keeps that of the start posture; give start, or a FixedOrientation",
+            argument="orientation",
+            value=orientation,
+        )
     return FixedOrientation(tool.kinematics(start[None]).rotation[0])

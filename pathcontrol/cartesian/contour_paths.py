@@ -77,7 +77,7 @@ class ContourPaths:
                     path, posture = self._path(contour, curve, self._orientation(whole, i, j), start)
                 except (TaskError, InputError) as error:
                     name = f" ({contour.name})" if contour.name else ""
-                    raise TaskError(f"contour {i} of {len(whole)}{name}: {error}") from error
+                    raise TaskError(f"contour {i} of {len(whole)}{name}: {error}", **error.details_with()) from error
                 yield path, contour, posture
                 start = path.q_d(np.array(path.s_end))
 
@@ -107,12 +107,18 @@ class ContourPaths:
 
     def _check_held(self, whole: Sequence[tuple[Contour, Smoothed]]) -> None:
         if self.held == "normals" and all(contour.normals is None for contour, _ in whole):
-            raise InputError("orientation = 'normals', but no contour has any; give i j k in a CSV, or take 'down'")
+            raise InputError(
+                "orientation = 'normals', but no contour has any; give i j k in a CSV, or take 'down'",
+                argument="orientation",
+                value=self.held,
+            )
         stops = sum(len(smooth.curves) - 1 for contour, smooth in whole if not contour.rapid)
         if self.held == "tangent" and stops:
             raise InputError(
                 f"orientation = 'tangent', but the contours have {stops} stops at corners, where the tool would have "
-                "to turn on the spot; blend the corners, or hold the tool 'down'"
+                "to turn on the spot; blend the corners, or hold the tool 'down'",
+                argument="orientation",
+                value=self.held,
             )
 
     def _orientation(self, whole: Sequence[tuple[Contour, Smoothed]], i: int, j: int) -> Orientation | None:
@@ -145,7 +151,11 @@ class ContourPaths:
         last = None if after is None else tangent.frames(after, np.array([after.s0]))[0]
         first, last = (last if first is None else first), (first if last is None else last)
         if first is None or last is None:
-            raise InputError("orientation = 'tangent', but there are only rapids; take 'down'")
+            raise InputError(
+                "orientation = 'tangent', but there are only rapids; take 'down'",
+                argument="orientation",
+                value="tangent",
+            )
         turns_here = j == len(whole[i][1].curves) - 1 and (i + 1 == len(whole) or not whole[i + 1][0].rapid)
         return (first, last) if turns_here else (first, first)
 

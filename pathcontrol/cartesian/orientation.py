@@ -76,12 +76,24 @@ class FixedOrientation(Orientation):
     def __init__(self, rotation: Annotated[ArrayLike, Form.ARRAY]) -> None:
         given = check_finite("rotation", as_array("rotation", rotation))
         if given.shape not in ((3, 3), (4,)):
-            raise InputError(f"rotation has shape {given.shape}, expected a matrix (3, 3) or a quaternion (x, y, z, w)")
+            raise InputError(
+                f"rotation has shape {given.shape}, expected a matrix (3, 3) or a quaternion (x, y, z, w)",
+                argument="rotation",
+                value=rotation,
+            )
         if given.shape == (4,) and not abs(np.linalg.norm(given) - 1) < 1e-6:
-            raise InputError(f"rotation = {given.tolist()} has the norm {np.linalg.norm(given):g}, expected 1")
+            raise InputError(
+                f"rotation = {given.tolist()} has the norm {np.linalg.norm(given):g}, expected 1",
+                argument="rotation",
+                value=rotation,
+            )
         matrix = Rotation.from_quat(given).as_matrix() if given.shape == (4,) else given
         if not (np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) and np.linalg.det(matrix) > 0):
-            raise InputError("rotation is no rotation matrix: its columns are not orthonormal and right-handed")
+            raise InputError(
+                "rotation is no rotation matrix: its columns are not orthonormal and right-handed",
+                argument="rotation",
+                value=rotation,
+            )
         self.rotation = freeze(Rotation.from_matrix(matrix).as_matrix())
 
     def frames(self, curve: ToolCurve, s: Array) -> Array:
@@ -151,7 +163,10 @@ class NormalOrientation(Orientation):
         if self.at is not None and (self.at[0] > curve.s0 + 1e-9 or self.at[-1] < curve.s_end - 1e-9):
             raise InputError(
                 f"the normals are given for s from {self.at[0]:g} to {self.at[-1]:g} m, but the curve goes from "
-                f"{curve.s0:g} to {curve.s_end:g} m"
+                f"{curve.s0:g} to {curve.s_end:g} m",
+                argument="at",
+                value=self.at,
+                limit=(curve.s0, curve.s_end),
             )
 
 
@@ -164,10 +179,12 @@ def _interpolate(normals: Array, at: Array | None) -> Callable[[Array], Array]:
         places = "no parameters at" if at is None else f"parameters at of shape {at.shape}"
         raise InputError(
             f"normals have shape {normals.shape} and {places}, expected (3,), or (k, 3) with parameters (k,), k ≥ 2; "
-            "for normals at the knots of a curve: at=curve.knots"
+            "for normals at the knots of a curve: at=curve.knots",
+            argument="normals",
+            value=normals,
         )
     if not (np.diff(at) > 0).all():
-        raise InputError("the parameters at of the normals do not increase")
+        raise InputError("the parameters at of the normals do not increase", argument="at", value=at)
     unit = _unit(normals, at)
     periodic = len(at) > 2 and np.linalg.norm(unit[0] - unit[-1]) < _PARALLEL
     if periodic:
@@ -184,7 +201,11 @@ def _direction(name: str, value: ArrayLike) -> Array:
     """Check that a direction is a vector (3,) with a length; return it with unit length."""
     vector = check_finite(name, as_array(name, value))
     if vector.shape != (3,) or not np.linalg.norm(vector) > 0:
-        raise InputError(f"{name} = {np.asarray(value).tolist()}, expected a direction (3,) with a length")
+        raise InputError(
+            f"{name} = {np.asarray(value).tolist()}, expected a direction (3,) with a length",
+            argument=name,
+            value=value,
+        )
     return vector / np.linalg.norm(vector)
 
 
@@ -193,7 +214,9 @@ def _unit(vectors: Array, s: Array) -> Array:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     if not (length > _PARALLEL).all():
         where = float(np.asarray(s)[int(np.argmin(length > _PARALLEL))])
-        raise InputError(f"the normal at s = {where:g} m has no length; between opposite normals give more of them")
+        raise InputError(
+            f"the normal at s = {where:g} m has no length; between opposite normals give more of them", s=where
+        )
     return vectors / length
 
 
@@ -204,7 +227,10 @@ def _perpendicular(direction: Array, axis: Array, axis_name: str, name: str, s: 
     if (length < _PARALLEL).any():
         where = float(np.asarray(s)[int(np.argmin(length))])
         raise InputError(
-            f"{axis_name} is parallel to {name} = {direction.tolist()} at s = {where:g} m; give another {name}"
+            f"{axis_name} is parallel to {name} = {direction.tolist()} at s = {where:g} m; give another {name}",
+            argument=name,
+            value=direction,
+            s=where,
         )
     return across / length
 

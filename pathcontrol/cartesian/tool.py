@@ -67,6 +67,8 @@ def _transform(offset: ArrayLike | None) -> Array:
     turn = given[:3, :3] if given.shape == (4, 4) else np.zeros((3, 3))
     if not (np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0):
         raise InputError(
-            f"tool has shape {given.shape}, expected its tip (3,), or a pose (4, 4) without scale or mirror"
+            f"tool has shape {given.shape}, expected its tip (3,), or a pose (4, 4) without scale or mirror",
+            argument="tool",
+            value=offset,
         )
     return given

@@ -133,4 +133,7 @@ def _check_feeds(toolpath: Toolpath, feed: float | None) -> None:
     for i, contour in enumerate(toolpath):
         if not contour.rapid and contour.feed is None:
             name = f" ({contour.name})" if contour.name else ""
-            raise InputError(f"contour {i}{name} has no feed in {toolpath.source or 'the toolpath'}; give feed in m/s")
+            raise InputError(
+                f"contour {i}{name} has no feed in {toolpath.source or 'the toolpath'}; give feed in m/s",
+                argument="feed",
+            )

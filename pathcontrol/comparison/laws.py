@@ -111,7 +111,11 @@ def recover_gains(law: Controller) -> Gains:
         gains = Gains(law.Lambda * law.K_v, law.Lambda + law.K_v)
     else:
         name = type(law).__name__
-        raise InputError(f"the gains of {name} mean nothing to other laws; expected one of {', '.join(KNOWN_LAWS)}")
+        raise InputError(
+            f"the gains of {name} mean nothing to other laws; expected one of {', '.join(KNOWN_LAWS)}",
+            value=name,
+            choices=tuple(KNOWN_LAWS),
+        )
     if max(np.ndim(gains.K_p), np.ndim(gains.K_v)) > 1:
         raise InputError(f"the gains of {type(law).__name__} differ between rollouts, expected one for all")
     return gains
@@ -146,11 +150,11 @@ def make_laws(
         key = name or (law if isinstance(law, str) else type(one).__name__)
         if key in made:
             advice = "name it once" if isinstance(law, str) else "give them names: {'first': …, 'second': …}"
-            raise InputError(f"two laws are called {key!r}; {advice}")
+            raise InputError(f"two laws are called {key!r}; {advice}", argument="laws", value=key)
         made[key] = one
     if not made:
         known = ", ".join([*_MAKERS, *FAMILY, *_WRAPPED])
-        raise InputError(f"there is no law to compare; expected some of {known}, or laws of your own")
+        raise InputError(f"there is no law to compare; expected some of {known}, or laws of your own", argument="laws")
     return made
 
 
@@ -163,7 +167,11 @@ def _list_laws(laws: Laws, more: Mapping[str, Law]) -> list[tuple[str, Law]]:
     try:
         given = list(laws)
     except TypeError as error:
-        raise InputError(f"laws = {laws!r:.80}, expected names, control laws, or a table of them by name") from error
+        raise InputError(
+            f"laws = {laws!r:.80}, expected names, control laws, or a table of them by name",
+            argument="laws",
+            value=laws,
+        ) from error
     names = [law for law in given if isinstance(law, str)]
     rest = [name for name in dict.fromkeys([*KNOWN_LAWS, *FAMILY, *more]) if name not in names]
     listed = [rest if isinstance(law, str) and law == ALL_LAWS else [law] for law in given]
@@ -181,7 +189,12 @@ def _make_law(
         if law not in makers | _WRAPPED:
             known = list(dict.fromkeys([*makers, *_WRAPPED, *more, ALL_LAWS]))
             choices = ", ".join(known)
-            raise UnknownNameError(f"there is no law {law!r}, expected one of {choices}{did_you_mean(law, known)}")
+            raise UnknownNameError(
+                f"there is no law {law!r}, expected one of {choices}{did_you_mean(law, known)}",
+                argument="laws",
+                value=law,
+                choices=tuple(known),
+            )
         name, wrapper = _WRAPPED.get(law, (law, None))
         inside, options = _make_like(pattern, name), _options_of(pattern, task)
         made = makers[name](robot, task, gains, options) if inside is None else inside
@@ -189,9 +202,17 @@ def _make_law(
     made = _call(law, robot, task) if callable(law) else law
     check_controller("laws", made)
     if made.robot.joint_names != robot.joint_names:
-        raise InputError(f"{type(made).__name__} is for the joints {made.robot.joint_names}, not {robot.joint_names}")
+        raise InputError(
+            f"{type(made).__name__} is for the joints {made.robot.joint_names}, not {robot.joint_names}",
+            argument="laws",
+            value=list(made.robot.joint_names),
+        )
     if not _is_same(made.task, task):
-        raise InputError(f"{type(made).__name__} is for another task than the scenario; make it with scenario.task")
+        raise InputError(
+            f"{type(made).__name__} is for another task than the scenario; make it with scenario.task",
+            argument="laws",
+            value=made,
+        )
     return made
 
 
@@ -229,7 +250,9 @@ def _call(make: Maker, robot: RobotModel, task: PathTask) -> Controller:
         if not isinstance(make, type):
             raise
         raise InputError(
-            f"{make.__name__}(robot, task) makes no law: {error}; give a law, or a function of robot and task"
+            f"{make.__name__}(robot, task) makes no law: {error}; give a law, or a function of robot and task",
+            argument="laws",
+            value=make.__name__,
         ) from error
 
 

@@ -88,14 +88,20 @@ class Scenario:
     def __post_init__(self) -> None:
         if self.event is not None and not 0 <= self.event[0] < min(self.event[1], self.duration):
             raise InputError(
-                f"event = {self.event}, expected begin and end [s] with a begin in the run of {self.duration:g} s"
+                f"event = {self.event}, expected begin and end [s] with a begin in the run of {self.duration:g} s",
+                argument="event",
+                value=self.event,
+                limit=(0.0, self.duration),
             )
 
         if self.undisturbed is not None and (own := _sampling(self.loop)) != (
             other := _sampling(self.undisturbed.loop)
         ):
             raise InputError(
-                f"undisturbed.loop has samples each {other:g} s and loop each {own:g} s, expected the same times"
+                f"undisturbed.loop has samples each {other:g} s and loop each {own:g} s, expected the same times",
+                argument="undisturbed",
+                value=other,
+                limit=own,
             )
 
     @property

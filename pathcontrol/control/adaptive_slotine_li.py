@@ -72,7 +72,10 @@ class AdaptiveSlotineLi(PlanFeedback):
         self.adaptation = rollout_gain("adaptation", adaptation)
         if (self.adaptation < 0).any():
             raise InputError(
-                f"adaptation = {self.adaptation.tolist()}, expected 0 or more: a negative one unlearns the parameters"
+                f"adaptation = {self.adaptation.tolist()}, expected 0 or more: a negative one unlearns the parameters",
+                argument="adaptation",
+                value=adaptation,
+                limit=0.0,
             )
 
     @property

@@ -324,7 +324,8 @@ def check_controller(name: str, controller: Any) -> None:
     if not hasattr(controller, "task"):
         kind = type(controller).__name__
         raise InputError(
-            f"{kind}.__init__ does not call super().__init__(robot, task), which gives a law its arm and task"
+            f"{kind}.__init__ does not call super().__init__(robot, task), which gives a law its arm and task",
+            argument=name,
         )
 
 

@@ -50,17 +50,23 @@ def refuse_several_gains(law: Controller) -> None:
         InputError: a gain, the observer or a rule of a wrapper has a row for each of several rollouts.
     """
     if isinstance(law, LawWrapper) and (rows := max(rule.count_rows() for rule in law.rules)) > 1:
-        raise InputError(f"{type(law).__name__} has settings of {rows} rollouts, expected those of one")
+        raise InputError(f"{type(law).__name__} has settings of {rows} rollouts, expected those of one", value=rows)
     inner = unwrap(law)
     if law.observer is not None and law.observer.gain.ndim > 1:
         rows = len(law.observer.gain)
-        raise InputError(f"observer_hz has rows for {rows} rollouts, expected one value, or one for each joint")
+        raise InputError(
+            f"observer_hz has rows for {rows} rollouts, expected one value, or one for each joint",
+            argument="observer_hz",
+            value=law.observer.gain,
+        )
     for name in inner.gains:
         shape = np.shape(getattr(inner, name))
         rows = len(shape) > 1 or name in _NUMBERS or shape[:1] != (law.robot.n,)
         if rows and shape and shape[0] > 1:
             raise InputError(
-                f"{name} has the gains of several rollouts, {shape}, expected those of one, ({law.robot.n},)"
+                f"{name} has the gains of several rollouts, {shape}, expected those of one, ({law.robot.n},)",
+                argument=name,
+                value=getattr(inner, name),
             )
 
 
@@ -106,7 +112,8 @@ def with_gains(law: Controller, gains: Mapping[str, ArrayLike]) -> Controller:
     if lost := [name for name in needed if arguments[name] is None]:
         raise InputError(
             f"{type(law).__name__} does not keep its argument {lost[0]!r}, so it cannot be made with other gains; "
-            f"store it as self.{lost[0]}"
+            f"store it as self.{lost[0]}",
+            argument=lost[0],
         )
     return type(law)(**{name: value for name, value in arguments.items() if name in needed or value is not None})
 
@@ -117,7 +124,7 @@ def _find(law: Controller, name: str) -> Any:
     if name not in known:
         of = type(unwrap(law)).__name__
         if not known:
-            raise UnknownNameError(f"{of} has no gain {name!r}, as it names none: set {of}.gains")
+            raise UnknownNameError(f"{of} has no gain {name!r}, as it names none: set {of}.gains", value=name)
         raise UnknownNameError(
             f"{of} has no gain {name!r}, expected one of {', '.join(known)}{did_you_mean(name, known)}",
             argument=name,

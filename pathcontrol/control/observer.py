@@ -129,7 +129,9 @@ class MomentumObserver:
         if memory.shape[-1] != self.size:
             raise InputError(
                 f"the momentum observer in the loop got {memory.shape[-1]} numbers of memory, expected "
-                f"{self.size}: start and advance of a law have to begin with what those of Controller return"
+                f"{self.size}: start and advance of a law have to begin with what those of Controller return",
+                value=memory.shape[-1],
+                limit=self.size,
             )
         parts = memory[..., : 4 * n].reshape(*memory.shape[:-1], 4, n)
         return parts[..., 0, :], parts[..., 1, :], parts[..., 2, :], parts[..., 3, :], memory[..., 4 * n :]

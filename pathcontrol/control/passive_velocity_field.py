@@ -94,7 +94,12 @@ class PassiveVelocityField(NearestPoint):
         self.Lambda, self.K_v = positive_rollout_gain("Lambda", Lambda), positive_rollout_gain("K_v", K_v)
         self.recharge = rollout_gain("recharge", recharge)
         if (self.recharge < 0).any():
-            raise InputError(f"recharge = {self.recharge.tolist()}, expected 0 or more: a negative one wastes energy")
+            raise InputError(
+                f"recharge = {self.recharge.tolist()}, expected 0 or more: a negative one wastes energy",
+                argument="recharge",
+                value=recharge,
+                limit=0.0,
+            )
         fastest, inertia = np.moveaxis(np.asarray(map_tasks(task, self._survey)), -1, 0)
         self.approach = positive_rollout_gain("approach", _as_rows(fastest) if approach is None else approach)
         enough = 2 * inertia * each_rollout(self.approach) ** 2
@@ -102,7 +107,10 @@ class PassiveVelocityField(NearestPoint):
         need = np.broadcast_to(0.5 * inertia * fastest**2 / _MOST, np.shape(enough))
         if (need > each_rollout(self.energy)).any():
             raise InputError(
-                f"energy = {self.energy.tolist()} J, but the arm may need {need.max():.3g} J at the speed of the task"
+                f"energy = {self.energy.tolist()} J, but the arm may need {need.max():.3g} J at the speed of the task",
+                argument="energy",
+                value=self.energy,
+                limit=need.max(),
             )
 
     def _survey(self, task: PathTask) -> Array:

@@ -61,7 +61,10 @@ class PlanFeedback(Controller):
         self.k = each_rollout(rollout_gain("k", k))
         if (self.k < 0).any():
             raise InputError(
-                f"k = {self.k.tolist()}, expected k ≥ 0: a negative gain drives the path away from the arm"
+                f"k = {self.k.tolist()}, expected k ≥ 0: a negative gain drives the path away from the arm",
+                argument="k",
+                value=k,
+                limit=0.0,
             )
 
     def plan(self, s: Array, q: Array, qd: Array) -> Plan:

@@ -54,7 +54,9 @@ class ControlTick:
         check_controller("law", law)
         gains = [law.observer_hz, *(getattr(law, name) for name in law.gains)]
         if isinstance(law.task, TaskBatch) or any(np.ndim(gain) > 1 for gain in gains):
-            raise InputError("the law is for several rollouts, expected one task and one set of gains")
+            raise InputError(
+                "the law is for several rollouts, expected one task and one set of gains", argument="law", value=law
+            )
         refuse_several_gains(law)
         self.law, self._period = law, as_scalar("period", period, positive=True)
         make = _CompiledTick if type(law) in GAINS and law.observer is None else _PythonTick
@@ -108,7 +110,9 @@ class ControlTick:
         """Return the law, which must have a speed input."""
         if not isinstance(self.law, LawWrapper):
             name = type(self.law).__name__
-            raise InputError(f"{name} has no speed input; wrap it: ControlTick(SpeedOverride(law), {self._period:g})")
+            raise InputError(
+                f"{name} has no speed input; wrap it: ControlTick(SpeedOverride(law), {self._period:g})", value=self.law
+            )
         return self.law
 
 

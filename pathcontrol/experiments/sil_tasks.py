@@ -65,7 +65,11 @@ def make_sil_task(robot: str | None, task: str | None) -> SilTask:
 def _make_paper(arm: RobotModel) -> SilTask:
     """Return the first experiment of the paper at 1 kHz."""
     if arm.n != 2:
-        raise InputError(f"task = 'paper' is for an arm of two joints, {arm.name} has {arm.n}; give contour")
+        raise InputError(
+            f"task = 'paper' is for an arm of two joints, {arm.name} has {arm.n}; give contour",
+            argument="task",
+            value="paper",
+        )
     law = paper_controllers(arm)["extended_motion_plan"]
     return SilTask(law, arm, np.deg2rad(START_DEG), 1e-3, _make_envelope(arm, tube=np.inf))
 
@@ -83,12 +87,18 @@ def _make_contour(arm: RobotModel) -> SilTask:
 def _read_task(robot: str | None, task: str) -> SilTask:
     """Return the law, arm, start and period of an experiment file."""
     if robot is not None:
-        raise InputError("the experiment file names its robot; leave robot out, or give task = 'paper' or 'contour'")
+        raise InputError(
+            "the experiment file names its robot; leave robot out, or give task = 'paper' or 'contour'",
+            argument="robot",
+            value=robot,
+        )
     if not Path(task).is_file():
-        raise InputError(f"task = {task!r}, expected 'paper', 'contour' or an experiment file")
+        raise InputError(
+            f"task = {task!r}, expected 'paper', 'contour' or an experiment file", argument="task", value=task
+        )
     setup = load_setup(task)
     if len(setup.controllers) > 1:
-        raise InputError(f"{task!r} is a sequence of paths, expected one path")
+        raise InputError(f"{task!r} is a sequence of paths, expected one path", argument="task", value=task)
     period = setup.loop.period if isinstance(setup.loop, SampledLoop) else 1e-3
     return SilTask(setup.controller, setup.plant, setup.q, period, _make_envelope(setup.controller.robot, tube=np.inf))
 

@@ -55,7 +55,9 @@ def write_urscript(trajectory: Trajectory) -> str:
     if len(trajectory.joints) != _UR_JOINTS or set(trajectory.units) != {"rad"}:
         raise InputError(
             f"URScript is for arms with six joints that turn, the trajectory has {len(trajectory.joints)} "
-            f"({', '.join(trajectory.joints)}); write csv or ros"
+            f"({', '.join(trajectory.joints)}); write csv or ros",
+            value=len(trajectory.joints),
+            limit=_UR_JOINTS,
         )
     low, high = _UR_PERIODS
     if not low * (1 - 1e-9) <= trajectory.period <= high * (1 + 1e-9):

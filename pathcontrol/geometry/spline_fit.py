@@ -31,7 +31,12 @@ def fit_samples(q: ArrayLike, s: ArrayLike | None, tolerance: float, closed: boo
         parameters = _check_parameters(s, samples, closed)
     least = 3 if closed else 2
     if len(samples) < least:
-        raise InputError(f"q has {len(samples)} different postures, expected at least {least} for this path")
+        raise InputError(
+            f"q has {len(samples)} different postures, expected at least {least} for this path",
+            argument="q",
+            value=q,
+            limit=least,
+        )
     spline = _refine(samples, parameters, tolerance, closed) if tolerance else None
     spline = spline or _interpolant(samples, parameters, closed)
     return spline, float(_distances(spline(parameters[: len(samples)]), samples).max())
@@ -41,7 +46,7 @@ def _check_samples(q: ArrayLike) -> Array:
     """Check that ``q`` is a finite array (m, n)."""
     samples = check_finite("q", as_array("q", q))
     if samples.ndim != 2 or not samples.shape[1]:
-        raise InputError(f"q has shape {samples.shape}, expected (m, n): one sample a row")
+        raise InputError(f"q has shape {samples.shape}, expected (m, n): one sample a row", argument="q", value=q)
     return samples
 
 
@@ -51,13 +56,15 @@ def _check_parameters(s: ArrayLike, samples: Array, closed: bool) -> Array:
     if parameters.shape != (len(samples) + closed,):
         more = ", one of them for the return to the first sample" if closed else ""
         raise InputError(
-            f"s has shape {parameters.shape}, expected ({len(samples) + closed},) for {len(samples)} samples{more}"
+            f"s has shape {parameters.shape}, expected ({len(samples) + closed},) for {len(samples)} samples{more}",
+            argument="s",
+            value=s,
         )
     falls = np.flatnonzero(np.diff(parameters) <= 0)
     if falls.size:
         i = int(falls[0])
         pair = f"s[{i}] = {parameters[i]:g} and s[{i + 1}] = {parameters[i + 1]:g}"
-        raise InputError(f"{pair}, expected parameters that increase")
+        raise InputError(f"{pair}, expected parameters that increase", argument="s", value=parameters[i + 1])
     return parameters
 
 

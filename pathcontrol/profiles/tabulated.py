@@ -78,21 +78,34 @@ class TabulatedProfile(VelocityProfile):
 def _check_knots(s: ArrayLike) -> Array:
     knots = check_finite("s", as_array("s", s))
     if knots.ndim != 1 or len(knots) < 2:
-        raise InputError(f"s has shape {knots.shape}, expected at least two knots, (m,)")
+        raise InputError(f"s has shape {knots.shape}, expected at least two knots, (m,)", argument="s", value=s)
     if not (np.diff(knots) > 0).all():
         i = int(np.argmax(np.diff(knots) <= 0))
-        raise InputError(f"s[{i}] = {knots[i]:g} is followed by {knots[i + 1]:g}, expected strictly increasing knots")
+        raise InputError(
+            f"s[{i}] = {knots[i]:g} is followed by {knots[i + 1]:g}, expected strictly increasing knots",
+            argument="s",
+            value=knots[i + 1],
+            limit=knots[i],
+        )
     return freeze(knots)
 
 
 def _check_squares(s: Array, squared: Array) -> Array:
     if squared.shape != s.shape:
-        raise InputError(f"squared has shape {squared.shape} and s {s.shape}, expected one ϑ² for each knot")
+        raise InputError(
+            f"squared has shape {squared.shape} and s {s.shape}, expected one ϑ² for each knot",
+            argument="squared",
+            value=squared,
+        )
     if not (squared > 0).all():
         i = int(np.argmin(squared))
         raise InputError(
             f"squared[{i}] = {squared[i]:g} at s = {s[i]:g}, expected ϑ² > 0: where it is not, the motion plan "
-            "ṡ = ϑ(s) stops for ever"
+            "ṡ = ϑ(s) stops for ever",
+            argument="squared",
+            value=squared[i],
+            limit=0.0,
+            s=float(s[i]),
         )
     return freeze(squared)
 
@@ -100,9 +113,15 @@ def _check_squares(s: Array, squared: Array) -> Array:
 def _check_period(s: Array, squared: Array, period: float) -> float:
     period = as_scalar("period", period, positive=True)
     if not np.isclose(s[-1] - s[0], period, rtol=1e-9, atol=0):
-        raise InputError(f"period = {period:g}, but the knots span {s[-1] - s[0]:g}; give knots from s0 to s0 + period")
+        raise InputError(
+            f"period = {period:g}, but the knots span {s[-1] - s[0]:g}; give knots from s0 to s0 + period",
+            argument="period",
+            value=period,
+        )
     if not np.isclose(squared[0], squared[-1], rtol=1e-9, atol=0):
         raise InputError(
-            f"squared begins with {squared[0]:g} and ends with {squared[-1]:g}, expected the same on a closed path"
+            f"squared begins with {squared[0]:g} and ends with {squared[-1]:g}, expected the same on a closed path",
+            argument="squared",
+            value=squared,
         )
     return period

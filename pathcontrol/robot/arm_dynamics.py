@@ -51,7 +51,9 @@ class ArmDynamics:
 
     def __post_init__(self) -> None:
         if self.threads < 1:
-            raise InputError(f"threads = {self.threads}, expected 1 or more")
+            raise InputError(
+                f"threads = {self.threads}, expected 1 or more", argument="threads", value=self.threads, limit=1
+            )
         object.__setattr__(self, "n", self.pinocchio_model.nv)
 
     def __repr__(self) -> str:
@@ -324,7 +326,9 @@ class ArmDynamics:
         """Return the index of Pinocchio's joint that moves a frame; 0, the base, is refused."""
         i = self.pinocchio_model.frames[self._frame_id(frame)].parentJoint
         if i == 0:
-            raise InputError(f"no joint of {self.name} moves the frame {frame!r}; give one farther out as tip")
+            raise InputError(
+                f"no joint of {self.name} moves the frame {frame!r}; give one farther out as tip", value=frame
+            )
         return i
 
     def _frame_id(self, frame: str) -> int:

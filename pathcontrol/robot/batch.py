@@ -40,13 +40,19 @@ class RobotBatch:
     def __init__(self, robots: Sequence[RobotModel], friction: FrictionLaw | None = None) -> None:
         self.robots = (robots,) if isinstance(robots, RobotModel) else tuple(robots)
         if not self.robots:
-            raise InputError("robots is an empty list, expected a RobotModel for each rollout")
+            raise InputError(
+                "robots is an empty list, expected a RobotModel for each rollout", argument="robots", value=[]
+            )
         for i, robot in enumerate(self.robots):
             expect(f"robots[{i}]", robot, RobotModel)
         first = self.robots[0]
         for i, robot in enumerate(self.robots):
             if robot is not first and robot.joint_names != first.joint_names:
-                raise InputError(f"plant[{i}] has the joints {robot.joint_names}, plant[0] {first.joint_names}")
+                raise InputError(
+                    f"plant[{i}] has the joints {robot.joint_names}, plant[0] {first.joint_names}",
+                    argument=f"plant[{i}]",
+                    value=robot,
+                )
         self.n, self.name, self.joint_names = first.n, first.name, first.joint_names
         self.position_units = first.position_units
         law = friction_of_each([robot.friction for robot in self.robots]) if friction is None else friction

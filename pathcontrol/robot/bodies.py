@@ -45,10 +45,17 @@ def payload_of(mass: float, com: ArrayLike, inertia: ArrayLike | None) -> Any:
     mass, lever = as_scalar("mass", mass, least=0.0), check_physical("com", as_array("com", com))
     tensor = np.zeros((3, 3)) if inertia is None else check_physical("inertia", as_array("inertia", inertia))
     if lever.shape != (3,) or tensor.shape != (3, 3):
-        raise InputError(f"com has shape {lever.shape} and inertia {tensor.shape}, expected (3,) and (3, 3)")
+        argument, value = ("com", com) if lever.shape != (3,) else ("inertia", inertia)
+        raise InputError(
+            f"com has shape {lever.shape} and inertia {tensor.shape}, expected (3,) and (3, 3)",
+            argument=argument,
+            value=value,
+        )
     least = -_ROUNDING * max(1.0, float(np.abs(tensor).max()))
     if not np.allclose(tensor, tensor.T) or np.linalg.eigvalsh(0.5 * (tensor + tensor.T)).min() < least:
-        raise InputError("the payload's inertia is not symmetric positive semi-definite")
+        raise InputError(
+            "the payload's inertia is not symmetric positive semi-definite", argument="inertia", value=inertia
+        )
     return body_of(mass, lever, tensor)
 
 
@@ -59,13 +66,16 @@ def scale_bodies(model: Any, names: tuple[str, ...], factors: Mapping[str, float
         InputError: a joint has both, or the factor is of a body that has no mass.
     """
     if both := sorted(factors.keys() & masses.keys()):
-        raise InputError(f"{', '.join(both)} has a scale and a mass in kg; give one of them")
+        raise InputError(f"{', '.join(both)} has a scale and a mass in kg; give one of them", joint=both[0])
     for joint, value in (*factors.items(), *masses.items()):
         i, argument = names.index(joint) + 1, "scale" if joint in factors else "kg"
         try:
             model.inertias[i] = _scale_body(model, i, value, argument)
         except InputError as error:
-            raise InputError(f"{argument} of {joint} = {value:g}: {error}") from error
+            raise InputError(
+                f"{argument} of {joint} = {value:g}: {error}",
+                **error.details_with(argument=argument, joint=joint, value=value),
+            ) from error
     given = [*(f"scale of {joint} = {value:g}" for joint, value in factors.items())]
     given += [f"kg of {joint} = {value:g}" for joint, value in masses.items()]
     check_spread(model, ", ".join(given))
@@ -96,7 +106,10 @@ def check_spread(model: Any, given: str) -> None:
     if felt and felt[most] > _SPREAD * felt[least]:
         raise InputError(
             f"{given}: what {most} moves has {felt[most] / felt[least]:.3g} times the inertia of what {least} moves, "
-            f"which is lost in rounding; expected {_SPREAD:g} times at most"
+            f"which is lost in rounding; expected {_SPREAD:g} times at most",
+            joint=most,
+            value=felt[most] / felt[least],
+            limit=_SPREAD,
         )
 
 

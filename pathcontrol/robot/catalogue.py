@@ -72,14 +72,18 @@ def _find_by_name(name: str, package_dirs: tuple[Path, ...]) -> UrdfSource:
     try:
         catalogue = _example_robots()
     except MissingExtraError as missing:
-        raise UnknownNameError(f"unknown robot {name!r}; known here: {_names()}. {missing}") from missing
+        raise UnknownNameError(f"unknown robot {name!r}; known here: {_names()}. {missing}", value=name) from missing
     loader = catalogue.get(name)
     if loader is None and Path(name).is_dir():
         raise UrdfError(f"{name!r} is a folder, expected a URDF file; give the one that is in it")
     if loader is None or not loader.urdf_filename or loader.free_flyer:
         reason = "has a floating base" if loader is not None and loader.free_flyer else "is unknown"
         meant = did_you_mean(name, known_robots())
-        raise UnknownNameError(f"robot {name!r} {reason}; known arms: {_names()}, or the path of a URDF{meant}")
+        raise UnknownNameError(
+            f"robot {name!r} {reason}; known arms: {_names()}, or the path of a URDF{meant}",
+            value=name,
+            choices=tuple(known_robots()),
+        )
     return _example_urdf(name, loader, package_dirs)
 
 

@@ -21,15 +21,18 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import SMALLEST, Array, as_array, check_physical, freeze
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.errors import InputError, UnknownNameError, about
 from pathcontrol.registry import FRICTION_LAWS
 
 
-def _coefficients(name: str, value: ArrayLike) -> Array:
+def _coefficients(name: str, value: ArrayLike, argument: str) -> Array:
     """Check that coefficients are finite and not negative, one for each joint."""
-    array = check_physical(name, np.atleast_1d(as_array(name, value)))
-    if (array < 0).any():
-        raise InputError(f"{name} = {array.tolist()}, expected no negative value: friction takes energy out")
+    with about(argument=argument):
+        array = check_physical(name, np.atleast_1d(as_array(name, value)))
+        if (array < 0).any():
+            raise InputError(
+                f"{name} = {array.tolist()}, expected no negative value: friction takes energy out", value=value
+            )
     return freeze(array)
 
 
@@ -104,7 +107,8 @@ class Viscous(FrictionLaw):
     coefficients: Annotated[Array, Form.NUMBERS, Unit("N m s/rad")]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "coefficients", _coefficients("viscous coefficients", self.coefficients))
+        coefficients = _coefficients("viscous coefficients", self.coefficients, "coefficients")
+        object.__setattr__(self, "coefficients", coefficients)
 
     @property
     def n(self) -> int:
@@ -123,11 +127,15 @@ class Coulomb(FrictionLaw):
     minus: Annotated[Array, Form.NUMBERS, Unit("N m")] | None = None
 
     def __post_init__(self) -> None:
-        plus = _coefficients("Coulomb friction for positive velocity", self.plus)
-        minus = plus if self.minus is None else _coefficients("Coulomb friction for negative velocity", self.minus)
+        plus = _coefficients("Coulomb friction for positive velocity", self.plus, "plus")
+        minus = plus
+        if self.minus is not None:
+            minus = _coefficients("Coulomb friction for negative velocity", self.minus, "minus")
         if plus.shape[-1] != minus.shape[-1]:
             raise InputError(
-                f"Coulomb levels for {plus.shape[-1]} joints forward and {minus.shape[-1]} backward; give both for all"
+                f"Coulomb levels for {plus.shape[-1]} joints forward and {minus.shape[-1]} backward; give both for all",
+                argument="minus",
+                value=self.minus,
             )
         object.__setattr__(self, "plus", plus)
         object.__setattr__(self, "minus", minus)
@@ -155,17 +163,21 @@ class Stribeck(FrictionLaw):
 
     def __post_init__(self) -> None:
         for name in ("coulomb", "static", "velocity"):
-            object.__setattr__(self, name, _coefficients(f"Stribeck {name}", getattr(self, name)))
+            object.__setattr__(self, name, _coefficients(f"Stribeck {name}", getattr(self, name), name))
         sizes = {name: getattr(self, name).shape[-1] for name in ("coulomb", "static", "velocity")}
         if len(set(sizes.values())) != 1:
             raise InputError(
-                f"Stribeck coefficients for different numbers of joints, {sizes}; expected one each per joint"
+                f"Stribeck coefficients for different numbers of joints, {sizes}; expected one each per joint",
+                value=sizes,
             )
         if (self.static < self.coulomb).any() or (self.velocity < SMALLEST).any():
             raise InputError(
                 f"Stribeck friction with static {self.static.tolist()}, Coulomb {self.coulomb.tolist()} and velocity "
                 f"{self.velocity.tolist()}; expected static ≥ Coulomb and velocity > 0 at each joint, of {SMALLEST:g} "
-                "rad/s or more"
+                "rad/s or more",
+                argument="static",
+                value=self.static,
+                limit=self.coulomb,
             )
 
     @property
@@ -186,7 +198,9 @@ class FrictionSum(FrictionLaw):
     def __post_init__(self) -> None:
         sizes = sorted({term.n for term in self.terms})
         if len(sizes) != 1:
-            raise InputError(f"friction laws for {sizes} joints cannot be added; give each law one value per joint")
+            raise InputError(
+                f"friction laws for {sizes} joints cannot be added; give each law one value per joint", value=sizes
+            )
 
     @property
     def n(self) -> int:
@@ -333,7 +347,8 @@ def _check_levels(law: FrictionLaw, qd: Array) -> None:
         if not (np.asarray(level) >= 0).all() or not np.isfinite(level).all():
             raise InputError(
                 f"{type(law).__name__}.levels gives {name} = {np.asarray(level).tolist()} N m at {qd[0]:g} rad/s, "
-                "expected numbers that are not negative: the level is a strength, its direction is that of motion"
+                "expected numbers that are not negative: the level is a strength, its direction is that of motion",
+                value=np.asarray(level),
             )
 
 
@@ -348,7 +363,9 @@ def _check_torque(law: FrictionLaw, qd: Array) -> None:
             raise InputError(
                 f"{type(law).__name__}.{name} gives {said:g} N m at {qd[0]:g} rad/s for joint {i[-1]}, but levels and "
                 f"viscous, which the simulated arm asks, give {expected[i]:g} N m; leave {name}() out, which follows "
-                "from them, or make them agree"
+                "from them, or make them agree",
+                value=said,
+                limit=expected[i],
             )
 
 

@@ -13,14 +13,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import as_array, as_quantity, as_scalar, check_physical, check_rigid
+from pathcontrol._arrays import as_array, as_quantity, check_physical, check_rigid
 from pathcontrol.arguments import Form, Point, Unit
-from pathcontrol.errors import InputError, warn
+from pathcontrol.errors import InputError, about, warn
 from pathcontrol.robot.actuation import Actuation
 from pathcontrol.robot.arm_dynamics import ArmDynamics
 from pathcontrol.robot.bodies import check_spread, payload_of, scale_bodies
 from pathcontrol.robot.friction import FrictionLaw, check_consistent, no_friction
-from pathcontrol.robot.urdf.locking import check_tip, locked_angles, locked_beyond_limits, names_to_keep
+from pathcontrol.robot.urdf.locking import check_tip, locked_angles, locked_beyond_limits, names_to_keep, read_angles
 from pathcontrol.robot.urdf.xml.parse import parse_urdf
 
 
@@ -56,7 +56,9 @@ class RobotModel(ArmDynamics):
         """
         law = no_friction(self.n) if friction is None else friction
         if law.n != self.n:
-            raise InputError(f"the friction law is for {law.n} joints, {self.name} has {self.n}")
+            raise InputError(
+                f"the friction law is for {law.n} joints, {self.name} has {self.n}", argument="friction", value=law
+            )
         check_consistent(law)
         actuation = Actuation(self.limits, law, self.actuation.encoder_counts)
         return replace(self, actuation=actuation)
@@ -96,10 +98,14 @@ class RobotModel(ArmDynamics):
             pose: its pose in ``parent`` [m], homogeneous (4, 4), or only the position of its origin, (3,).
         """
         if name in self.frame_names:
-            raise InputError(f"{self.name} has a frame {name!r} already; choose another name")
+            raise InputError(
+                f"{self.name} has a frame {name!r} already; choose another name", argument="name", value=name
+            )
         model, given = pin.Model(self.pinocchio_model), check_physical("pose", as_array("pose", pose))
         if given.shape not in ((3,), (4, 4)):
-            raise InputError(f"pose has shape {given.shape}, expected (4, 4), or (3,) for a position")
+            raise InputError(
+                f"pose has shape {given.shape}, expected (4, 4), or (3,) for a position", argument="pose", value=pose
+            )
         placement = pin.SE3(np.eye(3), given) if given.shape == (3,) else pin.SE3(check_rigid("pose", given, 1e-6))
         support = model.frames[self._frame_id(parent)]
         frame = pin.Frame(name, support.parentJoint, support.placement * placement, pin.FrameType.OP_FRAME)
@@ -110,7 +116,11 @@ class RobotModel(ArmDynamics):
         """Return the same arm with rotor inertia [kg m²], shape (n,), added to the diagonal of M."""
         added = check_physical("armature", self._array("armature", armature))
         if added.shape != (self.n,) or (added < 0).any():
-            raise InputError(f"armature = {added.tolist()}, expected {self.n} values not below 0")
+            raise InputError(
+                f"armature = {added.tolist()}, expected {self.n} values not below 0",
+                argument="armature",
+                value=armature,
+            )
         model = pin.Model(self.pinocchio_model)
         model.armature = np.asarray(model.armature) + added
         return self._with_model(model, "with_armature", {"armature": added.tolist()})
@@ -146,10 +156,16 @@ class RobotModel(ArmDynamics):
             if values.shape != (self.n,):
                 raise InputError(
                     f"{name} = {given!r}, expected numbers by joint, as {{{self.joint_names[0]!r}: 2.0}}, or one for "
-                    f"each of the {self.n} joints"
+                    f"each of the {self.n} joints",
+                    argument=name,
+                    value=given,
                 )
             given = dict(zip(self.joint_names, values.tolist(), strict=True))
-        return {joint: as_quantity(f"{name} of {joint}", value) for joint, value in (given or {}).items()}
+        found: dict[str, float] = {}
+        for joint, value in (given or {}).items():
+            with about(argument=name, joint=joint):
+                found[joint] = as_quantity(f"{name} of {joint}", value)
+        return found
 
     def with_threads(self, threads: int) -> RobotModel:
         """Return the same arm whose batched calls use ``threads`` threads."""
@@ -188,9 +204,12 @@ def lock_joints(robot: RobotModel, angles: Mapping[str, float]) -> RobotModel:
         InputError: an angle is not finite, or no joint is left.
         UnknownNameError: there is no such joint.
     """
-    indices = {robot.joint_index(joint): as_scalar(f"angle of {joint}", angle) for joint, angle in angles.items()}
+    indices = {robot.joint_index(joint): angle for joint, angle in read_angles(angles).items()}
     if len(indices) == robot.n:
-        raise InputError(f"locking all {robot.n} joints of {robot.name} leaves nothing to control; leave one free")
+        raise InputError(
+            f"locking all {robot.n} joints of {robot.name} leaves nothing to control; leave one free",
+            value=list(angles),
+        )
     q = np.zeros(robot.n)
     q[list(indices)] = list(indices.values())
     model = pin.buildReducedModel(robot.pinocchio_model, [i + 1 for i in indices], q)

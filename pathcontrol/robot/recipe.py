@@ -67,7 +67,11 @@ def _rebuild(recipe: Mapping[str, Any]) -> RobotModel:
     robot = build_checked_model(_source(recipe), "the recorded URDF", locked)
     for method, arguments in steps:
         if method not in _METHODS:
-            raise InputError(f"step {method!r} of the robot, expected one of {', '.join(_METHODS)}")
+            raise InputError(
+                f"step {method!r} of the robot, expected one of {', '.join(_METHODS)}",
+                value=method,
+                choices=tuple(_METHODS),
+            )
         robot = lock_joints(robot, arguments["lock"]) if method == "reduced" else getattr(robot, method)(**arguments)
     limits = Limits(*(_array(recipe["limits"][name], robot.n, missing) for name, missing in _LIMITS.items()))
     counts = recipe["encoder_counts"]
@@ -97,7 +101,7 @@ def _friction(description: Mapping[str, Any], n: int) -> FrictionLaw:
         warn(f"the robot is rebuilt without its friction: {error}")
         return no_friction(n)
     if law.n != n:
-        raise InputError(f"the recorded friction law is for {law.n} joints, the robot has {n}")
+        raise InputError(f"the recorded friction law is for {law.n} joints, the robot has {n}", value=law.n)
     return law
 
 
@@ -105,5 +109,5 @@ def _array(values: Sequence[float | None], n: int, missing: float) -> Array:
     """Convert values of JSON to an array (n,): null becomes ``missing``."""
     array = freeze(np.array([missing if value is None else value for value in values], dtype=np.float64))
     if array.shape != (n,):
-        raise InputError(f"{array.shape} values are recorded of the joints, expected ({n},)")
+        raise InputError(f"{array.shape} values are recorded of the joints, expected ({n},)", value=array.shape)
     return array

@@ -120,7 +120,9 @@ class RunContext:
             return task
         rows = rollouts - self._first()
         if ((rows < 0) | (rows >= len(task))).any():
-            raise InputError(f"the data have rollouts {rollouts.tolist()}, of which the run does not know all tasks")
+            raise InputError(
+                f"the data have rollouts {rollouts.tolist()}, of which the run does not know all tasks", value=rollouts
+            )
         return task.rows(rows)
 
     def rollout(self, number: int) -> RunContext:
@@ -202,7 +204,9 @@ def _first(stored: StoredContext) -> int:
     """Return the stored number of the first rollout."""
     first = _part_of(stored, "first_rollout")
     if not isinstance(first, int):
-        raise InputError(f"the tasks of the run are said to begin with rollout {first!r}, expected a number")
+        raise InputError(
+            f"the tasks of the run are said to begin with rollout {first!r}, expected a number", value=first
+        )
     return first
 
 

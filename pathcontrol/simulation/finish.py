@@ -128,7 +128,9 @@ def _check_laps(task: PathTask, laps: Any) -> None:
     """Check that ``laps`` is a whole number from 1 and the path is closed."""
     check_whole("laps", laps)
     if not task.closed:
-        raise InputError(f"laps = {laps}, but {type(task).__name__} is no closed path; leave laps out")
+        raise InputError(
+            f"laps = {laps}, but {type(task).__name__} is no closed path; leave laps out", argument="laps", value=laps
+        )
 
 
 def detection_ticks(finish: Finish | None, finish_time: Array, period: float) -> NDArray[np.int64]:

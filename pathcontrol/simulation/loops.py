@@ -69,17 +69,29 @@ class SampledLoop:
         as_scalar("period", self.period, positive=True)
         as_scalar("delay", self.delay, least=0.0)
         if not isinstance(self.substeps, int | np.integer) or not 1 <= self.substeps <= MOST_SUBSTEPS:
-            raise InputError(f"substeps = {self.substeps!r:.80}, expected a whole number from 1 to {MOST_SUBSTEPS}")
+            raise InputError(
+                f"substeps = {self.substeps!r:.80}, expected a whole number from 1 to {MOST_SUBSTEPS}",
+                argument="substeps",
+                value=self.substeps,
+                limit=(1, MOST_SUBSTEPS),
+            )
         if self.velocity not in ("exact", "difference"):
-            raise InputError(f"velocity = {self.velocity!r}, expected 'exact' or 'difference'")
+            raise InputError(
+                f"velocity = {self.velocity!r}, expected 'exact' or 'difference'",
+                argument="velocity",
+                value=self.velocity,
+                choices=("exact", "difference"),
+            )
         if self.filter_hz is not None:
             as_scalar("filter_hz", self.filter_hz, positive=True)
         if self.noise is not None and not isinstance(self.noise, SensorNoise):
-            raise InputError(f"noise = {self.noise!r}, expected a SensorNoise(...)")
+            raise InputError(f"noise = {self.noise!r}, expected a SensorNoise(...)", argument="noise", value=self.noise)
         if self.noise is not None and self.noise.on_velocity and self.velocity == "difference":
             raise InputError(
                 "noise of the velocity, but velocity = 'difference' is not measured: its noise is that of positions; "
-                "use velocity = 'exact', or no noise of it"
+                "use velocity = 'exact', or no noise of it",
+                argument="velocity",
+                value=self.velocity,
             )
 
     def sensors(self, robot: Arm) -> Sensors:
@@ -93,9 +105,19 @@ class SampledLoop:
             return None
         if "m" in robot.position_units:
             sliding = [j for j, unit in zip(robot.joint_names, robot.position_units, strict=True) if unit == "m"]
-            raise InputError(f"encoders count revolutions, but {', '.join(sliding)} slides; use encoders = False")
+            raise InputError(
+                f"encoders count revolutions, but {', '.join(sliding)} slides; use encoders = False",
+                argument="encoders",
+                value=self.encoders,
+                joint=sliding[0],
+            )
         if (counts <= 0).any():
-            raise InputError(f"encoders = {counts.tolist()}, expected counts per revolution greater than 0")
+            raise InputError(
+                f"encoders = {counts.tolist()}, expected counts per revolution greater than 0",
+                argument="encoders",
+                value=self.encoders,
+                limit=0.0,
+            )
         return 2 * np.pi / np.atleast_2d(counts)
 
     def describe(self) -> dict[str, Any]:
@@ -138,7 +160,10 @@ def torque_limits(mode: SampledLoop | ContinuousTime, robot: Arm) -> Array | Non
     if limits is not None and (limits <= 0).any():
         dead = [name for name, limit in zip(robot.joint_names, limits.T, strict=True) if (limit <= 0).any()]
         raise InputError(
-            f"the torque limit of {', '.join(dead)} is 0, which kills all torque; give torque_limits = [...] in N m"
+            f"the torque limit of {', '.join(dead)} is 0, which kills all torque; give torque_limits = [...] in N m",
+            argument="torque_limits",
+            value=mode,
+            joint=dead[0],
         )
     return limits
 
@@ -146,7 +171,9 @@ def torque_limits(mode: SampledLoop | ContinuousTime, robot: Arm) -> Array | Non
 def check_rows(values: Array | None, name: str, rollouts: int) -> None:
     """Check that the values of a loop for each rollout fit the number of rollouts."""
     if values is not None and values.ndim == 2 and len(values) not in (1, rollouts):
-        raise InputError(f"{name} has rows for {len(values)} rollouts, expected 1 or {rollouts}")
+        raise InputError(
+            f"{name} has rows for {len(values)} rollouts, expected 1 or {rollouts}", argument=name, value=values
+        )
 
 
 def _per_joint(
@@ -157,13 +184,19 @@ def _per_joint(
         return None
     if isinstance(value, bool | np.bool_):
         if own is None:
-            raise InputError(f"{name} = True, but {robot.name} says nothing about them; give one value per joint")
+            raise InputError(
+                f"{name} = True, but {robot.name} says nothing about them; give one value per joint",
+                argument=name,
+                value=value,
+            )
         return own
     array = as_array(name, value)
     if array.shape[-1:] != (robot.n,) or array.ndim > 2:
         raise InputError(
             f"{name} has shape {array.shape}, expected ({robot.n},): one value for each joint, or a row of "
-            "them for each rollout"
+            "them for each rollout",
+            argument=name,
+            value=value,
         )
     if infinite and not np.isnan(array).any():
         return array

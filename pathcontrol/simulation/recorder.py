@@ -40,7 +40,8 @@ class Recorder:
         if sum(8 * prod(shape) for shape in shapes.values()) > _LARGEST:
             raise InputError(
                 f"{rollouts} rollouts of {joints} joints at once, expected less than 2 GiB a sample; simulate them in "
-                "parts with first_rollout, or by sweep"
+                "parts with first_rollout, or by sweep",
+                value=rollouts,
             )
         sample = np.dtype(fields, align=True)
         self._use_block(new_block(min(samples, max(1, _ROOM // max(1, sample.itemsize))), sample))

@@ -88,10 +88,10 @@ class Run:
             found = self.data[name]
         except KeyError as error:
             known = ", ".join(map(str, self.data.variables))
-            raise UnknownNameError(f"the run has no variable {name!r}; there are {known}") from error
+            raise UnknownNameError(f"the run has no variable {name!r}; there are {known}", value=name) from error
         dims, *_ = (VARIABLES | OUTCOMES).get(name, (found.dims,))
         if found.dims != dims:
-            raise InputError(f"{name} of the run is over {found.dims}, expected {dims}")
+            raise InputError(f"{name} of the run is over {found.dims}, expected {dims}", value=name)
         return found
 
     def __contains__(self, name: str) -> bool:
@@ -253,8 +253,8 @@ class Run:
             InputError: there is none of that number.
         """
         check_index("rollout", index)
-        if not -self.rollouts <= index < self.rollouts:
-            raise InputError(f"rollout {index} does not exist: the run has {self.rollouts}, counted from 0")
+        if not -(n := self.rollouts) <= index < n:
+            raise InputError(f"rollout {index} does not exist: the run has {n}, counted from 0", value=index)
         part = self.data.isel(rollout=[index]) if self._samples is None else self._samples.alone(index)
         return Run(part, self.config, self._origin.rollout(int(self.array("rollout")[index])))
 
@@ -272,8 +272,8 @@ class Run:
             raise InputError("the run is no sequence of paths; make one with simulate_sequence")
         status, among, ends = (self.array(f"path_{name}") for name in ("status", "index", "finish_time"))
         if not 0 <= index < len(status) or status[index] == "waiting" or not (among == index).any():
-            followed = int((status != "waiting").sum())
-            raise InputError(f"path {index} was not followed: the run has {followed} paths, counted from 0")
+            n = int((status != "waiting").sum())
+            raise InputError(f"path {index} was not followed: the run has {n} paths, counted from 0", value=index)
         data, s = self.data.isel(time=among == index), self["s"][:, among == index]
         begin = data["time"].to_numpy()[0]
         data = data.assign(s=s - self.array("path_offset")[index])
@@ -319,12 +319,12 @@ class Run:
         Raises:
             InputError: the rollout diverged or there is no such one, or the rate gives less than two samples.
         """
-        if not 0 <= rollout < self.rollouts:
-            raise InputError(f"rollout = {rollout}, expected one of the {self.rollouts} of the run, counted from 0")
+        if not 0 <= rollout < (n := self.rollouts):
+            wanted = f"expected one of the {n} of the run, counted from 0"
+            raise InputError(f"rollout = {rollout}, {wanted}", argument="rollout", value=rollout, limit=(0, n - 1))
         if self.status[rollout] == "diverged":
-            raise InputError(
-                f"rollout {rollout} diverged at {self.diverged_time[rollout]:g} s and is no motion to follow"
-            )
+            t = float(self.diverged_time[rollout])
+            raise InputError(f"rollout {rollout} diverged at {t:g} s and is no motion to follow", value=rollout, time=t)
         end = self.finish_time[rollout]
         stop = None if np.isnan(end) else int(np.searchsorted(self.time, end, side="right"))
         q, qd = (self.array(name)[rollout, :stop] for name in ("q", "qd"))

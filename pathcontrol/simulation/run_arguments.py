@@ -34,7 +34,9 @@ def check_loop(loop: Loop | None) -> Loop:
     """Check the kind of loop; return it, or ``SampledLoop()`` if it is None."""
     loop = SampledLoop() if loop is None else loop
     if not isinstance(loop, SampledLoop | ContinuousTime):
-        raise InputError(f"loop = {loop!r}, expected SampledLoop(...) or ContinuousTime(...)")
+        raise InputError(
+            f"loop = {loop!r}, expected SampledLoop(...) or ContinuousTime(...)", argument="loop", value=loop
+        )
     return loop
 
 
@@ -42,7 +44,12 @@ def sample_period(loop: Loop, duration: float) -> float:
     """Return the time between samples [s]; ``duration`` [s] must hold at least one."""
     period = loop.period if isinstance(loop, SampledLoop) else loop.output_period
     if duration < period:
-        raise InputError(f"duration = {duration:g} s is less than one period of {period:g} s; both are in seconds")
+        raise InputError(
+            f"duration = {duration:g} s is less than one period of {period:g} s; both are in seconds",
+            argument="duration",
+            value=duration,
+            limit=period,
+        )
     return period
 
 
@@ -57,14 +64,21 @@ def check_length(duration: float, loop: Loop, rollouts: int, joints: int, ends: 
     sampled = isinstance(loop, SampledLoop)
     name, period = ("period", loop.period) if isinstance(loop, SampledLoop) else ("output_period", loop.output_period)
     if isinstance(loop, SampledLoop) and loop.delay > duration:
-        raise InputError(f"delay = {loop.delay:g} s, expected at most duration = {duration:g} s; both are in seconds")
+        raise InputError(
+            f"delay = {loop.delay:g} s, expected at most duration = {duration:g} s; both are in seconds",
+            argument="delay",
+            value=loop.delay,
+            limit=duration,
+        )
     needed, most = duration / period * rollouts * bytes_of_sample(joints), _memory()
     if needed <= most or (ends and sampled and duration / period < 2**53):
         return
     raise InputError(
         f"duration = {duration:g} s with {name} = {period:g} s makes {duration / period:.3g} samples of {rollouts} "
         f"rollouts, {needed / 1e9:.3g} GB, but this machine has {most / 1e9:.3g} GB; shorten duration, lengthen {name}"
-        + (", or take fewer rollouts at a time" if rollouts > 1 else "")
+        + (", or take fewer rollouts at a time" if rollouts > 1 else ""),
+        argument="duration",
+        value=duration,
     )
 
 
@@ -78,9 +92,15 @@ def make_plant(plant: RobotModel | Sequence[RobotModel] | None, controller: Cont
     plants = [controller.robot] if plant is None else [plant] if isinstance(plant, RobotModel) else list(plant)
     for i, robot in enumerate(plants):
         if not isinstance(robot, RobotModel):
-            raise InputError(f"plant[{i}] = {robot!r}, expected a RobotModel, or one for each rollout")
+            raise InputError(
+                f"plant[{i}] = {robot!r}, expected a RobotModel, or one for each rollout",
+                argument=f"plant[{i}]",
+                value=robot,
+            )
     if not plants:
-        raise InputError("plant is an empty list, expected a RobotModel, or one for each rollout")
+        raise InputError(
+            "plant is an empty list, expected a RobotModel, or one for each rollout", argument="plant", value=[]
+        )
     first = plants[0]
     rows = _count_friction_rows(first) if len(plants) == 1 else None
     if rows is not None:
@@ -99,7 +119,9 @@ def check_joints(controller: Controller, robot: Arm) -> None:
     """Check that the controller has the joints of the plant."""
     if robot.joint_names != controller.robot.joint_names:
         raise InputError(
-            f"the plant has the joints {robot.joint_names}, the controller's model {controller.robot.joint_names}"
+            f"the plant has the joints {robot.joint_names}, the controller's model {controller.robot.joint_names}",
+            argument="plant",
+            value=list(robot.joint_names),
         )
 
 
@@ -113,7 +135,9 @@ def initial_state(
     try:
         pair = np.broadcast_arrays(position, velocity)
     except ValueError as error:
-        raise InputError(f"q has shape {position.shape} and qd {velocity.shape}, which do not fit together") from error
+        raise InputError(
+            f"q has shape {position.shape} and qd {velocity.shape}, which do not fit together", argument="qd", value=qd
+        ) from error
     q0, qd0 = (np.array(a).reshape(-1, n) for a in pair)
     if rollouts is not None and len(q0) == 1:
         return q0.repeat(rollouts, axis=0), qd0.repeat(rollouts, axis=0)
@@ -211,7 +235,7 @@ def _check_output(controller: Controller, out: Any, q: Array, z: Array) -> None:
     """Check that a law returned a :class:`ControlOutput` whose shapes fit the initial states, with finite numbers."""
     name = _name_law(controller)
     if not isinstance(out, ControlOutput):
-        raise InputError(f"{name}.law returns {type(out).__name__}, expected a ControlOutput")
+        raise InputError(f"{name}.law returns {type(out).__name__}, expected a ControlOutput", value=out)
     if controller.observer is not None and out.observation is None:
         raise InputError(
             f"{type(unwrap(controller)).__name__}.law does not compensate what its observer estimates; end it with "
@@ -224,11 +248,14 @@ def _check_output(controller: Controller, out: Any, q: Array, z: Array) -> None:
             raise InputError(
                 _explain_rows(controller, len(q))
                 or f"{name}.law gives {field} of shape {np.shape(value)} for initial states of shape {q.shape}, "
-                f"expected {shape}"
+                f"expected {shape}",
+                value=value,
             )
         sound = np.isfinite(np.reshape(value, (len(q), -1))).all(-1)
         if not sound.any():  # if only some are not finite, those rollouts diverge
-            raise InputError(f"{name}.law gives {field} = {np.asarray(value).tolist()} at the start, expected numbers")
+            raise InputError(
+                f"{name}.law gives {field} = {np.asarray(value).tolist()} at the start, expected numbers", value=value
+            )
 
 
 def _call_law(controller: Controller, q: Array, function: Callable[..., Any], *arguments: Any) -> Any:

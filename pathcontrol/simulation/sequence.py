@@ -107,7 +107,11 @@ def simulate_sequence(
     laws = _check_controllers(controllers)
     robot = make_plant(plant, laws[0])
     if not isinstance(robot, RobotModel):
-        raise InputError("plant is one arm for each rollout, expected one: a sequence has a single rollout")
+        raise InputError(
+            "plant is one arm for each rollout, expected one: a sequence has a single rollout",
+            argument="plant",
+            value=plant,
+        )
     durations, loop = _check_durations(duration, len(laws)), check_loop(loop)
     q0, qd0 = _check_state(q, qd, robot.joint_names)
     period, ends = sample_period(loop, durations.min()), [_make_finish(law, laps) for law in laws]
@@ -188,10 +192,14 @@ def _check_controllers(controllers: Iterable[Controller]) -> list[Controller]:
     """Check that there is at least one controller, each with a single task; return them as a list."""
     laws = list(controllers) if isinstance(controllers, Iterable) else []
     if not laws or isinstance(controllers, str | PathTask):
-        raise InputError(f"controllers {describe(controllers)}, expected a list with one controller for each path")
+        raise InputError(
+            f"controllers {describe(controllers)}, expected a list with one controller for each path",
+            argument="controllers",
+            value=controllers,
+        )
     for i, law in enumerate(laws):
         check_controller(f"controllers[{i}]", law)
-        refuse_batch(f"the task of controllers[{i}]", law.task)
+        refuse_batch(f"the task of controllers[{i}]", law.task, f"controllers[{i}]")
     return laws
 
 
@@ -203,13 +211,19 @@ def _make_sequence(laws: Sequence[Controller], laps: int, gaps: bool) -> PathSeq
 def _check_sequence(task: PathSequence, laws: Sequence[Controller], laps: int) -> PathSequence:
     """Check that the paths of the given sequence are the tasks of the laws; return it."""
     if not isinstance(task, PathSequence) or len(task) != len(laws):
-        raise InputError(f"task = {task!r}, expected a PathSequence, such as a ToolpathTask, of {len(laws)} paths")
+        raise InputError(
+            f"task = {task!r}, expected a PathSequence, such as a ToolpathTask, of {len(laws)} paths",
+            argument="task",
+            value=task,
+        )
     for i, (path, law) in enumerate(zip(task, laws, strict=True)):
         length = _length(law.task, laps)
         if path.s0 != law.task.s0 or not np.isclose(path.s_end - path.s0, length, rtol=1e-12, atol=0.0):
             raise InputError(
                 f"the task of controllers[{i}] goes from s = {law.task.s0:g} on by {length:g}, path {i} of the whole "
-                f"from {path.s0:g} by {path.s_end - path.s0:g}; give the task whose paths the controllers follow"
+                f"from {path.s0:g} by {path.s_end - path.s0:g}; give the task whose paths the controllers follow",
+                argument=f"controllers[{i}]",
+                value=law,
             )
     return task
 
@@ -226,9 +240,18 @@ def _check_durations(duration: ArrayLike, paths: int) -> Array:
     """Check the durations; return one for each path, (paths,)."""
     durations = check_finite("duration", as_array("duration", duration))
     if durations.shape not in ((), (paths,)):
-        raise InputError(f"duration has shape {durations.shape}, expected one number or one for each of {paths} paths")
+        raise InputError(
+            f"duration has shape {durations.shape}, expected one number or one for each of {paths} paths",
+            argument="duration",
+            value=duration,
+        )
     if (durations <= 0).any():
-        raise InputError(f"duration = {durations.tolist()}, expected numbers greater than 0")
+        raise InputError(
+            f"duration = {durations.tolist()}, expected numbers greater than 0",
+            argument="duration",
+            value=duration,
+            limit=0.0,
+        )
     return np.broadcast_to(durations, (paths,))
 
 
@@ -238,6 +261,8 @@ def _check_state(q: ArrayLike, qd: ArrayLike | None, joints: Sequence[str]) -> t
     if len(q0) != 1:
         raise InputError(
             f"q and qd are {len(q0)} initial states, expected one: rollouts would not end their paths together; call "
-            "simulate_sequence once for each"
+            "simulate_sequence once for each",
+            argument="q",
+            value=q,
         )
     return q0, qd0

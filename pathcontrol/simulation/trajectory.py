@@ -47,10 +47,16 @@ class Trajectory:
         shape = len(self.time), len(self.joints)
         if any(array.shape != shape for array in (self.q, self.qd, self.qdd)) or self.time.ndim != 1:
             shapes = [array.shape for array in (self.time, self.q, self.qd, self.qdd)]
-            raise InputError(f"time, q, qd and qdd have shapes {shapes}, expected (k,) and three times (k, {shape[1]})")
+            raise InputError(
+                f"time, q, qd and qdd have shapes {shapes}, expected (k,) and three times (k, {shape[1]})",
+                argument="time",
+                value=self.time,
+            )
         steps = np.diff(self.time)
         if len(steps) < 1 or steps.min() <= 0 or np.ptp(steps) > 1e-6 * steps.mean():
-            raise InputError("the times of a trajectory are two or more in equal, positive steps")
+            raise InputError(
+                "the times of a trajectory are two or more in equal, positive steps", argument="time", value=self.time
+            )
 
     @property
     def period(self) -> float:
@@ -71,7 +77,9 @@ class Trajectory:
             InputError: a limit is passed; it names the joint, the value, the limit and the time.
         """
         if robot.n != len(self.joints):
-            raise InputError(f"the trajectory has {len(self.joints)} joints, {robot.name} has {robot.n}")
+            raise InputError(
+                f"the trajectory has {len(self.joints)} joints, {robot.name} has {robot.n}", value=len(self.joints)
+            )
         limits = robot.limits
         tau = robot.inverse_dynamics(self.q, self.qd, self.qdd) + robot.friction.torque(self.qd)
         self._check("position", self.q, limits.lower, limits.upper, "")
@@ -126,7 +134,7 @@ def interpolate_motion(time: Array, q: Array, qd: Array, rate: float) -> tuple[A
     from scipy.interpolate import CubicHermiteSpline  # takes a tenth of a second to load
 
     if len(time) < 3:
-        raise InputError(f"the motion has {len(time)} samples, expected three or more")
+        raise InputError(f"the motion has {len(time)} samples, expected three or more", value=len(time), limit=3)
     at = sample_times(rate, float(time[-1] - time[0]))
     velocity = CubicHermiteSpline(time - time[0], qd, np.gradient(qd, time, axis=0, edge_order=2))
     return at, CubicHermiteSpline(time - time[0], q, qd)(at), velocity(at), velocity(at, 1)

@@ -137,7 +137,7 @@ def basin(
             option is out of its range.
     """
     check_controller("controller", controller)
-    refuse_batch("the path of the law", controller.task)
+    refuse_batch("the path of the law", controller.task, "controller")
     refuse_several_gains(controller)
     duration, tolerance = (
         as_scalar(name, value, positive=True) for name, value in (("duration", duration), ("tolerance", tolerance))

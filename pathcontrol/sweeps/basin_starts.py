@@ -27,14 +27,21 @@ def make_starts(task: PathTask, starts: ArrayLike | int, margin: float, seed: in
         return _check_count(q.reshape(-1, task.n))
     count = check_whole("starts", starts)
     if count > MOST_SAMPLES:
-        raise InputError(f"starts = {count}, expected at most {MOST_SAMPLES}")
+        raise InputError(
+            f"starts = {count}, expected at most {MOST_SAMPLES}", argument="starts", value=count, limit=MOST_SAMPLES
+        )
     return _make_grid(task, count, margin) if task.n == 2 else _scatter(task, count, margin, seed)
 
 
 def _check_count(q: Array) -> Array:
     """Check that there are some starts, and not too many; return them."""
     if not 0 < len(q) <= MOST_SAMPLES:
-        raise InputError(f"starts has {len(q)} postures, expected 1 to {MOST_SAMPLES}")
+        raise InputError(
+            f"starts has {len(q)} postures, expected 1 to {MOST_SAMPLES}",
+            argument="starts",
+            value=len(q),
+            limit=(1, MOST_SAMPLES),
+        )
     return q
 
 

@@ -92,7 +92,10 @@ def make_measure(wanted: Sequence[str] | Measure | None) -> Measure:
     if unknown or isinstance(wanted, str):
         meant = did_you_mean(unknown[0], UNITS) if unknown and not isinstance(wanted, str) else ""
         raise UnknownNameError(
-            f"metrics = {wanted!r}, expected a list of {', '.join(UNITS)}, or a function of a Run{meant}"
+            f"metrics = {wanted!r}, expected a list of {', '.join(UNITS)}, or a function of a Run{meant}",
+            argument="metrics",
+            value=wanted,
+            choices=tuple(UNITS),
         )
     return lambda run: _select_metrics(metrics(run, only=wanted), wanted)
 
@@ -101,7 +104,12 @@ def _select_metrics(values: Mapping[str, ArrayLike], wanted: Sequence[str]) -> d
     """Return the ``wanted`` metrics; raise if one is missing."""
     missing = [name for name in wanted if name not in values]
     if missing:
-        raise UnknownNameError(f"metrics = {missing}: not defined for these runs; leave it out")
+        raise UnknownNameError(
+            f"metrics = {missing}: not defined for these runs; leave it out",
+            argument="metrics",
+            value=missing,
+            choices=tuple(values),
+        )
     return {name: values[name] for name in wanted}
 
 
@@ -125,10 +133,13 @@ def _compute(job: Job, parameters: Mapping[str, Array], samples: NDArray[np.int6
                     alone, {name: value[at].tolist() for name, value in parameters.items()}
                 )
     except InputError as error:
-        raise InputError(f"samples {samples[0]} to {samples[-1]}: {error}") from error
+        raise InputError(f"samples {samples[0]} to {samples[-1]}: {error}", **error.details_with()) from error
     clash = set(parameters) & set(measured) | {"sample"} & set(measured)
     if clash:
-        raise InputError(f"{', '.join(sorted(clash))}: both a parameter and a metric; call one of them otherwise")
+        raise InputError(
+            f"{', '.join(sorted(clash))}: both a parameter and a metric; call one of them otherwise",
+            value=sorted(clash),
+        )
     return Chunk({"sample": samples, **parameters, **measured}, runs, tuple(warnings))
 
 
@@ -136,7 +147,9 @@ def _simulate(engine: Engine, samples: NDArray[np.int64], arguments: Arguments) 
     """Simulate samples with the built arguments; check that there is one rollout for each."""
     taken = [name for name in _NOT_YOURS if name in arguments]
     if taken:
-        raise InputError(f"build gives {', '.join(taken)}, which the sweep sets itself; leave it out")
+        raise InputError(
+            f"build gives {', '.join(taken)}, which the sweep sets itself; leave it out", argument=taken[0]
+        )
     loop = arguments.get("loop")
     noisy = isinstance(loop, SampledLoop) and loop.noise is not None
     if noisy and (np.diff(samples) != 1).any():
@@ -150,7 +163,11 @@ def _simulate(engine: Engine, samples: NDArray[np.int64], arguments: Arguments) 
             raise
         run = error.run
     if run.rollouts != len(samples):
-        raise InputError(f"build gives {run.rollouts} rollouts for {len(samples)} samples; make q (k, n), one row each")
+        raise InputError(
+            f"build gives {run.rollouts} rollouts for {len(samples)} samples; make q (k, n), one row each",
+            value=run.rollouts,
+            limit=len(samples),
+        )
     return run
 
 
@@ -164,7 +181,11 @@ def _measure(run: Run, measure: Measure) -> dict[str, Array]:
         for name, value in measure(part).items():
             array = as_array(name, value)
             if array.shape != (len(rows),):
-                raise InputError(f"the metric {name} has shape {array.shape}, expected ({len(rows)},): one a rollout")
+                raise InputError(
+                    f"the metric {name} has shape {array.shape}, expected ({len(rows)},): one a rollout",
+                    argument=name,
+                    value=array,
+                )
             _put(values, {name: np.where(sound[rows], array, np.nan)}, rows, run.rollouts)
     return values
 
@@ -201,7 +222,12 @@ def _candidates(
     """Return the rows that may have to be kept, regardless of the other samples."""
     if keep.worst and (keep.by not in values or values[keep.by].dtype.kind not in "fiu"):
         known = [name for name in values if name not in OUTCOME]
-        raise UnknownNameError(f"keep.by = {keep.by!r}, expected a metric: {', '.join(known)}")
+        raise UnknownNameError(
+            f"keep.by = {keep.by!r}, expected a metric: {', '.join(known)}",
+            argument="keep.by",
+            value=keep.by,
+            choices=tuple(known),
+        )
     by = values[keep.by] if keep.worst else np.full(len(samples), np.nan)
     chosen = keep.chosen(samples, by, values["status"] == "diverged") | set(at_random.tolist())
     return [row for row, sample in enumerate(samples.tolist()) if sample in chosen]

@@ -55,7 +55,9 @@ class Manifest:
         self.folder = folder
         log, self.broken = _read_log(folder / LOG)  # first: while it is read, it may get into the manifest
         if self.broken and not mending:
-            raise InputError(f"{str(folder / LOG)!r} is damaged: {self.broken}; resume the sweep to mend it")
+            raise InputError(
+                f"{str(folder / LOG)!r} is damaged: {self.broken}; resume the sweep to mend it", file=str(folder / LOG)
+            )
         content = _read(folder)
         self.samples: int = content["samples"]
         self.definition: dict[str, Any] = content["definition"]
@@ -94,7 +96,8 @@ class Manifest:
         if differing := list(_differences(then, now)):
             raise InputError(
                 f"the sweep in {str(self.folder)!r} has another definition: {'; '.join(differing[:5])}; "
-                "give what it was begun with, or name another folder"
+                "give what it was begun with, or name another folder",
+                file=str(self.folder),
             )
         if self.versions[-1] != versions():
             self.versions.append(versions())
@@ -143,22 +146,25 @@ def _read(folder: Path) -> dict[str, Any]:
     """Read the manifest and check its form."""
     path = folder / MANIFEST
     if not path.is_file():
-        raise InputError(f"there is no sweep in {str(folder)!r}: it has no {MANIFEST}")
+        raise InputError(f"there is no sweep in {str(folder)!r}: it has no {MANIFEST}", file=str(folder))
     try:
         if path.stat().st_size > _MOST_BYTES:
             raise ValueError(f"it has {path.stat().st_size} bytes")
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{str(path)!r} cannot be read: {error}; {_DAMAGED}") from error
+        raise InputError(f"{str(path)!r} cannot be read: {error}; {_DAMAGED}", file=str(path)) from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise InputError(f"{str(path)!r} is not that of a sweep")
+        raise InputError(f"{str(path)!r} is not that of a sweep", file=str(path))
     if content.get("format_version") != FORMAT_VERSION:
         raise InputError(
             f"the sweep in {str(folder)!r} has the format version {content.get('format_version')}, expected "
-            f"{FORMAT_VERSION}; read it with the version of pathcontrol that wrote it"
+            f"{FORMAT_VERSION}; read it with the version of pathcontrol that wrote it",
+            value=content.get("format_version"),
+            limit=FORMAT_VERSION,
+            file=str(folder),
         )
     if wrong := next(_find_faults(content), None):
-        raise InputError(f"{str(path)!r} cannot be used: {wrong}; {_DAMAGED}")
+        raise InputError(f"{str(path)!r} cannot be used: {wrong}; {_DAMAGED}", file=str(path))
     return content
 
 
@@ -202,7 +208,7 @@ def _read_log(path: Path) -> tuple[list[dict[str, str | None]], str]:
     try:
         text = path.read_bytes() if path.is_file() else b""
     except OSError as error:
-        raise InputError(f"{str(path)!r} cannot be read: {error}") from error
+        raise InputError(f"{str(path)!r} cannot be read: {error}", file=str(path)) from error
     noted, broken = [], []
     for number, line in enumerate(text.split(b"\n")[:-1], 1):
         try:

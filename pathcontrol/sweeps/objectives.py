@@ -32,7 +32,11 @@ def check_objectives(objectives: Objectives) -> dict[str, str]:
     named = [objectives] if isinstance(objectives, str) else objectives
     given = dict(named) if isinstance(named, Mapping) else dict.fromkeys(named, "min")
     if not given or not all(isinstance(goal, str) and goal in _SIGNS for goal in given.values()):
-        raise InputError(f"objectives = {objectives!r}, expected names of metrics, or {{name: 'min' or 'max'}}")
+        raise InputError(
+            f"objectives = {objectives!r}, expected names of metrics, or {{name: 'min' or 'max'}}",
+            argument="objectives",
+            value=objectives,
+        )
     return given
 
 
@@ -58,7 +62,9 @@ def _parse_limit(name: str, given: Any) -> tuple[float, float]:
     if not low <= high or not (np.isfinite(low) or np.isfinite(high)):
         raise InputError(
             f"limits: {name} = {given!r}, expected the largest value allowed, or (smallest, largest) of which one may "
-            "be None"
+            "be None",
+            argument="limits",
+            value=given,
         )
     return low, high
 
@@ -119,5 +125,5 @@ def metric(table: xr.Dataset, name: str) -> Array:
     """
     known = [str(key) for key, values in table.data_vars.items() if values.dtype.kind in "fiu"]
     if name not in known:
-        raise UnknownNameError(f"metric {name!r}: expected one of {', '.join(known)}")
+        raise UnknownNameError(f"metric {name!r}: expected one of {', '.join(known)}", value=name, choices=tuple(known))
     return table[name].to_numpy().astype(np.float64)

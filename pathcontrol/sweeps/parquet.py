@@ -42,7 +42,7 @@ def decode_table(content: bytes, names: list[str] | None, rows: int) -> dict[str
     try:
         with load_parquet().ParquetFile(pa.BufferReader(content)) as opened:
             if opened.metadata.num_rows != rows:
-                raise InputError(f"it has {opened.metadata.num_rows} rows")
+                raise InputError(f"it has {opened.metadata.num_rows} rows", value=opened.metadata.num_rows, limit=rows)
             there = opened.schema_arrow.names
             some = None if names is None else [name for name in names if name in there]
             # threads of the pool that are still at work when Python ends abort the process

@@ -61,7 +61,9 @@ class SweepResult:
             InputError: it is not kept, or its file is damaged or missing.
         """
         if sample not in self.kept:
-            raise InputError(f"the history of sample {sample} is not kept; kept are {self.kept}")
+            raise InputError(
+                f"the history of sample {sample} is not kept; kept are {self.kept}", argument="sample", value=sample
+            )
         self._store.check_run(sample)
         return Run.load(self.history(sample))
 
@@ -86,12 +88,15 @@ class SweepResult:
         if not kept:
             raise InputError(
                 f"the sweep in {str(self.folder)!r} keeps no histories; give it keep=Keep(worst=3), or run one of its "
-                "samples: its table has their parameters"
+                "samples: its table has their parameters",
+                file=str(self.folder),
             )
         rows = np.searchsorted(columns["sample"], kept)
         badness = columns.get(self.kept_by, np.zeros(len(columns["sample"])))[rows]
         if badness.ndim != 1 or badness.dtype.kind not in "biuf":
-            raise InputError(f"{self.kept_by}, by which histories are kept, is {badness.dtype}, expected numbers")
+            raise InputError(
+                f"{self.kept_by}, by which histories are kept, is {badness.dtype}, expected numbers", value=self.kept_by
+            )
         order = np.argsort(np.where(columns["status"][rows] == "diverged", -np.inf, -badness), kind="stable")
         return self._load_histories([kept[i] for i in order], worst)
 

@@ -75,7 +75,11 @@ class Space:
 
     def __init__(self, parameters: Mapping[str, Any], method: str, samples: int | None) -> None:
         if not isinstance(parameters, Mapping) or not parameters:
-            raise InputError(f"parameters = {parameters!r}, expected a dict with a parameter at least")
+            raise InputError(
+                f"parameters = {parameters!r}, expected a dict with a parameter at least",
+                argument="parameters",
+                value=parameters,
+            )
         self._parameters = {str(name): _check_parameter(name, given) for name, given in parameters.items()}
         self.names, self.method = tuple(self._parameters), method
         self.samples = self._count_samples() if samples is None else check_whole("samples", samples)
@@ -153,7 +157,10 @@ class Space:
             raise InputError(
                 f"samples = {self.samples}{f' of a grid of {sizes}' if sizes else ''}, expected at most {most}, which "
                 "are in memory together; take fewer"
-                + (", as by Space.sobol or a coarser grid" if sizes else ", or several sweeps with a seed each")
+                + (", as by Space.sobol or a coarser grid" if sizes else ", or several sweeps with a seed each"),
+                argument="samples",
+                value=self.samples,
+                limit=most,
             )
 
     def _count_numbers(self) -> int:
@@ -170,14 +177,17 @@ class Space:
                 kind = parameter.frozen.dist.name
                 raise InputError(
                     f"{name} is a {kind} distribution, of which a {self.method} cannot have every value; give a list "
-                    "of values, or use Space.random, latin_hypercube or sobol"
+                    "of values, or use Space.random, latin_hypercube or sobol",
+                    argument=name,
                 )
         sizes = [len(values) for values in self._choices()]
         if self.method == "grid":
             return math.prod(sizes)
         if len(set(sizes)) > 1:
             listed = ", ".join(f"{name}: {size}" for name, size in zip(self.names, sizes, strict=True))
-            raise InputError(f"the parameters have different numbers of samples ({listed}), expected the same")
+            raise InputError(
+                f"the parameters have different numbers of samples ({listed}), expected the same", value=sizes
+            )
         return sizes[0]
 
 
@@ -213,17 +223,26 @@ def _check_parameter(name: str, given: Any) -> Choice | Distribution:
         parameter = Distribution(given)
         median = np.asarray(given.ppf(0.5))
         if median.ndim > 1 or not np.isfinite(median).all():
-            raise InputError(f"{name}: the distribution has the median {median.tolist()}, expected a number or vector")
+            raise InputError(
+                f"{name}: the distribution has the median {median.tolist()}, expected a number or vector",
+                argument=name,
+                value=median,
+            )
         return parameter
     try:
         values = np.asarray(given)
     except ValueError as error:
-        raise InputError(f"{name} = {given!r}, expected values of one kind and length") from error
+        raise InputError(
+            f"{name} = {given!r}, expected values of one kind and length", argument=name, value=given
+        ) from error
     if values.dtype.kind not in "biufU" or values.ndim not in (1, 2) or not values.size:
         raise InputError(
             f"{name} = {given!r}, expected a list of numbers, texts or vectors, or a frozen distribution of "
-            "scipy.stats, such as stats.uniform(1, 4)"
+            "scipy.stats, such as stats.uniform(1, 4)",
+            argument=name,
+            value=given,
         )
     if values.dtype.kind == "f" and not np.isfinite(values).all():
-        raise InputError(f"{name} holds {values[~np.isfinite(values)][0]}, expected finite numbers")
+        wrong = values[~np.isfinite(values)][0]
+        raise InputError(f"{name} holds {wrong}, expected finite numbers", argument=name, value=wrong)
     return Choice(values)

@@ -64,9 +64,15 @@ class Store:
         """
         folder = Path(folder)
         if (folder / MANIFEST).exists():
-            raise InputError(f"{str(folder)!r} holds a sweep already; resume it (resume=True), or name another folder")
+            raise InputError(
+                f"{str(folder)!r} holds a sweep already; resume it (resume=True), or name another folder",
+                file=str(folder),
+            )
         if any(folder.glob("chunks/*.parquet")):
-            raise InputError(f"{str(folder)!r} holds the chunks of a sweep without its {MANIFEST}; name another folder")
+            raise InputError(
+                f"{str(folder)!r} holds the chunks of a sweep without its {MANIFEST}; name another folder",
+                file=str(folder),
+            )
         try:
             with writing(folder):
                 for name in ("chunks", "runs"):
@@ -106,7 +112,10 @@ class Store:
                 "would not be noticed; resume it to give it some"
             )
         if bad := self._find_damaged("chunks"):
-            raise InputError(f"the sweep in {str(self.folder)!r} is damaged: {_describe_files(bad)}; {_RESUME}")
+            raise InputError(
+                f"the sweep in {str(self.folder)!r} is damaged: {_describe_files(bad)}; {_RESUME}",
+                file=str(self.folder),
+            )
 
     def _find_damaged(self, kind: str) -> dict[str, str]:
         """Return what is wrong with the noted files of a kind that are damaged, by their place."""
@@ -254,7 +263,11 @@ class Store:
         diverged = found["status"] == "diverged" if count else np.zeros(0, dtype=bool)
         by = found.get(keep.by, np.full(count, np.nan))
         if by.ndim != 1 or by.dtype.kind not in "biuf":
-            raise InputError(f"{keep.by}, by which histories are kept, is {by.dtype}, expected numbers")
+            raise InputError(
+                f"{keep.by}, by which histories are kept, is {by.dtype}, expected numbers",
+                argument="keep.by",
+                value=keep.by,
+            )
         return set(at_random.tolist()) | keep.chosen(found["sample"], by, diverged)
 
     def _read_once(self, place: str, names: list[str]) -> dict[str, Array]:
@@ -281,7 +294,9 @@ class Store:
         try:
             self._content(_run_place(sample))
         except InputError as error:
-            raise InputError(f"{str(self.run_file(sample))!r}: {error}; {_RESUME}") from error
+            raise InputError(
+                f"{str(self.run_file(sample))!r}: {error}; {_RESUME}", file=str(self.run_file(sample))
+            ) from error
 
     def _chunks(self) -> list[str]:
         """Return the noted chunks, in order."""
@@ -297,7 +312,9 @@ class Store:
             columns = decode_table(self._content(place), names, len(_samples(place)))
             _check_samples(columns.get("sample"), self.samples)
         except InputError as error:
-            raise InputError(f"{str(self.folder / place)!r} cannot be read: {error}; {_RESUME}") from error
+            raise InputError(
+                f"{str(self.folder / place)!r} cannot be read: {error}; {_RESUME}", file=str(self.folder / place)
+            ) from error
         return columns
 
 
@@ -313,7 +330,11 @@ def _check_samples(sample: Array | None, samples: int) -> None:
     if sample is None or sample.ndim != 1 or sample.dtype.kind not in "iu" or not sample.size:
         raise InputError("it has no numbers of samples")
     if sample.min() < 0 or sample.max() >= samples:
-        raise InputError(f"it has samples {sample.min()} to {sample.max()}, of a sweep of {samples}")
+        raise InputError(
+            f"it has samples {sample.min()} to {sample.max()}, of a sweep of {samples}",
+            value=(int(sample.min()), int(sample.max())),
+            limit=(0, samples - 1),
+        )
 
 
 def _file_digest(path: Path) -> str:

@@ -90,7 +90,9 @@ def sweep(
     engine = settle_engine(engine)
     keep, measure, seed = Keep() if keep is None else keep, make_measure(metrics), check_seed(seed)
     if not isinstance(keep, Keep):
-        raise InputError(f"keep = {keep!r}, expected a Keep, such as Keep(worst=5), or None")
+        raise InputError(
+            f"keep = {keep!r}, expected a Keep, such as Keep(worst=5), or None", argument="keep", value=keep
+        )
     with connect(cluster, security) as client:
         design = space.design(seed)
         job = Job(build, measure, keep, keep.at_random(space.samples, seed), engine)
@@ -125,13 +127,20 @@ def open_store(folder: Path, samples: int, definition: Mapping[str, Any], resume
     """
     load_parquet()
     if folder.exists() and not folder.is_dir():
-        raise InputError(f"{str(folder)!r} is a file, expected a folder for the sweep; name another")
+        raise InputError(
+            f"{str(folder)!r} is a file, expected a folder for the sweep; name another",
+            argument="folder",
+            value=str(folder),
+            file=str(folder),
+        )
     refuse_suffix(folder, "the folder of a sweep")
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     with hold_lock(folder) as ours:
         if not ours:
-            raise InputError(f"another process is writing to {str(folder)!r}; wait for it, or name another folder")
+            raise InputError(
+                f"another process is writing to {str(folder)!r}; wait for it, or name another folder", file=str(folder)
+            )
         begun = (folder / MANIFEST).exists()
         store = (
             Store.resume(folder, samples, definition) if resume and begun else Store.begin(folder, samples, definition)

@@ -208,14 +208,18 @@ class Task(ABC):
         return ClosestPoint(Curve(self.q_d, self.dq_d, self.ddq_d), lower, upper, self.closed, self.knots)
 
 
-def refuse_batch(name: str, task: Task) -> None:
+def refuse_batch(name: str, task: Task, argument: str | None = None) -> None:
     """Check that ``task`` is a single task and not a batch; errors call it ``name``.
 
     Raises:
         InputError: ``task``, which is called so, is a batch.
     """
     if task.rollouts is not None:
-        raise InputError(f"{name} is a TaskBatch of {task.rollouts} tasks, expected one task; take them one by one")
+        raise InputError(
+            f"{name} is a TaskBatch of {task.rollouts} tasks, expected one task; take them one by one",
+            argument=argument or name,
+            value=task,
+        )
 
 
 def _is_same_pose(a: Array | None, b: Array | None) -> bool:

@@ -73,7 +73,9 @@ class Ellipse(JointCurve):
         super().__init__(speed)
         axes = check_finite("semi_axes", as_array("semi_axes", semi_axes))
         if axes.shape != (2,) or (axes <= 0).any():
-            raise InputError(f"semi_axes = {semi_axes!r}, expected two lengths greater than 0")
+            raise InputError(
+                f"semi_axes = {semi_axes!r}, expected two lengths greater than 0", argument="semi_axes", value=semi_axes
+            )
         self.semi_axes = freeze(axes)
         self.center = _posture("center", center)
         self.joints = _two_joints(joints, len(self.center))
@@ -180,18 +182,27 @@ class Lissajous(JointCurve):
         self.amplitudes, self.frequencies, self.phases, self.center = arrays
         whole = self.frequencies == np.round(self.frequencies)
         if not whole.all() or (self.frequencies < 0).any() or not self.frequencies.any():
-            raise InputError(f"frequencies = {self.frequencies.tolist()}, expected whole numbers ≥ 0, not all 0")
+            raise InputError(
+                f"frequencies = {self.frequencies.tolist()}, expected whole numbers ≥ 0, not all 0",
+                argument="frequencies",
+                value=frequencies,
+            )
         if self.frequencies.max() > _HIGHEST:
             raise InputError(
                 f"frequencies = {self.frequencies.tolist()}, expected whole numbers up to {_HIGHEST}: no samples are "
-                "as dense as such a path; divide them by a common factor, or lower them"
+                "as dense as such a path; divide them by a common factor, or lower them",
+                argument="frequencies",
+                value=frequencies,
+                limit=_HIGHEST,
             )
         self.period = 2 * np.pi / float(np.gcd.reduce(self.frequencies.astype(int)))
         slowest = np.linalg.norm(self.dq_d(np.linspace(0, self.period, 4097)), axis=-1).min()
         if slowest < 1e-6 * np.abs(self.amplitudes * self.frequencies).max():
             raise InputError(
                 f"this Lissajous figure turns back on itself (‖q_d'‖ falls to {slowest:.1e}), so a constant speed is "
-                f"impossible; change phases = {self.phases.tolist()}"
+                f"impossible; change phases = {self.phases.tolist()}",
+                argument="phases",
+                value=phases,
             )
 
     def q_d(self, s: Array) -> Array:
@@ -224,10 +235,18 @@ class Line(JointCurve):
         super().__init__(speed)
         self.start, self.end = _posture("start", start), _posture("end", end)
         if self.start.shape != self.end.shape:
-            raise InputError(f"start has shape {self.start.shape} and end {self.end.shape}, expected the same (n,)")
+            raise InputError(
+                f"start has shape {self.start.shape} and end {self.end.shape}, expected the same (n,)",
+                argument="end",
+                value=end,
+            )
         self.s_end = float(np.linalg.norm(self.end - self.start))
         if self.s_end == 0:
-            raise InputError(f"start and end are the same posture {self.start.tolist()}; a line needs a length")
+            raise InputError(
+                f"start and end are the same posture {self.start.tolist()}; a line needs a length",
+                argument="end",
+                value=end,
+            )
         self._direction = (self.end - self.start) / self.s_end
 
     def q_d(self, s: Array) -> Array:
@@ -247,7 +266,9 @@ def _posture(name: str, given: ArrayLike) -> Array:
     """Check that there is one finite value for each joint, (n,)."""
     posture = check_finite(name, np.atleast_1d(as_array(name, given)))
     if posture.ndim != 1:
-        raise InputError(f"{name} has shape {posture.shape}, expected (n,): one value for each joint")
+        raise InputError(
+            f"{name} has shape {posture.shape}, expected (n,): one value for each joint", argument=name, value=given
+        )
     return freeze(posture)
 
 
@@ -255,9 +276,14 @@ def _two_joints(joints: Sequence[int], n: int) -> tuple[int, int]:
     try:
         i, j = (int(k) for k in joints)
     except (TypeError, ValueError) as error:
-        raise InputError(f"joints = {joints!r}, expected two joint indices such as (0, 1)") from error
+        raise InputError(
+            f"joints = {joints!r}, expected two joint indices such as (0, 1)", argument="joints", value=joints
+        ) from error
     if i == j or not (0 <= i < n and 0 <= j < n):
         raise InputError(
-            f"joints = ({i}, {j}), expected two different indices from 0 to {n - 1}: center has {n} joints"
+            f"joints = ({i}, {j}), expected two different indices from 0 to {n - 1}: center has {n} joints",
+            argument="joints",
+            value=joints,
+            limit=(0, n - 1),
         )
     return i, j

@@ -22,14 +22,21 @@ def take_domain(task: PathTask, s0: Any, s_end: Any, period: Any) -> None:
         task.period = as_scalar("period", period, positive=True)
     end = as_array("s_end", s_end)
     if end.ndim != 0 or not end > task.s0:
-        raise InputError(f"s0 = {task.s0:g} and s_end = {s_end}, expected a number s_end > s0")
+        raise InputError(
+            f"s0 = {task.s0:g} and s_end = {s_end}, expected a number s_end > s0",
+            argument="s_end",
+            value=s_end,
+            limit=task.s0,
+        )
     if end == np.inf:
         return
     task.s_end = float(end)
     if task.period is not None:
         raise InputError(
             f"period = {task.period:g} and s_end = {task.s_end:g} are both given, expected one: a closed path has a "
-            "period and goes on for ever, an open one has an s_end"
+            "period and goes on for ever, an open one has an s_end",
+            argument="s_end",
+            value=s_end,
         )
 
 
@@ -42,5 +49,7 @@ def refuse_two_rates(speed: Any, theta: Any) -> None:
     if (speed is None) == (theta is None):
         both = "neither speed nor theta is" if speed is None else "speed and theta are both"
         raise InputError(
-            f"{both} given, expected one: speed [rad/s] for a constant path speed, theta for a profile ϑ(s)"
+            f"{both} given, expected one: speed [rad/s] for a constant path speed, theta for a profile ϑ(s)",
+            argument="speed",
+            value=speed,
         )

@@ -58,7 +58,11 @@ class FunctionPath(PathTask):
         take_domain(self, s0, s_end, period)
         refuse_two_rates(speed, theta)
         if theta_derivative and not callable(theta):
-            raise InputError("theta_derivative is given without a function theta, expected both or none")
+            raise InputError(
+                "theta_derivative is given without a function theta, expected both or none",
+                argument="theta_derivative",
+                value=theta_derivative,
+            )
         self.function = getattr(function, "__qualname__", type(function).__qualname__)
         probes = np.interp(_PROBES, [0, 1], self.sampled_interval)
         self._q_d = vectorize("function", function, probes, None)

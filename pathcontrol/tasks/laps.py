@@ -21,8 +21,17 @@ class Laps(PathSection):
 
     def __init__(self, path: PathTask, laps: int) -> None:
         if path.period is None:
-            raise InputError(f"laps = {laps}, but {type(path).__name__} is no closed path; expected one with a period")
+            raise InputError(
+                f"laps = {laps}, but {type(path).__name__} is no closed path; expected one with a period",
+                argument="laps",
+                value=laps,
+            )
         if not 1 <= laps <= MOST_LAPS:
-            raise InputError(f"laps = {laps}, expected a whole number from 1 to {MOST_LAPS}")
+            raise InputError(
+                f"laps = {laps}, expected a whole number from 1 to {MOST_LAPS}",
+                argument="laps",
+                value=laps,
+                limit=(1, MOST_LAPS),
+            )
         self.laps = laps
         super().__init__(path, path.s0, path.s0 + laps * path.period)

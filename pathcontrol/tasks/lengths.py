@@ -28,13 +28,17 @@ def arc_length(task: Task, s0: ArrayLike | None = None, s_end: ArrayLike | None 
     """
     expect("task", task, Task, error=TaskError)
     if s_end is None and not np.isfinite(last_parameter(task)):
-        raise InputError(f"{type(task).__name__} neither ends nor repeats, so s_end is needed")
+        raise InputError(f"{type(task).__name__} neither ends nor repeats, so s_end is needed", argument="s_end")
     start = _check_inside(task, "s0", task.s0 if s0 is None else s0)
     end = _check_inside(task, "s_end", last_parameter(task) if s_end is None else s_end)
     try:
         both = np.stack(np.broadcast_arrays(start, end))
     except ValueError as error:
-        raise InputError(f"s0 has shape {start.shape} and s_end {end.shape}, expected shapes that broadcast") from error
+        raise InputError(
+            f"s0 has shape {start.shape} and s_end {end.shape}, expected shapes that broadcast",
+            argument="s_end",
+            value=s_end,
+        ) from error
     lower, upper = (
         (task.s0, last_parameter(task)) if task.closed else (both.min(initial=np.inf), both.max(initial=-np.inf))
     )

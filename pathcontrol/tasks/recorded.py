@@ -213,7 +213,10 @@ class RecordedPath(PathTask):
         if self.endless and (s > self._last).any():
             raise TaskError(
                 f"the endless {self.original or 'path'} is known up to s = {self._last:g}, a little further than its "
-                f"run went, not at s = {s.max():g}; make the task anew to go on"
+                f"run went, not at s = {s.max():g}; make the task anew to go on",
+                value=s.max(),
+                limit=self._last,
+                s=float(s.max()),
             )
         return s if self.period is None else _wrap(s, self.samples, self.period)
 
@@ -242,7 +245,11 @@ def _check_period(s: Array, period: float | None) -> float | None:
     if period is None:
         return None
     if not np.isclose(s[-1] - s[0], as_scalar("period", period, positive=True), rtol=1e-6, atol=0):
-        raise InputError(f"period = {period:g}, but the samples span {s[-1] - s[0]:g}, expected them over one period")
+        raise InputError(
+            f"period = {period:g}, but the samples span {s[-1] - s[0]:g}, expected them over one period",
+            argument="period",
+            value=period,
+        )
     return float(period)
 
 
@@ -250,14 +257,14 @@ def _check_knots(given: ArrayLike) -> Array:
     """Check that the knots are a finite array (K,)."""
     knots = check_finite("knots", as_array("knots", given))
     if knots.ndim != 1:
-        raise InputError(f"knots have shape {knots.shape}, expected (K,)")
+        raise InputError(f"knots have shape {knots.shape}, expected (K,)", argument="knots", value=given)
     return freeze(knots)
 
 
 def _check_rotations(rotations: int) -> int:
     """Check that 0, 2 or 3 rotations of the tool are prescribed."""
     if rotations not in (0, 2, 3):
-        raise InputError(f"rotations = {rotations!r}, expected 3, 2 or 0")
+        raise InputError(f"rotations = {rotations!r}, expected 3, 2 or 0", argument="rotations", value=rotations)
     return rotations
 
 
@@ -265,19 +272,19 @@ def _check_polyline(polyline: ArrayLike) -> Array:
     """Check the points of a polyline; return them read-only."""
     points = freeze(check_finite("polyline", as_array("polyline", polyline)))
     if points.ndim != 2:
-        raise InputError(f"polyline has shape {points.shape}, expected (k, d)")
+        raise InputError(f"polyline has shape {points.shape}, expected (k, d)", argument="polyline", value=polyline)
     return points
 
 
 def _check_tool(frame: str | None, tool_pose: ArrayLike | None) -> tuple[str | None, Array | None]:
     """Check the frame of the tool and its pose."""
     if not isinstance(frame, str | None):
-        raise InputError(f"frame = {frame!r}, expected the name of a frame, or None")
+        raise InputError(f"frame = {frame!r}, expected the name of a frame, or None", argument="frame", value=frame)
     if tool_pose is None:
         return frame, None
     pose = check_finite("tool_pose", as_array("tool_pose", tool_pose))
     if pose.shape != (4, 4):
-        raise InputError(f"tool_pose has shape {pose.shape}, expected (4, 4)")
+        raise InputError(f"tool_pose has shape {pose.shape}, expected (4, 4)", argument="tool_pose", value=tool_pose)
     return frame, freeze(pose)
 
 
@@ -285,7 +292,13 @@ def _check_samples(s: ArrayLike, jets: ArrayLike, order: int) -> tuple[Array, Ar
     """Check that parameters increase and that jets have their shape."""
     knots, values = check_finite("s", as_array("s", s)), check_finite("jets", as_array("jets", jets))
     if knots.ndim != 1 or len(knots) < 2 or not (np.diff(knots) > 0).all():
-        raise InputError(f"s has shape {knots.shape}, expected two or more increasing parameters")
+        raise InputError(
+            f"s has shape {knots.shape}, expected two or more increasing parameters", argument="s", value=s
+        )
     if values.ndim != order or values.shape[:2] != (order, len(knots)):
-        raise InputError(f"jets have shape {values.shape}, expected ({order}, {len(knots)}{', n' * (order == 3)})")
+        raise InputError(
+            f"jets have shape {values.shape}, expected ({order}, {len(knots)}{', n' * (order == 3)})",
+            argument="jets",
+            value=jets,
+        )
     return freeze(knots), freeze(values)

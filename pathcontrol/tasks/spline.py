@@ -32,7 +32,12 @@ class SplinePath(JointCurve):
     def __init__(self, spline: BSpline, speed: float, closed: bool = False) -> None:
         super().__init__(speed)
         if spline.k < 3:
-            raise InputError(f"the spline has degree {spline.k}, expected 3 or more: q_d must be twice differentiable")
+            raise InputError(
+                f"the spline has degree {spline.k}, expected 3 or more: q_d must be twice differentiable",
+                argument="spline",
+                value=spline.k,
+                limit=3,
+            )
         curve = _polynomials(spline)
         self._curves = [curve, curve.derivative(1), curve.derivative(2)]
         self.s0, last = float(curve.x[0]), float(curve.x[-1])

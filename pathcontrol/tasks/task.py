@@ -134,7 +134,7 @@ class DerivedPath(PathTask):
     """
 
     def __init__(self, path: PathTask) -> None:
-        refuse_batch(f"the path of a {type(self).__name__}", path)
+        refuse_batch(f"the path of a {type(self).__name__}", path, "path")
         self.path = path
         self.keep_tool(path)
 
@@ -246,7 +246,9 @@ class ShiftedPath(_MovedPath):
         self.offset = freeze(check_finite("offset", as_array("offset", offset)))
         if self.offset.shape != (path.n,):
             raise InputError(
-                f"offset has shape {self.offset.shape}, expected ({path.n},): the path has {path.n} joints"
+                f"offset has shape {self.offset.shape}, expected ({path.n},): the path has {path.n} joints",
+                argument="offset",
+                value=offset,
             )
         super().__init__(path, np.ones(path.n), self.offset)
 
@@ -260,11 +262,19 @@ class ScaledPath(_MovedPath):
     def __init__(self, path: PathTask, factor: ArrayLike, about: ArrayLike | None = None) -> None:
         self.factor = freeze(check_finite("factor", as_array("factor", factor)))
         if self.factor.shape not in ((), (path.n,)) or not self.factor.all():
-            raise InputError(f"factor = {self.factor.tolist()}, expected a number other than 0, or {path.n} of them")
+            raise InputError(
+                f"factor = {self.factor.tolist()}, expected a number other than 0, or {path.n} of them",
+                argument="factor",
+                value=factor,
+            )
         centre = path.q_d(np.asarray(path.s0)) if about is None else about
         self.about = freeze(check_finite("about", as_array("about", centre)))
         if self.about.shape != (path.n,):
-            raise InputError(f"about has shape {self.about.shape}, expected ({path.n},): the path has {path.n} joints")
+            raise InputError(
+                f"about has shape {self.about.shape}, expected ({path.n},): the path has {path.n} joints",
+                argument="about",
+                value=about,
+            )
         factors = np.broadcast_to(self.factor, path.n)
         super().__init__(path, factors, (1 - factors) * self.about)
 
@@ -282,7 +292,11 @@ class PathSection(_SameParameter):
         inside = path.closed or (self.s0 >= path.s0 - slack and self.s_end <= path.s_end + slack)
         if not (self.s0 < self.s_end and inside):
             whole = "" if path.closed else f", both from {path.s0:g} to {path.s_end:g}"
-            raise InputError(f"s0 = {self.s0:g} and s_end = {self.s_end:g}, expected s0 < s_end{whole}")
+            raise InputError(
+                f"s0 = {self.s0:g} and s_end = {self.s_end:g}, expected s0 < s_end{whole}",
+                argument="s_end",
+                value=self.s_end,
+            )
 
     def at(self, s: Array) -> PathPoint:
         return self.path.at(s)
@@ -312,7 +326,9 @@ class PathSection(_SameParameter):
             raise InputError(
                 f"the stretch from s0 = {self.s0:g} to s_end = {self.s_end:g} of a path with the period "
                 f"{self.path.period:g} has {pieces:.3g} pieces, expected at most {_MOST_PIECES}; take fewer laps, or "
-                "simulate the closed path itself"
+                "simulate the closed path itself",
+                argument="s_end",
+                value=self.s_end,
             )
 
 

@@ -33,7 +33,11 @@ def check_task(task: PathTask, n: int | None = None) -> None:
         _check_each(task, n)
         return
     if isinstance(task, list | tuple):
-        raise TaskError(f"task {describe(task)}, expected a PathTask, or TaskBatch([...]) of one for each rollout")
+        raise TaskError(
+            f"task {describe(task)}, expected a PathTask, or TaskBatch([...]) of one for each rollout",
+            argument="task",
+            value=task,
+        )
     expect("task", task, PathTask, error=TaskError)
     name = type(task).__name__
     _check_domain(task, name)
@@ -65,7 +69,11 @@ def _count_joints(task: PathTask, name: str, s: float) -> int:
     """Return the number of joints that q_d is for."""
     posture = _evaluate(f"{name}.q_d", task.q_d, np.float64(s))
     if posture.ndim != 1:
-        raise TaskError(f"{name}.q_d of a number s has shape {posture.shape}, expected (n,): a value for each joint")
+        raise TaskError(
+            f"{name}.q_d of a number s has shape {posture.shape}, expected (n,): a value for each joint",
+            value=posture.shape,
+            s=float(s),
+        )
     return len(posture)
 
 
@@ -85,10 +93,15 @@ def _check_domain(task: PathTask, name: str) -> None:
         if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
             raise TaskError(f"{name} has {end} = {value!r}, expected a number", value=value)
     if not np.isfinite(task.s0) or not task.s_end > task.s0:
-        raise TaskError(f"{name} has s0 = {task.s0} and s_end = {task.s_end}, expected a finite s0 < s_end")
+        raise TaskError(
+            f"{name} has s0 = {task.s0} and s_end = {task.s_end}, expected a finite s0 < s_end",
+            value=task.s_end,
+            limit=task.s0,
+        )
     if task.period is not None and not (0 < task.period < np.inf and task.s_end == np.inf):
         raise TaskError(
-            f"{name} has period = {task.period} and s_end = {task.s_end}; a closed path has a period > 0 and no s_end"
+            f"{name} has period = {task.period} and s_end = {task.s_end}; a closed path has a period > 0 and no s_end",
+            value=task.period,
         )
 
 
@@ -108,7 +121,8 @@ def _check_projection(task: PathTask, name: str, s: Array) -> None:
         if found.shape != s.shape:
             raise TaskError(
                 f"{label} of q with shape {q.shape} has shape {found.shape}, expected {s.shape}; joints come last: "
-                "q[..., 0]"
+                "q[..., 0]",
+                value=found.shape,
             )
         off = np.abs(np.asarray(task.q_d(found)) - q).max(-1)
         if not (worst := off.max()) <= 1e-3 * (1 + np.abs(q).max()):  # it may be found numerically
@@ -148,7 +162,8 @@ def _check_period(task: PathTask, name: str) -> None:
         if not np.allclose(here, later, rtol=1e-6, atol=1e-6 * (1 + np.abs(here).max())):
             raise TaskError(
                 f"{name}.{method} is not the same at s and s + period = s + {task.period:g}: it differs by "
-                f"{np.abs(here - later).max():.3g}; correct the period, or leave it out and give s_end"
+                f"{np.abs(here - later).max():.3g}; correct the period, or leave it out and give s_end",
+                value=float(np.abs(here - later).max()),
             )
 
 
@@ -159,7 +174,7 @@ def _check_values(label: str, function: Callable[[Any], Any], s: Array, n: int |
         value = _evaluate(label, function, argument)
         # ϑ may be a constant that broadcasts
         if value.shape != expected and not (n is None and value.shape == ()):
-            raise TaskError(_shape_message(label, np.shape(argument), value.shape, expected, n))
+            raise TaskError(_shape_message(label, np.shape(argument), value.shape, expected, n), value=value.shape)
     values = np.asarray(function(s), dtype=np.float64) + (np.zeros_like(s) if n is None else 0.0)
     if not np.isfinite(values).all():
         i = int(np.argwhere(~np.isfinite(values))[0][0])
@@ -189,7 +204,8 @@ def _evaluate(label: str, function: Callable[[Any], Any], s: Any) -> Array:
         raise TaskError(
             f"{label} gives {array.dtype} numbers, expected real ones"
             if array.dtype.kind == "c"
-            else f"{label} gives {value!r:.80}, expected an array of numbers"
+            else f"{label} gives {value!r:.80}, expected an array of numbers",
+            value=value,
         )
     return array
 

@@ -45,7 +45,7 @@ def vectorize(
         InputError: it is no function, fails, or returns another shape.
     """
     if not callable(function):
-        raise InputError(f"{name} = {function!r}, expected a function of s")
+        raise InputError(f"{name} = {function!r}, expected a function of s", argument=name, value=function)
     many, one = _try_call(function, probes), _try_call(function, probes[:1])
     if isinstance(many, np.ndarray) and isinstance(one, np.ndarray) and many.ndim and many.ndim == one.ndim:
         rows = len(many) == len(probes) and many[:1].shape == one.shape and np.allclose(many[:1], one, equal_nan=True)
@@ -56,11 +56,16 @@ def vectorize(
     if not isinstance(alone, np.ndarray):
         raise InputError(
             f"{name}(s={s:g}) fails with {alone!r}, and for an array of s with {many!r}; expected a function of "
-            "numbers or of arrays"
+            "numbers or of arrays",
+            argument=name,
+            value=function,
+            s=s,
         )
     if not _is_value(alone.shape, shape):
         expected = "one value for each joint, (n,)" if shape is None else f"{shape}" if shape else "a number"
-        raise InputError(f"{name}(s={s:g}) has shape {alone.shape}, expected {expected}")
+        raise InputError(
+            f"{name}(s={s:g}) has shape {alone.shape}, expected {expected}", argument=name, value=function, s=s
+        )
     return VectorizedFunction(function, alone.shape, False)
 
 

@@ -63,7 +63,9 @@ class WaypointPath(SplinePath):
         if slope.min() < 1e-6 * np.abs(self.points).max(initial=1e-12) / (upper - lower):
             raise InputError(
                 f"the path through these {len(self.points)} waypoints comes to a standstill (‖q_d'‖ falls to "
-                f"{slope.min():.1e}); lower tolerance = {self.tolerance:g}, or move waypoints that turn straight back"
+                f"{slope.min():.1e}); lower tolerance = {self.tolerance:g}, or move waypoints that turn straight back",
+                argument="tolerance",
+                value=self.tolerance,
             )
 
 
@@ -72,13 +74,19 @@ def _check_points(points: ArrayLike, closed: bool) -> Array:
     array = check_finite("points", as_array("points", points))
     least = 3 if closed else 2
     if array.ndim != 2 or len(array) < least:
-        raise InputError(f"points have shape {array.shape}, expected (m, n) with at least {least} waypoints")
+        raise InputError(
+            f"points have shape {array.shape}, expected (m, n) with at least {least} waypoints",
+            argument="points",
+            value=points,
+        )
     ring = np.concatenate([array, array[:1]]) if closed else array
     same = np.flatnonzero((np.diff(ring, axis=0) == 0).all(-1))
     if same.size:
         i, j = int(same[0]), int((same[0] + 1) % len(array))
         hint = "; leave the first point out at the end of a closed path" if j == 0 else "; leave one of them out"
-        raise InputError(f"points {i} and {j} are the same posture {array[i].tolist()}{hint}")
+        raise InputError(
+            f"points {i} and {j} are the same posture {array[i].tolist()}{hint}", argument="points", value=array[i]
+        )
     return array
 
 
@@ -90,7 +98,11 @@ def _parameters(ring: Array, parametrisation: Parametrisation | ArrayLike) -> Ar
         return np.concatenate([[0.0], np.cumsum(steps)])
     values = check_finite("parametrisation", as_array("parametrisation", parametrisation))
     if values.shape != (len(ring),) or not (np.diff(values) > 0).all():
-        raise InputError(f"parametrisation has shape {values.shape}, expected {len(ring)} increasing parameters")
+        raise InputError(
+            f"parametrisation has shape {values.shape}, expected {len(ring)} increasing parameters",
+            argument="parametrisation",
+            value=parametrisation,
+        )
     return values
 
 

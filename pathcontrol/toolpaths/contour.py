@@ -40,13 +40,20 @@ class Contour:
         if not self.segments:
             raise InputError("a contour needs at least one segment")
         if self.feed is not None and not 0 < self.feed < np.inf:
-            raise InputError(f"feed = {self.feed!r} m/s, expected a number greater than 0, or None")
+            raise InputError(
+                f"feed = {self.feed!r} m/s, expected a number greater than 0, or None",
+                argument="feed",
+                value=self.feed,
+                limit=0.0,
+            )
         ends, starts = self._ends
         gap = np.linalg.norm(ends[:-1] - starts[1:], axis=-1).max(initial=0.0)
         if self.closed:
             gap = max(gap, float(np.linalg.norm(ends[-1] - starts[0])))
         if gap > SAME_POINT * (1 + np.abs(starts).max()):
-            raise InputError(f"the segments of contour {self.name!r} do not meet: there is a gap of {gap:g} m")
+            raise InputError(
+                f"the segments of contour {self.name!r} do not meet: there is a gap of {gap:g} m", value=gap
+            )
 
     def __repr__(self) -> str:
         kind = "rapid" if self.rapid else "no feed" if self.feed is None else f"{self.feed:.4g} m/s"

@@ -31,7 +31,12 @@ class Notes:
 
     def __init__(self, unknown: str = "refuse") -> None:
         if unknown not in UNKNOWN:
-            raise InputError(f"unknown = {unknown!r}, expected one of {', '.join(map(repr, UNKNOWN))}")
+            raise InputError(
+                f"unknown = {unknown!r}, expected one of {', '.join(map(repr, UNKNOWN))}",
+                argument="unknown",
+                value=unknown,
+                choices=tuple(UNKNOWN),
+            )
         self.lenient = unknown == "warn"
         self._kinds: dict[tuple[str, str], _Kind] = {}
         self._sentences: dict[str, None] = {}

@@ -52,7 +52,11 @@ def read_toolpath(path: str | Path, **options: Any) -> Toolpath:
     unknown = sorted(set(options) - set(known))
     if unknown:
         takes, wrong = (", ".join(f"{name}=" for name in names) for names in (known, unknown))
-        raise InputError(f"{Path(path).name!r} is read by {reader.__name__}, which takes {takes}, not {wrong}")
+        raise InputError(
+            f"{Path(path).name!r} is read by {reader.__name__}, which takes {takes}, not {wrong}",
+            argument=unknown[0],
+            choices=tuple(known),
+        )
     toolpath = reader(path, **options)
     for note in toolpath.notes:
         warn(f"{Path(path).name}: {note}")

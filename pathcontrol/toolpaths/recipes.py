@@ -55,7 +55,9 @@ def _segment_of(recipe: dict[str, Any], get: Get) -> Segment:
         return Arc(center, x, y, float(start), float(sweep), rise)
     if "bezier" in recipe:
         return Bezier(get(recipe["bezier"]), None if recipe["weights"] is None else get(recipe["weights"]))
-    raise InputError(f"a segment is said to be {', '.join(recipe)}, expected a line, an arc or a Bézier curve")
+    raise InputError(
+        f"a segment is said to be {', '.join(recipe)}, expected a line, an arc or a Bézier curve", value=list(recipe)
+    )
 
 
 def _polyline(segment: Segment) -> Array:

@@ -80,7 +80,7 @@ def _read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
     try:
         file = Path(path)
     except TypeError as error:
-        raise InputError(f"path = {path!r}, expected the path of {what}") from error
+        raise InputError(f"path = {path!r}, expected the path of {what}", argument="path", value=path) from error
     data = None
     try:
         if stat.S_ISREG(file.stat().st_mode):  # a pipe or a device could be read for ever

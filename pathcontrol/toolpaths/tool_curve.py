@@ -49,12 +49,22 @@ class ToolCurve:
             i = int(np.argmax(np.diff(self.knots) <= 0))
             raise InputError(
                 f"s[{i + 1}] = {self.knots[i + 1]:.17g} m after s[{i}] = {self.knots[i]:.17g} m, expected increasing "
-                "knots; a curve much longer than its knots are far apart cannot tell them apart"
+                "knots; a curve much longer than its knots are far apart cannot tell them apart",
+                argument="s",
+                value=s,
             )
         if values.shape != (3, len(self.knots), 3) or len(self.knots) < 2:
-            raise InputError(f"s has shape {self.knots.shape}, expected increasing knots and p, dp, ddp of (k + 1, 3)")
+            raise InputError(
+                f"s has shape {self.knots.shape}, expected increasing knots and p, dp, ddp of (k + 1, 3)",
+                argument="s",
+                value=s,
+            )
         if closed and not np.allclose(values[:, 0], values[:, -1], rtol=1e-6, atol=1e-9):
-            raise InputError("the curve is said to be closed, but its last knot is not its first one again")
+            raise InputError(
+                "the curve is said to be closed, but its last knot is not its first one again",
+                argument="closed",
+                value=closed,
+            )
         self.s0, self.s_end, self.closed = float(self.knots[0]), float(self.knots[-1]), bool(closed)
         curve = hermite_polynomials(self.knots, values)
         self._curves = [curve, curve.derivative(1), curve.derivative(2)]
@@ -106,7 +116,9 @@ class ToolCurve:
         a, b = _vector("start", start), _vector("end", end)
         length = float(np.linalg.norm(b - a))
         if length == 0:
-            raise InputError(f"start and end are the same point {a.tolist()}; a line needs a length")
+            raise InputError(
+                f"start and end are the same point {a.tolist()}; a line needs a length", argument="end", value=end
+            )
         direction = (b - a) / length
         return cls([0.0, length], [a, b], [direction, direction], np.zeros((2, 3)))
 
@@ -149,12 +161,20 @@ class ToolCurve:
         given = check_finite("points", as_array("points", points))
         least = 5 if closed else 4
         if given.ndim != 2 or given.shape[1:] != (3,) or len(given) < least:
-            raise InputError(f"points have shape {given.shape}, expected (m, 3) with at least {least} points")
+            raise InputError(
+                f"points have shape {given.shape}, expected (m, 3) with at least {least} points",
+                argument="points",
+                value=points,
+            )
         ring = np.concatenate([given, given[:1]]) if closed else given
         chords = np.linalg.norm(np.diff(ring, axis=0), axis=-1)
         if (chords == 0).any():
             i = int(np.argmin(chords))
-            raise InputError(f"points {i} and {(i + 1) % len(given)} are the same, {given[i].tolist()}")
+            raise InputError(
+                f"points {i} and {(i + 1) % len(given)} are the same, {given[i].tolist()}",
+                argument="points",
+                value=given[i],
+            )
         s = np.concatenate([[0.0], np.cumsum(chords)])
         curve = make_interp_spline(s, ring, k=3, bc_type="periodic" if closed else "natural")
         return cls(s, ring, curve(s, 1), curve(s, 2), closed)
@@ -178,7 +198,9 @@ class ToolCurve:
         if sharpest is not None and sharpest.turn > TURN_BACK:
             raise InputError(
                 f"the edges turn back by {np.rad2deg(sharpest.turn):.0f}° at {sharpest.point.tolist()}, expected 150° "
-                "at most; end a curve there and begin another"
+                "at most; end a curve there and begin another",
+                argument="points",
+                value=sharpest.point,
             )
         curve = cls(*smooth_knots(contour, as_scalar("tolerance", tolerance, positive=True)).knots, closed=closed)
         curve.vertices = freeze(given)
@@ -188,7 +210,7 @@ class ToolCurve:
 def _vector(name: str, value: ArrayLike) -> Array:
     vector = check_finite(name, as_array(name, value))
     if vector.shape != (3,):
-        raise InputError(f"{name} has shape {vector.shape}, expected (3,)")
+        raise InputError(f"{name} has shape {vector.shape}, expected (3,)", argument=name, value=value)
     return vector
 
 
@@ -196,9 +218,13 @@ def _frame(normal: ArrayLike, start: ArrayLike) -> tuple[Array, Array]:
     """Return the unit normal of a plane and the unit vector in it nearest to ``start``."""
     axis, towards = _vector("normal", normal), _vector("start", start)
     if not np.linalg.norm(axis) > 0:
-        raise InputError(f"normal = {axis.tolist()}, expected a vector with a length")
+        raise InputError(f"normal = {axis.tolist()}, expected a vector with a length", argument="normal", value=normal)
     axis = axis / np.linalg.norm(axis)
     towards = towards - (towards @ axis) * axis
     if np.linalg.norm(towards) < 1e-9:
-        raise InputError(f"start = {np.asarray(start).tolist()} points along the normal; give another direction")
+        raise InputError(
+            f"start = {np.asarray(start).tolist()} points along the normal; give another direction",
+            argument="start",
+            value=start,
+        )
     return axis, towards / np.linalg.norm(towards)

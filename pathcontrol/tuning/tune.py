@@ -97,7 +97,10 @@ def tune(
     design = {} if several is None else several.design(seed)
     engine = settle_engine(engine)
     if both := set(design) & set(space.names):
-        raise InputError(f"{', '.join(sorted(both))}: both searched and in the scenarios; call one of them otherwise")
+        raise InputError(
+            f"{', '.join(sorted(both))}: both searched and in the scenarios; call one of them otherwise",
+            value=sorted(both),
+        )
     definition = _definition(terms, build, (space, several), digest(list(design.values())), wanted) | {
         "population": population,
         "generations": generations,
@@ -126,7 +129,9 @@ def _check_size(width: int, population: int, generations: int, scenarios: int) -
     if population * width > MOST_NUMBERS or population * generations * scenarios > MOST_SAMPLES:
         raise InputError(
             f"population = {population} candidates of {width} numbers, generations = {generations} and {scenarios} "
-            f"scenarios, expected at most {MOST_SAMPLES} simulations, and {MOST_NUMBERS} numbers in a generation"
+            f"scenarios, expected at most {MOST_SAMPLES} simulations, and {MOST_NUMBERS} numbers in a generation",
+            argument="population",
+            value=population,
         )
 
 
@@ -154,7 +159,10 @@ def _read_recorded(store: Store | None) -> Mapping[str, Array]:
     store.tidy(Keep(), np.zeros(0, dtype=np.intp))
     known = store.columns()
     if len(known["sample"]) and "status" not in known:
-        raise InputError(f"the tuning in {str(store.folder)!r} has no status of its candidates; begin it anew")
+        raise InputError(
+            f"the tuning in {str(store.folder)!r} has no status of its candidates; begin it anew",
+            file=str(store.folder),
+        )
     return known
 
 
@@ -185,7 +193,11 @@ def _split_scenarios(name: str, values: Array, count: int) -> Array:
         InputError: it is no metric, as in a folder that something else has written to.
     """
     if values.ndim != 1 or values.dtype.kind not in "biuf":
-        raise InputError(f"{name} of the candidates is {values.dtype} of shape {values.shape}, expected a number each")
+        raise InputError(
+            f"{name} of the candidates is {values.dtype} of shape {values.shape}, expected a number each",
+            argument=name,
+            value=values,
+        )
     return values.reshape(-1, count)
 
 

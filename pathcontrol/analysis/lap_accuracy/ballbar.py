@@ -70,7 +70,12 @@ def ballbar(
     assert path.period is not None
     laps = (along - along[0]) / path.period
     if laps.max() < skip + 1:
-        raise InputError(f"the run has {laps.max():.2f} laps, expected one whole lap after the first {skip}")
+        raise InputError(
+            f"the run has {laps.max():.2f} laps, expected one whole lap after the first {skip}",
+            argument="skip",
+            value=skip,
+            limit=float(laps.max()),
+        )
     counted = np.flatnonzero((laps >= skip) & (laps <= int(laps.max())))
     q, qd = one.array("q")[0, counted], one.array("qd")[0, counted]
     x = (space.move(q, qd)[0] - circle.centre) @ circle.plane.T
@@ -87,7 +92,7 @@ def _find_circle(path: PathTask, space: ComparedSpace) -> _Fit:
     """
     kind = type(path).__name__
     if path.period is None:
-        raise InputError(f"{kind} is no closed path, expected a circle")
+        raise InputError(f"{kind} is no closed path, expected a circle", value=kind)
     s = path.s0 + path.period * np.arange(_POINTS) / _POINTS
     x, v, _ = space.move(path.q_d(s), path.dq_d(s))
     middle = x.mean(0)
@@ -96,7 +101,9 @@ def _find_circle(path: PathTask, space: ComparedSpace) -> _Fit:
     a, b, constant = np.linalg.lstsq(np.column_stack([2 * flat, np.ones(len(s))]), (flat**2).sum(1), rcond=None)[0]
     radius, centre = float(np.sqrt(constant + a**2 + b**2)), middle + np.array([a, b]) @ plane
     if np.abs(np.linalg.norm(x - centre, axis=-1) - radius).max() > _ROUND * radius:
-        raise InputError(f"{kind} is no circle in {'the joints' if space.tool is None else space.tool.frame!r}")
+        raise InputError(
+            f"{kind} is no circle in {'the joints' if space.tool is None else space.tool.frame!r}", value=kind
+        )
     first = (x[0] - centre) / np.linalg.norm(x[0] - centre)
     across = v[0] - (v[0] @ first) * first
     return _Fit(centre, np.stack([first, across / np.linalg.norm(across)]), radius)

@@ -153,10 +153,18 @@ def _check_polyline(polyline: ArrayLike, path: PathTask, space: ComparedSpace) -
     """Check the given polyline; return its points, (k, d)."""
     points, d = check_finite("polyline", as_array("polyline", polyline)), 3 if space.tool is not None else path.n
     if points.ndim != 2 or len(points) < 3 or points.shape[1] != d:
-        raise InputError(f"polyline has shape {points.shape}, expected (k, {d}) with k ≥ 3 points [{space.unit}]")
+        raise InputError(
+            f"polyline has shape {points.shape}, expected (k, {d}) with k ≥ 3 points [{space.unit}]",
+            argument="polyline",
+            value=polyline,
+        )
     ring = np.concatenate([points, points[:1]]) if path.period is not None else points
     if (np.diff(ring, axis=0) == 0).all(-1).any():
-        raise InputError("polyline has neighbours that are the same point; leave one of them out")
+        raise InputError(
+            "polyline has neighbours that are the same point; leave one of them out",
+            argument="polyline",
+            value=polyline,
+        )
     return points
 
 

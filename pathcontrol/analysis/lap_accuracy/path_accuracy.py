@@ -206,7 +206,11 @@ def accuracy(
     cycles, crossed = _select(found, path.period is None)
     if crossed.sum() < _FEWEST:
         what = "rollout" if path.period is None else f"lap after the first {skip}"
-        raise InputError(f"no {what} crosses the {sections} sections of the path; give a longer run, or a smaller skip")
+        raise InputError(
+            f"no {what} crosses the {sections} sections of the path; give a longer run, or a smaller skip",
+            argument="skip",
+            value=skip,
+        )
     x, speed = (np.stack(part)[:, crossed] for part in ([one.x for one in cycles], [one.speed for one in cycles]))
     rotation = None if space.tool is None else np.stack([one.rotation for one in cycles])[:, crossed]
     corners = find_corners(path, space, polyline)
@@ -239,7 +243,10 @@ class _Planes(NamedTuple):
         centre, slope, rotation = space.move(point.q_d, point.dq_d)
         length = np.linalg.norm(slope, axis=-1)
         if not (length > 1e-9 * np.ptp(centre, axis=0).max()).all():
-            raise InputError(f"the path does not move there at s = {s[length.argmin()]:.4g}, so it has no normal plane")
+            raise InputError(
+                f"the path does not move there at s = {s[length.argmin()]:.4g}, so it has no normal plane",
+                s=float(s[length.argmin()]),
+            )
         return cls(centre, slope / length[:, None], length * point.theta, rotation)
 
 
@@ -298,7 +305,9 @@ def count_along(one: Run, path: PathTask) -> Array:
     s = np.unwrap(s, period=path.period)
     if (back := float(s[0] - s[-1]) / path.period) > _BACKWARDS:
         raise InputError(
-            f"the run goes {back:.2f} laps against the direction of the path; give the path the other way round"
+            f"the run goes {back:.2f} laps against the direction of the path; give the path the other way round",
+            value=back,
+            limit=_BACKWARDS,
         )
     return s
 

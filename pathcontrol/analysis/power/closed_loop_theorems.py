@@ -105,7 +105,11 @@ def theorem_of(controller: Controller) -> Theorem:
         if isinstance(law, kind):
             return make(law)
     known = ", ".join(kind.__name__ for kind in _THEOREMS)
-    raise InputError(f"no Lyapunov function is given for {type(law).__name__}; expected one of {known}")
+    raise InputError(
+        f"no Lyapunov function is given for {type(law).__name__}; expected one of {known}",
+        argument="controller",
+        value=controller,
+    )
 
 
 class _LinearErrors:

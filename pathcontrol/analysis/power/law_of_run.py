@@ -58,11 +58,13 @@ def find_law(run: Run, controller: Controller | None) -> Controller:
     name = str(described.get("controller", "")).rstrip(")").rpartition("(")[2]
     make = LAWS.find(name) if name else None
     if make is None:
-        raise InputError(f"the law of the run is {name or 'not known'!r}, which cannot be made again; {_GIVE}")
+        raise InputError(
+            f"the law of the run is {name or 'not known'!r}, which cannot be made again; {_GIVE}", value=name
+        )
     try:
         law = make(run.model, resolve_task(run, None), **_select_rows(run, _select_arguments(make, described)))
     except TypeError as error:  # a law of one's own, which keeps its arguments under other names
-        raise InputError(f"the law of the run, {name}, cannot be made again: {error}; {_GIVE}") from error
+        raise InputError(f"the law of the run, {name}, cannot be made again: {error}; {_GIVE}", value=name) from error
     expect("controller", law, Controller)
     return law
 
@@ -74,7 +76,10 @@ def _refuse_other_rows(run: Run, controller: Controller) -> None:
         if rows != run.rollouts:
             raise InputError(
                 f"{name} of the law has {rows} rows, the run {run.rollouts} rollouts; expected as many, or one value "
-                "for all"
+                "for all",
+                argument=name,
+                value=rows,
+                limit=run.rollouts,
             )
 
 
@@ -116,7 +121,7 @@ def law_states(run: Run, controller: Controller | None = None) -> Array:
     expect("run", run, Run)
     name = str(table(run.config, "controller").get("controller", ""))
     if controller is None and "(" in name:
-        raise InputError(f"the law of the run is {name}, a law that is wrapped; {_GIVE}")
+        raise InputError(f"the law of the run is {name}, a law that is wrapped; {_GIVE}", value=name)
     law, measured = find_law(run, controller), "q_measured" in run and "qd_measured" in run
     q, qd = (run.array(f"{part}_measured" if measured else part).swapaxes(0, 1) for part in ("q", "qd"))
     return np.stack([z for _, z in _walk(run, law, q, qd)], axis=1)
@@ -141,7 +146,11 @@ def _select_rows(run: Run, arguments: dict[str, Any]) -> dict[str, Any]:
         array = np.asarray(value)
         own = array.ndim == 2 or (name == "k" and array.ndim == 1)
         if own and array.shape[0] != 1 and rows.max() >= len(array):
-            raise InputError(f"{name} of the run has {len(array)} rows, it has a rollout {rows.max()}; {_GIVE}")
+            raise InputError(
+                f"{name} of the run has {len(array)} rows, it has a rollout {rows.max()}; {_GIVE}",
+                argument=name,
+                value=len(array),
+            )
         found[name] = array[rows, None] if own and array.ndim == 1 else array[rows] if own and len(array) > 1 else value
     return found
 
@@ -159,5 +168,8 @@ def _select_arguments(make: Any, described: Mapping[str, Any]) -> dict[str, Any]
             found |= {name: described[name] for name in names if name in described and name not in _GIVEN}
     lacking = [name for name in make.gains if name not in found or not is_whole(found[name])]
     if lacking:
-        raise InputError(f"the run does not say the gains {', '.join(lacking)} of its {make.__name__}; {_GIVE}")
+        raise InputError(
+            f"the run does not say the gains {', '.join(lacking)} of its {make.__name__}; {_GIVE}",
+            choices=tuple(lacking),
+        )
     return found

@@ -88,7 +88,10 @@ class PowerBalance:
         if not among.any():
             raise InputError(
                 f"begin = {begin:g} s and end = {end:g} s leave no sample of a run from {self.time[0]:g} to "
-                f"{self.time[-1]:g} s"
+                f"{self.time[-1]:g} s",
+                argument="begin",
+                value=begin,
+                limit=(float(self.time[0]), float(self.time[-1])),
             )
         level = 0.5 * (self.V[:, 1:] + self.V[:, :-1])
         rates = {"V": level, "predicted": self.predicted, "measured": self.measured, **self.shares}
@@ -158,11 +161,19 @@ def _find_checked_law(run: Run, controller: Controller | None) -> tuple[Controll
     if missing := [name for name in _NEEDED if name not in run or np.isnan(run.array(name)).all()]:
         raise InputError(f"the run has no {', '.join(missing)}; a power balance needs {', '.join(_NEEDED)}")
     if len(run.time) < 2:
-        raise InputError(f"the run has {len(run.time)} sample, expected two at least, between which V changes")
+        raise InputError(
+            f"the run has {len(run.time)} sample, expected two at least, between which V changes",
+            value=len(run.time),
+            limit=2,
+        )
     law = find_law(run, controller)
     s = run.array("s")
     if has_demand(run) and not is_along(run.task, law.task, s[np.isfinite(s)]):
-        raise InputError(f"{law!r} goes along another path than the run, {run.task!r}; give a law of that path")
+        raise InputError(
+            f"{law!r} goes along another path than the run, {run.task!r}; give a law of that path",
+            argument="controller",
+            value=law,
+        )
     return law, theorem_of(law)
 
 

@@ -104,10 +104,17 @@ class TorqueAccount(NamedTuple):
 def _check_arm(arm: RobotModel, run: Run) -> None:
     """Check that an arm has mass and the joints of a run."""
     if arm.n != len(run.joints):
-        raise InputError(f"{arm.name} has {arm.n} joints, the run {len(run.joints)}; expected as many")
+        raise InputError(
+            f"{arm.name} has {arm.n} joints, the run {len(run.joints)}; expected as many",
+            argument="plant",
+            value=arm.n,
+            limit=len(run.joints),
+        )
     if not arm.has_mass:
         raise InputError(
-            f"{arm.name} has no mass, so torques say nothing of its motion; give plant=…, an arm with masses"
+            f"{arm.name} has no mass, so torques say nothing of its motion; give plant=…, an arm with masses",
+            argument="plant",
+            value=arm.name,
         )
 
 

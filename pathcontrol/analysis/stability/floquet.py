@@ -107,11 +107,14 @@ def check_path(law: Controller) -> PathTask:
     """Return the closed path of a law with one set of gains, whose arm has no dry friction."""
     task, arm = law.task, law.robot
     if isinstance(task, TaskBatch) or task.period is None:
-        raise InputError(f"{type(task).__name__} is no single closed path, and multipliers are those of its laps")
+        raise InputError(
+            f"{type(task).__name__} is no single closed path, and multipliers are those of its laps", value=task
+        )
     refuse_several_gains(law)
     if any(np.any(level) for level in levels_of(arm.friction, np.zeros(arm.n))):
         raise InputError(
-            "the arm has dry friction, which has no derivative; give the law the arm with Viscous friction only"
+            "the arm has dry friction, which has no derivative; give the law the arm with Viscous friction only",
+            argument="law",
         )
     return task
 

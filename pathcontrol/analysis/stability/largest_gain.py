@@ -51,7 +51,9 @@ def largest_gain(law: Controller, gain: str, loop: Loop = None, *, settle: int =
         found = _search(grow, own, 1 / step, most, stable=True)
         if found is None:
             raise InputError(
-                f"{type(law).__name__} is unstable with any {gain} up to {own:g}; its other gains do not suit the loop"
+                f"{type(law).__name__} is unstable with any {gain} up to {own:g}; its other gains do not suit the loop",
+                argument=gain,
+                value=own,
             )
         low, high = found, found * step
     return float(grow.find_roots(np.array([[low]]), np.array([[high]]))[0, 0])

@@ -104,12 +104,18 @@ def stability_map(
 def _check_gains(gains: Any) -> tuple[tuple[str, ...], tuple[Array, ...]]:
     """Return the names of one or two gains and their values, increasing."""
     if not isinstance(gains, Mapping) or len(gains) not in (1, 2):
-        raise InputError(f"gains = {gains!r:.80}, expected one or two gains with their values: {{'k': [5, 10, 20]}}")
+        raise InputError(
+            f"gains = {gains!r:.80}, expected one or two gains with their values: {{'k': [5, 10, 20]}}",
+            argument="gains",
+            value=gains,
+        )
     grids = []
     for name, given in gains.items():
         values = check_finite(str(name), as_array(str(name), given))
         if values.ndim != 1 or not len(values) or len(np.unique(values)) < len(values):
-            raise InputError(f"{name} = {given!r:.80}, expected a sequence of different numbers")
+            raise InputError(
+                f"{name} = {given!r:.80}, expected a sequence of different numbers", argument=str(name), value=given
+            )
         grids.append(np.sort(values))
     return tuple(map(str, gains)), tuple(grids)
 

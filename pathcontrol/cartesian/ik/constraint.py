@@ -56,7 +56,11 @@ class ToolConstraint:
         unranked = cls(tool, curve, orientation, tolerance)
         moving = (np.abs(jacobian) > _NO_RANK * np.abs(jacobian).max()).any((0, 1)) & ~unranked.frozen
         if not moving.any():
-            raise InputError(f"no joint of {tool.robot.name} moves the frame {tool.frame!r}; name one at its tool")
+            raise InputError(
+                f"no joint of {tool.robot.name} moves the frame {tool.frame!r}; name one at its tool",
+                argument="frame",
+                value=tool.frame,
+            )
         linear, angular = (np.sqrt((jacobian[:, rows] ** 2).mean()) for rows in (slice(3), slice(3, 6)))
         length = float(linear / angular) if linear > 0 and angular > 0 else 1.0
         unranked = replace(unranked, length=length)

@@ -97,7 +97,10 @@ def _check_progress(constraint: ToolConstraint, mesh: Array, worst: Array) -> No
         raise TaskError(
             f"the path of the joints does not come within the tolerance of the curve with {len(mesh)} knots: near "
             f"{place(constraint, float(mesh[i]))}, it is still {worst[i]:.3g} times too far off; the curve or the "
-            "orientation along it may have a kink there (both have to be smooth), or the tolerance is too small"
+            "orientation along it may have a kink there (both have to be smooth), or the tolerance is too small",
+            argument="tolerance",
+            value=constraint.tolerance,
+            s=float(mesh[i]),
         )
 
 

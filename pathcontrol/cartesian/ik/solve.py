@@ -63,7 +63,7 @@ def check_posture(robot: RobotModel, start: ArrayLike) -> Array:
     """Check that ``start`` is a posture (n,) within the joint limits."""
     q = check_finite("start", as_joint_array("start", start, robot.n, robot.joint_names))
     if q.shape != (robot.n,):
-        raise InputError(f"start has shape {q.shape}, expected one posture ({robot.n},)")
+        raise InputError(f"start has shape {q.shape}, expected one posture ({robot.n},)", argument="start", value=start)
     if is_outside(robot, q):
         i = int(np.argmin(distance_to_limits(robot, q)))
         low, high = robot.limits.lower[i], robot.limits.upper[i]

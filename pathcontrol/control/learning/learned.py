@@ -68,11 +68,16 @@ class Learned(LawWrapper):
         super().__init__(law)
         gain = as_scalar("learning_gain", learning_gain, positive=True)
         if gain > 1:
-            raise InputError(f"learning_gain = {gain:g}, expected a gain γ of 0 < γ ≤ 1", argument="learning_gain")
+            raise InputError(
+                f"learning_gain = {gain:g}, expected a gain γ of 0 < γ ≤ 1",
+                argument="learning_gain",
+                value=gain,
+                limit=(0.0, 1.0),
+            )
         if not self.task.closed:
             raise TaskError(f"{type(self.task).__name__} is not closed, so that nothing is learned from lap to lap")
         if isinstance(self.inner, LearningLaw):
-            raise InputError("the law is Learned already; wrap it once")
+            raise InputError("the law is Learned already; wrap it once", argument="law", value=law)
         self._settings: dict[str, Any] = {
             "learning_gain": gain,
             "nodes": check_whole("nodes", nodes, _FEWEST),

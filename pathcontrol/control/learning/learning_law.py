@@ -75,7 +75,9 @@ class LearningLaw(Controller):
         return np.concatenate([self.base.advance(own, inside, period), memory], axis=-1)
 
     def rate(self, out: ControlOutput) -> Array:
-        raise InputError("a law learns from tick to tick, and not in continuous time; give loop=SampledLoop(...)")
+        raise InputError(
+            "a law learns from tick to tick, and not in continuous time; give loop=SampledLoop(...)", argument="loop"
+        )
 
     def outcome(self, z: Array) -> dict[str, Array]:
         memory = self.table.split(self.split(z)[1])

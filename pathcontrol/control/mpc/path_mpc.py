@@ -172,14 +172,27 @@ class PathMPC(Controller):
             InputError: there are none, or dry friction takes all of one.
         """
         if not 0 <= self.margin < 1:
-            raise InputError(f"margin = {self.margin:g}, expected the share of the torque that is left, 0 ≤ margin < 1")
+            raise InputError(
+                f"margin = {self.margin:g}, expected the share of the torque that is left, 0 ≤ margin < 1",
+                argument="margin",
+                value=self.margin,
+                limit=(0.0, 1.0),
+            )
         limits = (1 - self.margin) * joint_values("torque", self.torque, self.robot.limits.effort, self.robot)
         if not np.isfinite(limits).all():
-            raise InputError(f"torque = {limits.tolist()}, expected a limit of each joint; give torque = [N m, …]")
+            raise InputError(
+                f"torque = {limits.tolist()}, expected a limit of each joint; give torque = [N m, …]",
+                argument="torque",
+                value=self.torque,
+            )
         if self.friction == "full":
             rest = limits - np.max(levels_of(self.robot.friction, np.zeros(self.robot.n)), axis=0)
             if (rest <= 0).any():
-                raise InputError(f"dry friction takes all of the torque limits {limits.tolist()} N m of a joint")
+                raise InputError(
+                    f"dry friction takes all of the torque limits {limits.tolist()} N m of a joint",
+                    argument="torque",
+                    value=limits,
+                )
             return rest
         return check_finite("torque", limits)
 

@@ -51,9 +51,17 @@ class SpeedSteps:
     def __init__(self, steps: ArrayLike) -> None:
         table = freeze(check_finite("override", as_array("override", steps)))
         if table.ndim != 2 or table.shape[1] != 2 or not len(table):
-            raise InputError(f"override has shape {table.shape}, expected a number, (N,), or steps [[t, u], …], (m, 2)")
+            raise InputError(
+                f"override has shape {table.shape}, expected a number, (N,), or steps [[t, u], …], (m, 2)",
+                argument="override",
+                value=steps,
+            )
         if (np.diff(table[:, 0]) <= 0).any():
-            raise InputError(f"override has steps at {table[:, 0].tolist()} s, expected increasing times")
+            raise InputError(
+                f"override has steps at {table[:, 0].tolist()} s, expected increasing times",
+                argument="override",
+                value=table[:, 0],
+            )
         self.times, self.factors = table.T
 
     def __call__(self, t: float) -> Array:
@@ -96,7 +104,12 @@ class OverrideRule(SpeedRule):
     def override(self, value: Override) -> None:
         """Set how fast the plan goes when it is not held; a number is not below 0, as :meth:`reverse` goes back."""
         if not callable(value) and np.ndim(value) < 2 and np.any(as_array("override", value) < 0):
-            raise InputError(f"override = {value}, expected 0 to {MOST:g}; reverse() goes back")
+            raise InputError(
+                f"override = {value}, expected 0 to {MOST:g}; reverse() goes back",
+                argument="override",
+                value=value,
+                limit=(0.0, MOST),
+            )
         self._value = _make_function(value)
         self._given = value if callable(value) else np.asarray(value).tolist()
 
@@ -199,6 +212,9 @@ def _check_range(name: str, u: ArrayLike) -> Array:
     if array.ndim > 1 or not array.size or not (np.abs(array) <= MOST).all():  # NaN is refused too
         raise InputError(
             f"{name} = {array.tolist()}, expected factors of the speed from {-MOST:g} to {MOST:g}, one for all "
-            "rollouts or one for each: 1 is the profile itself, 0 holds, and less goes back"
+            "rollouts or one for each: 1 is the profile itself, 0 holds, and less goes back",
+            argument=name,
+            value=u,
+            limit=(-MOST, MOST),
         )
     return array

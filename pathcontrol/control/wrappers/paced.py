@@ -55,7 +55,12 @@ class Paced(LawWrapper):
         check_controller("law", law)
         margin = as_scalar("torque_margin", torque_margin)
         if not 0 <= margin < 1:
-            raise InputError(f"torque_margin = {margin:g}, expected a share of the torque limits, 0 ≤ margin < 1")
+            raise InputError(
+                f"torque_margin = {margin:g}, expected a share of the torque limits, 0 ≤ margin < 1",
+                argument="torque_margin",
+                value=margin,
+                limit=(0.0, 1.0),
+            )
         torque = joint_values("torque_limits", torque_limits, law.robot.limits.effort, law.robot)
         if not np.isfinite(torque).any():
             raise InputError(_describe_missing_limits(law.robot, torque_limits), argument="torque_limits")

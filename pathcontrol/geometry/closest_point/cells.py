@@ -87,7 +87,9 @@ class Cells(NamedTuple):
             raise TaskError(
                 f"the path turns by more than {self.turn.sum():.3g} rad on the way from s = {first:g} to {last:g}, "
                 f"and {_MAX_CELLS} cells do not follow it, expected a tangent that goes on from cell to cell; "
-                "look for noise in the path or its derivatives, for other units, and for a frequency that is too high"
+                "look for noise in the path or its derivatives, for other units, and for a frequency that is too high",
+                value=self.turn.sum(),
+                s=float(first),
             )
 
     def place(self, s: Array, interval: Interval) -> Array:
@@ -158,7 +160,10 @@ def _evaluate_points(curve: Curve, s: Array) -> Array:
     if not (known := (np.abs(p) < FARTHEST).all(-1)).all():
         i = int(np.argmin(known))
         raise TaskError(
-            f"the path is {p[i].tolist()} at s = {s[i]:g}, expected numbers below {FARTHEST:g} on the whole domain"
+            f"the path is {p[i].tolist()} at s = {s[i]:g}, expected numbers below {FARTHEST:g} on the whole domain",
+            value=p[i],
+            limit=FARTHEST,
+            s=float(s[i]),
         )
     return p
 

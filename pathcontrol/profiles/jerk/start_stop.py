@@ -115,7 +115,8 @@ def _check_open(path: Path) -> None:
     if path.period is not None or not np.isfinite(path.s_end):
         raise TaskError(
             f"{type(path).__name__} has period = {path.period} and s_end = {path.s_end}: only an open path with a "
-            "finite s_end has a start and a stop"
+            "finite s_end has a start and a stop",
+            value=path.s_end,
         )
 
 

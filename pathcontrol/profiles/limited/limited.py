@@ -69,7 +69,10 @@ def limited(
     ceiling, tangential = demands.at(quarters(s))
     squared = largest_sequence(keep_below(ceiling), *all_steps(tangential, len(s) - 1), closed=path.period is not None)
     if not np.isfinite(squared).all():
-        raise InputError(f"nothing limits the speed at s = {s[np.argmax(squared)]:g}; give a MotionLimit with a speed")
+        raise InputError(
+            f"nothing limits the speed at s = {s[np.argmax(squared)]:g}; give a MotionLimit with a speed",
+            s=float(s[np.argmax(squared)]),
+        )
     return TabulatedProfile(s, squared, path.period)
 
 
@@ -154,5 +157,9 @@ def _check_velocity(velocity: ArrayLike | None, n: int) -> Array:
     """Check the velocity limits of the joints, (n,); ``inf`` for none."""
     fastest = as_joint_array("velocity", np.full(n, np.inf) if velocity is None else velocity, n)
     if not (fastest > 0).all():
-        raise InputError(f"velocity = {fastest.tolist()}, expected speeds greater than 0; inf for no limit")
+        raise InputError(
+            f"velocity = {fastest.tolist()}, expected speeds greater than 0; inf for no limit",
+            argument="velocity",
+            value=velocity,
+        )
     return fastest

@@ -40,7 +40,7 @@ class MotionLimit:
         names = ("speed", "tangential", "normal", "chord_error")
         given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         if not given:
-            raise InputError(f"this MotionLimit limits nothing; give at least one of {', '.join(names)}")
+            raise InputError(f"this MotionLimit limits nothing; give at least one of {', '.join(names)}", choices=names)
         for name, value in {**given, "control_period": self.control_period}.items():
             as_scalar(name, value, positive=True)
         if isinstance(self.motion, ToolMotion) and self.speed is not None:

@@ -61,7 +61,8 @@ def sample(path: Path, knots: Array, n: int) -> Samples:
         if value.shape != (len(s), n):
             raise TaskError(
                 f"{type(path).__name__}.{name} of s with shape {s.shape} has shape {value.shape}, expected "
-                f"{(len(s), n)}: the arm has {n} joints"
+                f"{(len(s), n)}: the arm has {n} joints",
+                value=value.shape,
             )
         if not np.isfinite(value).all():
             i = int(np.argmin(np.isfinite(value).all(-1)))

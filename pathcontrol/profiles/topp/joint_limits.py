@@ -68,9 +68,18 @@ def joint_limits(
         InputError: a limit is not positive, has a wrong shape, or there is none.
     """
     if not 0 <= as_scalar("margin", margin) < 1:
-        raise InputError(f"margin = {margin:g}, expected the share of the torque left for feedback, 0 ≤ margin < 1")
+        raise InputError(
+            f"margin = {margin:g}, expected the share of the torque left for feedback, 0 ≤ margin < 1",
+            argument="margin",
+            value=margin,
+            limit=(0.0, 1.0),
+        )
     if acceleration is True:
-        raise InputError("acceleration = True, but a URDF has no acceleration limits; give one for each joint")
+        raise InputError(
+            "acceleration = True, but a URDF has no acceleration limits; give one for each joint",
+            argument="acceleration",
+            value=True,
+        )
     limits = JointLimits(
         robot,
         joint_values("velocity", velocity, robot.limits.velocity, robot),
@@ -95,12 +104,20 @@ def joint_values(kind: str, choice: LimitChoice, own: Array | None, robot: Robot
         own if own is not None and choice is True else as_array(kind, strip_labels(kind, choice, robot.joint_names))
     )
     if values.shape not in ((), (robot.n,)):
-        raise InputError(f"{kind} has shape {values.shape}, expected one limit for each of the {robot.n} joints")
+        raise InputError(
+            f"{kind} has shape {values.shape}, expected one limit for each of the {robot.n} joints",
+            argument=kind,
+            value=choice,
+        )
     values = np.broadcast_to(values, robot.n)
     if not (values > 0).all():
         i = int(np.argmin(values > 0))
         raise InputError(
             f"the {kind} limit of {robot.joint_names[i]} is {values[i]:g}, expected more than 0; give {kind} = "
-            "one limit for each joint (inf for none), or None for no such limits"
+            "one limit for each joint (inf for none), or None for no such limits",
+            argument=kind,
+            value=values[i],
+            limit=0.0,
+            joint=robot.joint_names[i],
         )
     return values

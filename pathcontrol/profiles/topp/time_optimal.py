@@ -130,9 +130,17 @@ def _ends(path: Path, **ends: float | str | None) -> list[float | None]:
     """Check the rates and the time asked for at the ends of a path, and return them, ∞ for a free rate."""
     given = {name: _end(name, value) for name, value in ends.items() if value is not None}
     if given and path.period is not None:
-        raise InputError(f"{' and '.join(given)} for a closed path, which begins as fast as it ends; leave them out")
+        raise InputError(
+            f"{' and '.join(given)} for a closed path, which begins as fast as it ends; leave them out",
+            argument=next(iter(given)),
+            value=next(iter(given.values())),
+        )
     if given.keys() >= {"end_rate", "end_time"}:
-        raise InputError("both end_rate and end_time are given; one of them says how an open path ends")
+        raise InputError(
+            "both end_rate and end_time are given; one of them says how an open path ends",
+            argument="end_time",
+            value=ends["end_time"],
+        )
     return [given.get(name) for name in ends]
 
 

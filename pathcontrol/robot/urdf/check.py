@@ -72,7 +72,11 @@ def check_urdf(
         InputError: ``text`` is neither.
     """
     if not isinstance(text, str | Path):
-        raise InputError(f"text = {quote(repr(text))}, expected the XML of a robot as a string, or the Path of a file")
+        raise InputError(
+            f"text = {quote(repr(text))}, expected the XML of a robot as a string, or the Path of a file",
+            argument="text",
+            value=text,
+        )
     if isinstance(text, Path) and base_dir is None:
         base_dir = text.resolve().parent
     try:

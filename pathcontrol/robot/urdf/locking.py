@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from lxml import etree
 
 from pathcontrol._arrays import as_scalar
-from pathcontrol.errors import InputError, UnknownNameError
+from pathcontrol.errors import InputError, UnknownNameError, about
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES, link_at
 from pathcontrol.robot.urdf.numbers import read_numbers
 
@@ -43,9 +43,17 @@ def locked_angles(
         *(() if tip is None else _supporting_joints(root, tip, joints)),
     }
     if both := sorted(kept & given.keys()):
-        raise InputError(f"{', '.join(both)}: to be locked and kept; take it out of lock, keep or tip")
+        raise InputError(
+            f"{', '.join(both)}: to be locked and kept; take it out of lock, keep or tip",
+            argument="lock",
+            joint=both[0],
+        )
     if following := sorted(name for name in kept if _leaders(name, joints)):
-        raise InputError(f"{', '.join(following)} follows another joint and cannot stay free; keep or lock that one")
+        raise InputError(
+            f"{', '.join(following)} follows another joint and cannot stay free; keep or lock that one",
+            argument="keep",
+            joint=following[0],
+        )
     chosen = bool(keep) or tip is not None
     wanted = [name for name in joints if name in given or (chosen and name not in kept)]
     wanted += [name for name in joints if not given.keys().isdisjoint(_leaders(name, joints))]
@@ -108,8 +116,19 @@ def _positions(lock: Mapping[str, float] | None, joints: Collection[str]) -> dic
     if lock is None:
         return {}
     if not isinstance(lock, Mapping):
-        raise InputError(f"lock = {lock!r}, expected angles by joint, as {{'joint name': 0.0}}")
-    return {_check_known("lock", name, joints): as_scalar(f"angle of {name}", angle) for name, angle in lock.items()}
+        raise InputError(
+            f"lock = {lock!r}, expected angles by joint, as {{'joint name': 0.0}}", argument="lock", value=lock
+        )
+    return read_angles({_check_known("lock", name, joints): angle for name, angle in lock.items()})
+
+
+def read_angles(lock: Mapping[str, float]) -> dict[str, float]:
+    """Check that the positions of joints to lock are finite numbers."""
+    found: dict[str, float] = {}
+    for name, angle in lock.items():
+        with about(argument="lock", joint=name):
+            found[name] = as_scalar(f"angle of {name}", angle)
+    return found
 
 
 def names_to_keep(keep: str | Sequence[str] | None) -> list[str]:
@@ -120,7 +139,9 @@ def names_to_keep(keep: str | Sequence[str] | None) -> list[str]:
     """
     names = [] if keep is None else [keep] if isinstance(keep, str) else keep
     if not isinstance(names, Iterable) or not all(isinstance(name, str) for name in names):
-        raise InputError(f"keep = {keep!r}, expected names of joints, as ['joint name', ...]")
+        raise InputError(
+            f"keep = {keep!r}, expected names of joints, as ['joint name', ...]", argument="keep", value=keep
+        )
     return list(names)
 
 
@@ -131,7 +152,9 @@ def check_tip(tip: str | None) -> None:
         InputError: it is not.
     """
     if tip is not None and not isinstance(tip, str):
-        raise InputError(f"tip = {tip!r}, expected the name of one frame; keep=[...] takes several joints")
+        raise InputError(
+            f"tip = {tip!r}, expected the name of one frame; keep=[...] takes several joints", argument="tip", value=tip
+        )
 
 
 def _check_known(argument: str, name: str, joints: Collection[str]) -> str:

@@ -139,7 +139,11 @@ class TimedDisturbance(Disturbance):
     def __init__(self, start: ArrayLike, duration: ArrayLike, name: str = "start") -> None:
         self.start, length = _check_each(name, start), as_array("duration", duration)
         if length.ndim > 1 or not (length > 0).all():
-            raise InputError(f"duration = {length.tolist()}, expected times greater than 0 [s], one or (N,)")
+            raise InputError(
+                f"duration = {length.tolist()}, expected times greater than 0 [s], one or (N,)",
+                argument="duration",
+                value=duration,
+            )
         self.duration = freeze(length)
         check_rollouts(**{name: self.start.shape}, duration=length.shape)
 
@@ -287,7 +291,11 @@ def check_disturbance(disturbance: Any, q: Array, qd: Array) -> None:
     if disturbance is None:
         return
     if not isinstance(disturbance, Disturbance):
-        raise InputError(f"disturbance = {disturbance!r}, expected a Disturbance, such as Push(...) or a sum of them")
+        raise InputError(
+            f"disturbance = {disturbance!r}, expected a Disturbance, such as Push(...) or a sum of them",
+            argument="disturbance",
+            value=disturbance,
+        )
     for term in list_terms(disturbance):
         _check_term(term, q, qd)
 
@@ -297,10 +305,15 @@ def _check_term(disturbance: Disturbance, q: Array, qd: Array) -> None:
     name = type(disturbance).__name__
     torque = np.asarray(_try(name, "torque", q, lambda: np.array(disturbance.torque(0.0, q, qd), dtype=np.float64)))
     if torque.shape not in ((), q.shape[1:], (1, q.shape[1]), q.shape):
-        raise InputError(f"{name}.torque has shape {torque.shape}, expected {q.shape}: rollouts and joints")
+        raise InputError(
+            f"{name}.torque has shape {torque.shape}, expected {q.shape}: rollouts and joints", value=torque.shape
+        )
     held = _try(name, "held_joints", q, lambda: disturbance.held_joints(0.0, q))
     if held is not None and np.shape(held) not in (q.shape[1:], (1, q.shape[1]), q.shape):
-        raise InputError(f"{name}.held_joints has shape {np.shape(held)}, expected {q.shape}: rollouts and joints")
+        raise InputError(
+            f"{name}.held_joints has shape {np.shape(held)}, expected {q.shape}: rollouts and joints",
+            value=np.shape(held),
+        )
     if not np.isfinite(torque).all():
         raise InputError(f"{name}.torque gives {torque.tolist()} at the start, expected numbers", argument=name)
     jump_times(disturbance)
@@ -365,5 +378,9 @@ def _check_each(name: str, value: ArrayLike) -> Array:
     """Check a number, or one for each rollout, (N,); return it read-only."""
     array = freeze(check_finite(name, as_array(name, value)))
     if array.ndim > 1:
-        raise InputError(f"{name} has shape {array.shape}, expected a number, or one for each rollout, (N,)")
+        raise InputError(
+            f"{name} has shape {array.shape}, expected a number, or one for each rollout, (N,)",
+            argument=name,
+            value=value,
+        )
     return array

@@ -38,7 +38,11 @@ class JammedJoint(TimedDisturbance):
         names = np.asarray(joint)
         whole = names.dtype.kind in "iu" and bool((names >= 0).all())
         if names.ndim > 1 or not names.size or not (whole or names.dtype.kind == "U"):
-            raise InputError(f"joint = {joint!r}, expected the name of a joint or its number from 0, or one a rollout")
+            raise InputError(
+                f"joint = {joint!r}, expected the name of a joint or its number from 0, or one a rollout",
+                argument="joint",
+                value=joint,
+            )
         self.joint = joint if isinstance(joint, str | int) else names.tolist()
         self._index = names.astype(np.intp) if whole else None
         check_rollouts(start=self.start.shape, duration=self.duration.shape, joint=names.shape)
@@ -61,7 +65,9 @@ class JammedJoint(TimedDisturbance):
         """
         if self._index is None:
             raise InputError(
-                f"joint = {self.joint!r} is a name: use JammedJoint(...).find_names(robot), as simulate does"
+                f"joint = {self.joint!r} is a name: use JammedJoint(...).find_names(robot), as simulate does",
+                argument="joint",
+                value=self.joint,
             )
         return self._index[..., None]
 

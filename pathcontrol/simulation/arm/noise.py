@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, check_finite, check_whole
 from pathcontrol.arguments import Form, Unit
-from pathcontrol.errors import InputError
+from pathcontrol.errors import InputError, about
 
 _DRAWN = 1 << 20  # count of numbers drawn in advance, for all rollouts together
 _LONGEST = 256  # limit of samples drawn in advance
@@ -37,9 +37,15 @@ class SensorNoise:
 
     def __post_init__(self) -> None:
         for name in ("position", "velocity"):
-            deviation = check_finite(f"noise of the {name}", np.asarray(getattr(self, name), dtype=np.float64))
+            with about(argument=name):
+                deviation = check_finite(f"noise of the {name}", np.asarray(getattr(self, name), dtype=np.float64))
             if (deviation < 0).any() or deviation.ndim > 2:
-                raise InputError(f"noise of the {name} = {deviation.tolist()}, expected standard deviations ≥ 0")
+                raise InputError(
+                    f"noise of the {name} = {deviation.tolist()}, expected standard deviations ≥ 0",
+                    argument=name,
+                    value=deviation,
+                    limit=0.0,
+                )
         check_whole("seed", self.seed, 0)
 
     @property
@@ -104,5 +110,7 @@ def _broadcast(name: str, deviation: ArrayLike, shape: tuple[int, int]) -> Array
         return np.broadcast_to(array, shape)
     except ValueError as error:
         raise InputError(
-            f"noise of the {name} has shape {array.shape}, expected one that fits {shape}: rollouts and joints"
+            f"noise of the {name} has shape {array.shape}, expected one that fits {shape}: rollouts and joints",
+            argument=name,
+            value=deviation,
         ) from error

@@ -128,7 +128,8 @@ class PickUp(TimedDisturbance):
         """Return the Jacobian of the mass, (3, n), at q (n,)."""
         if self._robot is None:
             raise InputError(
-                f"the arm of frame {self.frame!r} is not known: use PickUp(...).find_names(robot), as simulate does"
+                f"the arm of frame {self.frame!r} is not known: use PickUp(...).find_names(robot), as simulate does",
+                value=self.frame,
             )
         J, turn = self._robot.frame_jacobian(q, self.frame), self._robot.frame_pose(q, self.frame)[:3, :3]
         return np.asarray(J[:3] + np.cross(J[3:].T, turn @ offset).T)

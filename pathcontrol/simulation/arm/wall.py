@@ -61,18 +61,32 @@ class Wall(TimedDisturbance):
         self.point, self.normal = check_vectors("point", point), check_vectors("normal", normal)
         length = np.linalg.norm(self.normal, axis=-1, keepdims=True)
         if (length == 0).any():
-            raise InputError("normal = [0, 0, 0], expected the direction out of the wall, of any other length")
+            raise InputError(
+                "normal = [0, 0, 0], expected the direction out of the wall, of any other length",
+                argument="normal",
+                value=normal,
+            )
         if stiffness is None and not rigid:
             raise InputError(
-                "a wall has nothing to push with, expected a stiffness: give stiffness=1e5 [N/m] or rigid=True"
+                "a wall has nothing to push with, expected a stiffness: give stiffness=1e5 [N/m] or rigid=True",
+                argument="stiffness",
             )
         if stiffness is not None and rigid:
-            raise InputError(f"stiffness = {stiffness!r} and rigid = True, expected a stiffness [N/m] or rigid=True")
+            raise InputError(
+                f"stiffness = {stiffness!r} and rigid = True, expected a stiffness [N/m] or rigid=True",
+                argument="stiffness",
+                value=stiffness,
+            )
         self.stiffness = None if stiffness is None else _check_each("stiffness", stiffness, np.inf)
         self.friction = _check_each("friction", friction)
         self.damping = None if damping is None else _check_each("damping", damping)
         if self.stiffness is not None and (self.stiffness == 0).any():
-            raise InputError(f"stiffness = {self.stiffness.tolist()}, expected numbers greater than 0 [N/m]")
+            raise InputError(
+                f"stiffness = {self.stiffness.tolist()}, expected numbers greater than 0 [N/m]",
+                argument="stiffness",
+                value=stiffness,
+                limit=0.0,
+            )
         numbers = {"stiffness": self.stiffness, "friction": self.friction, "damping": self.damping}
         counts = {name: value.shape for name, value in numbers.items() if value is not None}
         check_rollouts(
@@ -113,7 +127,8 @@ class Wall(TimedDisturbance):
         """
         if self._robot is None:
             raise InputError(
-                f"the arm of frame {self.frame!r} is not known: use Wall(...).find_names(robot), as simulate does"
+                f"the arm of frame {self.frame!r} is not known: use Wall(...).find_names(robot), as simulate does",
+                value=self.frame,
             )
         return self._robot
 
@@ -151,7 +166,12 @@ def _check_each(name: str, value: ArrayLike, most: float = np.finfo(np.float64).
     """Check a number from 0 to ``most``, or one for each rollout, (N,); return it read-only."""
     array = freeze(as_array(name, value))
     if array.ndim > 1 or not ((array >= 0) & (array <= most)).all():
-        raise InputError(f"{name} = {array.tolist()}, expected a number not below 0, or one for each rollout, (N,)")
+        raise InputError(
+            f"{name} = {array.tolist()}, expected a number not below 0, or one for each rollout, (N,)",
+            argument=name,
+            value=value,
+            limit=(0.0, most),
+        )
     return array
 
 

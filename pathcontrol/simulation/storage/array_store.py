@@ -62,8 +62,10 @@ class ArrayStore:
             return check_finite("values", np.array(place["values"], dtype=np.float64))
         (numbers,), shape, at = self._parts, place["shape"], place["at"]
         if not isinstance(shape, list) or not all(type(length) is int and length >= 0 for length in (at, *shape)):
-            raise InputError(f"an array is said to have the shape {shape} and to be at {at}, expected whole numbers")
+            raise InputError(
+                f"an array is said to have the shape {shape} and to be at {at}, expected whole numbers", value=shape
+            )
         size = math.prod(shape)
         if len(shape) > _MOST_AXES or at + size > len(numbers):
-            raise InputError(f"an array of shape {shape} is said to be at {at} of {len(numbers)} numbers")
+            raise InputError(f"an array of shape {shape} is said to be at {at} of {len(numbers)} numbers", value=shape)
         return check_finite("numbers", numbers[at : at + size].reshape(shape))

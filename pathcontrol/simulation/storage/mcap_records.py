@@ -111,7 +111,11 @@ def _add_chunk(content: Content, record: bytes) -> None:
 def _check_size(chunk: Chunk) -> None:
     """Check that a chunk is not said to be larger than chunks are, before memory is taken for it."""
     if chunk.uncompressed_size > _LARGEST:
-        raise InputError(f"a chunk of it is said to have {chunk.uncompressed_size} bytes, expected at most {_LARGEST}")
+        raise InputError(
+            f"a chunk of it is said to have {chunk.uncompressed_size} bytes, expected at most {_LARGEST}",
+            value=chunk.uncompressed_size,
+            limit=_LARGEST,
+        )
 
 
 def _check_crc(found: int, stored: bytes, what: str) -> None:

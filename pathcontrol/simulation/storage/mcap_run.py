@@ -170,7 +170,7 @@ def read_mcap(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext]:
     except ImportError:
         raise
     except Exception as error:  # a broken file may fail anywhere in the readers
-        raise InputError(f"{str(path)!r} is not a run saved by Run.save: {error}") from error
+        raise InputError(f"{str(path)!r} is not a run saved by Run.save: {error}", file=str(path)) from error
     if not content.whole:
         warn(
             f"{str(path)!r} has no end, as its writer was killed or still writes: it is read up to "
@@ -185,7 +185,11 @@ def _read_head(content: Content) -> dict[str, Any]:
         raise InputError("it is an MCAP file of something else; Run.from_log makes a run of arrays of times, q and τ")
     head = json.loads(content.attachments[_HEAD])
     if head["version"] != _VERSION:
-        raise InputError(f"it has the version {head['version']!r}, this package reads {_VERSION}; update the package")
+        raise InputError(
+            f"it has the version {head['version']!r}, this package reads {_VERSION}; update the package",
+            value=head["version"],
+            limit=_VERSION,
+        )
     return dict(head)
 
 

@@ -68,7 +68,7 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | No
         InputError: there is no such file, it is damaged, or it is not a saved run.
     """
     if not path.is_file():
-        raise InputError(f"there is no file {str(path)!r}")
+        raise InputError(f"there is no file {str(path)!r}", file=str(path))
     try:
         check_seal(path)
         with h5py.File(path, "r") as file:
@@ -83,7 +83,7 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | No
         stored = _read_origin(path)
     except Exception as error:  # a broken file may fail anywhere in the readers
         reason = str(error) if "file signature not found" not in str(error) else f"it is no HDF5 file{_remedy(path)}"
-        raise InputError(f"{str(path)!r} is not a run saved by Run.save: {reason}") from error
+        raise InputError(f"{str(path)!r} is not a run saved by Run.save: {reason}", file=str(path)) from error
     if digest is None:
         warn(
             f"{str(path)!r} has no checksum, as it was written by an earlier version: damage would not be noticed; "

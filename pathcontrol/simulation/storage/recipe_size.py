@@ -37,7 +37,7 @@ def check_extent(recipe: Any) -> None:
 def _get_list(recipe: Mapping[str, Any], name: str) -> list[Any]:
     """Return a list in the recipe; raise if it is none."""
     if not isinstance(recipe.get(name), list):
-        raise InputError(f"its {name} are {recipe.get(name)!r:.80}, expected a list")
+        raise InputError(f"its {name} are {recipe.get(name)!r:.80}, expected a list", value=recipe.get(name))
     return recipe[name]
 
 
@@ -47,7 +47,9 @@ def _check_part(recipe: Any, parts: Sequence[_Extent]) -> _Extent:
     if extent.size > _MOST or extent.depth > _DEEPEST:
         raise InputError(
             f"a task is said to be made of {extent.size} tables, {extent.depth} deep, expected at most {_MOST} and "
-            f"{_DEEPEST}"
+            f"{_DEEPEST}",
+            value=extent.size,
+            limit=_MOST,
         )
     return extent
 
@@ -57,7 +59,7 @@ def _measure(recipe: Any, parts: Sequence[_Extent]) -> _Extent:
     if isinstance(recipe, Mapping) and "part" in recipe:
         part = recipe["part"]
         if type(part) is not int or not 0 <= part < len(parts):
-            raise InputError(f"part {part!r:.80} is named, of {len(parts)} before it")
+            raise InputError(f"part {part!r:.80} is named, of {len(parts)} before it", value=part, limit=len(parts))
         return parts[part]
     if isinstance(recipe, Mapping | list):
         inner = [_measure(value, parts) for value in (recipe.values() if isinstance(recipe, Mapping) else recipe)]

@@ -83,7 +83,7 @@ def task_of(recipe: Any, store: ArrayStore) -> PathTask:
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
         raise InputError(f"this is no recipe of a task ({type(error).__name__}: {error})") from error
     if not isinstance(task, PathTask):
-        raise InputError(f"this is a recipe of {task!r}, expected one of a task")
+        raise InputError(f"this is a recipe of {task!r}, expected one of a task", value=task)
     return task
 
 
@@ -156,7 +156,11 @@ def _make(recipe: Any, store: ArrayStore, parts: Sequence[Any] = ()) -> Any:
     if cls is None:
         names = [place.rpartition(":")[2] for kind in (TASKS, PROFILES) for place in kind.members.values()]
         known = [*filter(_class_of, names), *_PLACES]
-        raise InputError(f"class {recipe['class']!r} of a task, expected one of {', '.join(known)}")
+        raise InputError(
+            f"class {recipe['class']!r} of a task, expected one of {', '.join(known)}",
+            value=recipe["class"],
+            choices=tuple(known),
+        )
     own = {name: [read(item, store.get) for item in values.pop(name)] for name, (_, read) in _codecs_of(cls).items()}
     return _try_out(cls(**own, **{name: _make(value, store, parts) for name, value in values.items()}))
 

@@ -48,7 +48,11 @@ def connect(cluster: Any, security: Security | None = None) -> Iterator[Client |
     """
     if cluster is None:
         if security is not None:
-            raise InputError("security is given without a cluster; give cluster=, as 'tls://host:8786'")
+            raise InputError(
+                "security is given without a cluster; give cluster=, as 'tls://host:8786'",
+                argument="security",
+                value=security,
+            )
         yield None
         return
     if isinstance(cluster, load_extra("distributed", *_EXTRA).Client):
@@ -85,7 +89,9 @@ def load_security(ca: str | Path | None, cert: str | Path | None, key: str | Pat
     for name, file in given.items():
         if file is None or not Path(file).is_file():
             raise InputError(
-                f"{name} = {None if file is None else str(file)!r}, expected a file; TLS needs {', '.join(given)}"
+                f"{name} = {None if file is None else str(file)!r}, expected a file; TLS needs {', '.join(given)}",
+                argument=name,
+                value=None if file is None else str(file),
             )
     files = {"tls_ca_file": str(ca), "tls_client_cert": str(cert), "tls_client_key": str(key)}
     return load_extra("distributed.security", *_EXTRA).Security(require_encryption=True, **files)

@@ -63,7 +63,9 @@ class ShippedJob:
         except Exception as error:  # whatever a user's object raises
             raise InputError(
                 f"build cannot be sent to workers ({error}); make what it needs inside it, as open files and locks "
-                "belong to this machine"
+                "belong to this machine",
+                argument="build",
+                value=build,
             ) from error
 
     def __reduce__(self) -> tuple[type[ShippedJob], tuple[bytes, Mapping[str, str]]]:

@@ -21,10 +21,12 @@ def check_tasks(tasks: Any) -> tuple[PathTask, ...]:
         InputError: they are not.
     """
     if isinstance(tasks, PathTask) or not isinstance(tasks, Iterable):
-        raise InputError(f"tasks = {tasks!r}, expected a list of tasks, one for each rollout")
+        raise InputError(
+            f"tasks = {tasks!r}, expected a list of tasks, one for each rollout", argument="tasks", value=tasks
+        )
     found = tuple(tasks)
     if not found:
-        raise InputError("tasks is an empty list, expected a task for each rollout")
+        raise InputError("tasks is an empty list, expected a task for each rollout", argument="tasks", value=[])
     for i, task in enumerate(found):
         expect(f"tasks[{i}]", task, PathTask)
     return found
@@ -50,19 +52,25 @@ def check_same_kind(tasks: Sequence[PathTask]) -> None:
         if _joints(tasks, i) != n:
             raise InputError(
                 f"tasks[{i}] is a path of {task.n} joints, tasks[0] of {n}; all rollouts are of one arm, so give each "
-                "number of joints a batch of its own"
+                "number of joints a batch of its own",
+                argument=f"tasks[{i}]",
+                value=task,
             )
         kind = classify_end(task)
         if kind == "endless":
             raise InputError(
                 f"tasks[{i}], a {type(task).__name__}, neither ends nor repeats; give it a finite s_end, as "
-                "task.between(s0, s_end), or a period"
+                "task.between(s0, s_end), or a period",
+                argument=f"tasks[{i}]",
+                value=task,
             )
         if kind != first:
             raise InputError(
                 f"tasks[{i}], a {type(task).__name__}, is {kind}, but tasks[0], a {type(tasks[0]).__name__}, is "
                 f"{first}; give each kind a batch of its own, or make a closed path an open one with "
-                "task.between(s0, s_end)"
+                "task.between(s0, s_end)",
+                argument=f"tasks[{i}]",
+                value=task,
             )
 
 
@@ -95,4 +103,9 @@ def _joints(tasks: Sequence[PathTask], i: int) -> int:
     try:
         return tasks[i].n
     except (TypeError, ValueError, IndexError) as error:
-        raise InputError(f"tasks[{i}].q_d fails at s0 = {tasks[i].s0}: {error}; try check_task on it") from error
+        raise InputError(
+            f"tasks[{i}].q_d fails at s0 = {tasks[i].s0}: {error}; try check_task on it",
+            argument=f"tasks[{i}]",
+            value=tasks[i],
+            s=tasks[i].s0,
+        ) from error

@@ -167,7 +167,11 @@ class TaskBatch(PathTask):
             return np.broadcast_to(array, len(self))
         if array.ndim < axes or array.shape[-axes] != len(self):
             expected = f"(*batch, {len(self)}{', n' if axes == 2 else ''})"
-            raise InputError(f"{name} has shape {array.shape}, expected {expected}: there are {len(self)} tasks")
+            raise InputError(
+                f"{name} has shape {array.shape}, expected {expected}: there are {len(self)} tasks",
+                argument=name,
+                value=values,
+            )
         return array
 
 

@@ -154,7 +154,9 @@ class ConcatenatedPath(PathTask):
         distance = gap(before, after)
         reason = explain_gap(before, after) if distance else explain_jump(before, after)
         if reason and (not self.blend or distance > self.blend):
-            raise InputError(f"paths[{i}] and paths[{i + 1}] do not join: {reason}")
+            raise InputError(
+                f"paths[{i}] and paths[{i + 1}] do not join: {reason}", argument=f"paths[{i + 1}]", value=after
+            )
         return reason is not None
 
     def _cut(self, i: int, at_start: bool, at_end: bool) -> tuple[float, float]:
@@ -166,7 +168,10 @@ class ConcatenatedPath(PathTask):
         if length.total <= self.blend * (at_start + at_end):
             raise InputError(
                 f"paths[{i}] has the length {length.total:.3g} rad and gives up {self.blend:g} rad to each of its "
-                f"{at_start + at_end} blends; make blend less than {length.total / (at_start + at_end):.3g}"
+                f"{at_start + at_end} blends; make blend less than {length.total / (at_start + at_end):.3g}",
+                argument="blend",
+                value=self.blend,
+                limit=length.total / (at_start + at_end),
             )
         first, last = length.inverse(np.array([self.blend * at_start, length.total - self.blend * at_end]))
         return float(first), float(last)
@@ -176,7 +181,9 @@ class ConcatenatedPath(PathTask):
         try:
             return Blend(before, after, span / speed)
         except InputError as error:
-            raise InputError(f"paths[{i}] and paths[{i + 1}] do not join: {error}") from error
+            raise InputError(
+                f"paths[{i}] and paths[{i + 1}] do not join: {error}", **error.details_with(argument=f"paths[{i + 1}]")
+            ) from error
 
 
 def _rescale(point: PathPoint, rate: float) -> PathPoint:
@@ -188,7 +195,7 @@ def _check_paths(paths: Sequence[PathTask]) -> list[PathTask]:
     """Check that there are two or more open paths for the same joints."""
     checked = list(paths)
     if len(checked) < 2:
-        raise InputError(f"{len(checked)} paths are given, expected two or more")
+        raise InputError(f"{len(checked)} paths are given, expected two or more", argument="paths", value=checked)
     for i, path in enumerate(checked):
         expect(f"paths[{i}]", path, PathTask)
         refuse_batch(f"paths[{i}]", path)
@@ -196,10 +203,16 @@ def _check_paths(paths: Sequence[PathTask]) -> list[PathTask]:
             kind = "is closed" if path.closed else "has no end"
             raise InputError(
                 f"paths[{i}], a {type(path).__name__}, {kind}; expected open paths: cut a stretch of it with "
-                "between(s0, s_end)"
+                "between(s0, s_end)",
+                argument=f"paths[{i}]",
+                value=path,
             )
         if path.n != checked[0].n:
-            raise InputError(f"paths[{i}] has {path.n} joints and paths[0] has {checked[0].n}, expected the same")
+            raise InputError(
+                f"paths[{i}] has {path.n} joints and paths[0] has {checked[0].n}, expected the same",
+                argument=f"paths[{i}]",
+                value=path,
+            )
     return checked
 
 

@@ -40,13 +40,15 @@ class PathSequence(PathTask):
     def __init__(self, paths: Sequence[PathTask], *, gaps: bool = False) -> None:
         self.paths, self.gaps = tuple(paths), gaps
         if not self.paths:
-            raise InputError("a sequence needs at least one path")
+            raise InputError("a sequence needs at least one path", argument="paths", value=[])
         for i, path in enumerate(self.paths):
             expect(f"paths[{i}]", path, PathTask)
-            refuse_batch(f"path {i} of the sequence", path)
+            refuse_batch(f"path {i} of the sequence", path, f"paths[{i}]")
             if path.closed or not np.isfinite(path.s_end):
                 raise InputError(
-                    f"path {i} of the sequence does not end; take a part of it, as path.between(s0, s_end)"
+                    f"path {i} of the sequence does not end; take a part of it, as path.between(s0, s_end)",
+                    argument=f"paths[{i}]",
+                    value=path,
                 )
         self._check_meeting()
         self.keep_tool(*self.paths)
@@ -119,7 +121,11 @@ class PathSequence(PathTask):
         """Check that each path begins where the one before it ends."""
         for i, (path, after) in enumerate(zip(self.paths[:-1], self.paths[1:], strict=True)):
             if path.n != after.n:
-                raise InputError(f"path {i} is for {path.n} joints, path {i + 1} for {after.n}")
+                raise InputError(
+                    f"path {i} is for {path.n} joints, path {i + 1} for {after.n}",
+                    argument=f"paths[{i + 1}]",
+                    value=after,
+                )
             if self.gaps:
                 continue
             end, start = path.q_d(np.array(path.s_end)), after.q_d(np.array(after.s0))
@@ -129,5 +135,8 @@ class PathSequence(PathTask):
                 raise InputError(
                     f"path {i + 1} begins {gap[joint]:.3g} rad away from the end of path {i}, at joint {joint + 1}: at "
                     f"{start[joint]:.6g} after {end[joint]:.6g}, expected at most {_MEET:g} rad; put a path in "
-                    "between, begin it with the posture at that end (start=…), or allow it by gaps=True"
+                    "between, begin it with the posture at that end (start=…), or allow it by gaps=True",
+                    argument=f"paths[{i + 1}]",
+                    value=gap[joint],
+                    limit=_MEET,
                 )

@@ -36,19 +36,28 @@ def derivatives(label: str, formula: sympy.Expr, s: sympy.Symbol, bounded: bool)
     try:
         first = formula.diff(s)
         if bounded and first.count_ops() > _LARGEST:
-            raise InputError(f"the derivative of {label} has more than {_LARGEST} operations; simplify the formula")
+            raise InputError(
+                f"the derivative of {label} has more than {_LARGEST} operations; simplify the formula",
+                argument=label,
+                value=str(formula),
+                limit=_LARGEST,
+            )
         second = first.diff(s)
     except (RecursionError, TypeError, ArithmeticError) as error:
-        raise InputError(f"{label} cannot be differentiated ({error}); simplify it") from None
+        raise InputError(
+            f"{label} cannot be differentiated ({error}); simplify it", argument=label, value=str(formula)
+        ) from None
     rough = [a for e in (formula, first, second) for a in e.atoms(*(getattr(sympy, r) for r in _ROUGH)) if a.has(s)]
     if rough:
         raise InputError(
             f"{label} = {formula} is not twice continuously differentiable: it or a derivative of it has {rough[0]}; "
-            "write it with smooth functions, or give a FunctionPath with its derivatives"
+            "write it with smooth functions, or give a FunctionPath with its derivatives",
+            argument=label,
+            value=str(formula),
         )
     # a negative number to the power s has a complex derivative only
     if any(e.has(sympy.I, sympy.zoo, sympy.nan, sympy.oo, -sympy.oo) for e in (formula, first, second)):
-        raise InputError(f"{label} = {formula}, expected a real, finite expression")
+        raise InputError(f"{label} = {formula}, expected a real, finite expression", argument=label, value=str(formula))
     return [first, second]
 
 

@@ -49,14 +49,16 @@ def parse(label: str, text: str, names: Mapping[str, Any]) -> Any:
             raise _FormulaError(f"it has {len(text)} characters, at most {_LONGEST} are read")
         return _expression(_tree(text), names, _DEEPEST)
     except UnknownNameError as error:
-        raise UnknownNameError(f"{label} = {shown!r}: {error}") from None
+        raise UnknownNameError(f"{label} = {shown!r}: {error}", **error.details_with(argument=label)) from None
     except _FormulaError as error:
         reason = str(error)
     except (ArithmeticError, TypeError, ValueError, RecursionError) as error:
         reason = f"sympy fails with {error!r}"
     raise InputError(
         f"{label} = {shown!r} is not understood: {reason}. A formula is made of numbers, + - * / **, brackets, "
-        f"{', '.join(_CONSTANTS)}, {', '.join(_FUNCTIONS)} and {', '.join(names)}"
+        f"{', '.join(_CONSTANTS)}, {', '.join(_FUNCTIONS)} and {', '.join(names)}",
+        argument=label,
+        value=text,
     )
 
 
@@ -121,7 +123,11 @@ def _named(name: str, names: Mapping[str, Any]) -> Any:
     if name in _FUNCTIONS:
         raise _FormulaError(f"{name} needs its argument in brackets")
     known = ", ".join(names)
-    raise UnknownNameError(f"nothing is known about {name!r}, expected {known}; give parameters={{{name!r}: …}}")
+    raise UnknownNameError(
+        f"nothing is known about {name!r}, expected {known}; give parameters={{{name!r}: …}}",
+        value=name,
+        choices=tuple(names),
+    )
 
 
 def _chain(node: ast.expr, operators: tuple[type[ast.operator], ...], names: Mapping[str, Any], depth: int) -> Any:

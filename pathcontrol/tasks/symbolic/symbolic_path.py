@@ -130,7 +130,10 @@ class SymbolicPath(PathTask):
         if unknown:
             raise UnknownNameError(
                 f"{label} = {formula} has the symbol {unknown[0]!r}, expected {', '.join(names)}; "
-                f"give parameters={{{unknown[0]!r}: …}}, or s={unknown[0]!r} if it is the path parameter"
+                f"give parameters={{{unknown[0]!r}: …}}, or s={unknown[0]!r} if it is the path parameter",
+                argument=label,
+                value=unknown[0],
+                choices=tuple(names),
             )
         return formula.subs({symbol: names[symbol.name] for symbol in formula.free_symbols})
 
@@ -169,17 +172,25 @@ def _symbol(s: Any, parameters: Mapping[str, float]) -> sympy.Symbol:
 
     for name in (str(s), *parameters):
         if not name.isidentifier() or name in RESERVED:
-            raise InputError(f"{name!r} is no name for a symbol, expected letters and digits and no name of a function")
+            raise InputError(
+                f"{name!r} is no name for a symbol, expected letters and digits and no name of a function", value=name
+            )
     if str(s) in parameters:
-        raise InputError(f"{str(s)!r} is the path parameter and among parameters; leave it out there, or rename s")
+        raise InputError(
+            f"{str(s)!r} is the path parameter and among parameters; leave it out there, or rename s",
+            argument="s",
+            value=str(s),
+        )
     return sympy.Symbol(str(s), real=True)
 
 
 def _check_formulas(q_d: Iterable[Formula]) -> list[Formula]:
     """Check that there is a list of formulas, one for each joint."""
     if isinstance(q_d, str) or not isinstance(q_d, Iterable):
-        raise InputError(f"q_d = {q_d!r}, expected a list with one expression for each joint")
+        raise InputError(
+            f"q_d = {q_d!r}, expected a list with one expression for each joint", argument="q_d", value=q_d
+        )
     formulas = list(q_d)
     if not formulas:
-        raise InputError("q_d has no expressions, expected one for each joint")
+        raise InputError("q_d has no expressions, expected one for each joint", argument="q_d", value=[])
     return formulas

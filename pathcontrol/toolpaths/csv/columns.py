@@ -84,7 +84,9 @@ def check_choice(chosen: Any) -> Chosen | None:
     raise InputError(
         f"columns = {reprlib.repr(chosen)}, expected names in the order of the file, such as ('x', 'y', 'z', 'i', 'j', "
         "'k'), or for each name a number from 0 or the name that the file gives it, such as {'x': 0, 'y': 'Pos Y', "
-        f"'z': 2}}; names are {', '.join(KNOWN)}"
+        f"'z': 2}}; names are {', '.join(KNOWN)}",
+        argument="columns",
+        value=chosen,
     )
 
 

@@ -86,7 +86,12 @@ def read_csv(
 
 def _check_choice(name: str, value: str | None, choices: list[str]) -> None:
     if value is not None and value not in choices:
-        raise InputError(f"{name} = {value!r}, expected one of {', '.join(choices)}, or None")
+        raise InputError(
+            f"{name} = {value!r}, expected one of {', '.join(choices)}, or None",
+            argument=name,
+            value=value,
+            choices=tuple(choices),
+        )
 
 
 def _assume_metres(rows: Rows, passed: Notes) -> str:

@@ -68,7 +68,7 @@ def checked_gap(gap: float | None) -> float | None:
         InputError: it is something else.
     """
     if gap is not None and as_scalar("gap", gap) < 0:
-        raise InputError(f"gap = {gap!r} m, expected a length not less than 0")
+        raise InputError(f"gap = {gap!r} m, expected a length not less than 0", argument="gap", value=gap, limit=0.0)
     return gap
 
 

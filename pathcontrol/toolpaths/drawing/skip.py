@@ -45,7 +45,9 @@ def names_of(option: str, names: str | Sequence[str] | None) -> tuple[str, ...] 
     found = (names,) if isinstance(names, str) or not isinstance(names, Iterable) else tuple(names)
     wrong = [name for name in found if not isinstance(name, str)]
     if wrong:
-        raise InputError(f"{option} = {names!r}, expected a name or several, such as ['a', 'b']")
+        raise InputError(
+            f"{option} = {names!r}, expected a name or several, such as ['a', 'b']", argument=option, value=names
+        )
     return found
 
 
@@ -68,7 +70,9 @@ def kinds_to_skip(names: str | Sequence[str] | None, known: Iterable[str]) -> fr
         if not single.issuperset(kinds):
             raise UnknownNameError(
                 f"skip: {name[:60]!r} is no kind of thing in this drawing, expected some of "
-                f"{', '.join(map(repr, KINDS))}, or a type such as {', '.join(map(repr, sorted(there)[:12]))}"
+                f"{', '.join(map(repr, KINDS))}, or a type such as {', '.join(map(repr, sorted(there)[:12]))}",
+                argument="skip",
+                value=name,
             )
         found.update(kinds)
     return frozenset(found)

@@ -144,7 +144,9 @@ def _unit(source: str, unit: str | None, code: int) -> str:
     known = ", ".join(UNITS)
     if unit is not None:
         if unit not in UNITS:
-            raise UnknownNameError(f"unit = {unit!r}, expected one of {known}")
+            raise UnknownNameError(
+                f"unit = {unit!r}, expected one of {known}", argument="unit", value=unit, choices=tuple(UNITS)
+            )
         return unit
     if code not in _BY_CODE:
         reason = f"a unit that is not known ($INSUNITS = {code})" if code else "no unit of length"

@@ -40,7 +40,9 @@ class Layers:
         unknown = [] if chosen is None else [name for name in chosen if str(name).lower() not in self.names]
         if unknown:
             raise UnknownNameError(
-                f"layers: there is no layer {str(unknown[0])[:60]!r}, expected some of {self.listed}"
+                f"layers: there is no layer {str(unknown[0])[:60]!r}, expected some of {self.listed}",
+                argument="layers",
+                value=unknown[0],
             )
 
     @property

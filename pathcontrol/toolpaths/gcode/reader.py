@@ -64,7 +64,12 @@ def read_gcode(
         ToolpathError: the file cannot be used; the message says in which line and why.
     """
     if unit is not None and unit not in UNITS:
-        raise InputError(f"unit = {unit!r}, expected one of {', '.join(UNITS)}, or None")
+        raise InputError(
+            f"unit = {unit!r}, expected one of {', '.join(UNITS)}, or None",
+            argument="unit",
+            value=unit,
+            choices=tuple(UNITS),
+        )
     if feed is not None:
         feed = as_scalar("feed", feed, positive=True)
     if arc_tolerance is not None:
@@ -90,9 +95,14 @@ def _start(start: ArrayLike | None, texts: list[str]) -> list[float]:
         return [math.nan if known else 0.0 for known in named]
     position = check_finite("start", as_array("start", start))
     if position.shape != (3,):
-        raise InputError(f"start has shape {position.shape}, expected (3,)")
+        raise InputError(f"start has shape {position.shape}, expected (3,)", argument="start", value=start)
     if np.abs(position).max() > MAX_COORDINATE:
-        raise InputError(f"start = {position.tolist()} m is further than {MAX_COORDINATE:g} m from the origin")
+        raise InputError(
+            f"start = {position.tolist()} m is further than {MAX_COORDINATE:g} m from the origin",
+            argument="start",
+            value=start,
+            limit=MAX_COORDINATE,
+        )
     return position.tolist()
 
 

@@ -146,5 +146,5 @@ def _point(name: str, point: Sequence[float] | Array) -> tuple[float, ...]:
     """Check that a point has three finite numbers."""
     numbers = tuple(map(float, point))
     if not all(map(math.isfinite, numbers)) or len(numbers) != 3:
-        raise InputError(f"{name} = {numbers}, expected three finite numbers")
+        raise InputError(f"{name} = {numbers}, expected three finite numbers", argument=name, value=numbers)
     return numbers

@@ -40,11 +40,15 @@ class Arc(Segment):
         for name in ("center", "x", "y", "rise"):
             array = check_finite(name, as_array(name, getattr(self, name)))
             if array.shape != (3,):
-                raise InputError(f"{name} has shape {array.shape}, expected (3,)")
+                raise InputError(f"{name} has shape {array.shape}, expected (3,)", argument=name, value=array)
             object.__setattr__(self, name, freeze(array))
         as_scalar("start", self.start)
         if as_scalar("sweep", self.sweep) == 0 or not _parallelogram(self.x.tolist(), self.y.tolist()) > 0:
-            raise InputError(f"an arc with x = {self.x}, y = {self.y} and sweep = {self.sweep:g} has no length")
+            raise InputError(
+                f"an arc with x = {self.x}, y = {self.y} and sweep = {self.sweep:g} has no length",
+                argument="sweep",
+                value=self.sweep,
+            )
 
     @property
     def first(self) -> Array:

@@ -28,14 +28,26 @@ class Bezier(Segment):
     def __post_init__(self) -> None:
         points = check_finite("points", as_array("points", self.points))
         if points.ndim != 2 or points.shape[1:] != (3,) or len(points) < 2:
-            raise InputError(f"points have shape {points.shape}, expected (degree + 1, 3), degree ≥ 1")
+            raise InputError(
+                f"points have shape {points.shape}, expected (degree + 1, 3), degree ≥ 1",
+                argument="points",
+                value=points,
+            )
         if not np.ptp(points, axis=0).any():
-            raise InputError(f"all control points are the same, {points[0].tolist()}: the curve has no length")
+            raise InputError(
+                f"all control points are the same, {points[0].tolist()}: the curve has no length",
+                argument="points",
+                value=points,
+            )
         object.__setattr__(self, "points", freeze(points))
         if self.weights is not None:
             weights = check_finite("weights", as_array("weights", self.weights))
             if weights.shape != points.shape[:1] or not (weights > 0).all():
-                raise InputError(f"weights = {weights.tolist()}, expected {len(points)} weights greater than 0")
+                raise InputError(
+                    f"weights = {weights.tolist()}, expected {len(points)} weights greater than 0",
+                    argument="weights",
+                    value=weights,
+                )
             object.__setattr__(self, "weights", freeze(weights))
 
     @classmethod

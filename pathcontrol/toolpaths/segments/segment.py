@@ -96,11 +96,19 @@ class Polyline(Segment):
     def __post_init__(self) -> None:
         points = check_finite("points", as_array("points", self.points))
         if points.ndim != 2 or points.shape[1:] != (3,) or len(points) < 2:
-            raise InputError(f"points have shape {points.shape}, expected (k, 3) with at least 2 points")
+            raise InputError(
+                f"points have shape {points.shape}, expected (k, 3) with at least 2 points",
+                argument="points",
+                value=points,
+            )
         object.__setattr__(self, "points", freeze(points))
         if (self.edges <= _SHORTEST).any():
             i = int(np.argmin(self.edges))
-            raise InputError(f"points {i} and {i + 1} are the same, {points[i].tolist()}; leave one of them out")
+            raise InputError(
+                f"points {i} and {i + 1} are the same, {points[i].tolist()}; leave one of them out",
+                argument="points",
+                value=points[i],
+            )
 
     @cached_property
     def edges(self) -> Array:

@@ -88,7 +88,8 @@ def curved_stretch(segment: Segment, start: float, end: float) -> Stretch:
         if not resolved or len(s) > _MOST_PIECES:
             raise InputError(
                 f"a {type(segment).__name__} of length {segment.length:g} m at {data.p[0].tolist()} cannot be followed "
-                "to 1 nm: it bends too sharply, or is too far from the origin"
+                "to 1 nm: it bends too sharply, or is too far from the origin",
+                value=segment.length,
             )
         s = np.sort(np.concatenate([s, 0.5 * (s[:-1] + s[1:])[coarse]]))
     return Stretch(Knots(s - s[0], *data), _ACCURACY, np.array([0.0, s[-1] - s[0]]))

@@ -32,7 +32,9 @@ class Chosen:
             found = [element for element in document.root.iter("*") if name in _names(element)]
             if not found:
                 raise UnknownNameError(
-                    f"layers: there is no layer or id {str(name)[:60]!r}, expected some of {_list_names(document)}"
+                    f"layers: there is no layer or id {str(name)[:60]!r}, expected some of {_list_names(document)}",
+                    argument="layers",
+                    value=name,
                 )
             self._elements.update(found)
 
