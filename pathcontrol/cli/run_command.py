@@ -56,11 +56,11 @@ def _animation(done: Outcome, out: Path) -> Path:
 
 def _print_results(done: Outcome, as_json: bool) -> None:
     """Print the results."""
-    from rich import print as rich_print
+    from rich.console import Console
 
     from pathcontrol.analysis.run_remarks import remarks
     from pathcontrol.analysis.window import describe_window
-    from pathcontrol.cli.tables import contour_lines, metric_lines, remark_lines
+    from pathcontrol.cli.tables import contour_tables, metric_lines, remark_lines
 
     written = {name: str(path) for name, path in done.written.items()}
     if as_json:
@@ -79,8 +79,9 @@ def _print_results(done: Outcome, as_json: bool) -> None:
         click.echo(f"  posture: {posture}")
     for line in metric_lines(done.metrics, done.run):
         click.echo(f"  {line}")
-    for table in contour_lines(done.run):
-        rich_print(table)
+    console = Console()
+    for table in contour_tables(done.run, console.width):
+        console.print(table)
     for line in remark_lines(done.run):
         click.echo(f"  {line}")
     for name, path in written.items():

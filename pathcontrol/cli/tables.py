@@ -69,34 +69,45 @@ def comparison_tables(compared: Comparison, width: int) -> list[Table]:
     """
     from pathcontrol.comparison.comparison_table import tabulate
 
-    labels, *laws = zip(*tabulate(compared), strict=True)
+    title = Text(printable(f"{compared.scenario.name}: {compared.scenario.sentence}"))
+    return _deal_columns(tabulate(compared), 1, width, title)
+
+
+def _deal_columns(rows: Sequence[Sequence[str]], labels: int, width: int, title: Text | None = None) -> list[Table]:
+    """Return rows, heads first, as tables that no ``width`` breaks a word of: each has the first ``labels`` columns.
+
+    The other columns are dealt out to as many tables as that takes.
+    """
+    columns = list(zip(*rows, strict=True))
+    names, others = columns[:labels], columns[labels:]
     tables: list[list[Sequence[str]]] = []
     room = 0
-    for law in laws:
-        room -= _longest_word(law) + _BORDER
+    for column in others:
+        room -= _least_width(column, width) + _BORDER
         if room < 0 or not tables:
-            tables.append([labels])
-            room = width - 1 - sum(_longest_word(column) + _BORDER for column in (labels, law))
-        tables[-1].append(law)
-    title = Text(printable(f"{compared.scenario.name}: {compared.scenario.sentence}"))
-    return [_make_table(columns, None if i else title, width) for i, columns in enumerate(tables)]
+            tables.append([*names])
+            room = width - 1 - sum(_least_width(each, width) + _BORDER for each in (*names, column))
+        tables[-1].append(column)
+    return [_make_table(columns, labels, None if i else title, width) for i, columns in enumerate(tables)]
 
 
-def _longest_word(column: Sequence[str]) -> int:
-    """Return the length of the longest word, the least width of a column."""
-    return max(len(word) for cell in column for word in cell.split())
+def _least_width(column: Sequence[str], width: int) -> int:
+    """Return the length of the longest word of a column, or the part of ``width`` in which longer ones are folded."""
+    return min(max((len(word) for cell in column for word in cell.split()), default=0), width // 3)
 
 
-def _make_table(columns: Sequence[Sequence[str]], title: Text | None, width: int) -> Table:
+def _make_table(columns: Sequence[Sequence[str]], labels: int, title: Text | None, width: int) -> Table:
     """Return a table of columns, heads first, which share what ``width`` leaves beside their longest words."""
-    least = [_longest_word(column) for column in columns]
+    least = [_least_width(column, width) for column in columns]
     spare = max(width - 1 - sum(least) - _BORDER * len(columns), 0) // len(columns)
     table = Table(title=title)
     for i, (column, word) in enumerate(zip(columns, least, strict=True)):
         needed = min(max(map(len, column)), word + spare)
-        table.add_column(Text(printable(column[0])), justify="right" if i else "left", width=needed)
+        table.add_column(
+            Text(printable(column[0])), justify="left" if i < labels else "right", width=needed, overflow="fold"
+        )
     for row in list(zip(*columns, strict=True))[1:]:
-        table.add_row(*map(Text, row))
+        table.add_row(*map(Text, map(printable, row)))
     return table
 
 
@@ -105,23 +116,19 @@ def red(text: str) -> str:
     return click.style(text, fg="red")
 
 
-def contour_lines(run: Run) -> list[Table]:
-    """Return the table of contours of a toolpath, or of laps; empty for another run."""
+def contour_tables(run: Run, width: int) -> list[Table]:
+    """Return the table of contours of a toolpath, or of laps, as several where ``width`` letters are too few.
+
+    There is none for another run.
+    """
     from pathcontrol.analysis.contours import contour_table
     from pathcontrol.analysis.lap_table import lap_table
 
     heads, *rows = contour_table(run) or lap_table(run) or [[]]
-    if not rows:
-        return []
-    table = Table()
-    for i, head in enumerate(heads):
-        table.add_column(Text(head), justify="left" if i < 2 else "right")
-    for row in rows[:_MOST_ROWS]:
-        table.add_row(*map(Text, row))
-    return [table]
+    return _deal_columns([heads, *rows[:_MOST_ROWS]], 2, width) if rows else []
 
 
-def toolpath_table(content: dict[str, Any]) -> list[Text | Table]:
+def toolpath_tables(content: dict[str, Any], width: int) -> list[Text | Table]:
     """Return the content of a toolpath from its summary, in millimetres: a line, and a row for each contour."""
     contours = content["contours"]
     size = " × ".join(f"{1e3 * (b - a):.6g}" for a, b in zip(*content["bounds_m"], strict=True))
@@ -130,19 +137,16 @@ def toolpath_table(content: dict[str, Any]) -> list[Text | Table]:
         f"{content['source']}: {count_words(len(contours), 'contour')}, drawn in {content['unit']}: {cuts} mm of cuts "
         f"and {rapids} mm of rapids, within {size} mm"
     )
-    table = Table()
-    for column in ("contour", "", "length [mm]", "feed [mm/s]", "points", "corners", "sharpest [°]"):
-        table.add_column(Text(column), justify="left" if column in ("contour", "") else "right")
-    for contour in contours[:_MOST_ROWS]:
-        table.add_row(*_contour_row(contour))
+    heads = ["contour", "", "length [mm]", "feed [mm/s]", "points", "corners", "sharpest [°]"]
+    tables = _deal_columns([heads, *map(_contour_row, contours[:_MOST_ROWS])], 2, width)
     left_out = len(contours) - _MOST_ROWS
-    return [Text(head), table, *([Text(f"and {left_out} more; --json lists them all")] if left_out > 0 else [])]
+    return [Text(head), *tables, *([Text(f"and {left_out} more; --json lists them all")] if left_out > 0 else [])]
 
 
-def _contour_row(contour: dict[str, Any]) -> list[Text | str]:
+def _contour_row(contour: dict[str, Any]) -> list[str]:
     """Return the row of a contour."""
     return [
-        Text(contour["name"]),
+        contour["name"],
         "rapid" if contour["rapid"] else "closed" if contour["closed"] else "open",
         f"{1e3 * contour['length_m']:.6g}",
         "" if contour["feed_m_s"] is None else f"{1e3 * contour['feed_m_s']:.4g}",

@@ -66,7 +66,7 @@ from pathcontrol.cli.quantity import QuantityType, check_feed
 def command(file: Path, plot: Path | None, as_json: bool, **options: Any) -> None:
     """Show what is in a toolpath FILE: CSV, G-code, SVG or DXF."""
     check_file(file, "a toolpath")
-    from pathcontrol.cli.tables import toolpath_table
+    from pathcontrol.cli.tables import toolpath_tables
     from pathcontrol.toolpaths.read import read_toolpath
     from pathcontrol.toolpaths.summary import summary
 
@@ -88,7 +88,7 @@ def command(file: Path, plot: Path | None, as_json: bool, **options: Any) -> Non
     from rich.text import Text
 
     console = Console()
-    for part in toolpath_table(content):
+    for part in toolpath_tables(content, console.width):
         console.print(part)
     for name in content.get("figures", []):
         console.print(Text(f"  figure: {name}"))

@@ -164,7 +164,8 @@ def test_out_writes_page_figure_and_numbers(tmp_path, monkeypatch):
 @pytest.mark.parametrize("width", [40, 80, 120, 240])
 def test_the_table_shows_all_laws_on_a_terminal_of_any_width(width, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(width))
-    table = call("--scenario", "undisturbed", "--law", "all", "--rollouts", 1).stdout.partition("The numbers of one start")[0]
+    said = call("--scenario", "undisturbed", "--law", "all", "--rollouts", 1).stdout
+    table = said.partition("The numbers of one start")[0]
     assert "…" not in table
     assert max(map(len, table.splitlines())) <= width
     for word in ("computed", "projection", "linearization", "velocity", "saturated"):

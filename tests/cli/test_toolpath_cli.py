@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from rich.console import Console
 
 from pathcontrol import ExperimentError, Run
 from pathcontrol.cli import main
+from pathcontrol.cli.tables import toolpath_tables
 from pathcontrol.experiments.runner import load_setup, run_experiment
 
 SQUARE = """G21 G90 G17
@@ -194,3 +196,25 @@ def test_mistakes_are_told_by_key(experiment, old, new, message):
     experiment.write_text(text)
     with pytest.raises(ExperimentError, match=message):
         load_setup(experiment)
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120])
+def test_tables_of_contours_break_no_number_at_any_width(width):
+    """Whole numbers and words come out, and no line is wider than the terminal; a very long name is folded."""
+    rows = [(f"line {n}", 88860.125 * 10**-n, 12345.678 / n) for n in range(1, 5)] + [("pocket_" * 40, 1.0, 2.0)]
+    contours = [
+        {"name": name, "rapid": False, "closed": n % 2 == 0, "length_m": length, "feed_m_s": feed, "points": 10**n}
+        | {"corners": 3, "sharpest_deg": 90.0}
+        for n, (name, length, feed) in enumerate(rows)
+    ]
+    content = {"source": "a.ngc", "contours": contours, "bounds_m": [[0, 0], [1, 1]], "unit": "mm"}
+    _, *tables = toolpath_tables(content | {"cut_length_m": 1.0, "rapid_length_m": 0.0}, width)
+    console = Console(width=width)
+    with console.capture() as shown:
+        for table in tables:
+            console.print(table)
+    lines, words = shown.get().splitlines(), shown.get().split()
+    assert max(map(len, lines)) <= width
+    assert "…" not in shown.get()
+    for one in contours:
+        assert {f"{1e3 * one['length_m']:.6g}", f"{1e3 * one['feed_m_s']:.4g}", str(one["points"])} <= set(words)
