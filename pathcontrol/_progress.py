@@ -1,4 +1,4 @@
-"""A progress bar on standard error, shown once a task has taken two seconds."""
+"""A progress bar on standard error, shown once a task has taken two seconds, or at once where its steps are slow."""
 
 from __future__ import annotations
 
@@ -12,9 +12,14 @@ _BETWEEN = 0.1  # s, between two drawings
 
 
 @contextlib.contextmanager
-def progress_bar(description: str, total: float, enabled: bool = True) -> Iterator[Callable[[float], None]]:
-    """Give a function that takes how much of ``total`` is done; the bar appears after two seconds."""
-    due = time.monotonic() + _PATIENCE
+def progress_bar(
+    description: str, total: float, enabled: bool = True, *, at_once: bool = False
+) -> Iterator[Callable[[float], None]]:
+    """Give a function that takes how much of ``total`` is done; the bar appears after two seconds, or ``at_once``.
+
+    What ends before ``total`` is done as a whole, too: unless an exception ends it the bar ends at 100 %.
+    """
+    due = time.monotonic() + (0.0 if at_once else _PATIENCE)
     shown = None
 
     def update(done: float) -> None:
@@ -29,6 +34,8 @@ def progress_bar(description: str, total: float, enabled: bool = True) -> Iterat
 
     try:
         yield update
+        if shown is not None:
+            shown.update(shown.task_ids[0], completed=total, refresh=True)
     finally:
         if shown is not None:
             shown.stop()

@@ -50,3 +50,27 @@ def test_a_file_gets_nothing_of_a_bar(monkeypatch, capfd):
     with progress_bar("into a file", 4) as update:
         update(1)
     assert capfd.readouterr().err == ""
+
+
+def stop_at(done, total):
+    """A task that Ctrl-C ends."""
+    with progress_bar("interrupted", total) as update:
+        update(done)
+        raise KeyboardInterrupt
+
+
+def test_what_ends_early_ends_at_the_whole(terminal, monkeypatch, capsys):
+    """An arm that is done before its longest duration has done all of it; one that failed has not."""
+    monkeypatch.setattr(_progress, "_PATIENCE", 0.0)
+    with progress_bar("done early", 100) as update:
+        update(42)
+    assert "100%" in capsys.readouterr().err
+    with pytest.raises(KeyboardInterrupt):
+        stop_at(42, 100)
+    assert "100%" not in capsys.readouterr().err
+
+
+def test_steps_that_are_slow_are_announced_at_once(terminal, capsys):
+    with progress_bar("drawing", 5, at_once=True) as update:
+        update(0)
+        assert "drawing" in capsys.readouterr().err

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pathcontrol._files import whole_file
 from pathcontrol._json import to_json
+from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.analysis.deviation import toolpath_metrics
 from pathcontrol.analysis.run_metrics import UNITS, metrics
@@ -18,16 +21,38 @@ from pathcontrol.experiments.builders.setup import Setup
 from pathcontrol.experiments.schema.experiment import Output
 from pathcontrol.simulation.run import Run
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-def check_folder(out_dir: Path, output: Output) -> None:
+_FIGURES = 5  # at most
+
+
+@contextlib.contextmanager
+def output_folder(out_dir: Path, output: Output) -> Iterator[None]:
     """Make the output folder and see that every file can be written, before time is spent on a simulation.
+
+    Folders that were made are removed where the block ends by an exception, or by Ctrl-C, and nothing is in them.
 
     Raises:
         InputError: the folder is named like a file, cannot be made or written to, or is where a file should go.
     """
+    targets = [out_dir / name for name in output.model_dump(exclude_none=True, exclude={"figure_joints"}).values()]
+    folders = {folder for target in targets for folder in target.parents}
+    new = sorted((folder for folder in folders if not folder.exists()), key=lambda folder: -len(folder.parts))
+    try:
+        _check_folder(out_dir, targets)
+        yield
+    except BaseException:
+        for folder in new:
+            with contextlib.suppress(OSError):  # it is not empty
+                folder.rmdir()
+        raise
+
+
+def _check_folder(out_dir: Path, targets: Sequence[Path]) -> None:
+    """Make the folder, and see that files can be written."""
     refuse_suffix(out_dir, "a folder")
-    for name in output.model_dump(exclude_none=True, exclude={"figure_joints"}).values():
-        target = out_dir / name
+    for target in targets:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -45,8 +70,10 @@ def measure_run(run: Run, setup: Setup) -> dict[str, Any]:
     return to_json(metrics(run, setup.task))
 
 
-def write_outputs(run: Run, numbers: dict[str, Any], setup: Setup, out_dir: Path) -> dict[str, Path]:
-    """Write the files that ``setup.output`` names.
+def write_outputs(
+    run: Run, numbers: dict[str, Any], setup: Setup, out_dir: Path, progress: bool = True
+) -> dict[str, Path]:
+    """Write the files that ``setup.output`` names, with a bar for what takes a while.
 
     Returns:
         The files by what they are: ``data``, ``summary``, ``html``, and ``figure-…`` for each figure.
@@ -56,9 +83,15 @@ def write_outputs(run: Run, numbers: dict[str, Any], setup: Setup, out_dir: Path
     if output.summary:
         written["summary"] = _write_summary(numbers, out_dir / output.summary)
     if output.figure:
-        written |= _write_figures(run, setup, out_dir / output.figure)
+        with progress_bar("drawing figures", _FIGURES, progress, at_once=True) as update:
+            update(0)
+            for i, files in enumerate(_write_figures(run, setup, out_dir / output.figure)):
+                written |= files
+                update(i + 1)
     if output.html:
-        written["html"] = _write_html(run, setup, out_dir / output.html)
+        with progress_bar("writing the animation", 1, progress, at_once=True) as update:
+            update(0)
+            written["html"] = _write_html(run, setup, out_dir / output.html)
     return written
 
 
@@ -69,19 +102,27 @@ def _write_summary(numbers: dict[str, Any], path: Path) -> Path:
     return path
 
 
-def _write_figures(run: Run, setup: Setup, path: Path) -> dict[str, Path]:
-    from pathcontrol.view.figures.run_figures import add_name, run_figure
+def _write_figures(run: Run, setup: Setup, path: Path) -> Iterator[dict[str, Path]]:
+    """Write the figures; yield the files of each when they are there."""
+    from pathcontrol.view.figures.run_figures import add_name
+    from pathcontrol.view.figures.style import save_figure
+
+    stem = path.with_suffix("").name
+    for name, figure in _draw_figures(run, setup):
+        files = save_figure(figure, add_name(path, name))
+        yield {f"figure{file.name.removeprefix(stem)}": file for file in files}
+
+
+def _draw_figures(run: Run, setup: Setup) -> Iterator[tuple[str, Figure]]:
+    """Yield the figures by name, one after another."""
+    from pathcontrol.view.figures.run_figures import draw_figures
 
     pair = setup.output.figure_joints
-    joints = None if pair is None else (pair[0], pair[1])
-    figures = run_figure(run, path, setup.task, joints=joints, limits=setup.plant.limits.effort)
+    yield from draw_figures(run, setup.task, None if pair is None else (pair[0], pair[1]), setup.plant.limits.effort)
     if isinstance(setup.task, ToolpathTask):
         from pathcontrol.view.figures.deviation_figure import deviation_figure
-        from pathcontrol.view.figures.style import save_figure
 
-        figures += save_figure(deviation_figure(run, setup.plant, setup.task), add_name(path, "deviation"))
-    stem = path.with_suffix("").name
-    return {f"figure{figure.name.removeprefix(stem)}": figure for figure in figures}
+        yield "deviation", deviation_figure(run, setup.plant, setup.task)
 
 
 def _write_html(run: Run, setup: Setup, path: Path) -> Path:

@@ -10,7 +10,7 @@ import numpy as np
 from pathcontrol.errors import ExperimentError, warn
 from pathcontrol.experiments.builders.setup import Setup, build
 from pathcontrol.experiments.load import load_experiment, make_build_error, read_text
-from pathcontrol.experiments.outputs import check_folder, measure_run, write_outputs
+from pathcontrol.experiments.outputs import measure_run, output_folder, write_outputs
 from pathcontrol.simulation.engines import Engine
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.sequence import simulate_sequence
@@ -50,11 +50,11 @@ def run_experiment(
         SimulationError: the simulation diverged.
     """
     setup, text, out_dir = load_setup(path), read_text(path), Path(out_dir)
-    check_folder(out_dir, setup.output)
-    run = _simulate(setup if engine is None else setup._replace(engine=engine), progress)
-    run.config["experiment"] = text
-    numbers = measure_run(run, setup)
-    return Outcome(run, numbers, write_outputs(run, numbers, setup, out_dir))
+    with output_folder(out_dir, setup.output):
+        run = _simulate(setup if engine is None else setup._replace(engine=engine), progress)
+        run.config["experiment"] = text
+        numbers = measure_run(run, setup)
+        return Outcome(run, numbers, write_outputs(run, numbers, setup, out_dir, progress))
 
 
 def _simulate(setup: Setup, progress: bool) -> Run:

@@ -257,6 +257,23 @@ def test_folders_that_cannot_be_written_to(write_experiment, tmp_path, monkeypat
         run_experiment(write_experiment(), tmp_path / "out")
 
 
+@pytest.mark.parametrize("step", ["simulate", "measure_run", "write_outputs"])
+def test_ctrl_c_leaves_no_empty_folder(step, write_experiment, tmp_path, monkeypatch):
+    """Folders that were made for the outputs go with what should have been in them; those that were there stay."""
+
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(f"pathcontrol.experiments.runner.{step}", interrupt)
+    (tmp_path / "there").mkdir()
+    for out in ("there", "there/new", "new/deep"):
+        with pytest.raises(KeyboardInterrupt):
+            run_experiment(write_experiment(), tmp_path / out, progress=False)
+    assert (tmp_path / "there").is_dir()
+    assert not list((tmp_path / "there").iterdir())
+    assert not (tmp_path / "new").exists()
+
+
 # --- the schema alone ---------------------------------------------------------------------------------------
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
+from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from pathcontrol._suffixes import refuse_suffix
@@ -34,11 +36,19 @@ def run_figure(
         limits: largest torques (n,); by default those of the run's own robot.
     """
     refuse_suffix(path, "figures", ".svg", ".png", ".pdf")
-    figures = {"errors": error_figure(run)}
-    if len(run.joints) > 1:
-        figures["path"] = path_figure(run, task, joints)
-    figures |= {"torque": torque_figure(run, limits), "speed": speed_figure(run, task)}
+    figures = dict(draw_figures(run, task, joints, limits))
     return [file for name, figure in figures.items() for file in save_figure(figure, add_name(path, name))]
+
+
+def draw_figures(
+    run: Run, task: PathTask | None, joints: tuple[int, int] | None, limits: ArrayLike | None
+) -> Iterator[tuple[str, Figure]]:
+    """Yield the figures of :func:`run_figure` by name, one after another, as each takes a while."""
+    yield "errors", error_figure(run)
+    if len(run.joints) > 1:
+        yield "path", path_figure(run, task, joints)
+    yield "torque", torque_figure(run, limits)
+    yield "speed", speed_figure(run, task)
 
 
 def add_name(path: str | Path, name: str) -> Path:
