@@ -104,25 +104,21 @@ def _write_summary(numbers: dict[str, Any], path: Path) -> Path:
 
 def _write_figures(run: Run, setup: Setup, path: Path) -> Iterator[dict[str, Path]]:
     """Write the figures; yield the files of each when they are there."""
-    from pathcontrol.view.figures.run_figures import add_name
+    from pathcontrol.view.figures.run_figures import add_name, draw_figures
     from pathcontrol.view.figures.style import save_figure
 
-    stem = path.with_suffix("").name
-    for name, figure in _draw_figures(run, setup):
-        files = save_figure(figure, add_name(path, name))
-        yield {f"figure{file.name.removeprefix(stem)}": file for file in files}
-
-
-def _draw_figures(run: Run, setup: Setup) -> Iterator[tuple[str, Figure]]:
-    """Yield the figures by name, one after another."""
-    from pathcontrol.view.figures.run_figures import draw_figures
+    def save(name: str, figure: Figure) -> dict[str, Path]:
+        files, stem = save_figure(figure, add_name(path, name)), path.with_suffix("").name
+        return {f"figure{file.name.removeprefix(stem)}": file for file in files}
 
     pair = setup.output.figure_joints
-    yield from draw_figures(run, setup.task, None if pair is None else (pair[0], pair[1]), setup.plant.limits.effort)
+    joints = None if pair is None else (pair[0], pair[1])
+    for name, figure in draw_figures(run, setup.task, joints, setup.plant.limits.effort):
+        yield save(name, figure)
     if isinstance(setup.task, ToolpathTask):
         from pathcontrol.view.figures.deviation_figure import deviation_figure
 
-        yield "deviation", deviation_figure(run, setup.plant, setup.task)
+        yield save("deviation", deviation_figure(run, setup.plant, setup.task))
 
 
 def _write_html(run: Run, setup: Setup, path: Path) -> Path:
