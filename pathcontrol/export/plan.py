@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,12 +14,14 @@ from pathcontrol.errors import InputError, SimulationError, warn
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.trajectory import Trajectory, sample_times
 from pathcontrol.tasks.base import refuse_batch
+from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.tasks.task_check import check_task
 
 _ACCURACY = 1e-11  # of the path parameter, relative and absolute
 _LONGEST = 1e5  # s
 _REST = 1e-3  # rad/s or m/s
+_RISE = 0.1  # s in which each path of a sequence comes from rest to its speed, as all plans come to rest at an end
 
 
 def plan_trajectory(
@@ -32,7 +34,8 @@ def plan_trajectory(
     """Return the timed trajectory q_d(σ(t)) of the plan σ̇ = ϑ(σ) from the start of a path, with its braking at an end.
 
     Velocity and acceleration are q_d'σ̇ and q_d''σ̇² + q_d'ϑ'σ̇. It is what motion control follows; an arm that begins
-    with it at rest can not do so where the plan begins at speed, which a warning tells.
+    with it at rest can not do so where the plan begins at speed, which a warning tells. Each path of a sequence, as of
+    a :class:`ToolpathTask`, begins at rest: its plan is σ̇ = wϑ(σ) with a share w that grows from 0 to 1 in 0.1 s.
 
     Args:
         task: the path and its velocity profile.
@@ -49,55 +52,82 @@ def plan_trajectory(
     refuse_batch("task", task)
     check_task(task, None if robot is None else robot.n)
     times = sample_times(rate, _find_duration(task, rate) if duration is None else as_scalar("duration", duration))
-    point = plan_of(task, Ending.of(task))(_parameter(task, times))
-    q, qd = point.q_d, point.velocity
-    qdd = point.velocity_slope * np.broadcast_to(point.theta, times.shape)[:, None]
+    s, share, rise = _sample_legs(_follow_plan(task, times[-1]), times, isinstance(task, PathSequence))
+    point = plan_of(task, Ending.of(task))(s)
+    q, qd = point.q_d, share * point.velocity
+    qdd = share**2 * point.velocity_slope * np.broadcast_to(point.theta, times.shape)[:, None] + rise * point.velocity
     _warn_of_start(qd[0])
     if robot is not None:
         return Trajectory(times, q, qd, qdd, robot.joint_names, robot.position_units)
     return Trajectory(times, q, qd, qdd, joints or [f"joint_{i + 1}" for i in range(q.shape[-1])])
 
 
-def _follow_plan(task: PathTask, duration: float, **options: Any) -> Any:
-    """Integrate σ̇ = ϑ(σ) from the start of a path for a ``duration`` [s]."""
-    from scipy.integrate import solve_ivp  # takes a quarter of a second to load
+class _Leg(NamedTuple):
+    """The plan along a path, or one path of a sequence: from ``begin`` to ``end`` [s], and s at times between."""
 
-    plan = plan_of(task, Ending.of(task))
-    solution = solve_ivp(
-        lambda _, s: plan(s).theta + np.zeros_like(s),
-        (0.0, duration),
-        [task.s0],
-        method="DOP853",
-        rtol=_ACCURACY,
-        atol=_ACCURACY,
-        **options,
-    )
-    if not solution.success:
-        raise SimulationError(f"the plan of {task!r} cannot be followed: {solution.message}")
-    return solution
-
-
-def _parameter(task: PathTask, times: Array) -> Array:
-    """Return σ(t) of the plan at increasing times from 0, (k,)."""
-    return np.asarray(_follow_plan(task, times[-1], t_eval=times).y[0])
+    begin: float
+    end: float
+    parameter: Callable[[Array], Array]
 
 
 def _find_duration(task: PathTask, rate: float) -> float:
     """Return how long the plan takes for the whole path [s], up to a whole number of samples."""
     if task.period is None and not np.isfinite(task.s_end):
         raise InputError(f"{task!r} neither ends nor repeats; give a duration", argument="duration")
-    end = arrival_parameter(task) if task.period is None else task.s0 + task.period
+    whole = _follow_plan(task, _LONGEST, arrival_parameter(task) if task.period is None else task.s0 + task.period)
+    if whole[-1].end >= _LONGEST:
+        raise InputError(
+            f"the plan of {task!r} is not at its end within {_LONGEST:g} s; give a duration", argument="duration"
+        )
+    return float(np.ceil(whole[-1].end * rate) / rate)
+
+
+def _follow_plan(task: PathTask, longest: float, end: float = np.inf) -> list[_Leg]:
+    """Integrate σ̇ = wϑ(σ) from the start of a path for the ``longest`` time [s], or to σ = ``end``, path by path.
+
+    Raises:
+        SimulationError: the plan cannot be followed.
+    """
+    between = list(task.starts[1:-1]) if isinstance(task, PathSequence) else []
+    legs, t, s, rise = list[_Leg](), 0.0, task.s0, _RISE if isinstance(task, PathSequence) else 0.0
+    for mark in [*between, end]:
+        legs.append(_follow_leg(task, t, s, mark, longest, rise))
+        t, s = legs[-1].end, mark
+        if t >= longest:
+            break
+    return legs
+
+
+def _follow_leg(task: PathTask, begin: float, s: float, end: float, longest: float, rise: float) -> _Leg:
+    """Integrate the plan from s at the time ``begin`` [s] until it is at the parameter ``end``, or time is up."""
+    from scipy.integrate import solve_ivp  # takes a quarter of a second to load
+
+    plan, last = plan_of(task, Ending.of(task)), np.nextafter(end, -np.inf)
+
+    def rate(t: float, s: Array) -> Array:
+        share = min((t - begin) / rise, 1.0) if rise else 1.0
+        return share * plan(np.minimum(s, last)).theta + np.zeros_like(s)
 
     def left(_: float, s: Array) -> float:
         return float(s[0] - end)
 
     left.terminal = True  # type: ignore[attr-defined]
-    found = _follow_plan(task, _LONGEST, events=left).t_events[0]
-    if not found.size:
-        raise InputError(
-            f"the plan of {task!r} is not at its end within {_LONGEST:g} s; give a duration", argument="duration"
-        )
-    return float(np.ceil(found[0] * rate) / rate)
+    tolerances = {"rtol": _ACCURACY, "atol": _ACCURACY}
+    events = left if np.isfinite(end) else None
+    found = solve_ivp(rate, (begin, longest), [s], method="DOP853", events=events, dense_output=True, **tolerances)
+    if not found.success:
+        raise SimulationError(f"the plan of {task!r} cannot be followed: {found.message}")
+    return _Leg(begin, float(found.t[-1]), lambda times: np.minimum(found.sol(times)[0], last))
+
+
+def _sample_legs(legs: Sequence[_Leg], times: Array, rises: bool) -> tuple[Array, Array, Array]:
+    """Return σ at increasing ``times`` (k,), the share w of the speed and its rate [1/s], (k, 1) each."""
+    which = np.clip(np.searchsorted([leg.begin for leg in legs], times, side="right") - 1, 0, None)
+    s = np.concatenate([leg.parameter(np.minimum(times[which == i], leg.end)) for i, leg in enumerate(legs)])
+    if not rises:
+        return s, np.ones((len(times), 1)), np.zeros((len(times), 1))
+    since = times - np.array([leg.begin for leg in legs])[which]
+    return s, np.minimum(since / _RISE, 1.0)[:, None], np.where(since < _RISE, 1.0 / _RISE, 0.0)[:, None]
 
 
 def _warn_of_start(qd: Array) -> None:

@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+import warnings
 
 import numpy as np
 import pytest
@@ -228,3 +229,29 @@ def test_urscript_refuses_other_arms_and_rates(arm, tmp_path):
 def test_unknown_choices_are_told(arm, tmp_path, option, value):
     with pytest.raises(pc.UnknownNameError, match=value):
         pc.export_trajectory(trajectory_of(np.zeros((5, 2)), arm), tmp_path / "x", **{option: value})
+
+
+@pytest.mark.parametrize("rate", [250.0, 1000.0])
+def test_each_path_of_a_sequence_begins_and_ends_at_rest(rate):
+    """No velocity jumps: it changes by the largest acceleration at most, and is the rate of the positions."""
+    paths = [pc.Line([0.2, 0.3], [0.5, 0.1], 0.5), pc.Line([0.5, 0.1], [0.4, 0.6], 0.3)]
+    task = pc.PathSequence(
+        [
+            path.with_profile(pc.SmoothStartStop(path, pc.ConstantSpeed(0.5), 4.0, 40.0, start_speed=0.1))
+            for path in paths
+        ]
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plan = pc.plan_trajectory(task, rate)
+    assert not plan.qd[0].any()
+    assert np.abs(np.diff(plan.qd, axis=0)).max() * rate < 1.1 * np.abs(plan.qdd).max() + 0.01 * rate
+    middle = 0.5 * (plan.qd[1:] + plan.qd[:-1])
+    np.testing.assert_allclose(np.diff(plan.q, axis=0) * rate, middle, atol=20.0 / rate)
+    np.testing.assert_allclose(plan.q[[0, -1]], [[0.2, 0.3], [0.4, 0.6]], atol=1e-3)
+    corner = np.linalg.norm(plan.q - [0.5, 0.1], axis=1).argmin()
+    assert np.abs(plan.qd[corner]).max() < 0.02
+    assert plan.duration > sum(pc.plan_trajectory(path, rate).duration for path in task.paths)
+    half = pc.plan_trajectory(task, rate, duration=0.5 * plan.duration)
+    count = len(half.time)
+    np.testing.assert_allclose(half.q, plan.q[:count], atol=2e-5)  # interpolated between other steps
