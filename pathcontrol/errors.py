@@ -31,7 +31,7 @@ class PathControlError(Exception):
         **details: values of the attributes.
 
     Attributes:
-        argument: name of the argument that was refused, with an index where one part of it was, as ``paths[1]``.
+        argument: name of the argument that was refused or is missing, with an index for one part, as ``paths[1]``.
         value: what was given, or what came out.
         limit: what the value is held to, a number or both ends.
         choices: the names that there are.

@@ -31,7 +31,9 @@ def lap_times(run: Run, task: PathTask | None = None, rollout: int = 0) -> Array
     if path is not None:
         expect("task", path, PathTask)
     if path is None or not path.closed:
-        raise InputError("laps are of closed paths; the path of this run has no period, or is not known")
+        raise InputError(
+            "laps are of closed paths; the path of this run has no period, or is not known", argument="task", value=task
+        )
     return np.diff(_find_lap_ends(part, path)[0])
 
 

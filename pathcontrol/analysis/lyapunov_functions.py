@@ -126,7 +126,9 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
     raise InputError(
         f"no Lyapunov function of e_p and e_v is given for {type(controller).__name__}; the laws that have one are "
         "ExtendedMotionPlan (with k = 0 computed torque), StateToReferenceProjection, Projection, ManeuverRegulation "
-        "and TransverseLinearization"
+        "and TransverseLinearization",
+        argument="controller",
+        value=controller,
     )
 
 

@@ -117,7 +117,11 @@ def recover_gains(law: Controller) -> Gains:
             choices=tuple(KNOWN_LAWS),
         )
     if max(np.ndim(gains.K_p), np.ndim(gains.K_v)) > 1:
-        raise InputError(f"the gains of {type(law).__name__} differ between rollouts, expected one for all")
+        raise InputError(
+            f"the gains of {type(law).__name__} differ between rollouts, expected one for all",
+            argument="laws",
+            value=law,
+        )
     return gains
 
 

@@ -129,5 +129,6 @@ def _find(law: Controller, name: str) -> Any:
             f"{of} has no gain {name!r}, expected one of {', '.join(known)}{did_you_mean(name, known)}",
             argument=name,
             choices=tuple(known),
+            value=name,
         )
     return known[name]

@@ -73,6 +73,8 @@ class MomentumObserver:
             raise InputError(
                 f"observer_hz has rows for {rows[0]} rollouts, expected as many as there are initial states, {len(q)}",
                 argument="observer_hz",
+                value=rows[0],
+                limit=len(q),
             )
         p = self.robot.momentum(q, qd)
         p = np.broadcast_to(p, (*np.broadcast_shapes(rows, p.shape[:-1]), self.robot.n))

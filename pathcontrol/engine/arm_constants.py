@@ -30,7 +30,11 @@ def arm_struct(robot: RobotModel) -> Arm:
     known = _READY.get(robot)
     if known is None:
         if robot.n > MOST_JOINTS:
-            raise EngineError(f"{robot.name} has {robot.n} joints, the compiled engine takes {MOST_JOINTS} at most")
+            raise EngineError(
+                f"{robot.name} has {robot.n} joints, the compiled engine takes {MOST_JOINTS} at most",
+                value=robot.n,
+                limit=MOST_JOINTS,
+            )
         known = fill_arm(arm_constants(robot))
         check_against_pinocchio(robot, known)
         _READY[robot] = known
@@ -61,7 +65,10 @@ def check_against_pinocchio(robot: RobotModel, arm: Arm) -> None:
         if not apart[worst] <= _CLOSE * scale:
             raise EngineError(
                 f"the compiled engine and Pinocchio differ in the {name} of joint {robot.joint_names[worst]!r} of "
-                f"{robot.name} by {apart[worst]:.3g}, of {scale:.3g}; use engine='pinocchio' and report this arm"
+                f"{robot.name} by {apart[worst]:.3g}, of {scale:.3g}; use engine='pinocchio' and report this arm",
+                value=apart[worst],
+                limit=_CLOSE * scale,
+                joint=robot.joint_names[worst],
             )
 
 

@@ -64,7 +64,11 @@ def _add(terms: list[Coefficients]) -> Coefficients:
     """Add the coefficients of several laws."""
     falling = tuple(pair for term in terms for pair in term.falling)
     if len(falling) > MOST_STRIBECK:
-        raise EngineError(f"the friction has {len(falling)} Stribeck terms, the engine takes {MOST_STRIBECK} at most")
+        raise EngineError(
+            f"the friction has {len(falling)} Stribeck terms, the engine takes {MOST_STRIBECK} at most",
+            value=len(falling),
+            limit=MOST_STRIBECK,
+        )
     return Coefficients(
         sum((t.viscous for t in terms[1:]), terms[0].viscous),
         sum((t.forward for t in terms[1:]), terms[0].forward),

@@ -70,7 +70,11 @@ def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braki
             table, gamma, memory, _count_candidates(centre, radius, shape.pieces)
         )
     if known.work > _MOST_WORK:
-        raise EngineError(f"{known.work} pieces of Γ may be nearest to a state on it, expected at most {_MOST_WORK}")
+        raise EngineError(
+            f"{known.work} pieces of Γ may be nearest to a state on it, expected at most {_MOST_WORK}",
+            value=known.work,
+            limit=_MOST_WORK,
+        )
     *series, rows, _ = q.shape
     states = [np.ascontiguousarray(values, dtype=np.float64) for values in (q, qd)]
     distance, s = np.empty((2, *series, rows))

@@ -47,7 +47,8 @@ def _open(build: str) -> CDLL:
     if not path.exists():
         raise EngineError(
             f"the compiled engine is not installed ({path.name} is missing); simulations run on Pinocchio. To build "
-            "it, install pathcontrol again with a C++ compiler or the package ziglang at hand"
+            "it, install pathcontrol again with a C++ compiler or the package ziglang at hand",
+            file=str(path),
         )
     try:
         library = CDLL(str(path))
@@ -55,13 +56,17 @@ def _open(build: str) -> CDLL:
         found = [library.pathcontrol_layout(k) for k in range(len(LAYOUT) + 2)]
     except (OSError, AttributeError) as error:
         raise EngineError(
-            f"{path.name} cannot be used on this {platform.machine()} machine: {error}; install pathcontrol again"
+            f"{path.name} cannot be used on this {platform.machine()} machine: {error}; install pathcontrol again",
+            file=str(path),
         ) from error
     expected = [ctypes.sizeof(struct) for struct in LAYOUT] + [MOST_JOINTS, MOST_STRIBECK]
     if found != expected:
         raise EngineError(
             f"{path.name} was built from other sources: its structs have the sizes {found}, expected {expected}; "
-            "install pathcontrol again"
+            "install pathcontrol again",
+            value=found,
+            limit=expected,
+            file=str(path),
         )
     _declare(library)
     return library

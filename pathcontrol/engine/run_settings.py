@@ -43,7 +43,11 @@ def add_law(setup: Setup, controller: Controller, memory: Memory) -> None:
     kind = type(controller)
     if kind not in GAINS:
         known = ", ".join(law.__name__ for law in GAINS)
-        raise EngineError(f"the law {kind.__name__} is in Python; compiled are {known}")
+        raise EngineError(
+            f"the law {kind.__name__} is in Python; compiled are {known}",
+            value=kind.__name__,
+            choices=tuple(law.__name__ for law in GAINS),
+        )
     if controller.observer is not None:
         raise EngineError("the law has a momentum observer, friction='observed'")
     n = controller.robot.n

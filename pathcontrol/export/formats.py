@@ -64,6 +64,8 @@ def write_urscript(trajectory: Trajectory) -> str:
         raise InputError(
             f"rate = {1 / trajectory.period:g} Hz, expected from {1 / high:g} to {1 / low:g} Hz for servoj",
             argument="rate",
+            value=1 / trajectory.period,
+            limit=(1 / high, 1 / low),
         )
     lines = [
         "def follow_path():",

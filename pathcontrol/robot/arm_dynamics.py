@@ -319,7 +319,9 @@ class ArmDynamics:
         if idle := self._idle_joints:
             raise UrdfError(
                 f"{self.name}: {', '.join(idle)} would move no mass, so there are no dynamics; give some with "
-                f"with_masses(kg={{{idle[-1]!r}: 2.0, ...}})"
+                f"with_masses(kg={{{idle[-1]!r}: 2.0, ...}})",
+                joint=idle[-1],
+                value=list(idle),
             )
 
     def _support(self, frame: str) -> int:
@@ -352,5 +354,7 @@ def build_model(text: str) -> Any:
     except ValueError as error:  # the checks should have found it; say at least what Pinocchio says
         raise UrdfError(f"Pinocchio cannot build a model from this URDF: {error}") from error
     if model.nq != model.nv:
-        raise UrdfError(f"{model.name} has joints that are not one angle or one length each; use a fixed-base arm")
+        raise UrdfError(
+            f"{model.name} has joints that are not one angle or one length each; use a fixed-base arm", value=model.name
+        )
     return model

@@ -42,13 +42,16 @@ def find_urdf(source: str | Path, package_dirs: tuple[Path, ...] = ()) -> UrdfSo
     if isinstance(source, str) and source.isidentifier():  # a file of that name would have a suffix
         return _find_by_name(source, package_dirs)
     if not isinstance(source, str | PathLike):
-        raise UrdfError(f"robot = {source!r:.80}, expected the name of a known robot, the path of a URDF or its text")
+        raise UrdfError(
+            f"robot = {source!r:.80}, expected the name of a known robot, the path of a URDF or its text", value=source
+        )
     path = Path(source).expanduser()
     try:
         text = _read(path)
     except UrdfError as error:
         raise UrdfError(
-            f"cannot read the URDF file {str(path)!r} ({error}); give a file, a URDF string or one of: {_names()}"
+            f"cannot read the URDF file {str(path)!r} ({error}); give a file, a URDF string or one of: {_names()}",
+            file=str(path),
         ) from error
     return UrdfSource(text, path.resolve().parent, (*package_dirs, *_folders_of_link(path)))
 
@@ -75,7 +78,9 @@ def _find_by_name(name: str, package_dirs: tuple[Path, ...]) -> UrdfSource:
         raise UnknownNameError(f"unknown robot {name!r}; known here: {_names()}. {missing}", value=name) from missing
     loader = catalogue.get(name)
     if loader is None and Path(name).is_dir():
-        raise UrdfError(f"{name!r} is a folder, expected a URDF file; give the one that is in it")
+        raise UrdfError(
+            f"{name!r} is a folder, expected a URDF file; give the one that is in it", value=name, file=name
+        )
     if loader is None or not loader.urdf_filename or loader.free_flyer:
         reason = "has a floating base" if loader is not None and loader.free_flyer else "is unknown"
         meant = did_you_mean(name, known_robots())
@@ -116,7 +121,9 @@ def own_urdf(name: str, path: Path, known: set[str]) -> tuple[Path, str]:
             return other, text
     raise UrdfError(
         f"robot {name!r}: its file {str(path)!r} describes the robot {own!r}, and none beside it calls itself "
-        f"{name!r}; update example-robot-data, or give the path of a URDF"
+        f"{name!r}; update example-robot-data, or give the path of a URDF",
+        value=own,
+        file=str(path),
     )
 
 

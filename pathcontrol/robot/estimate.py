@@ -106,7 +106,11 @@ def _shape(holder: etree._Element, urdf: UrdfSource, density: float) -> Lump:
     solid.density = density
     lump = Lump(float(solid.mass), np.array(solid.center_mass), np.array(solid.moment_inertia))
     if not (SMALLEST <= lump.mass < LARGEST and np.isfinite(lump.com).all() and np.isfinite(lump.inertia).all()):
-        raise UrdfError(f"a <{shape.tag}> of {lump.mass:g} kg at {density:g} kg/m³ is too small or too large")
+        raise UrdfError(
+            f"a <{shape.tag}> of {lump.mass:g} kg at {density:g} kg/m³ is too small or too large",
+            value=lump.mass,
+            limit=(SMALLEST, LARGEST),
+        )
     return lump
 
 
@@ -132,7 +136,10 @@ def _mesh(shape: etree._Element, urdf: UrdfSource) -> trimesh.Trimesh:
     except UrdfError as error:
         raise UrdfError(f"mesh {quote(name)}: {error}") from error
     if scale is None:
-        raise UrdfError(f"mesh {quote(name)}: its scale is {quote(shape.get('scale'))}, expected 3 numbers")
+        raise UrdfError(
+            f"mesh {quote(name)}: its scale is {quote(shape.get('scale'))}, expected 3 numbers",
+            value=shape.get("scale"),
+        )
     whole: Any = trimesh.util.concatenate([trimesh.Trimesh(part.vertices, part.faces) for part in parts])
     whole.apply_scale(scale)
     return whole if whole.is_volume else _hull(whole)

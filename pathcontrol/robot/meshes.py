@@ -62,11 +62,20 @@ def _check_part(part: Part) -> None:
     """Check that every triangle has three corners in space that exist in the file."""
     count = len(part.vertices)
     if part.vertices.ndim != 2 or part.vertices.shape[1] != 3 or part.vertices.dtype.kind not in "fiu":
-        raise UrdfError(f"its vertices have the shape {part.vertices.shape}, expected three coordinates each")
+        raise UrdfError(
+            f"its vertices have the shape {part.vertices.shape}, expected three coordinates each",
+            value=part.vertices.shape,
+        )
     if part.faces.ndim != 2 or part.faces.shape[1] != 3 or part.faces.dtype.kind not in "iu":
-        raise UrdfError(f"its faces have the shape {part.faces.shape}, expected three corners each")
+        raise UrdfError(
+            f"its faces have the shape {part.faces.shape}, expected three corners each", value=part.faces.shape
+        )
     if part.faces.min() < 0 or part.faces.max() >= count:
-        raise UrdfError(f"a triangle has a corner {part.faces.max()}, but there are {count} vertices")
+        raise UrdfError(
+            f"a triangle has a corner {part.faces.max()}, but there are {count} vertices",
+            value=part.faces.max(),
+            limit=count,
+        )
 
 
 def _parts(data: bytes, path: Path) -> list[Part]:
@@ -79,7 +88,11 @@ def _parts(data: bytes, path: Path) -> list[Part]:
     shapes = [(transform, shape) for transform, shape in placed if isinstance(shape, trimesh.Trimesh)]
     triangles = sum(len(shape.faces) for _, shape in shapes)
     if triangles > MAX_TRIANGLES:
-        raise UrdfError(f"it has {triangles} triangles, expected at most {MAX_TRIANGLES}; thin it out")
+        raise UrdfError(
+            f"it has {triangles} triangles, expected at most {MAX_TRIANGLES}; thin it out",
+            value=triangles,
+            limit=MAX_TRIANGLES,
+        )
     metres = _metres(scene.units)
     return [_place(shape, transform, metres) for transform, shape in shapes if len(shape.faces)]
 
@@ -112,7 +125,11 @@ def _check_accessors(data: bytes, kind: str) -> None:
         data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
     counts = [accessor.get("count", 0) for accessor in json.loads(data).get("accessors", [])]
     if sum(counts) > 6 * MAX_TRIANGLES:
-        raise UrdfError(f"it announces {sum(counts)} vertices and faces, expected at most {6 * MAX_TRIANGLES}")
+        raise UrdfError(
+            f"it announces {sum(counts)} vertices and faces, expected at most {6 * MAX_TRIANGLES}",
+            value=sum(counts),
+            limit=6 * MAX_TRIANGLES,
+        )
 
 
 class _Beside(trimesh.resolvers.Resolver):
@@ -124,7 +141,9 @@ class _Beside(trimesh.resolvers.Resolver):
     def get(self, key: str) -> bytes:
         path = (self._folder / key).resolve()
         if path.suffix.lower() not in _BESIDE or not path.is_relative_to(self._folder):
-            raise UrdfError(f"{key!r} is not read, expected files in its folder that end in {', '.join(_BESIDE)}")
+            raise UrdfError(
+                f"{key!r} is not read, expected files in its folder that end in {', '.join(_BESIDE)}", value=key
+            )
         return read_bounded(path, MAX_BYTES, "a part of a mesh", UrdfError)
 
     def keys(self) -> list[str]:
@@ -134,4 +153,4 @@ class _Beside(trimesh.resolvers.Resolver):
         return _Beside(self._folder / namespace)
 
     def write(self, name: str, data: bytes) -> None:
-        raise UrdfError(f"nothing is written to a mesh: {name!r}")
+        raise UrdfError(f"nothing is written to a mesh: {name!r}", value=name)

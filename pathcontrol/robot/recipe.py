@@ -57,7 +57,7 @@ def robot_of(recipe: Mapping[str, Any]) -> RobotModel:
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError) as error:
         if isinstance(error, PathControlError):
             raise
-        raise InputError(f"this is no recipe of a robot ({type(error).__name__}: {error})") from error
+        raise InputError(f"this is no recipe of a robot ({type(error).__name__}: {error})", value=recipe) from error
 
 
 def _rebuild(recipe: Mapping[str, Any]) -> RobotModel:

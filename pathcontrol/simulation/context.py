@@ -40,7 +40,10 @@ def check_sequence(data: xr.Dataset, task: PathTask | None) -> None:
         return
     which = data["path_index"]
     if which.dims != ("time",) or which.dtype.kind not in "iu":
-        raise InputError(f"path_index is {which.dtype} over {which.dims}, expected whole numbers over ('time',)")
+        raise InputError(
+            f"path_index is {which.dtype} over {which.dims}, expected whole numbers over ('time',)",
+            value=str(which.dtype),
+        )
     if (which.size and not 0 <= int(which.min()) <= int(which.max()) < len(task)) or (
         data.sizes.get("path", len(task)) != len(task)
     ):

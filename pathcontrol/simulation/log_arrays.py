@@ -131,13 +131,18 @@ def _read_times(times: ArrayLike) -> tuple[Array, float]:
         first = float(passed.flat[0]) if passed.size else 0.0
         passed = passed - first
     if passed.ndim != 1 or len(passed) < 2:
-        raise InputError(f"times has shape {given.shape}, expected (k,), two or more times [s]", argument="times")
+        raise InputError(
+            f"times has shape {given.shape}, expected (k,), two or more times [s]", argument="times", value=given
+        )
     if (back := np.flatnonzero(~(np.diff(passed) > 0))).size:
         i = int(back[0]) + 1
         raise InputError(
             f"times[{i}] = {given[i]} is not after times[{i - 1}] = {given[i - 1]}; expected increasing times: sort "
             "them, and drop samples that are repeated",
             argument="times",
+            value=given[i],
+            limit=given[i - 1],
+            time=float(given[i]),
         )
     return passed, first
 
@@ -158,6 +163,7 @@ def _read_shape(name: str, values: ArrayLike, time: Array, n: int | None) -> Arr
             f"{name} has shape {array.shape}, expected ({len(time)}, {'n' if n is None else n}): a row for each time, "
             f"a column for each joint{turned}",
             argument=name,
+            value=array,
         )
     return np.array(as_joint_array(name, array, array.shape[1]))
 

@@ -162,7 +162,10 @@ def broadcast_states(q: ArrayLike, qd: ArrayLike | None, robot: Arm, task: PathT
 def _check_equal(counts: Mapping[str, int]) -> None:
     """Check that all counts are the same."""
     if len(set(counts.values())) > 1:
-        raise InputError(", ".join(said.format(count) for said, count in counts.items()) + "; expected as many")
+        raise InputError(
+            ", ".join(said.format(count) for said, count in counts.items()) + "; expected as many",
+            value=list(counts.values()),
+        )
 
 
 def start_law(

@@ -232,7 +232,9 @@ def _make_finish(law: Controller, laps: int) -> Finish:
     """Return the rule by which the path of a law finishes."""
     finish = make_finish(law.task, laps if law.task.closed else None, "end", 1)
     if finish is None:
-        raise InputError(f"{law.task!r} neither ends nor repeats, so no path can follow it; give it an s_end")
+        raise InputError(
+            f"{law.task!r} neither ends nor repeats, so no path can follow it; give it an s_end", value=law.task
+        )
     return finish
 
 

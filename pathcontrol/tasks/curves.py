@@ -178,7 +178,10 @@ class Lissajous(JointCurve):
             arrays = [freeze(a) for a in np.broadcast_arrays(*arrays)]
         except ValueError as error:
             shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
-            raise InputError(f"one value per joint is needed of each; got {shapes}") from error
+            raise InputError(
+                f"one value per joint is needed of each; got {shapes}",
+                value={name: array.shape for name, array in zip(given, arrays, strict=True)},
+            ) from error
         self.amplitudes, self.frequencies, self.phases, self.center = arrays
         whole = self.frequencies == np.round(self.frequencies)
         if not whole.all() or (self.frequencies < 0).any() or not self.frequencies.any():

@@ -81,4 +81,9 @@ def _reader(path: Path) -> Callable[..., Toolpath]:
             return _load(*place)
     known = ", ".join(suffix for suffixes in READERS for suffix in suffixes)
     advice = f"; {_EXPORTS[path.suffix.lower()]}" if path.suffix.lower() in _EXPORTS else ""
-    raise ToolpathError(f"{str(path)!r} ends in {path.suffix or 'nothing'!r}, expected one of {known}{advice}")
+    raise ToolpathError(
+        f"{str(path)!r} ends in {path.suffix or 'nothing'!r}, expected one of {known}{advice}",
+        argument="path",
+        value=str(path),
+        file=str(path),
+    )

@@ -43,10 +43,11 @@ def read_text(path: str | os.PathLike[str], what: str = "a toolpath") -> str:
     data = _read_bytes(path, what)
     for beginning, kind in _OTHERS.items():
         if data.startswith(beginning):
-            raise ToolpathError(f"{os.fspath(path)} is {kind}")
+            raise ToolpathError(f"{os.fspath(path)} is {kind}", file=os.fspath(path))
     if b"\0" in data:
         raise ToolpathError(
-            f"{os.fspath(path)} holds NUL bytes and is no text, expected {what}; if it is UTF-16, save it as UTF-8"
+            f"{os.fspath(path)} holds NUL bytes and is no text, expected {what}; if it is UTF-16, save it as UTF-8",
+            file=os.fspath(path),
         )
     try:
         text = data.decode("utf-8-sig")
@@ -64,13 +65,21 @@ def read_lines(path: str | os.PathLike[str], what: str = "a toolpath") -> list[s
     """
     text = read_text(path, what)
     if text.count("\n") > _MAX_LINES:
-        raise ToolpathError(f"{os.fspath(path)} has more than {_MAX_LINES} lines; split it into several files")
+        raise ToolpathError(
+            f"{os.fspath(path)} has more than {_MAX_LINES} lines; split it into several files",
+            limit=_MAX_LINES,
+            file=os.fspath(path),
+        )
     lines = text.split("\n")
     for number, line in enumerate(lines, 1):
         if len(line) > _MAX_LINE_LENGTH:
             raise ToolpathError(
                 f"{os.fspath(path)}: line {number}: {len(line)} characters, expected at most {_MAX_LINE_LENGTH} in a "
-                f"line; is it {what}?"
+                f"line; is it {what}?",
+                value=len(line),
+                limit=_MAX_LINE_LENGTH,
+                file=os.fspath(path),
+                line=number,
             )
     return lines
 
@@ -88,11 +97,13 @@ def _read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
                 data = stream.read(_MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise ToolpathError(f"{str(path)!r} cannot be read, expected {what}: {reason}") from error
+        raise ToolpathError(f"{str(path)!r} cannot be read, expected {what}: {reason}", file=str(path)) from error
     if data is None:
-        raise ToolpathError(f"{path} is no regular file, expected {what}")
+        raise ToolpathError(f"{path} is no regular file, expected {what}", file=str(path))
     if len(data) > _MAX_BYTES:
         raise ToolpathError(
-            f"{path} is larger than the {_MAX_BYTES >> 20} MiB that are read at most; split it into several files"
+            f"{path} is larger than the {_MAX_BYTES >> 20} MiB that are read at most; split it into several files",
+            limit=_MAX_BYTES,
+            file=str(path),
         )
     return data

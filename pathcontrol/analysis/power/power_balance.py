@@ -159,7 +159,11 @@ def power_balance(run: Run, controller: Controller | None = None, *, plant: Robo
 def _find_checked_law(run: Run, controller: Controller | None) -> tuple[Controller, Theorem]:
     """Return the law of a run with its theorem, after a check that the run has what the balance needs."""
     if missing := [name for name in _NEEDED if name not in run or np.isnan(run.array(name)).all()]:
-        raise InputError(f"the run has no {', '.join(missing)}; a power balance needs {', '.join(_NEEDED)}")
+        raise InputError(
+            f"the run has no {', '.join(missing)}; a power balance needs {', '.join(_NEEDED)}",
+            value=missing,
+            choices=tuple(_NEEDED),
+        )
     if len(run.time) < 2:
         raise InputError(
             f"the run has {len(run.time)} sample, expected two at least, between which V changes",

@@ -43,7 +43,9 @@ class GainGrowth:
             raise InputError(
                 "parameters that an adaptive law learns, and that do not show on the path, neither decay nor grow with "
                 "any gain, so that there is no boundary of stability; floquet(law).exponents has all rates, and "
-                "SlotineLi with the same gains a boundary"
+                "SlotineLi with the same gains a boundary",
+                argument="law",
+                value=law,
             )
         self._law, self._names, self._loop, self._settle = law, tuple(names), loop, settle
         self._task = check_path(law)

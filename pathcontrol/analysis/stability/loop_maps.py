@@ -129,10 +129,14 @@ def _refuse_jumps(law: Controller) -> None:
     if isinstance(unwrap(law), PathMPC):
         raise InputError(
             "PathMPC solves an optimisation at each tick, to a tolerance and with torque limits, which leaves no "
-            "derivative to rely on; without limits its deviations decay with (Q/R)^¼ and its speed with √(W/R_s)"
+            "derivative to rely on; without limits its deviations decay with (Q/R)^¼ and its speed with √(W/R_s)",
+            argument="law",
+            value=law,
         )
     if isinstance(law, LawWrapper) and isinstance(law.inner, LearningLaw):
         raise InputError(
             "what a law learns changes at once at the end of a lap, which has no derivative; give the law inside: a "
-            "feedforward that is learned moves no multiplier"
+            "feedforward that is learned moves no multiplier",
+            argument="law",
+            value=law,
         )

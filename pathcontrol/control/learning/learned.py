@@ -75,7 +75,11 @@ class Learned(LawWrapper):
                 limit=(0.0, 1.0),
             )
         if not self.task.closed:
-            raise TaskError(f"{type(self.task).__name__} is not closed, so that nothing is learned from lap to lap")
+            raise TaskError(
+                f"{type(self.task).__name__} is not closed, so that nothing is learned from lap to lap",
+                argument="law",
+                value=law,
+            )
         if isinstance(self.inner, LearningLaw):
             raise InputError("the law is Learned already; wrap it once", argument="law", value=law)
         self._settings: dict[str, Any] = {
@@ -110,6 +114,7 @@ class Learned(LawWrapper):
                 f"z has shape {state.shape}, expected a state of this law, (*batch, m), as ControlTick.state gives it, "
                 "or pc.law_states(run, law)",
                 argument="z",
+                value=state,
             )
         return self.inner.table.split(self.inner.split(own)[1])
 

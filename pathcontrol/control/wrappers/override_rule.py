@@ -203,6 +203,7 @@ def check_one_speed(value: Override, t: float) -> None:
             f"override = {u.tolist()}, expected one factor, as it is for one arm; a number, steps [[t, u], …], or a "
             "function of time",
             argument="override",
+            value=u,
         )
 
 

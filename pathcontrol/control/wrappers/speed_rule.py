@@ -55,6 +55,8 @@ def check_rows(name: str, rows: int, rollouts: int) -> None:
             f"{name} has {rows} values for {rollouts} rollouts, expected as many, or one for all; give as many initial "
             "states, or one",
             argument=name.split()[0],
+            value=rows,
+            limit=rollouts,
         )
 
 

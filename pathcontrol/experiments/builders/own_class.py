@@ -32,13 +32,25 @@ def find_own_class(folder: Path, source: str, name: str, kind: Kind) -> type:
     there = f"its {kinds}es are {', '.join(own)}" if own else f"it defines no {kinds}"
     where = Path(source).name
     if found is None:
-        raise InputError(f"there is no {name!r} in {where}{did_you_mean(name, own) or ';'} {there}")
-    raise InputError(f"{name!r} in {where} is not a subclass of pathcontrol.{base.__name__}; {there}")
+        raise InputError(
+            f"there is no {name!r} in {where}{did_you_mean(name, own) or ';'} {there}",
+            value=name,
+            choices=tuple(own),
+        )
+    raise InputError(
+        f"{name!r} in {where} is not a subclass of pathcontrol.{base.__name__}; {there}",
+        value=name,
+        choices=tuple(own),
+    )
 
 
 def _load_file(file: Path) -> ModuleType:
     if not file.is_file():
-        raise InputError(f"there is no Python file {str(file)!r}; the path is relative to the TOML file")
+        raise InputError(
+            f"there is no Python file {str(file)!r}; the path is relative to the TOML file",
+            value=str(file),
+            file=str(file),
+        )
     return _run(file, file.read_bytes())
 
 
@@ -48,7 +60,8 @@ def _import_module(name: str) -> ModuleType:
     except (Exception, SystemExit) as error:
         raise InputError(
             f"the module {name!r} cannot be imported: {describe_error(error)}; a file beside the TOML file is named "
-            "with its .py"
+            "with its .py",
+            value=name,
         ) from error
 
 
@@ -65,7 +78,9 @@ def _run(file: Path, source: bytes) -> ModuleType:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[module_name]
-        raise InputError(f"{file.name} fails{_line(error, file)} with {describe_error(error)}") from error
+        raise InputError(
+            f"{file.name} fails{_line(error, file)} with {describe_error(error)}", file=str(file)
+        ) from error
     return module
 
 

@@ -88,7 +88,11 @@ def joint_limits(
         margin,
     )
     if not np.isfinite(limits[1:4]).any():
-        raise InputError("no velocity, acceleration or torque is limited, so nothing bounds the speed; give a limit")
+        raise InputError(
+            "no velocity, acceleration or torque is limited, so nothing bounds the speed; give a limit",
+            argument="velocity",
+            value=velocity,
+        )
     return limits
 
 

@@ -101,5 +101,9 @@ def _read_source(source: str | Path) -> str:
     if isinstance(source, Path):
         return decode(read_bounded(source, MAX_BYTES, "a URDF", UrdfError), source.name)
     if "<" not in source and source.strip().lower().endswith((".urdf", ".xml")):
-        raise UrdfError(f"{quote(source)} is a name and not XML; give Path({quote(source)}) to have the file read")
+        raise UrdfError(
+            f"{quote(source)} is a name and not XML; give Path({quote(source)}) to have the file read",
+            argument="text",
+            value=source,
+        )
     return source

@@ -36,23 +36,27 @@ def find_mesh(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) ->
         UrdfError: there is no such file, or it is no mesh; the message says why and what to try.
     """
     if not is_local(name):
-        raise UrdfError("it is not fetched; expected package://, file:// or a relative path")
+        raise UrdfError("it is not fetched; expected package://, file:// or a relative path", value=name)
     path = _find_first(name, base_dir, package_dirs)
     if path is None:
-        raise UrdfError(f"it is not found; {_advise(name)}")
+        raise UrdfError(f"it is not found; {_advise(name)}", value=name)
     check_format(path)
     try:
         with path.open("rb") as file:
             check_content(file.read(len(_POINTER)))
     except OSError as error:
-        raise UrdfError(f"it cannot be read: {error.strerror}") from error
+        raise UrdfError(f"it cannot be read: {error.strerror}", file=str(path)) from error
     return path
 
 
 def check_format(path: Path) -> None:
     """Refuse a file whose suffix is of no known mesh format, with a :class:`UrdfError`."""
     if path.suffix.lower() not in FORMATS:
-        raise UrdfError(f"it ends in {path.suffix or 'nothing'!r}, expected one of {', '.join(FORMATS)}")
+        raise UrdfError(
+            f"it ends in {path.suffix or 'nothing'!r}, expected one of {', '.join(FORMATS)}",
+            value=path.suffix,
+            choices=tuple(FORMATS),
+        )
 
 
 def check_content(start: bytes) -> None:

@@ -197,7 +197,12 @@ class TorqueLimitDrop(TimedDisturbance):
         super().__init__(start, duration)
         self.factor = freeze(check_finite("factor", as_array("factor", factor)))
         if not ((self.factor >= 0) & (self.factor <= 1)).all():
-            raise InputError(f"factor = {self.factor.tolist()}, expected numbers from 0 to 1", argument="factor")
+            raise InputError(
+                f"factor = {self.factor.tolist()}, expected numbers from 0 to 1",
+                argument="factor",
+                value=self.factor,
+                limit=(0.0, 1.0),
+            )
         check_rollouts(start=self.start.shape, duration=self.duration.shape, factor=self.factor.shape[:-1])
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
@@ -315,7 +320,9 @@ def _check_term(disturbance: Disturbance, q: Array, qd: Array) -> None:
             value=np.shape(held),
         )
     if not np.isfinite(torque).all():
-        raise InputError(f"{name}.torque gives {torque.tolist()} at the start, expected numbers", argument=name)
+        raise InputError(
+            f"{name}.torque gives {torque.tolist()} at the start, expected numbers", argument=name, value=torque
+        )
     jump_times(disturbance)
 
 
@@ -327,6 +334,7 @@ def _try(name: str, method: str, q: Array, call: Callable[[], Any]) -> Any:
         raise InputError(
             f"{name}.{method} fails for {len(q)} rollouts of {q.shape[1]} joints: {error}",
             argument=name,
+            value=list(q.shape),
         ) from error
 
 
@@ -363,6 +371,8 @@ def check_rollouts(**axes: tuple[int, ...]) -> None:
                 f"{first} is for {several[first]} rollouts and {name} for {count}, expected as many of both, or one "
                 "for all rollouts",
                 argument=name,
+                value=count,
+                limit=several[first],
             )
 
 
@@ -370,7 +380,9 @@ def check_vectors(name: str, value: ArrayLike) -> Array:
     """Check vectors (3,) or (N, 3); return them read-only."""
     array = freeze(check_finite(name, as_array(name, value)))
     if array.shape[-1:] != (3,) or array.ndim > 2:
-        raise InputError(f"{name} has shape {array.shape}, expected (3,), or (N, 3) for each rollout", argument=name)
+        raise InputError(
+            f"{name} has shape {array.shape}, expected (3,), or (N, 3) for each rollout", argument=name, value=array
+        )
     return array
 
 

@@ -67,6 +67,8 @@ class Dropout(TimedDisturbance):
             raise InputError(
                 f"probability = {chance.tolist()}, expected numbers above 0 and up to 1, one or (N,)",
                 argument="probability",
+                value=chance,
+                limit=(0.0, 1.0),
             )
         self.what, self.fallback, self.probability = what, fallback, freeze(chance)
         self.seed = check_whole("seed", seed, 0)

@@ -82,7 +82,9 @@ def _check_amount(name: str, value: ArrayLike) -> Array:
     """Check that factors or levels are numbers not below 0; return them read-only."""
     array = check_physical(name, as_array(name, value))
     if array.ndim > 2 or not (array >= 0).all():
-        raise InputError(f"{name} = {array.tolist()}, expected numbers not below 0", argument=name)
+        raise InputError(
+            f"{name} = {array.tolist()}, expected numbers not below 0", argument=name, value=array, limit=0.0
+        )
     return freeze(array)
 
 

@@ -83,4 +83,9 @@ class JammedJoint(TimedDisturbance):
     def _check(self, n: int) -> None:
         """Raise if a joint's number is beyond the arm."""
         if (self.joints >= n).any():
-            raise InputError(f"joint = {self.joint!r}, but the arm has joints 0 to {n - 1}", argument="joint")
+            raise InputError(
+                f"joint = {self.joint!r}, but the arm has joints 0 to {n - 1}",
+                argument="joint",
+                value=self.joint,
+                limit=(0, n - 1),
+            )

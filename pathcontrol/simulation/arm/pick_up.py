@@ -47,12 +47,17 @@ class PickUp(TimedDisturbance):
         super().__init__(time, duration, "time")
         self.time = self.start
         if not isinstance(frame, str):
-            raise InputError(f"frame = {frame!r}, expected the name of a frame, such as 'tool'", argument="frame")
+            raise InputError(
+                f"frame = {frame!r}, expected the name of a frame, such as 'tool'", argument="frame", value=frame
+            )
         self.frame = frame
         self.mass = freeze(check_physical("mass", as_array("mass", mass)))
         if self.mass.ndim > 1 or not (self.mass > 0).all():
             raise InputError(
-                f"mass = {self.mass.tolist()}, expected numbers above 0 [kg], one or (N,)", argument="mass"
+                f"mass = {self.mass.tolist()}, expected numbers above 0 [kg], one or (N,)",
+                argument="mass",
+                value=self.mass,
+                limit=0.0,
             )
         self.offset, self.velocity = check_vectors("offset", offset), check_vectors("velocity", velocity)
         places = {"offset": self.offset.shape[:-1], "velocity": self.velocity.shape[:-1]}

@@ -55,7 +55,9 @@ class Wall(TimedDisturbance):
     ) -> None:
         super().__init__(start, duration)
         if not isinstance(frame, str):
-            raise InputError(f"frame = {frame!r}, expected the name of a frame, such as 'tool'", argument="frame")
+            raise InputError(
+                f"frame = {frame!r}, expected the name of a frame, such as 'tool'", argument="frame", value=frame
+            )
         self.frame, self.rigid = frame, bool(rigid)
         self._robot: RobotModel | None = None
         self.point, self.normal = check_vectors("point", point), check_vectors("normal", normal)

@@ -30,14 +30,15 @@ def check_sizes(file: h5py.File, size: int) -> None:
     stored = 0
     for name, variable in _variables(file):
         if variable.external or variable.is_virtual:
-            raise InputError(f"the numbers of {name} are said to be in another file")
+            raise InputError(f"the numbers of {name} are said to be in another file", value=name)
         stored += variable.id.get_storage_size()
         most = _UNWRITTEN + _DENSEST * min(stored, size)
         chunk = 1 if variable.chunks is None else int(np.prod([float(length) for length in variable.chunks]))
         count = max(chunk, int(np.prod([float(length) for length in variable.shape])))
         if count * variable.dtype.itemsize > most:
             raise InputError(
-                f"it says that {name} has the shape {variable.shape}, which cannot be in a file of {size} bytes"
+                f"it says that {name} has the shape {variable.shape}, which cannot be in a file of {size} bytes",
+                value=variable.shape,
             )
 
 
@@ -46,7 +47,7 @@ def _variables(group: h5py.Group) -> Iterator[tuple[str, h5py.Dataset]]:
     for name in group:
         link = group.get(name, getlink=True)
         if not isinstance(link, h5py.HardLink):
-            raise InputError(f"{name} is a link to somewhere else")
+            raise InputError(f"{name} is a link to somewhere else", value=name)
         item = group[name]
         if isinstance(item, h5py.Group):
             yield from ((f"{name}/{inner}", one) for inner, one in _variables(item))
@@ -66,21 +67,25 @@ def check_form(data: xr.Dataset, config: Any) -> None:
         InputError: they have not.
     """
     if not isinstance(config, dict):
-        raise InputError(f"its configuration is a {type(config).__name__}, expected names and values")
+        raise InputError(
+            f"its configuration is a {type(config).__name__}, expected names and values", value=type(config).__name__
+        )
     if is_deeper(config, _DEEPEST):
-        raise InputError(f"its configuration is nested more than {_DEEPEST} deep")
+        raise InputError(f"its configuration is nested more than {_DEEPEST} deep", limit=_DEEPEST)
     if missing := [name for name in ("q", "time", "status") if name not in data.variables]:
-        raise InputError(f"it has no {' and no '.join(missing)}")
+        raise InputError(f"it has no {' and no '.join(missing)}", value=missing)
     for name, (dims, *_) in (VARIABLES | OUTCOMES | {"time": (("time",),)}).items():
         if name not in data.variables:
             continue
         variable = data[name]
         if variable.dims != dims or (variable.dtype.kind in "bfiu") == (name in _WORDS):
-            raise InputError(f"{name} is {variable.dtype} over {variable.dims}, expected other values over {dims}")
+            raise InputError(
+                f"{name} is {variable.dtype} over {variable.dims}, expected other values over {dims}", value=name
+            )
         if name in _COUNTS and variable.dtype.kind not in "iu":
-            raise InputError(f"{name} is {variable.dtype}, expected whole numbers")
+            raise InputError(f"{name} is {variable.dtype}, expected whole numbers", value=name)
         if name in VARIABLES and not isinstance(variable.attrs.get("units"), str):
-            raise InputError(f"{name} has no unit")
+            raise InputError(f"{name} has no unit", value=name)
     _check_labels(data)
 
 
@@ -88,22 +93,22 @@ def _check_labels(data: xr.Dataset) -> None:
     """Check the values along which the arrays are laid out: times, names of joints, numbers of rollouts, texts."""
     for name in ("rollout", "joint"):
         if name in data.coords and data[name].dims != (name,):
-            raise InputError(f"{name} is over {data[name].dims}, expected ({name!r},)")
+            raise InputError(f"{name} is over {data[name].dims}, expected ({name!r},)", value=name)
     time, joints = data["time"].to_numpy(), data["joint"].to_numpy() if "joint" in data.coords else None
     if not np.isfinite(time).all():
         raise InputError("its times are not finite")
     if not (np.diff(time) > 0).all():
         raise InputError("its times do not increase")
     if joints is None or not all(isinstance(name, str) for name in joints.tolist()):
-        raise InputError(f"its joints are {joints}, expected their names")
+        raise InputError(f"its joints are {joints}, expected their names", value=joints)
     if len(set(joints.tolist())) < len(joints):
-        raise InputError(f"its joints are {joints.tolist()}, expected names that differ")
+        raise InputError(f"its joints are {joints.tolist()}, expected names that differ", value=joints)
     rollouts = data["rollout"].to_numpy()  # the numbers 0, 1, … where the file has none
     if rollouts.dtype.kind not in "iu" or len(np.unique(rollouts)) < len(rollouts):
-        raise InputError(f"its rollouts are {rollouts}, expected whole numbers that differ")
+        raise InputError(f"its rollouts are {rollouts}, expected whole numbers that differ", value=rollouts)
     for name in _WORDS:
         if name in data.variables and not all(isinstance(word, str) for word in data[name].to_numpy().tolist()):
-            raise InputError(f"{name} holds something else than words")
+            raise InputError(f"{name} holds something else than words", value=name)
 
 
 def is_deeper(value: Any, levels: int) -> bool:

@@ -49,7 +49,7 @@ class MessageFormat:
         self.variables, self.joints = tuple(variables), tuple(joints)
         for one in variables:
             if np.dtype(one.dtype).kind not in _KINDS or np.dtype(one.dtype).itemsize > 8:
-                raise InputError(f"{one.name} is {np.dtype(one.dtype)}, expected numbers")
+                raise InputError(f"{one.name} is {np.dtype(one.dtype)}, expected numbers", value=one.name)
         self._template = self._make_template()
 
     def schema(self) -> bytes:
@@ -146,6 +146,6 @@ def read_loose(value: Mapping[str, Any]) -> Array:
         return words.reshape(value["shape"])
     dtype = np.dtype(value["dtype"])
     if dtype.kind not in _KINDS:
-        raise InputError(f"an array of {dtype}, expected numbers or words")
+        raise InputError(f"an array of {dtype}, expected numbers or words", value=str(dtype))
     numbers = np.array(value["values"], dtype=np.float64 if dtype.kind == "f" else dtype)
     return numbers.astype(dtype).reshape(value["shape"])

@@ -67,7 +67,7 @@ def read_content(data: bytes) -> Content:
             return content
         reached = end
     if content.whole:
-        raise InputError(f"it is damaged: no record begins at its byte {reached}")
+        raise InputError(f"it is damaged: no record begins at its byte {reached}", value=reached)
     return content
 
 
@@ -122,4 +122,4 @@ def _check_crc(found: int, stored: bytes, what: str) -> None:
     """Check a checksum; 0 stands for none."""
     (wanted,) = struct.unpack("<I", stored[:4])
     if wanted not in (0, found):
-        raise InputError(f"it is damaged: the checksum of {what} is another one; take another copy of it")
+        raise InputError(f"it is damaged: the checksum of {what} is another one; take another copy of it", value=what)

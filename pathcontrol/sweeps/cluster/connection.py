@@ -72,7 +72,11 @@ def _address(cluster: Any) -> Any:
         return json.loads(Path(cluster).read_text(encoding="utf-8"))["address"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ClusterError(
-            f"the scheduler file {str(cluster)!r} cannot be read: {error}; `dask scheduler --scheduler-file` writes one"
+            f"the scheduler file {str(cluster)!r} cannot be read: {error}; "
+            "`dask scheduler --scheduler-file` writes one",
+            argument="cluster",
+            value=str(cluster),
+            file=str(cluster),
         ) from error
 
 
@@ -108,7 +112,9 @@ def _open_client(address: Any, security: Security | None) -> Client:
     except Exception as error:  # any kind of process may answer
         raise ClusterError(
             f"cluster = {address!r}: no Dask scheduler answers ({str(error) or 'it says nothing'}); start one with "
-            "`dask scheduler`, and give its address, as tcp://host:8786, or its scheduler file"
+            "`dask scheduler`, and give its address, as tcp://host:8786, or its scheduler file",
+            argument="cluster",
+            value=address,
         ) from error
 
 
@@ -143,7 +149,8 @@ def _check_workers(client: Client) -> None:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except TimeoutError as error:
         raise ClusterError(
-            f"{address} has no workers; start some: `dask worker {address} --nworkers=-1 --nthreads 1`"
+            f"{address} has no workers; start some: `dask worker {address} --nworkers=-1 --nthreads 1`",
+            value=address,
         ) from error
     expected, ask = expected_versions(), _make_question()
     found = {"the scheduler": client.run_on_scheduler(ask), **_ask_workers(client, ask)}

@@ -98,7 +98,9 @@ class Dispatcher:
             if losses > _LOSSES:
                 raise ClusterError(
                     f"all workers were lost {losses} times one after another, perhaps for lack of memory; make chunks "
-                    f"smaller; {_KEPT}"
+                    f"smaller; {_KEPT}",
+                    value=losses,
+                    limit=_LOSSES,
                 )
 
     def _next(self) -> Future | None:
@@ -201,7 +203,9 @@ class Dispatcher:
             self._retry(future, piece, error)
             return None
         except ModuleNotFoundError as error:
-            raise ClusterError(f"a worker lacks the module {error.name!r}; install it there; {_KEPT}") from error
+            raise ClusterError(
+                f"a worker lacks the module {error.name!r}; install it there; {_KEPT}", value=error.name
+            ) from error
         except (OSError, TimeoutError) as error:
             if not _is_connection_error(error):  # the user's own function has failed with it
                 raise
@@ -260,7 +264,7 @@ def sweep_chunk(shipped: ShippedJob, parameters: dict[str, Array], samples: NDAr
 
     worker: Any = get_worker()
     if other := other_versions(shipped.versions):
-        raise ClusterError(f"{worker.address} has joined with other versions: {other}; {_KEPT} without it")
+        raise ClusterError(f"{worker.address} has joined with other versions: {other}; {_KEPT} without it", value=other)
     with _one_at_a_time:
         return shipped.compute((parameters, samples), worker.local_directory)
 

@@ -63,7 +63,9 @@ class Columns:
     def unit_with(self, unit: str | None) -> str:
         """Return the unit of the coordinates, given the one that the caller names."""
         if unit and self.unit and unit != self.unit:
-            raise ToolpathError(f"its columns are in {self.unit!r}, which unit = {unit!r} contradicts")
+            raise ToolpathError(
+                f"its columns are in {self.unit!r}, which unit = {unit!r} contradicts", argument="unit", value=unit
+            )
         return unit or self.unit or "m"
 
 
@@ -107,7 +109,12 @@ def _names(rows: Rows, header: Header, chosen: Chosen | None, *, flat: bool) -> 
         return names
     if chosen is not None:
         if len(chosen) > header.width:
-            raise ToolpathError(f"columns= names {len(chosen)} columns, the file has {header.width}")
+            raise ToolpathError(
+                f"columns= names {len(chosen)} columns, the file has {header.width}",
+                argument="columns",
+                value=chosen,
+                limit=header.width,
+            )
         return [Name.of(name).name for name in chosen]
     if header.names:
         return [name.name for name in header.names]

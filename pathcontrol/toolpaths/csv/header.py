@@ -53,7 +53,12 @@ class Header:
         """
         if isinstance(at, int):
             if not 0 <= at < self.width:
-                raise ToolpathError(f"columns= names column {at}, the file has the columns 0 to {self.width - 1}")
+                raise ToolpathError(
+                    f"columns= names column {at}, the file has the columns 0 to {self.width - 1}",
+                    argument="columns",
+                    value=at,
+                    limit=(0, self.width - 1),
+                )
             return at
         wanted = at.lower().replace(" ", "")
         for spell in (lambda name: name.plain, lambda name: name.plain.partition("[")[0].partition("(")[0]):
@@ -61,7 +66,12 @@ class Header:
             if len(found) == 1:
                 return found[0]
         there = ", ".join(repr(name.text) for name in self.names[:20]) or "none that have names"
-        raise ToolpathError(f"columns= names a column {at!r}, the file has {there}")
+        raise ToolpathError(
+            f"columns= names a column {at!r}, the file has {there}",
+            argument="columns",
+            value=at,
+            choices=tuple(name.text for name in self.names),
+        )
 
     def unit(self, places: Mapping[str, int]) -> str | None:
         """Return the unit of the coordinates, given their columns.

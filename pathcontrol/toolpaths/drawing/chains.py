@@ -58,7 +58,7 @@ class Strand(NamedTuple):
         try:
             return contour_of(self.segments, feed, self.name)
         except InputError as error:
-            raise ToolpathError(f"{source}, {self.name}: {error}") from error
+            raise ToolpathError(f"{source}, {self.name}: {error}", **error.details_with(file=source)) from error
 
 
 def checked_gap(gap: float | None) -> float | None:

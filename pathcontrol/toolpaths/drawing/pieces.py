@@ -143,7 +143,8 @@ class Budget:
         self._used += sum(_effort(piece) for piece in pieces)
         if self._used > MAX_SEGMENTS:
             raise ToolpathError(
-                f"the drawing has more than {MAX_SEGMENTS} lines, or {MAX_SEGMENTS // _CURVE} curves; split it"
+                f"the drawing has more than {MAX_SEGMENTS} lines, or {MAX_SEGMENTS // _CURVE} curves; split it",
+                limit=MAX_SEGMENTS,
             )
 
 
@@ -202,6 +203,8 @@ def _check_bounded(values: Array, most: float = MAX_COORDINATE, what: str = "a c
     largest = np.abs(values).max()
     if not largest <= most:
         raise ToolpathError(
-            f"it has {what} {largest:g} m, expected finite numbers up to {most:g} m; is the unit of length right?"
+            f"it has {what} {largest:g} m, expected finite numbers up to {most:g} m; is the unit of length right?",
+            value=largest,
+            limit=most,
         )
     return values

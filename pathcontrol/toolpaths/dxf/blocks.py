@@ -89,18 +89,28 @@ class Entities:
     def _block(self, insert: Any, depth: int) -> Any:
         name = str(insert.dxf.get("name", ""))
         if depth == _MOST_INSERTS:
-            raise ToolpathError(f"more than {_MOST_INSERTS} blocks inside each other; is {name!r} inserted in itself?")
+            raise ToolpathError(
+                f"more than {_MOST_INSERTS} blocks inside each other; is {name!r} inserted in itself?",
+                value=name,
+                limit=_MOST_INSERTS,
+            )
         block = self._document.blocks.get(name)
         if block is None:
-            raise ToolpathError(f"it inserts block {name!r}, which is not in the file")
+            raise ToolpathError(f"it inserts block {name!r}, which is not in the file", value=name)
         if block.block.dxf.get("flags", 0) & _EXTERNAL:
-            raise ToolpathError(f"block {name!r} is in another file, which is not fetched: bind the reference")
+            raise ToolpathError(
+                f"block {name!r} is in another file, which is not fetched: bind the reference", value=name
+            )
         return block
 
     def _counted(self) -> None:
         self._count += 1
         if self._count > _MOST_ENTITIES:
-            raise ToolpathError(f"{self.source} draws more than {_MOST_ENTITIES} entities; split the drawing")
+            raise ToolpathError(
+                f"{self.source} draws more than {_MOST_ENTITIES} entities; split the drawing",
+                limit=_MOST_ENTITIES,
+                file=self.source,
+            )
 
 
 def _places(insert: Any) -> Iterator[Array]:

@@ -50,7 +50,7 @@ def _arc_between(entity: Any, start: float, end: float) -> EllipticArc:
     check_given(entity, "center", "radius")
     radius, axes = number(entity, "radius"), object_axes(entity)
     if radius <= 0:
-        raise ToolpathError(f"its radius is {radius:g}, expected more than 0")
+        raise ToolpathError(f"its radius is {radius:g}, expected more than 0", value=radius, limit=0.0)
     center, first = axes @ vector(entity, "center"), float(np.radians(start))
     return EllipticArc(
         center, radius * axes[:, 0], radius * axes[:, 1], first, sweep_between(first, float(np.radians(end)))

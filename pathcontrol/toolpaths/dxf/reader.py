@@ -102,7 +102,8 @@ def read_dxf(
         if not contours:
             raise ToolpathError(
                 f"{source} draws no outline on the layers read; its layers are {found.listed}"
-                + "".join(f"; {note}" for note in passed.notes)
+                + "".join(f"; {note}" for note in passed.notes),
+                file=source,
             )
         note_doubled(contours, passed)
     return Toolpath(tuple(contours), source, unit, passed.notes)
@@ -117,10 +118,17 @@ def _load(source: str, text: str) -> Any:
     if len(lines) > _MOST_LINES or entities > _MOST_ENTITIES:
         raise ToolpathError(
             f"{source} has {len(lines)} lines and {entities} entities, expected at most {_MOST_LINES} and "
-            f"{_MOST_ENTITIES}; split it into several files"
+            f"{_MOST_ENTITIES}; split it into several files",
+            value=len(lines),
+            limit=_MOST_LINES,
+            file=source,
         )
     if max(map(len, lines)) > _LONGEST_LINE:
-        raise ToolpathError(f"{source} has a line of more than {_LONGEST_LINE} characters; is it a DXF drawing?")
+        raise ToolpathError(
+            f"{source} has a line of more than {_LONGEST_LINE} characters; is it a DXF drawing?",
+            limit=_LONGEST_LINE,
+            file=source,
+        )
     return read(io.StringIO(text))
 
 
@@ -136,7 +144,9 @@ def _readable(source: str) -> Iterator[None]:
         reason = f"{error}".strip() or type(error).__name__
         if isinstance(error, LookupError):
             reason = f"it has no {reason}"
-        raise ToolpathError(f"{source} is no DXF drawing that can be read: {reason}; save it again as DXF") from error
+        raise ToolpathError(
+            f"{source} is no DXF drawing that can be read: {reason}; save it again as DXF", file=source
+        ) from error
 
 
 def _unit(source: str, unit: str | None, code: int) -> str:
@@ -150,7 +160,13 @@ def _unit(source: str, unit: str | None, code: int) -> str:
         return unit
     if code not in _BY_CODE:
         reason = f"a unit that is not known ($INSUNITS = {code})" if code else "no unit of length"
-        raise ToolpathError(f"{source} names {reason}; give it: unit= one of {known}")
+        raise ToolpathError(
+            f"{source} names {reason}; give it: unit= one of {known}",
+            argument="unit",
+            value=code,
+            choices=tuple(UNITS),
+            file=source,
+        )
     return _BY_CODE[code]
 
 
@@ -180,7 +196,8 @@ def _strands(entities: Entities, layers: Layers, skip: frozenset[str], scale: Ar
         kinds = ",".join(dict.fromkeys(kind for (kind, _), _ in refused.most_common(8)))
         raise ToolpathError(
             f"{entities.source} holds what cannot be cut: {what}; take it away, leave it out with skip={kinds!r}, pass "
-            f"it over with unknown='warn', or choose with layers= from {layers.listed}"
+            f"it over with unknown='warn', or choose with layers= from {layers.listed}",
+            file=entities.source,
         )
     return strands
 

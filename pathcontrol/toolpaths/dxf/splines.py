@@ -44,7 +44,7 @@ def interpolate(points: Array, tangents: tuple[Array, Array] | None, closed: boo
     Its ends are straight (second derivative 0), have the given tangents, or go over into each other.
     """
     if not (points != points[:1]).any():
-        raise ToolpathError(f"it has {len(points)} fit points, expected at least 2 different ones")
+        raise ToolpathError(f"it has {len(points)} fit points, expected at least 2 different ones", value=len(points))
     ring = np.concatenate([points, points[:1]]) if closed else points
     chords = np.linalg.norm(np.diff(ring, axis=0), axis=-1)
     ring, chords = ring[np.append(True, chords > 0)], chords[chords > 0]
@@ -75,11 +75,15 @@ def _bernstein(powers: Array) -> Array:
 def _check(degree: int, knots: Array, points: Array, weights: Array | None) -> None:
     """Check the data of a B-spline."""
     if not 1 <= degree <= _HIGHEST_DEGREE:
-        raise ToolpathError(f"it has degree {degree}, expected 1 to {_HIGHEST_DEGREE}")
+        raise ToolpathError(
+            f"it has degree {degree}, expected 1 to {_HIGHEST_DEGREE}", value=degree, limit=(1, _HIGHEST_DEGREE)
+        )
     if len(points) <= degree or len(knots) != len(points) + degree + 1:
         raise ToolpathError(
             f"it has {len(points)} control points and {len(knots)} knots, expected at least {degree + 1} points and "
-            f"{degree + 1} knots more than points"
+            f"{degree + 1} knots more than points",
+            value=len(points),
+            limit=degree + 1,
         )
     if not (np.isfinite(knots).all() and np.isfinite(points).all()):
         raise ToolpathError("it has a knot or a control point that is not finite")
@@ -88,4 +92,8 @@ def _check(degree: int, knots: Array, points: Array, weights: Array | None) -> N
     if weights is not None and not (
         len(weights) == len(points) and np.isfinite(weights).all() and weights.min() > _LIGHTEST * weights.max()
     ):
-        raise ToolpathError(f"it has {len(weights)} weights, expected one greater than 0 for each control point")
+        raise ToolpathError(
+            f"it has {len(weights)} weights, expected one greater than 0 for each control point",
+            value=len(weights),
+            limit=len(points),
+        )

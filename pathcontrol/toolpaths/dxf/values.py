@@ -30,14 +30,14 @@ def check_given(entity: Any, *names: str) -> None:
     """Check that the file gives all required attributes, which would otherwise be read as defaults."""
     missing = [name for name in names if not entity.dxf.hasattr(name)]
     if missing:
-        raise ToolpathError(f"it has no {' and no '.join(missing)}")
+        raise ToolpathError(f"it has no {' and no '.join(missing)}", value=missing)
 
 
 def number(entity: Any, name: str) -> float:
     """Return a number of an entity, from the file or the default of the format."""
     value = entity.dxf.get_default(name)
     if value is None or not np.isfinite(value):
-        raise ToolpathError(f"its {name} is {value}, expected a finite number")
+        raise ToolpathError(f"its {name} is {value}, expected a finite number", value=value)
     return float(value)
 
 
@@ -55,7 +55,7 @@ def vector(entity: Any, name: str) -> Array:
     """Return a point or direction of an entity, (3,)."""
     value = entity.dxf.get_default(name)
     if value is None or not np.isfinite(tuple(value)).all():
-        raise ToolpathError(f"its {name} is {value}, expected finite coordinates")
+        raise ToolpathError(f"its {name} is {value}, expected finite coordinates", value=value)
     return np.array(tuple(value), dtype=np.float64)
 
 
@@ -63,7 +63,7 @@ def object_axes(entity: Any) -> Array:
     """Return the axes of the object coordinate system, as columns (3, 3), by the arbitrary axis algorithm."""
     normal = vector(entity, "extrusion")
     if not 0 < np.linalg.norm(normal) < np.inf:
-        raise ToolpathError(f"its extrusion is {normal.tolist()}, expected a direction")
+        raise ToolpathError(f"its extrusion is {normal.tolist()}, expected a direction", value=normal)
     system = entity.ocs()
     return np.column_stack([system.ux, system.uy, system.uz])
 

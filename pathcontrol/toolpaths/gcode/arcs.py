@@ -43,7 +43,11 @@ def arcs(
     by_radius = "R" in words
     center = (_center_by_radius if by_radius else _center_by_offsets)(first, last, words, modes, clockwise)
     if not all(abs(coordinate) <= MAX_COORDINATE for coordinate in center):  # false for NaN too
-        raise ToolpathError(f"the arc's centre is further than {MAX_COORDINATE:g} m from the origin; write a line, G1")
+        raise ToolpathError(
+            f"the arc's centre is further than {MAX_COORDINATE:g} m from the origin; write a line, G1",
+            value=center,
+            limit=MAX_COORDINATE,
+        )
     if not by_radius:
         _check_normal(start[normal], end[normal], words, modes)
         _check_radii(first, last, center, words, modes)
@@ -65,7 +69,11 @@ def _turns(words: Mapping[str, float]) -> int:
     """Return the number of turns of an arc, the last of which is the rest."""
     value = words.get("P", 1.0)
     if not 1 <= value <= _MOST_TURNS or value % 1:
-        raise ToolpathError(f"P{value:g} is no number of turns of an arc, expected 1 to {_MOST_TURNS}")
+        raise ToolpathError(
+            f"P{value:g} is no number of turns of an arc, expected 1 to {_MOST_TURNS}",
+            value=value,
+            limit=(1, _MOST_TURNS),
+        )
     return int(value)
 
 
@@ -77,7 +85,8 @@ def _check_normal(start: float, end: float, words: Mapping[str, float], modes: M
     if min(abs(value - level) for level in allowed) > SAME_POINT:
         raise ToolpathError(
             f"{letter}{words[letter]:g} leads out of the plane of {_NAMES[modes.plane]}, where the arc's centre is: "
-            "leave it out; the pitch of a helix follows from its end"
+            "leave it out; the pitch of a helix follows from its end",
+            value=words[letter],
         )
 
 
@@ -171,7 +180,9 @@ def _center_by_radius(
     if missing > max(_LEAST_RADIUS, modes.arc_tolerance or 0.0):
         raise ToolpathError(
             f"an arc of radius {unit.text(abs(radius))} between points {unit.text(chord)} apart, expected a radius of "
-            f"at least half of that{f'; {_advise_rounding(missing, unit)}' if missing < 0.1 * half else ''}"
+            f"at least half of that{f'; {_advise_rounding(missing, unit)}' if missing < 0.1 * half else ''}",
+            value=radius,
+            limit=chord / 2,
         )
     height = math.sqrt((abs(radius) - half) * (abs(radius) + half)) / chord
     left = -height if clockwise == (radius > 0) else height

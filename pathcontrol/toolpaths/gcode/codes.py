@@ -77,7 +77,7 @@ def groups(block: Block) -> dict[str, int]:
     for code in block.g:
         group = _GROUP_OF.get(code)
         if group is None:
-            raise ToolpathError(f"G{code / 10:g} is not understood: {_REASONS.get(code, _POST)}")
+            raise ToolpathError(f"G{code / 10:g} is not understood: {_REASONS.get(code, _POST)}", value=code / 10)
         if group in found:
             names = GROUPS[group]
             raise ToolpathError(f"{names[found[group]]} and {names[code]} exclude each other in one line")
@@ -95,4 +95,6 @@ def check_letters(block: Block, allowed: str) -> None:
     for letter in block.words:
         if letter not in "FST" and letter not in allowed:
             reason = _LETTERS.get(letter, "nothing in the line uses it")
-            raise ToolpathError(f"{letter}{block.words[letter]:g} is not understood here: {reason}")
+            raise ToolpathError(
+                f"{letter}{block.words[letter]:g} is not understood here: {reason}", value=block.words[letter]
+            )

@@ -56,7 +56,9 @@ class Drilling:
         """Return the level above the hole at which rapids end, and its bottom [m]."""
         missing = [a for a in ("RZQ" if self.code in _PECKS else "RZ") if a not in self.words]
         if missing:
-            raise ToolpathError(f"{DRILLING[self.code]} without {' and '.join(missing)}, expected it in the first line")
+            raise ToolpathError(
+                f"{DRILLING[self.code]} without {' and '.join(missing)}, expected it in the first line", value=missing
+            )
         if not modes.absolute and abs(z - self.initial) > 1e-9:
             raise ToolpathError(
                 "R of a cycle in G91 counts from the first level on some machines, from where the tool is on others: "
@@ -86,7 +88,8 @@ class Drilling:
         step = modes.length("Q", self.words["Q"])
         if not step >= _LEAST or (clear - bottom) / step > _MOST_PECKS:
             raise ToolpathError(
-                f"Q{self.words['Q']:g} is no depth of pecks, expected more than 0 and at most {_MOST_PECKS} for a hole"
+                f"Q{self.words['Q']:g} is no depth of pecks, expected more than 0 and at most {_MOST_PECKS} for a hole",
+                value=self.words["Q"],
             )
         count = 1
         while clear - count * step > bottom + 1e-9:
@@ -98,5 +101,9 @@ def _repeats(words: Mapping[str, float]) -> int:
     """Return the number of times that the line is carried out."""
     value = words.get("L", 1.0)
     if not 1 <= value <= _MOST_REPEATS or value % 1:
-        raise ToolpathError(f"L{value:g} is no number of repetitions, expected 1 to {_MOST_REPEATS}")
+        raise ToolpathError(
+            f"L{value:g} is no number of repetitions, expected 1 to {_MOST_REPEATS}",
+            value=value,
+            limit=(1, _MOST_REPEATS),
+        )
     return int(value)

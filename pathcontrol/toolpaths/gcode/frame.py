@@ -85,7 +85,9 @@ class Frame:
             stays = self._rotary.setdefault(letter, value if absolute and not begun else 0.0) if absolute else 0.0
             if value != stays:
                 raise ToolpathError(
-                    f"{letter}{value:g} turns {letter} from {stays:g}: only X, Y and Z are supported, others must stay"
+                    f"{letter}{value:g} turns {letter} from {stays:g}: only X, Y and Z are supported, others must stay",
+                    value=value,
+                    limit=stays,
                 )
             self._passed.pass_over(f"{letter}, an axis that stays where it is,", line)
         return block._replace(words={letter: value for letter, value in block.words.items() if letter not in found})

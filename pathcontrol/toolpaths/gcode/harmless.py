@@ -90,11 +90,13 @@ def _of_m(code: int, block: Block, line: int, passed: Notes) -> set[str]:
         passed.pass_over(f"M{code}", line)
         return {*_OUTPUTS[code]}
     if (reason := reason_to_refuse(code)) is not None and not _shows_progress(code, block):
-        raise ToolpathError(f"M{code} is not understood: {reason}")
+        raise ToolpathError(f"M{code} is not understood: {reason}", value=code)
     if code in _PRINTERS and not block.g:
         letters = {*block.words}
     elif block.words.keys() & ({*"PQRLE"} if block.g else _PLACES):
-        raise ToolpathError(f"M{code} is not understood, and shares its line with words that may be its own")
+        raise ToolpathError(
+            f"M{code} is not understood, and shares its line with words that may be its own", value=code
+        )
     else:
         letters = set() if block.g else {*block.words} - {"F"}
     passed.unless_refused(f"M{code}", line, f"M{code} is not understood: delete it if it moves nothing")

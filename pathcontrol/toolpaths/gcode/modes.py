@@ -48,7 +48,11 @@ class Modes:
                 raise ToolpathError("F where the unit changes is another feed on other machines: give it its own line")
             self.feed = self.feed_of(block.words["F"])
             if not 0 < self.feed < math.inf:
-                raise ToolpathError(f"F{block.words['F']:g} is no feed, expected a number greater than 0")
+                raise ToolpathError(
+                    f"F{block.words['F']:g} is no feed, expected a number greater than 0",
+                    value=block.words["F"],
+                    limit=0.0,
+                )
         self.motion = codes.get("motion", None if "end of motion" in codes else self.motion)
         self.stopped = self.motion is None and (self.stopped or "end of motion" in codes)
         self.return_level = codes.get("return level", self.return_level)
@@ -69,7 +73,8 @@ class Modes:
         if self.unit is None:
             raise ToolpathError(
                 f"{needed_by} has no unit: write G20, inches, or G21, millimetres, before it, or read the file with "
-                "unit='mm' or unit='in'"
+                "unit='mm' or unit='in'",
+                argument="unit",
             )
         return self.unit
 
@@ -77,5 +82,9 @@ class Modes:
         """Return the end of an axis word on that axis, from ``here`` [m]."""
         target = self.length(letter, value) + (0.0 if self.absolute else here)
         if abs(target) > MAX_COORDINATE:
-            raise ToolpathError(f"{letter}{value:g} leads further than {MAX_COORDINATE:g} m from the origin")
+            raise ToolpathError(
+                f"{letter}{value:g} leads further than {MAX_COORDINATE:g} m from the origin",
+                value=value,
+                limit=MAX_COORDINATE,
+            )
         return target

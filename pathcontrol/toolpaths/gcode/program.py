@@ -184,11 +184,14 @@ class Program:
         if unknown:
             raise ToolpathError(
                 f"it cuts where {' and '.join(unknown)} is not known: position the tool before it with "
-                f"G90 G0 {'… '.join(unknown)}…, or read the file with start=(x, y, z)"
+                f"G90 G0 {'… '.join(unknown)}…, or read the file with start=(x, y, z)",
+                argument="start",
+                value=unknown,
             )
         if self.modes.feed is None:
             raise ToolpathError(
-                "it cuts before there is a feed: write F, in units per minute, or read the file with feed="
+                "it cuts before there is a feed: write F, in units per minute, or read the file with feed=",
+                argument="feed",
             )
 
 
@@ -206,4 +209,4 @@ def _check_dwell(block: Block) -> None:
     check_letters(block, "PXUS")
     times = [block.words[letter] for letter in "PXUS" if letter in block.words]
     if not times or min(times) < 0:
-        raise ToolpathError("G4 needs a time to wait, P, that is not negative")
+        raise ToolpathError("G4 needs a time to wait, P, that is not negative", value=times, limit=0.0)

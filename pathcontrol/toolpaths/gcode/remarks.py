@@ -51,7 +51,8 @@ def _without_slashes(text: str, line: int, passed: Notes) -> str:
     if after.strip() and are_words(after):
         raise ToolpathError(
             f"{text[:40]!r} may be a comment, or a line that is carried out or not by a switch of the machine: delete "
-            "it, or the //"
+            "it, or the //",
+            value=text,
         )
     passed.unless_refused(
         "a text after //", line, f"{text[:40]!r} is not understood: {_COMMENT}, not after //: write it so"

@@ -50,7 +50,7 @@ class Strokes:
         """Add a move from ``start`` [m], (3,), along an arc or straight, at ``feed`` [m/s], or None for a rapid."""
         self._moves += 1
         if self._moves > MAX_SEGMENTS:
-            raise ToolpathError(f"more than {MAX_SEGMENTS} moves; split the program")
+            raise ToolpathError(f"more than {MAX_SEGMENTS} moves; split the program", limit=MAX_SEGMENTS)
         if self._builder is None or feed != self._feed:
             self.end()
             self._builder, self._feed = ContourBuilder(start), feed
@@ -65,7 +65,9 @@ class Strokes:
         """End the contour: the next move begins a new one."""
         if self._builder is not None and not self._builder.empty:
             if len(self._contours) == MAX_CONTOURS:
-                raise ToolpathError(f"more than {MAX_CONTOURS} changes between rapids and feeds; split the program")
+                raise ToolpathError(
+                    f"more than {MAX_CONTOURS} changes between rapids and feeds; split the program", limit=MAX_CONTOURS
+                )
             rapid = self._feed is None
             self._contours.append(self._builder.contour(feed=self._feed, rapid=rapid, name=self._name))
         self._builder = None

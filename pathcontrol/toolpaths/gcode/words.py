@@ -84,14 +84,15 @@ def parse(text: str) -> Block:
     for spelled, digits in _WORD.findall(text):
         letter = spelled.upper()
         if "e" in digits and (spelled.islower() or letter in "GMNO"):
-            raise ToolpathError(_two_readings(spelled + digits))
+            raise ToolpathError(_two_readings(spelled + digits), value=spelled + digits)
         if letter == "G":
             block.g.append(_code(letter, digits, 10))
         elif letter == "M":
             block.m.append(_code(letter, digits, 1))
         elif letter in block.words or (letter == "N" and (block.label or block.words or block.g or block.m)):
             raise ToolpathError(
-                f"{letter}{digits[:20]} is not the first {'word' if letter == 'N' else letter} of the line"
+                f"{letter}{digits[:20]} is not the first {'word' if letter == 'N' else letter} of the line",
+                value=letter + digits,
             )
         elif letter == "N":
             block = block._replace(label=f"N{digits[:20]}")
@@ -112,7 +113,7 @@ def _code(letter: str, digits: str, tenths: int) -> int:
     """Return the number of a G or M word, times ten where tenths are allowed."""
     number = float(digits) * tenths
     if not 0 <= number < 10_000 or abs(number - round(number)) > 1e-3:
-        raise ToolpathError(f"{letter}{digits[:20]} is not understood")
+        raise ToolpathError(f"{letter}{digits[:20]} is not understood", value=letter + digits)
     return round(number)
 
 
@@ -125,4 +126,4 @@ def _mistake(text: str) -> ToolpathError:
         reason = "subprograms and control flow are not supported: let the CAM program write every move"
     else:
         reason = _REASONS.get(culprit, "expected words, each a letter and a number such as X10.5")
-    return ToolpathError(f"{rest[:20]!r} is not understood: {reason}")
+    return ToolpathError(f"{rest[:20]!r} is not understood: {reason}", value=rest)

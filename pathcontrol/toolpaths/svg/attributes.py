@@ -30,7 +30,9 @@ def number(text: str) -> float:
     """Parse a number, whose size must allow calculation."""
     value = float(text)
     if not abs(value) <= _LARGEST:
-        raise ToolpathError(f"the number {text} is too large, expected at most {_LARGEST:g}")
+        raise ToolpathError(
+            f"the number {text} is too large, expected at most {_LARGEST:g}", value=value, limit=_LARGEST
+        )
     return value
 
 
@@ -56,7 +58,7 @@ def _scan(text: str, what: str) -> list[float]:
         found.append(figure)
         at = match.end()
     if at < len(text) or comma:
-        raise ToolpathError(f"{what} has {_excerpt(text, at)}, expected numbers")
+        raise ToolpathError(f"{what} has {_excerpt(text, at)}, expected numbers", value=text)
     return [number(figure) for figure in found]
 
 
@@ -70,7 +72,7 @@ def arcs(text: str, what: str) -> list[float]:
             match = pattern.match(text, at)
             if match is None:
                 expected = "radii, rotation, two flags 0 or 1, x and y"
-                raise ToolpathError(f"{what} has {_excerpt(text, at)}, expected {expected}")
+                raise ToolpathError(f"{what} has {_excerpt(text, at)}, expected {expected}", value=text)
             figure, comma = match.groups()
             found.append(number(figure))
             at = match.end()
@@ -107,7 +109,7 @@ class Viewport:
         match = _LENGTH.match(text)
         unit = text[match.end() :].strip().lower() if match else None
         if match is None or (unit not in ("", "px", "%") and unit not in _PER_INCH):
-            raise ToolpathError(f"{what} = {text[:30]!r}, expected a length in px, mm, cm, in, pt, pc or %")
+            raise ToolpathError(f"{what} = {text[:30]!r}, expected a length in px, mm, cm, in, pt, pc or %", value=text)
         value = number(match[1])
         if unit == "%":
             return value / 100 * self._whole(what)
@@ -131,11 +133,13 @@ def transform(text: str) -> Array:
         values = numbers(_ANGLE_OR_PX.sub("", match[2]), f"{match[1]}(…)")
         if len(values) not in _TAKES.get(name, ()):
             known = "matrix(6 numbers), translate(1 or 2), scale(1 or 2), rotate(1 or 3), skewX(1), skewY(1)"
-            raise ToolpathError(f"transform has {match[0].strip()[:59] + ')'!r}, expected {known}")
+            raise ToolpathError(
+                f"transform has {match[0].strip()[:59] + ')'!r}, expected {known}", value=match[0].strip()
+            )
         with np.errstate(over="ignore", invalid="ignore"):  # an overflow is refused when it is drawn
             total = total @ _plane(*_matrix(name, values))
     if text[end:].strip():
-        raise ToolpathError(f"transform has {text[end:][:30]!r}, expected name(numbers)")
+        raise ToolpathError(f"transform has {text[end:][:30]!r}, expected name(numbers)", value=text)
     return total
 
 

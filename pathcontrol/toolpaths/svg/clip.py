@@ -78,14 +78,15 @@ class Clips:
             except ToolpathError as error:
                 raise ToolpathError(
                     f"{name} = {value[:60]!r} is not understood ({error}): apply it to the shapes in the drawing "
-                    "program, or take it away"
+                    "program, or take it away",
+                    value=value,
                 ) from error
 
     def _linked(self, name: str, clip: Any, matrix: Array, viewport: Viewport, depth: int) -> Iterator[Region]:
         """Yield the regions of one clipPath or mask element."""
         expected = "clipPath" if name == "clip-path" else "mask"
         if tag_of(clip) != expected:
-            raise ToolpathError(f"it refers to {tag_of(clip)}, expected {expected}")
+            raise ToolpathError(f"it refers to {tag_of(clip)}, expected {expected}", value=tag_of(clip))
         yield from self._regions(clip, matrix, viewport, depth + 1)
         get, style = self._document.attributes(clip), self._document.style(clip)
         if name == "mask":
@@ -113,9 +114,9 @@ class Clips:
                 tag, style = tag_of(child), self._document.style(child)
                 place = place @ transform(style.get("transform", ""))
             if tag not in SHAPES or _CLIPS & style.keys():
-                raise ToolpathError(f"it holds {tag}, expected a shape such as rect")
+                raise ToolpathError(f"it holds {tag}, expected a shape such as rect", value=tag)
             if mask and not self._lets_through(clip, child):
-                raise ToolpathError(f"its {tag} is not opaque and bright")
+                raise ToolpathError(f"its {tag} is not opaque and bright", value=tag)
             drawn = subpaths(tag, self._document.attributes(child), viewport)
             if len(drawn) == 1:
                 yield from _convex(drawn[0].pieces, place)

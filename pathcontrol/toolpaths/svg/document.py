@@ -42,7 +42,11 @@ class Document:
         self._styles: dict[Any, dict[str, str]] = {}
         for count, element in enumerate(self.root.iter("*")):
             if count == _MOST_ELEMENTS:
-                raise ToolpathError(f"{self.path} has more than {_MOST_ELEMENTS} elements; split it into several files")
+                raise ToolpathError(
+                    f"{self.path} has more than {_MOST_ELEMENTS} elements; split it into several files",
+                    limit=_MOST_ELEMENTS,
+                    file=str(self.path),
+                )
             if element.get("id") is not None:
                 self._targets.setdefault(element.get("id"), element)
             if tag_of(element) == "style" and element.get("type") in (None, "", "text/css"):
@@ -82,7 +86,7 @@ class Document:
         """Return the element of this file that ``#id`` stands for."""
         if link.startswith("#") and link[1:] in self._targets:
             return self._targets[link[1:]]
-        raise ToolpathError(f"it refers to {link[:60]!r}, expected # and the id of an element in this file")
+        raise ToolpathError(f"it refers to {link[:60]!r}, expected # and the id of an element in this file", value=link)
 
     def _paint(self, value: str) -> str:
         """Return a paint; a reference to nothing in this file is replaced by its fallback, or none."""
@@ -98,17 +102,27 @@ class Document:
         if entity >= 0:
             line = text.count("\n", 0, entity) + 1
             raise ToolpathError(
-                f"{self.path}, line {line}: definitions of entities are refused; save the drawing as plain SVG"
+                f"{self.path}, line {line}: definitions of entities are refused; save the drawing as plain SVG",
+                file=str(self.path),
+                line=line,
             )
         parser = etree.XMLParser(encoding="utf-8", resolve_entities=False, no_network=True, load_dtd=False)
         try:
             root = etree.fromstring(text.encode("utf-8", "replace"), parser)
         except etree.XMLSyntaxError as error:
-            raise ToolpathError(f"{self.path} {_refusal(str(error))}") from error
+            raise ToolpathError(
+                f"{self.path} {_refusal(str(error))}", file=str(self.path), line=error.lineno
+            ) from error
         if tag_of(root) != "svg":
-            raise ToolpathError(f"{self.path} begins with the element {str(root.tag)[:60]!r}, expected svg")
+            raise ToolpathError(
+                f"{self.path} begins with the element {str(root.tag)[:60]!r}, expected svg",
+                value=str(root.tag),
+                file=str(self.path),
+            )
         if any(node.target == "xml-stylesheet" for node in root.itersiblings(etree.PI, preceding=True)):
-            raise ToolpathError(f"{self.path} has its style in another file, which is not fetched; write it in")
+            raise ToolpathError(
+                f"{self.path} has its style in another file, which is not fetched; write it in", file=str(self.path)
+            )
         return root
 
 

@@ -23,7 +23,10 @@ def parse_path(data: str) -> list[Subpath]:
     """
     before, *parts = _COMMAND.split(data)
     if before.strip() or (parts and parts[0] not in "Mm"):
-        raise ToolpathError(f"path data begins with {data.strip()[:20]!r}, expected M or m: where the pen is set down")
+        raise ToolpathError(
+            f"path data begins with {data.strip()[:20]!r}, expected M or m: where the pen is set down",
+            value=data.strip(),
+        )
     pen = Pen()
     for letter, arguments in zip(parts[::2], parts[1::2], strict=True):
         _draw(pen, letter, arguments)
@@ -35,13 +38,17 @@ def _draw(pen: Pen, letter: str, arguments: str) -> None:
     name, relative = letter.upper(), letter.islower()
     if name == "Z":
         if arguments.strip():
-            raise ToolpathError(f"path data has {arguments.strip()[:20]!r} after {letter}, expected a command")
+            raise ToolpathError(
+                f"path data has {arguments.strip()[:20]!r} after {letter}, expected a command", value=arguments.strip()
+            )
         pen.close()
         return
     values, size = (arcs if name == "A" else numbers)(arguments, f"path data after {letter}"), _TAKES[name]
     if not values or len(values) % size:
         raise ToolpathError(
-            f"path data has {len(values)} numbers after {letter}, expected {size} or a multiple: {arguments[:30]!r}"
+            f"path data has {len(values)} numbers after {letter}, expected {size} or a multiple: {arguments[:30]!r}",
+            value=len(values),
+            limit=size,
         )
     if name in _RUNS and len(values) > size:
         points = np.array(values[::2]) + 1j * np.array(values[1::2])

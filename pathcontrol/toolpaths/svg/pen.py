@@ -102,7 +102,7 @@ class Pen:
         self.at, self._handle = point, ("", 0j)
         self._strokes += strokes
         if self._strokes > MAX_SEGMENTS:
-            raise ToolpathError(f"path data has more than {MAX_SEGMENTS} segments; split it")
+            raise ToolpathError(f"path data has more than {MAX_SEGMENTS} segments; split it", limit=MAX_SEGMENTS)
 
     def _add(self, piece: Piece, end: complex) -> None:
         self._end_line()
@@ -128,7 +128,9 @@ class Pen:
         if self._pieces:
             self._subpaths.append(Subpath(self._pieces, closed))
             if len(self._subpaths) > MAX_CONTOURS:
-                raise ToolpathError(f"path data has more than {MAX_CONTOURS} subpaths; split the drawing")
+                raise ToolpathError(
+                    f"path data has more than {MAX_CONTOURS} subpaths; split the drawing", limit=MAX_CONTOURS
+                )
         self._pieces, self._line = [], [self._start]
         self.at, self._handle = self._start, ("", 0j)
 

@@ -72,7 +72,8 @@ def read_svg(
     if not strands:
         raise ToolpathError(
             f"{document.path} draws no outline; expected paths or shapes that are seen"
-            + "".join(f"; {note}" for note in passed.notes)
+            + "".join(f"; {note}" for note in passed.notes),
+            file=str(document.path),
         )
     contours = [
         s.contour(document.path, feed) for s in (strands if gap is None else chain_strands(strands, gap, passed))

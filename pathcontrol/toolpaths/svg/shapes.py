@@ -56,14 +56,14 @@ class _Lengths:
             return None
         value = self._viewport.length(text, name)
         if value < 0:
-            raise ToolpathError(f"{name} = {text!r}, expected a length not below 0")
+            raise ToolpathError(f"{name} = {text!r}, expected a length not below 0", value=text, limit=0.0)
         return value
 
 
 def _poly(values: list[float], closed: bool) -> list[Subpath]:
     """Return the subpath of a polyline or polygon."""
     if len(values) % 2:
-        raise ToolpathError(f"points has {len(values)} numbers, expected x and y of each point")
+        raise ToolpathError(f"points has {len(values)} numbers, expected x and y of each point", value=len(values))
     pen = Pen()
     for i, point in enumerate(zip(values[::2], values[1::2], strict=True)):
         (pen.line if i else pen.move)(complex(*point))

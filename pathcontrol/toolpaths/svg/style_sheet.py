@@ -60,7 +60,9 @@ class StyleSheet:
         css = _EMBEDDED.sub("url()", css)
         self._length += len(css)
         if self._length > _LONGEST:
-            raise ToolpathError(f"the style sheet has more than {_LONGEST} characters; write styles as attributes")
+            raise ToolpathError(
+                f"the style sheet has more than {_LONGEST} characters; write styles as attributes", limit=_LONGEST
+            )
         self._add(tinycss2.parse_stylesheet(css, skip_comments=True, skip_whitespace=True), f"@media {media}", 0)
 
     def match(self, root: Any) -> None:
@@ -101,7 +103,9 @@ class StyleSheet:
     def _add_at_rule(self, rule: Any, depth: int) -> None:
         head = f"@{rule.at_keyword} {_text(rule.prelude).strip()}".strip()
         if rule.lower_at_keyword == "import":
-            raise ToolpathError(f"the style sheet has {head[:60]!r}, which is not fetched: write its rules here")
+            raise ToolpathError(
+                f"the style sheet has {head[:60]!r}, which is not fetched: write its rules here", value=head
+            )
         if rule.lower_at_keyword == "media" and rule.content is not None and depth < 4:
             inside = tinycss2.parse_rule_list(rule.content, skip_comments=True, skip_whitespace=True)
             self._add(inside, head, depth + 1)
@@ -115,14 +119,18 @@ class StyleSheet:
         head = _text(rule.prelude).strip()
         self._selectors += 1 + head.count(",")
         if self._selectors > _MOST_SELECTORS:
-            raise ToolpathError(f"the style sheet has over {_MOST_SELECTORS} selectors; write styles as attributes")
+            raise ToolpathError(
+                f"the style sheet has over {_MOST_SELECTORS} selectors; write styles as attributes",
+                limit=_MOST_SELECTORS,
+            )
         self._slow |= bool(_SLOW.search(head))
         try:
             selectors = compile_selector_list(rule.prelude)
         except (SelectorError, SyntaxError, RecursionError, MemoryError) as error:
             raise ToolpathError(
                 f"the style sheet gives {', '.join(given)} to {head[:60]!r}, which is no selector that is understood: "
-                "write it as attributes"
+                "write it as attributes",
+                value=head,
             ) from error
         for selector in selectors:
             self._matcher.add_selector(selector, given)
@@ -178,7 +186,9 @@ def _check_steps(steps: int) -> None:
 def _refuse_condition(text: str, head: str) -> None:
     """Refuse a conditional rule that affects the geometry."""
     if _DECIDES.search(text):
-        raise ToolpathError(f"the style sheet decides with {head[:60]!r} what is drawn: write it as attributes")
+        raise ToolpathError(
+            f"the style sheet decides with {head[:60]!r} what is drawn: write it as attributes", value=head
+        )
 
 
 def _text(nodes: Any) -> str:

@@ -40,7 +40,9 @@ def nested_view(get: Attributes, outer: Viewport, size: Attributes) -> View:
     place[:2, 3] = [outer.length(get(name) or "0", name) for name in ("x", "y")]
     width, height = (outer.length(_explicit_size(size, name) or "100%", name) for name in ("width", "height"))
     if width < 0 or height < 0:
-        raise ToolpathError(f"width = {width:g}, height = {height:g}, expected lengths not below 0")
+        raise ToolpathError(
+            f"width = {width:g}, height = {height:g}, expected lengths not below 0", value=(width, height), limit=0.0
+        )
     inner = _fit(_view_box(get), Viewport(width, height, outer.ppi), get)
     return View(inner.viewport, place @ inner.matrix)
 
@@ -76,7 +78,11 @@ def _page_size(get: Attributes, box: list[float] | None, ppi: float) -> tuple[fl
     assert width is not None
     assert height is not None
     if not (width > 0 and height > 0):
-        raise ToolpathError(f"the page is {width:g} px wide and {height:g} px high, expected more than 0")
+        raise ToolpathError(
+            f"the page is {width:g} px wide and {height:g} px high, expected more than 0",
+            value=(width, height),
+            limit=0.0,
+        )
     return width, height
 
 
@@ -93,7 +99,7 @@ def _view_box(get: Attributes) -> list[float] | None:
         return None
     box = numbers(text, "viewBox")
     if len(box) != 4 or not min(box[2:]) > 0:
-        raise ToolpathError(f"viewBox = {text[:60]!r}, expected x, y, a width and a height greater than 0")
+        raise ToolpathError(f"viewBox = {text[:60]!r}, expected x, y, a width and a height greater than 0", value=text)
     return box
 
 
@@ -106,7 +112,7 @@ def _fit(box: list[float] | None, viewport: Viewport, get: Attributes) -> View:
     word, *fit = text.split() or [""]
     aspect = _ALIGN.fullmatch(word)
     if aspect is None or fit not in ([], ["meet"], ["slice"]):
-        raise ToolpathError(f"preserveAspectRatio = {text[:60]!r}, expected none or such as xMidYMid meet")
+        raise ToolpathError(f"preserveAspectRatio = {text[:60]!r}, expected none or such as xMidYMid meet", value=text)
     size = np.array([viewport.width, viewport.height])
     scale = size / box[2:]
     if word != "none":

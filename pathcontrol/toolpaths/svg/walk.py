@@ -87,7 +87,9 @@ class Walk:
                 found = self._visit(element, place)
             yield from found
         raise ToolpathError(
-            f"{self._document.path} draws more than {_MOST_ELEMENTS} elements; split it into several files"
+            f"{self._document.path} draws more than {_MOST_ELEMENTS} elements; split it into several files",
+            limit=_MOST_ELEMENTS,
+            file=str(self._document.path),
         )
 
     def _visit(self, element: Any, place: _Place, sized: Attributes | None = None) -> list[Strand]:
@@ -157,7 +159,9 @@ class Walk:
 
     def _use(self, element: Any, place: _Place) -> list[Strand]:
         if place.uses == _MOST_USES:
-            raise ToolpathError(f"more than {_MOST_USES} use elements inside each other; does it refer to itself?")
+            raise ToolpathError(
+                f"more than {_MOST_USES} use elements inside each other; does it refer to itself?", limit=_MOST_USES
+            )
         get, target = self._document.attributes(element), self._document.target(element)
         shift = np.eye(4)
         shift[:2, 3] = [place.viewport.length(get(name) or "0", name) for name in ("x", "y")]
@@ -212,7 +216,8 @@ def _refuse(style: dict[str, str], element: Any) -> None:
         if style[name] not in ("none", "1", "") and not moot:
             raise ToolpathError(
                 f"{name} = {style[name][:60]!r} is not understood: apply it to the shapes in the drawing program, "
-                "or take it away"
+                "or take it away",
+                value=style[name],
             )
 
 

@@ -27,7 +27,7 @@ def decode(data: bytes, name: str) -> str:
         if data.startswith(mark):
             return _decode_strictly(data, encoding, name)
     if b"\0" in data:
-        raise UrdfError(f"{name!r} holds NUL bytes and is no text; expected a URDF, saved as UTF-8")
+        raise UrdfError(f"{name!r} holds NUL bytes and is no text; expected a URDF, saved as UTF-8", value=name)
     try:
         return data.decode()
     except UnicodeDecodeError as error:
@@ -44,7 +44,7 @@ def _decode_strictly(data: bytes, encoding: str, name: str) -> str:
     try:
         return data.decode(encoding)
     except UnicodeDecodeError as error:
-        raise UrdfError(f"{name!r} is not a text file in {encoding.upper()[:6]}: {error}") from error
+        raise UrdfError(f"{name!r} is not a text file in {encoding.upper()[:6]}: {error}", value=name) from error
 
 
 def _decode_as_declared(data: bytes) -> tuple[str, str]:

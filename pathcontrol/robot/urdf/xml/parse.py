@@ -68,9 +68,11 @@ def _encode(text: str) -> bytes:
         data = text.encode()
     except UnicodeEncodeError as error:
         message = f"character {error.start} is not Unicode; save the file as UTF-8"
-        raise UrdfError(message) from None
+        raise UrdfError(message, value=error.start) from None
     if len(data) > MAX_BYTES:
-        raise UrdfError(f"the file has {len(data)} bytes; expected at most {MAX_BYTES}")
+        raise UrdfError(
+            f"the file has {len(data)} bytes; expected at most {MAX_BYTES}", value=len(data), limit=MAX_BYTES
+        )
     return data
 
 
@@ -92,7 +94,7 @@ def _not_xml(error: etree.XMLSyntaxError) -> UrdfError:
     """Return the error about malformed XML."""
     reason = str(error.msg).splitlines()[0][:_LONGEST]  # it repeats names and values of the file
     advice = _RUN_XACRO if "xacro" in reason else "correct that line"
-    return UrdfError(f"line {error.lineno}: not XML: {reason}; {advice}")
+    return UrdfError(f"line {error.lineno}: not XML: {reason}; {advice}", line=error.lineno)
 
 
 def _without_stray_xacro(root: etree._Element) -> list[Finding]:
@@ -155,7 +157,9 @@ def _refuse_other_roots(root: etree._Element) -> None:
             namespace = quote(name.namespace)
             raise UrdfError(
                 f"line {element.sourceline}: <{name.localname}> is in the XML namespace {namespace}; "
-                "expected none, remove that xmlns"
+                "expected none, remove that xmlns",
+                value=name.namespace,
+                line=element.sourceline,
             )
 
 
