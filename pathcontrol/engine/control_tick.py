@@ -8,7 +8,8 @@ from ctypes import addressof
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_joint_array, as_scalar
+from pathcontrol._arrays import Array, as_joint_array
+from pathcontrol._milliseconds import as_period
 from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.control.law_gains import refuse_several_gains
 from pathcontrol.control.wrappers.override_rule import Override, check_one_speed
@@ -58,7 +59,7 @@ class ControlTick:
                 "the law is for several rollouts, expected one task and one set of gains", argument="law", value=law
             )
         refuse_several_gains(law)
-        self.law, self._period = law, as_scalar("period", period, positive=True)
+        self.law, self._period = law, as_period("period", period)
         make = _CompiledTick if type(law) in GAINS and law.observer is None else _PythonTick
         self._tick: _PythonTick | _CompiledTick = make(law, self._period)
         self.start(np.zeros(law.robot.n) if law.start_at == "s0" else law.task.q_d(np.array(law.task.s0)))

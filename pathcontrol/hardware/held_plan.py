@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 from pathcontrol._arrays import Array
@@ -9,7 +11,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.control.wrappers.speed_override import SpeedOverride
 from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.engine.control_tick import ControlTick
-from pathcontrol.errors import EngineError, TaskError
+from pathcontrol.errors import EngineError, PathControlWarning, TaskError
 
 _FULL = 1e-9  # of the speed that may be missing when the law goes on without the speed input
 
@@ -101,6 +103,8 @@ class HeldPlan:
 def _compiled(law: Controller, period: float) -> ControlTick | None:
     """Return the compiled tick of a law, None where there is none."""
     try:
-        return ControlTick(law, period)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PathControlWarning)  # the tick with the speed input has said it
+            return ControlTick(law, period)
     except EngineError:
         return None

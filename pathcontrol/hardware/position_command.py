@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, as_joint_vector, as_scalar, freeze
+from pathcontrol._milliseconds import LONGEST_LAG, as_period, question_time
 from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.control.law_gains import refuse_several_gains
 from pathcontrol.control.wrappers.override_rule import Override, check_one_speed
@@ -97,10 +98,12 @@ class PositionCommand:
         refuse_several_gains(law)
         self._wait = WaitRule(as_scalar("tolerance", tolerance, positive=True))
         self.law = LawWrapper(law, self._wait)
-        self.period, robot = as_scalar("period", period, positive=True), law.robot
+        self.period, robot = as_period("period", period), law.robot
         self._omega = as_scalar("bandwidth", bandwidth, positive=True)
         self._tube = read_tube(tube)
-        self._servo = ServoModel(_spread("lag", lag, robot.n, least=0.0), self.period)
+        lags = _spread("lag", lag, robot.n, least=0.0)
+        question_time("lag", float(lags.max()), LONGEST_LAG)
+        self._servo = ServoModel(lags, self.period)
         limit = np.where(
             (robot.limits.velocity > 0) & (robot.limits.velocity < _NO_LIMIT), robot.limits.velocity, np.inf
         )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, as_scalar, check_finite
+from pathcontrol._milliseconds import LONGEST_DELAY, as_period, question_time
 from pathcontrol.arguments import Form, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import RobotBatch
@@ -66,8 +67,8 @@ class SampledLoop:
     noise: SensorNoise | None = None
 
     def __post_init__(self) -> None:
-        as_scalar("period", self.period, positive=True)
-        as_scalar("delay", self.delay, least=0.0)
+        as_period("period", self.period)
+        question_time("delay", as_scalar("delay", self.delay, least=0.0), LONGEST_DELAY)
         if not isinstance(self.substeps, int | np.integer) or not 1 <= self.substeps <= MOST_SUBSTEPS:
             raise InputError(
                 f"substeps = {self.substeps!r:.80}, expected a whole number from 1 to {MOST_SUBSTEPS}",
