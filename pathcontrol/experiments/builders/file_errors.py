@@ -5,13 +5,18 @@ from __future__ import annotations
 import contextlib
 import json
 import re
+import sysconfig
+import traceback
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from pathcontrol._advice import reword_advice
 from pathcontrol._units import Quantity, list_units
 from pathcontrol.errors import ExperimentError, PathControlError
 
+_PACKAGE = Path(__file__).parents[2]
+_INSTALLED = {"site-packages", "dist-packages"}
 _LISTS = str.maketrans("()", "[]")  # of Python and of TOML
 
 
@@ -35,7 +40,8 @@ def report_by_key(key: str, fields: Iterable[str] | Mapping[str, str] = ()) -> I
         details = error.details_with() if isinstance(error, PathControlError) else {}
         if (name := details.get("argument")) in names:
             details["argument"] = f"{key}.{names[name]}"
-        raise ExperimentError(f"{key}{joint}{message}", **details) from error
+        place = find_place(error) if joint == ": " else ""
+        raise ExperimentError(f"{key}{joint}{message}{place}", **details) from error
 
 
 def _line(name: str, value: str) -> str:
@@ -58,7 +64,7 @@ def report_users_code(key: str, doing: str, fields: Iterable[str] = ()) -> Itera
     except PathControlError:
         raise
     except Exception as error:
-        raise ExperimentError(f"{key}: {doing} raised {describe_error(error)}") from error
+        raise ExperimentError(f"{key}: {doing} raised {describe_error(error)}{find_place(error)}") from error
 
 
 def refuse_unit(key: str, value: Any, unit: str) -> None:
@@ -69,6 +75,19 @@ def refuse_unit(key: str, value: Any, unit: str) -> None:
     """
     if isinstance(value, Quantity) and value.unit != unit:
         raise ExperimentError(f"{key} was given in {value.unit}, expected {list_units([unit])}: so the joint moves")
+
+
+def find_place(error: BaseException) -> str:
+    """Return `` (FILE, line N)``, the last line of the user's own files that an exception passed, or ""."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if Path(frame.filename).is_file() and not _is_installed(Path(frame.filename))]
+    return f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
+
+
+def _is_installed(file: Path) -> bool:
+    """Return whether a file is of this package, of Python, or of an installed package."""
+    folders = [_PACKAGE, *(Path(sysconfig.get_path(name)) for name in ("stdlib", "purelib", "platlib"))]
+    return any(map(file.is_relative_to, folders)) or not _INSTALLED.isdisjoint(file.parts)
 
 
 def describe_error(error: BaseException) -> str:
