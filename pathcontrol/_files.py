@@ -14,6 +14,7 @@ import stat
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from pathcontrol.errors import InputError, PathControlError, StorageError
 
@@ -23,6 +24,18 @@ _NOT_TAKEN = frozenset(
     getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS", "EACCES", "EPERM", "ENAMETOOLONG")
 )
 _parts: set[Path] = set()  # temporary files that this process has, or is about to have
+
+
+def as_path(name: str, value: Any) -> Path:
+    """Convert the name of a file or a folder to a path; errors name it.
+
+    Raises:
+        InputError: it is neither a text nor a path.
+    """
+    try:
+        return Path(value)
+    except TypeError as error:
+        raise InputError(f"{name} = {value!r:.80}, expected a path, as a text", argument=name, value=value) from error
 
 
 @contextlib.contextmanager
@@ -36,7 +49,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         InputError: ``path`` is a folder, or below a file.
         StorageError: the disk is full, or does not take the file; what was there before stays.
     """
-    target = Path(path).resolve()  # through a link, to the file that is meant
+    target = as_path("path", path).resolve()  # through a link, to the file that is meant
     with writing(target):
         if target.is_dir():
             raise InputError(

@@ -199,6 +199,7 @@ REFUSED = [
     (lambda: pc.ToolCurve.line([1.0, 2.0, 3.0], [1.0, 2.0, 3.0]), "end", [1.0, 2.0, 3.0]),
     (lambda: pc.ToolCurve.line([1.0, 2.0], [1.0, 2.0, 3.0]), "start", [1.0, 2.0]),
     (lambda: pc.ToolCurve.spline(POINTS), "points", POINTS),
+    (lambda: pc.read_toolpath(3.5), "path", 3.5),
     # simulation
     (lambda: simulated(duration=-2.0), "duration", -2.0),
     (lambda: simulated(loop="fast"), "loop", "fast"),
@@ -219,6 +220,7 @@ REFUSED = [
     (lambda: run().rollout(7), None, 7),
     (lambda: run()["speed"], None, "speed"),
     (lambda: run().to_trajectory(100.0, rollout=9), "rollout", 9),
+    (lambda: pc.Run.load(b"a.nc"), "path", b"a.nc"),
     # analysis
     (lambda: pc.metrics(run(), window="most"), "window", "most"),
     (lambda: pc.metrics(run(), fraction=1.5), "fraction", 1.5),
@@ -230,7 +232,10 @@ REFUSED = [
     (lambda: pc.Space.grid({"k": [1.0, math.inf]}), "k", math.inf),
     (lambda: pc.Space.random({"k": [1.0, 2.0]}, samples=-3), "samples", -3),
     (lambda: pc.Keep(worst=-1), "keep.worst", -1),
+    (lambda: pc.SweepResult(7), "folder", 7),
+    (lambda: pc.sweep(dict, pc.Space.grid({"k": [1.0]}), out=7), "out", 7),
     # comparison, view, experiments
+    (lambda: pc.run_experiment(3, "out"), "path", 3),
     (lambda: pc.make_scenario("moon"), "scenario", "moon"),
     (lambda: pc.save_figure(3, "a.svg"), "figure", 3),
 ]

@@ -12,6 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from pathcontrol._files import as_path
 from pathcontrol.errors import ExperimentError
 from pathcontrol.experiments.schema.experiment import Experiment
 from pathcontrol.experiments.schema.validators import show_value
@@ -29,7 +30,7 @@ def load_experiment(path: str | Path) -> Experiment:
         ExperimentError: the file is missing, is not TOML, or says what it must not; the message has one line
             for each error, with the key path, the value, what was expected and the choices.
     """
-    path = Path(path)
+    path = as_path("path", path)
     data = read_toml(path)
     try:
         return Experiment.model_validate(data)
@@ -81,7 +82,7 @@ def read_text(path: str | Path) -> str:
     Raises:
         ExperimentError: the file is missing, is no regular file, is too long or is no text in UTF-8.
     """
-    path = Path(path)
+    path = as_path("path", path)
     try:
         data = _read(path)
         return data.decode("utf-8-sig").replace("\r\n", "\n")

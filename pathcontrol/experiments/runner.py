@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pathcontrol._files import as_path
 from pathcontrol.errors import ExperimentError, warn
 from pathcontrol.experiments.builders.setup import Setup, build
 from pathcontrol.experiments.load import load_experiment, make_build_error, read_text
@@ -49,7 +50,7 @@ def run_experiment(
         InputError: ``out_dir`` cannot be written to.
         SimulationError: the simulation diverged.
     """
-    setup, text, out_dir = load_setup(path), read_text(path), Path(out_dir)
+    setup, text, out_dir = load_setup(path), read_text(path), as_path("out_dir", out_dir)
     with output_folder(out_dir, setup.output):
         run = _simulate(setup if engine is None else setup._replace(engine=engine), progress)
         run.config["experiment"] = text

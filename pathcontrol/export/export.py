@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from pathcontrol._expect import expect, expect_choice
-from pathcontrol._files import write_whole
+from pathcontrol._files import as_path, write_whole
 from pathcontrol.errors import InputError, warn
 from pathcontrol.export.formats import FORMATS, Format
 from pathcontrol.robot.model import RobotModel
@@ -48,7 +48,8 @@ def export_trajectory(
     if robot is not None:
         _check_limits(trajectory, robot, limits)
     write, suffix = FORMATS[format]
-    path = Path(path) if Path(path).suffix else Path(path).with_suffix(suffix)
+    path = as_path("path", path)
+    path = path if path.suffix else path.with_suffix(suffix)
     write_whole(path, write(trajectory).encode())
     return path
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol._files import write_whole, writing
+from pathcontrol._files import as_path, write_whole, writing
 from pathcontrol.errors import InputError, warn
 from pathcontrol.sweeps.chunk import Chunk
 from pathcontrol.sweeps.histories import Keep
@@ -47,7 +47,7 @@ class Store:
     """
 
     def __init__(self, folder: str | Path, mending: bool = False) -> None:
-        self.folder = Path(folder)
+        self.folder = as_path("folder", folder)
         self.manifest = Manifest(self.folder, mending)
         self.samples = self.manifest.samples
         load_parquet()  # or tell now that it is missing
@@ -62,7 +62,7 @@ class Store:
         Raises:
             InputError: something is there that would get mixed up with it.
         """
-        folder = Path(folder)
+        folder = as_path("folder", folder)
         if (folder / MANIFEST).exists():
             raise InputError(
                 f"{str(folder)!r} holds a sweep already; resume it (resume=True), or name another folder",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pathcontrol._arrays import Array, check_whole
 from pathcontrol._expect import expect
-from pathcontrol._files import hold_lock, writing
+from pathcontrol._files import as_path, hold_lock, writing
 from pathcontrol._progress import progress_bar
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.arguments import Form
@@ -99,7 +99,7 @@ def sweep(
         computed = partial(_compute_here, job) if client is None else Dispatcher(client, job).chunks
         definition = _definition(build, space, design, metrics, keep, seed)
         definition |= {"engine": engine}
-        with open_store(Path(out), space.samples, definition, resume) as store:
+        with open_store(out, space.samples, definition, resume) as store:
             store.tidy(keep, job.at_random)
             missing, done, tell = store.missing(chunk), 0, WarningFilter()
             pieces = (({name: values[samples] for name, values in design.items()}, samples) for samples in missing)
@@ -119,17 +119,18 @@ def _compute_here(job: Job, pieces: Iterable[Piece]) -> Generator[Chunk]:
 
 
 @contextmanager
-def open_store(folder: Path, samples: int, definition: Mapping[str, Any], resume: bool) -> Iterator[Store]:
+def open_store(out: str | Path, samples: int, definition: Mapping[str, Any], resume: bool) -> Iterator[Store]:
     """Give the store of a new sweep, or with ``resume`` of one that was begun; remove it if it stays empty.
 
     Raises:
         InputError: something else is there, or another process writes there.
     """
     load_parquet()
+    folder = as_path("out", out)
     if folder.exists() and not folder.is_dir():
         raise InputError(
             f"{str(folder)!r} is a file, expected a folder for the sweep; name another",
-            argument="folder",
+            argument="out",
             value=str(folder),
             file=str(folder),
         )

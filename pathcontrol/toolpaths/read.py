@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from pathcontrol._files import as_path
 from pathcontrol.errors import InputError, ToolpathError, warn
 from pathcontrol.toolpaths.contour import Toolpath
 
@@ -47,7 +48,7 @@ def read_toolpath(path: str | Path, **options: Any) -> Toolpath:
         ToolpathError: no reader knows such files, or the file cannot be used; the message says where and why.
         InputError: the reader has no such option.
     """
-    reader = _reader(Path(path))
+    reader = _reader(as_path("path", path))
     known = [name for name in inspect.signature(reader).parameters if name != "path"]
     unknown = sorted(set(options) - set(known))
     if unknown:

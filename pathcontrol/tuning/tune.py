@@ -108,7 +108,7 @@ def tune(
         "engine": engine,
     }
     total, measure = population * generations * count, make_measure(wanted)
-    folder = nullcontext() if out is None else open_store(Path(out), total, json.loads(json.dumps(definition)), resume)
+    folder = nullcontext() if out is None else open_store(out, total, json.loads(json.dumps(definition)), resume)
     tables: list[xr.Dataset] = []
     with folder as store, progress_bar("tune", generations, progress) as update:
         cases = Cases(Job(build, measure, engine=engine), design, count, chunk, store, _read_recorded(store))

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pathcontrol._files import as_path
 from pathcontrol._suffixes import check_suffix
 from pathcontrol.simulation.context import StoredContext
 from pathcontrol.simulation.samples import Samples
@@ -40,7 +41,7 @@ def read_file(path: str | Path) -> tuple[xr.Dataset, dict[str, Any], StoredConte
     Raises:
         InputError: there is no such file, it is damaged, or it is not a saved run.
     """
-    path = Path(path)
+    path = as_path("path", path)
     if _begins_as_mcap(path) or (path.suffix.lower() == ".mcap" and path.is_file()):
         from pathcontrol.simulation.storage.mcap_run import read_mcap
 
