@@ -275,7 +275,7 @@ def test_what_a_message_says_stands_beside_it(call, argument, value):
 
 
 #: errors of the package that say nothing but their message; a new one has what it is about beside it
-SILENT = 110
+SILENT = 107
 
 
 def test_most_errors_have_attributes():
@@ -308,6 +308,9 @@ K_v = 10.0
         ("radius = 1.0", "radius = true", "task.radius", True),  # of the file alone
         ("radius = 1.0", "radius = -1.0", "task.radius", -1.0),
         ("K_p = 100.0", "K_p = [100.0, -1.0]", "controller.K_p", [100.0, -1.0]),  # of what the law takes
+        ("duration = 1.0", "duration = 1.0\nlaps = 0", "laps", 0),  # of both together
+        ("duration = 1.0", "duration = 1.0\n[loop]\nperiod = 0.01\ndelay = 3.0", "loop.delay", 3.0),
+        ("duration = 1.0", "duration = 1.0\n[output]\nfigure_joints = [0, 4]", "output.figure_joints", [0, 4]),
     ],
 )
 def test_an_experiment_file_names_the_key_and_its_value(tmp_path, old, new, key, value):

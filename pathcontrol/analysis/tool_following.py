@@ -160,7 +160,11 @@ def require_tool(robot: RobotModel, task: PathTask) -> Tool:
         InputError: the path was made for none.
     """
     if task.frame is None:
-        raise InputError(f"the {type(task).__name__} was not made for a frame of the arm, so it has no tool")
+        raise InputError(
+            f"the {type(task).__name__} was not made for a frame of the arm, so it has no tool",
+            argument="task",
+            value=task,
+        )
     return Tool(robot, task.frame, task.tool_pose)
 
 

@@ -88,7 +88,8 @@ def read_text(path: str | Path) -> str:
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except FileNotFoundError as error:
         raise ExperimentError(
-            f"there is no experiment file {str(path)!r}; `pathcontrol run --example` prints one to start from"
+            f"there is no experiment file {str(path)!r}; `pathcontrol run --example` prints one to start from",
+            file=str(path),
         ) from error
     except UnicodeDecodeError as error:
         line, byte = data[: error.start].count(b"\n") + 1, data[error.start]

@@ -42,7 +42,9 @@ def load_scenario(path: str | Path) -> Scenario:
     """
     setup, path = load_setup(path), Path(path)
     if isinstance(setup.task, PathSequence):
-        raise ExperimentError(f"{str(path)!r} follows a sequence of paths; laws are compared on a single path")
+        raise ExperimentError(
+            f"{str(path)!r} follows a sequence of paths; laws are compared on a single path", file=str(path)
+        )
     try:
         gains, operator = recover_gains(setup.controller), _find_override(setup.controller)
         scenario = Scenario(
@@ -63,7 +65,9 @@ def load_scenario(path: str | Path) -> Scenario:
             **operator,
         )
     except InputError as error:
-        raise ExperimentError(f"{str(path)!r} is no scenario for a comparison: {error}") from error
+        raise ExperimentError(
+            f"{str(path)!r} is no scenario for a comparison: {error}", **error.details_with(file=str(path))
+        ) from error
     _warn_of_wrappers(setup.controller, path)
     _warn_of_start(setup, path)
     calm = replace(scenario, disturbance=None, override=None)

@@ -58,7 +58,7 @@ def run_sweep(
     with connect(cluster, security) as client:
         try:
             if section is None:
-                raise ExperimentError("sweep: missing; add a section [sweep] with its parameters")
+                raise ExperimentError("sweep: missing; add a section [sweep] with its parameters", argument="sweep")
             data = of_samples(read_toml(path)) | ({} if engine is None else {"engine": engine})
             build = SweptExperiment(data, Path(path).parent.absolute(), section.parameters)
             space = space_of(section)
@@ -84,7 +84,9 @@ def space_of(section: SweepSection) -> Space:
     if (section.method == "grid") != (section.samples is None):
         large = "is as large as its grids; leave samples out, or take method = 'random'"
         said = large if section.method == "grid" else "needs samples = …"
-        raise ExperimentError(f"sweep.samples: method = {section.method!r} {said}")
+        raise ExperimentError(
+            f"sweep.samples: method = {section.method!r} {said}", argument="sweep.samples", value=section.samples
+        )
     with report_by_key("sweep", ("samples",)):
         return Space(parameters, section.method, section.samples)
 
@@ -101,11 +103,13 @@ def values_of(key: str, given: dict[str, list[Any]]) -> Any:
             a, b = (np.asarray(value, dtype=np.float64) for value in values)
             a, b = np.broadcast_arrays(a, b)
         except (TypeError, ValueError) as error:
-            raise ExperimentError(f"{key}: {kind} = {values}, expected numbers or lists") from error
+            raise ExperimentError(
+                f"{key}: {kind} = {values}, expected numbers or lists", argument=key, value=values
+            ) from error
         least = {"uniform": a < b, "log_uniform": (a > 0) & (a < b), "normal": b > 0}[kind]
         if not least.all() or not np.isfinite([a, b]).all():
             wanted = {"uniform": "a < b", "log_uniform": "0 < a < b", "normal": "a deviation greater than 0"}[kind]
-            raise ExperimentError(f"{key}: {kind} = {values}, expected {wanted}")
+            raise ExperimentError(f"{key}: {kind} = {values}, expected {wanted}", argument=key, value=values)
     a, b = a[()], b[()]
     if kind == "uniform":
         return stats.uniform(a, b - a)

@@ -46,7 +46,7 @@ def run_tune(
     section = load_experiment(path).tune
     try:
         if section is None:
-            raise ExperimentError("tune: missing; add a section [tune] with parameters and objectives")
+            raise ExperimentError("tune: missing; add a section [tune] with parameters and objectives", argument="tune")
         varied = {"parameters": section.parameters, "scenarios": section.scenarios}
         data = of_samples(read_toml(path)) | ({} if engine is None else {"engine": engine})
         build = SweptExperiment(data, Path(path).parent.absolute(), varied, "tune")
@@ -66,7 +66,11 @@ def run_tune(
 def _space(section: TuneSection) -> Space:
     for key, given in section.parameters.items():
         if "normal" in given:
-            raise ExperimentError(f"tune.parameters.{key}: normal has no ends to search between; give uniform = [a, b]")
+            raise ExperimentError(
+                f"tune.parameters.{key}: normal has no ends to search between; give uniform = [a, b]",
+                argument=f"tune.parameters.{key}",
+                value=given["normal"],
+            )
     values = {key: values_of(f"tune.parameters.{key}", given) for key, given in section.parameters.items()}
     with report_by_key("tune.parameters"):
         return Space.random(values, 1)

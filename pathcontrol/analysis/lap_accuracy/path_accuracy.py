@@ -276,9 +276,15 @@ def choose_path(task: PathTask, rollout: int) -> PathTask:
     """
     path = task.tasks[rollout] if isinstance(task, TaskBatch) else task
     if isinstance(task, TaskBatch) and path.period is None:
-        raise InputError("each rollout has an open path of its own; accuracy needs rollouts along one path")
+        raise InputError(
+            "each rollout has an open path of its own; accuracy needs rollouts along one path",
+            argument="task",
+            value=task,
+        )
     if path.period is None and not np.isfinite(path.s_end):
-        raise InputError(f"{type(path).__name__} neither ends nor repeats, so it has no cycles")
+        raise InputError(
+            f"{type(path).__name__} neither ends nor repeats, so it has no cycles", argument="task", value=path
+        )
     return path
 
 

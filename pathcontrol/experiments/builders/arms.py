@@ -48,7 +48,8 @@ def build_models(experiment: Experiment, base_dir: Path) -> tuple[RobotModel, Ro
     if not model.has_mass:
         raise ExperimentError(
             f"robot: no link of {model.name} has a mass, so there are kinematics and no dynamics; give "
-            "estimated_inertia = true, a density as in estimated_inertia = 2700.0, or <inertial> in the URDF"
+            "estimated_inertia = true, a density as in estimated_inertia = 2700.0, or <inertial> in the URDF",
+            argument="robot",
         )
     return bare, model
 
@@ -122,7 +123,10 @@ def _refuse_degrees(robot: RobotModel, sliding: set[str]) -> None:
     if free:
         raise ExperimentError(
             f"angle_unit = 'deg', but {', '.join(free)} of {robot.name} slides, and a length is no angle; "
-            "write the file in 'rad' and metres, or lock the joint"
+            "write the file in 'rad' and metres, or lock the joint",
+            argument="angle_unit",
+            value="deg",
+            joint=free[0],
         )
 
 

@@ -64,7 +64,9 @@ def report_users_code(key: str, doing: str, fields: Iterable[str] = ()) -> Itera
     except PathControlError:
         raise
     except Exception as error:
-        raise ExperimentError(f"{key}: {doing} raised {describe_error(error)}{find_place(error)}") from error
+        raise ExperimentError(
+            f"{key}: {doing} raised {describe_error(error)}{find_place(error)}", argument=key
+        ) from error
 
 
 def refuse_unit(key: str, value: Any, unit: str) -> None:
@@ -74,7 +76,11 @@ def refuse_unit(key: str, value: Any, unit: str) -> None:
         ExperimentError: it was.
     """
     if isinstance(value, Quantity) and value.unit != unit:
-        raise ExperimentError(f"{key} was given in {value.unit}, expected {list_units([unit])}: so the joint moves")
+        raise ExperimentError(
+            f"{key} was given in {value.unit}, expected {list_units([unit])}: so the joint moves",
+            argument=key,
+            value=value,
+        )
 
 
 def find_place(error: BaseException) -> str:

@@ -21,7 +21,9 @@ def pose_of(key: str, arguments: Mapping[str, Any]) -> Array:
     given = {name: arguments.get(name, [0.0, 0.0, 0.0]) for name in ("position", "rpy")}
     for name, value in given.items():
         if len(value) != 3:
-            raise ExperimentError(f"{key}.{name} = {value}, expected three numbers")
+            raise ExperimentError(
+                f"{key}.{name} = {value}, expected three numbers", argument=f"{key}.{name}", value=value
+            )
     pose = np.eye(4)
     pose[:3, :3] = rotation_of_rpy(given["rpy"])
     pose[:3, 3] = given["position"]

@@ -104,7 +104,9 @@ def _controllers(experiment: Experiment, model: RobotModel, task: PathTask, plac
         return (law_of(experiment, model, task, place),)
     if experiment.until != "end":
         raise ExperimentError(
-            f"until = {experiment.until!r}, expected 'end': each path of a sequence is followed to it"
+            f"until = {experiment.until!r}, expected 'end': each path of a sequence is followed to it",
+            argument="until",
+            value=experiment.until,
         )
     return tuple(law_of(experiment, model, path, place) for path in task.paths)
 
@@ -130,7 +132,10 @@ def _refuse_joints(output: Output, robot: RobotModel) -> None:
     if output.figure_joints is not None and max(output.figure_joints) >= robot.n:
         raise ExperimentError(
             f"output.figure_joints = {list(output.figure_joints)}, expected indices from 0 to {robot.n - 1}: "
-            f"{', '.join(robot.joint_names)}"
+            f"{', '.join(robot.joint_names)}",
+            argument="output.figure_joints",
+            value=list(output.figure_joints),
+            limit=(0, robot.n - 1),
         )
 
 
@@ -155,7 +160,7 @@ def _check_loop(
     """Check that the loop can do what the disturbance does, and say so in the keys of the file."""
     named = None if disturbance is None else disturbance.find_names(plant)
     if misfit := find_misfit(named, loop, q[None]):
-        raise ExperimentError(f"disturbance: {misfit.problem}; {_LOOP_KEYS[misfit.lacks]}")
+        raise ExperimentError(f"disturbance: {misfit.problem}; {_LOOP_KEYS[misfit.lacks]}", argument="disturbance")
 
 
 def _refuse_too_long(duration: float, name: str, period: float, delay: float = 0.0) -> None:
@@ -163,10 +168,17 @@ def _refuse_too_long(duration: float, name: str, period: float, delay: float = 0
     if samples > _MOST_SAMPLES:
         raise ExperimentError(
             f"duration = {duration:g} and loop.{name} = {period:g} make {samples:.3g} samples, "
-            f"expected at most {_MOST_SAMPLES:.0e}: shorten the one or lengthen the other"
+            f"expected at most {_MOST_SAMPLES:.0e}: shorten the one or lengthen the other",
+            argument="duration",
+            value=duration,
         )
     if delay > duration:
-        raise ExperimentError(f"loop.delay = {delay:g}, expected at most duration = {duration:g}")
+        raise ExperimentError(
+            f"loop.delay = {delay:g}, expected at most duration = {duration:g}",
+            argument="loop.delay",
+            value=delay,
+            limit=duration,
+        )
 
 
 def _state(experiment: Experiment, controller: Controller) -> tuple[Array, Array]:

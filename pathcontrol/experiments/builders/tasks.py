@@ -65,13 +65,15 @@ def build_duration(experiment: Experiment, task: PathTask) -> tuple[float | Arra
     laps = experiment.laps
     if laps is not None and (not task.closed or laps < 1):
         closed = "" if task.closed else f" of a closed path, but {type(task).__name__} is open; leave it out"
-        raise ExperimentError(f"laps = {laps}, expected a whole number from 1{closed}")
+        raise ExperimentError(f"laps = {laps}, expected a whole number from 1{closed}", argument="laps", value=laps)
     if experiment.duration is not None:
         return float(experiment.duration), laps
     if isinstance(task, PathSequence):
         return np.array([_generous_duration(path) for path in task.paths]), None
     if laps is None and not np.isfinite(task.s_end):
-        raise ExperimentError(f"duration: missing; {type(task).__name__} does not end by itself; give it or laps")
+        raise ExperimentError(
+            f"duration: missing; {type(task).__name__} does not end by itself; give it or laps", argument="duration"
+        )
     return _generous_duration(task, laps or 1), laps
 
 

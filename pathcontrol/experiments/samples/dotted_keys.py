@@ -40,7 +40,9 @@ def check_keys(keys: list[str], where: str) -> None:
         outer = _steps(one, where)
         if _steps(other, where)[: len(outer)] == outer:
             raise ExperimentError(
-                f"{where}: {other!r} is a part of what {one!r} sets, so that one of them would not count; vary one only"
+                f"{where}: {other!r} is a part of what {one!r} sets, so that one of them would not count; "
+                "vary one only",
+                argument=other,
             )
 
 
@@ -51,7 +53,9 @@ def section_of_key(key: str) -> str:
 
 def _steps(key: str, where: str) -> list[str | int]:
     if not _KEY.fullmatch(key):
-        raise ExperimentError(f"{where}: {key!r}, expected a key of this file, such as 'controller.k' or 'start.q[0]'")
+        raise ExperimentError(
+            f"{where}: {key!r}, expected a key of this file, such as 'controller.k' or 'start.q[0]'", argument=key
+        )
     return [name or int(index) for name, index in _STEP.findall(key)]
 
 
@@ -60,5 +64,7 @@ def _entry(inside: Any, step: str | int, key: str) -> Any:
         return inside[step]
     except (KeyError, IndexError, TypeError) as error:
         raise ExperimentError(
-            f"{key}: the file has no entry {step!r} on the way there; give a value for it, or vary the whole list"
+            f"{key}: the file has no entry {step!r} on the way there; give a value for it, or vary the whole list",
+            argument=key,
+            value=step,
         ) from error

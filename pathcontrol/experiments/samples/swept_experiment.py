@@ -116,7 +116,9 @@ class SweptExperiment:
             try:
                 parts += self._parts(key, np.array(rows), [experiments[row] for row in rows], varied)
             except ExperimentError as error:
-                raise ExperimentError(f"in samples {samples[rows[0]]} to {samples[rows[-1]]}: {error}") from error
+                raise ExperimentError(
+                    f"in samples {samples[rows[0]]} to {samples[rows[-1]]}: {error}", **error.details_with()
+                ) from error
         return parts
 
     def _parts(
@@ -170,7 +172,9 @@ class SweptExperiment:
             if (numbers < 0).any() or (not zero[name] and (numbers == 0).any()):
                 raise ExperimentError(
                     f"{self._where}: controller.{name} = {show_value(arguments[name])} in sample {sample}, expected "
-                    "gains greater than 0; choose another distribution, such as log_uniform"
+                    "gains greater than 0; choose another distribution, such as log_uniform",
+                    argument=f"controller.{name}",
+                    value=numbers,
                 )
 
     def _experiment(self, parameters: Mapping[str, Array], row: int, sample: int) -> Experiment:
@@ -237,7 +241,11 @@ def _states(setup: Setup, experiments: list[Experiment], tasks: list[SweptTask])
         with report_by_key(f"start.{name}"):
             wrong = [state.tolist() for state in states if state.shape != setup.q.shape]
             if wrong:
-                raise ExperimentError(f"start.{name} = {wrong[0]}, expected {len(setup.q)} values, one for each joint")
+                raise ExperimentError(
+                    f"start.{name} = {wrong[0]}, expected {len(setup.q)} values, one for each joint",
+                    argument=f"start.{name}",
+                    value=wrong[0],
+                )
     return np.array(found["q"]), np.array(found["qd"])
 
 

@@ -50,7 +50,7 @@ def build_tasks(experiments: Sequence[Experiment], model: RobotModel, base_dir: 
 def refuse_sequence(task: PathTask) -> None:
     """Refuse a sequence of paths, as a sweep is of single tasks."""
     if isinstance(task, PathSequence):
-        raise ExperimentError("task: a sequence of paths cannot be swept; sweep one of its paths")
+        raise ExperimentError("task: a sequence of paths cannot be swept; sweep one of its paths", argument="task")
 
 
 def group_rows(tasks: Sequence[SweptTask]) -> list[NDArray[np.intp]]:
