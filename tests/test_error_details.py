@@ -310,6 +310,8 @@ K_v = 10.0
         ("K_p = 100.0", "K_p = [100.0, -1.0]", "controller.K_p", [100.0, -1.0]),  # of what the law takes
         ("duration = 1.0", "duration = 1.0\nlaps = 0", "laps", 0),  # of both together
         ("duration = 1.0", "duration = 1.0\n[loop]\nperiod = 0.01\ndelay = 3.0", "loop.delay", 3.0),
+        ("[task]", "[robot.friction]\nviscous = [1.0]\n[task]", "robot.friction.viscous", [1.0]),  # of the arm
+        ("duration = 1.0", "duration = 1.0\n[loop]\nencoders = [1.0]", "loop.encoders", [1.0]),
         ("duration = 1.0", "duration = 1.0\n[output]\nfigure_joints = [0, 4]", "output.figure_joints", [0, 4]),
     ],
 )
@@ -331,6 +333,15 @@ def test_a_drawing_that_cannot_be_read_names_its_own_line(tmp_path):
     error = raised(pc.ExperimentError, lambda: pc.run_experiment(file, tmp_path / "out"))
     assert (error.file, error.line) == (str(drawing), 3)
     assert error.findings[0].startswith("task.file: ")
+
+
+def test_a_toolpath_without_feed_names_the_key_that_gives_one(tmp_path):
+    (tmp_path / "part.csv").write_text("0,0,0\n1,0,0\n")
+    file = tmp_path / "e.toml"
+    start = FILE.index("[task]"), FILE.index("[controller]")
+    task = '[task]\ntype = "toolpath"\nfile = "part.csv"\nframe = "tool"\nunit = "mm"\n'
+    file.write_text(FILE[: start[0]] + task + FILE[start[1] :])
+    assert raised(pc.ExperimentError, lambda: pc.run_experiment(file, tmp_path / "out")).argument == "task.feed"
 
 
 def test_all_is_none_where_an_error_is_not_about_it():

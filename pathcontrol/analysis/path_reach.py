@@ -133,7 +133,7 @@ def _find_robot(task: PathTask, robot: RobotModel | None, frame: str | None) -> 
     own = getattr(task, "robot", None)
     found = own if robot is None and isinstance(own, RobotModel) else robot
     if frame is not None and found is None:
-        raise InputError(f"frame = {frame!r} is of an arm; give robot=load_robot(...)", argument="robot")
+        raise InputError(f"frame = {frame!r} is of an arm; give robot=load_robot(...)", argument="frame", value=frame)
     known = task.frame is not None and found is not None and task.frame in found.frame_names
     return found if frame is not None or known else None
 

@@ -30,9 +30,8 @@ def _coefficients(name: str, value: ArrayLike, argument: str) -> Array:
     with about(argument=argument):
         array = check_physical(name, np.atleast_1d(as_array(name, value)))
         if (array < 0).any():
-            raise InputError(
-                f"{name} = {array.tolist()}, expected no negative value: friction takes energy out", value=value
-            )
+            wanted = "no negative value: friction takes energy out"
+            raise InputError(f"{name} = {array.tolist()}, expected {wanted}", argument=argument, value=value)
     return freeze(array)
 
 

@@ -114,11 +114,15 @@ def sample_times(rate: float, duration: float) -> Array:
     """
     rate = as_scalar("rate", rate, positive=True)
     if not 1e-3 <= rate <= _FASTEST:
-        raise InputError(f"rate = {rate:g}, expected samples per second, from 0.001 to {_FASTEST:g} Hz", value=rate)
+        raise InputError(
+            f"rate = {rate:g}, expected samples per second, from 0.001 to {_FASTEST:g} Hz", argument="rate", value=rate
+        )
     count = int(duration * rate + _ROUNDING) + 1
     if not 2 <= count <= _MOST:
         raise InputError(
-            f"rate = {rate:g} Hz over {duration:g} s gives {count} samples, expected from 2 to {_MOST}", value=rate
+            f"rate = {rate:g} Hz over {duration:g} s gives {count} samples, expected from 2 to {_MOST}",
+            argument="rate",
+            value=rate,
         )
     return np.arange(count) / rate
 

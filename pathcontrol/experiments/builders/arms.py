@@ -147,7 +147,7 @@ def with_friction(key: str, robot: RobotModel, section: Any, place: Place) -> Ro
     """
     if section is None or isinstance(section, str):
         return robot.with_friction(None) if section == "none" else robot
-    with report_by_key(key, FrictionTable.model_fields):
+    with report_by_key(key, list(FrictionTable.model_fields)):
         if isinstance(section, FrictionTable):
             laws = _laws(section, robot.n, place)
         elif isinstance(section, list):
@@ -179,5 +179,7 @@ def _coulomb(levels: Directions | list[float], n: int) -> Coulomb:
 def _each_joint(name: str, values: list[float], n: int) -> Array:
     array = np.asarray(values, dtype=np.float64)
     if array.shape != (n,) or (array < 0).any():
-        raise InputError(f"{name} = {values}, expected {n} numbers not below 0, one for each joint")
+        raise InputError(
+            f"{name} = {values}, expected {n} numbers not below 0, one for each joint", argument=name, value=values
+        )
     return array

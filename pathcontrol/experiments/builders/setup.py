@@ -142,7 +142,7 @@ def _refuse_joints(output: Output, robot: RobotModel) -> None:
 def _loop(experiment: Experiment, plant: RobotModel, duration: float, place: Place) -> SampledLoop | ContinuousTime:
     """Return the loop, with encoders and torque limits that fit the simulated arm."""
     loop: SampledLoop | ContinuousTime = make("loop", experiment.loop, None, place, {"robot": plant})
-    with report_by_key("loop", type(experiment.loop).model_fields):
+    with report_by_key("loop", list(type(experiment.loop).model_fields)):
         torque_limits(loop, plant)
         if isinstance(loop, ContinuousTime):
             _refuse_too_long(duration, "output_period", loop.output_period)

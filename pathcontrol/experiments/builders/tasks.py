@@ -52,7 +52,7 @@ def build_toolpath(section: ToolpathSection, robot: RobotModel, place: Place) ->
         toolpath = read_toolpath(place.folder / section.file, **section.reading)
     arguments = arguments_of("task", section, None, place)
     check_joint_units("task", ToolpathTask, arguments, robot)
-    with report_by_key("task", type(section).model_fields):
+    with report_by_key("task", list(type(section).model_fields)):
         return ToolpathTask(robot, arguments.pop("frame"), toolpath, workpiece, **arguments)
 
 
