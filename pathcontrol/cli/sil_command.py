@@ -16,6 +16,24 @@ if TYPE_CHECKING:
     from pathcontrol.experiments.sil_tasks import SilTask
     from pathcontrol.hardware.sil.session import SilReport
 
+_PEAKS = {
+    "e_p": "e_p {:.4g} rad",
+    "contour_error": "contour error {:.4g} rad",
+    "qd": "velocity {:.4g} rad/s",
+    "tau": "torque {:.4g} N m",
+    "tau_ratio": "share of the torque limits {:.3g}",
+}
+_FAULTS = {
+    "measurement": "bad measurements",
+    "deadline": "late steps",
+    "motion": "joints too fast or too near to a limit",
+    "tube": "steps out of the tube",
+    "law": "faults of the law",
+    "start": "starts from afar",
+    "operator": "holds by the operator",
+    "arm": "stops of the arm",
+}
+
 
 @click.command("sil")
 @click.option("--robot", metavar="FILE", help="A URDF file or the name of a known robot. Default: the paper's arm.")
@@ -57,7 +75,7 @@ def command(
         _serve(driven, serve, secret)
         return
     report = _drive(driven, duration, connect, secret)
-    click.echo(json.dumps(report.to_dict()) if as_json else _describe(report))
+    click.echo(json.dumps(report.to_dict()) if as_json else describe_report(report))
 
 
 def _drive(driven: SilTask, duration: float, address: str | None, key: bytes | None) -> SilReport:
@@ -107,16 +125,19 @@ def _read_key(path: Path) -> bytes:
         return stream.read(4096)
 
 
-def _describe(report: SilReport) -> str:
+def describe_report(report: SilReport) -> str:
     """Return the numbers in words."""
-    peaks, events = report.peaks, report.events
-    jitter = ", ".join(f"{name} {1e6 * value:.0f} us" for name, value in report.jitter.items())
+    events, end = report.events, report.end
+    jitter = ", ".join(f"{name} {1e6 * value:.0f} µs" for name, value in report.jitter.items())
+    peaks = ", ".join(_PEAKS[name].format(value) for name, value in report.peaks.items()) or "nothing was measured"
+    faults = ", ".join(f"{_FAULTS.get(kind, kind)}: {count}" for kind, count in events["faults"].items())
+    times = "once" if events["resumed"] == 1 else f"{events['resumed']} times"
     lines = [
         f"{report.ticks} ticks, {report.missed} missed, {'with' if report.real_time else 'without'} real-time priority",
         f"  jitter: {jitter}",
-        "  peaks in the second half: " + ", ".join(f"{name} {value:.4g}" for name, value in peaks.items()),
-        f"  envelope: {events['faults'] or 'nothing to react to'}, resumed {events['resumed']} times",
+        f"  peaks in the second half: {peaks}",
+        f"  envelope: {faults}; resumed {times}" if faults else "  envelope: nothing to react to",
         f"  end: {events['mode']}{', ' + events['reason'] if events['reason'] else ''}; "
-        f"{report.end.get('distance', float('nan')):.3g} rad from the path at {report.end.get('speed', 0.0):.2g} rad/s",
+        f"{end.get('distance', float('nan')):.3g} rad from the path at {end.get('speed', 0.0):.2g} rad/s",
     ]
     return "\n".join(lines)

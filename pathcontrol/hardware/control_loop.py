@@ -191,6 +191,12 @@ class ControlLoop:
         """Let the plan come to rest on the path and stay there."""
         self._react(Mode.HOLD, "operator", "held by the operator")
 
+    def finish(self, reason: str) -> None:
+        """Let the plan come to rest on the path and stay there, at the end of a drive, which is no fault."""
+        if self._mode < Mode.HOLD:
+            self._mode, self._reason = Mode.HOLD, reason
+            self._plan.hold()
+
     def stop(self, reason: str) -> None:
         """Carry only the weight of the arm, because it has stopped by itself or cannot be reached, for a ``reason``."""
         self._react(Mode.GRAVITY, "arm", reason)

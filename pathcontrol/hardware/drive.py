@@ -18,6 +18,7 @@ from pathcontrol.hardware.sample_ring import Moments, SampleRing
 from pathcontrol.simulation.run import Run
 
 _OF_AN_ARM = ("carries_weight", "locate", "read", "write", "finish")
+ENDED = "the drive ended"  #: the begin of the reason for which a loop rests at the end of a drive
 _WARM = 10
 _FIRST = 100  # periods in which the first measurement must come
 
@@ -143,12 +144,13 @@ class _Driver:
         first = self._read_first()
         self._start = first.t
         try:
+            ended = f"{ENDED} after {span:g} s"
             try:
                 self._tick(first)
                 self._follow(span)
-            except KeyboardInterrupt:
-                pass  # the operator ends the drive, and the arm comes to rest
-            self._loop.hold()
+            except KeyboardInterrupt:  # the operator ends the drive, and the arm comes to rest
+                ended = f"{ENDED} by Ctrl-C"
+            self._loop.finish(ended)
             self._follow(self._elapsed + rest)
         except ArmError as error:
             self._loop.stop(str(error))

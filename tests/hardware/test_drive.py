@@ -128,7 +128,8 @@ def test_a_drive_ends_on_the_path_at_rest():
     arm = SimulatedArm(law)
     record = drive(ControlLoop(law, H), arm, 0.5)
     assert arm.finished == 1
-    assert record.status.mode == Mode.HOLD
+    assert (record.status.mode, record.status.reason) == (Mode.HOLD, "the drive ended after 0.5 s")
+    assert record.status.faults == {}  # the end is none
     assert np.abs(record.qd[-1]).max() < 1e-2 < np.abs(record.qd[250]).max()
     assert record.stopped == ""
 
@@ -138,7 +139,7 @@ def test_ctrl_c_ends_a_drive_in_the_same_way():
     record = drive(ControlLoop(law_of(), H), arm, 100.0)
     assert arm.finished == 1
     assert record.t[-1] < 1.0
-    assert record.status.mode == Mode.HOLD
+    assert (record.status.mode, record.status.reason) == (Mode.HOLD, "the drive ended by Ctrl-C")
     assert np.abs(record.qd[-1]).max() < 1e-2
 
 

@@ -9,6 +9,7 @@ import select
 import socket
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from hypothesis import strategies as st
 
 import pathcontrol as pc
 from pathcontrol.cli import main
+from pathcontrol.cli.sil_command import describe_report
 from pathcontrol.errors import ArmError, InputError
 from pathcontrol.hardware.real_time import real_time
 from pathcontrol.hardware.sil import session
@@ -278,6 +280,31 @@ def test_the_command_drives_the_papers_experiment_and_says_the_numbers():
     assert {"ticks", "missed", "jitter", "peaks", "events", "packets", "end", "real_time"} <= set(told)
     assert {"e_p", "contour_error", "qd", "tau", "tau_ratio"} <= set(told["peaks"]) or not told["peaks"]
     assert told["ticks"] > 100
+
+
+def test_the_numbers_are_said_in_words_with_their_units():
+    report = session.SilReport(
+        1000,
+        3,
+        {"p50": 29e-6, "max": 4.8e-3},
+        {"e_p": 0.01, "contour_error": 0.009, "qd": 1.9, "tau": 35.27, "tau_ratio": 0.235},
+        {"faults": {"deadline": 2, "measurement": 7}, "resumed": 1, "stopped": "", "mode": "HOLD", "reason": "why"},
+        {},
+        {"distance": 0.005, "speed": 0.0015},
+        False,
+    )
+    said = describe_report(report)
+    for part in (
+        "29 µs",
+        "e_p 0.01 rad",
+        "velocity 1.9 rad/s",
+        "torque 35.27 N m",
+        "late steps: 2, bad measurements: 7",
+    ):
+        assert part in said
+    assert "resumed once" in said
+    assert "{" not in said
+    assert "nothing to react to" in describe_report(replace(report, events=report.events | {"faults": {}}))
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
 from pathcontrol.hardware.arm import Measurement
 from pathcontrol.hardware.control_loop import ControlLoop, Mode
-from pathcontrol.hardware.drive import DriveRecord, drive
+from pathcontrol.hardware.drive import ENDED, DriveRecord, drive
 from pathcontrol.hardware.envelope import Envelope
 from pathcontrol.hardware.sil.machine_arm import MachineArm
 from pathcontrol.hardware.sil.machine_process import MachineProcess
@@ -141,7 +141,7 @@ class _Patient:
     def write(self, tau: Array) -> None:
         self._line.write(tau)
         status = self._loop.status
-        held = status.mode in (Mode.HOLD, Mode.DAMP) and not status.reason.startswith("held by the operator")
+        held = status.mode in (Mode.HOLD, Mode.DAMP) and not status.reason.startswith(("held by the operator", ENDED))
         self._calm = self._calm + 1 if held else 0
         if self._calm * self._loop.period > _CALM:
             self._loop.resume()
