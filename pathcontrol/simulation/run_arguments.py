@@ -21,6 +21,7 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.checks.override_form import warn_of_override
 from pathcontrol.simulation.loops import Arm, ContinuousTime, SampledLoop
 from pathcontrol.simulation.summaries import summarize
 from pathcontrol.simulation.variables import bytes_of_sample
@@ -180,6 +181,8 @@ def start_law(
     """
     q, qd, z = _start_rows(controller, q, qd)
     if len(q) == 1 and len(z) > 1:  # an observer or a wrapper with rows
+        if disturbance is None or _count_rows(_first_torque(disturbance, q, qd)) == 1:
+            warn_of_override(controller)
         q, qd = q.repeat(len(z), axis=0), qd.repeat(len(z), axis=0)
     out = _call_law(controller, q, controller.law, 0.0, q, qd, z)
     if len(q) == 1:

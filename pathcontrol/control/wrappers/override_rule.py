@@ -120,6 +120,12 @@ class OverrideRule(SpeedRule):
         u = self._value(t)
         return -u if self._back else u
 
+    @property
+    def factors(self) -> Array | None:
+        """The factors of several rollouts that do not change, (N,); None where u is something else."""
+        fixed = self._value.factor if isinstance(self._value, FixedSpeed) else np.ones(())
+        return fixed if fixed.ndim else None
+
     def count_rows(self) -> int:
         return self._value(0.0).size
 

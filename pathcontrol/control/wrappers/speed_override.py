@@ -25,7 +25,8 @@ class SpeedOverride(LawWrapper):
     Args:
         law: any law that is to be overridden.
         override: u from −2 to 2: a number, one for each rollout (N,), a function of the time since the law took over,
-            in seconds, that returns either, or steps [[t, u], …], (m, 2), with u = 1 before the first.
+            in seconds, that returns either, or steps [[t, u], …], (m, 2), with u = 1 before the first;
+            one step is [[t, u]].
         acceleration: largest |ẇ| [1/s]. At 10 the plan comes from full speed to rest in a tenth of a second; the
             acceleration along the path is ẇ‖q_d'ϑ‖ [rad/s²], the torque for it M(q)q_d'ϑẇ [N m]. By default it is what
             the torque limits of the law's model leave beside the motion everywhere on the path, from 2 to 10.
