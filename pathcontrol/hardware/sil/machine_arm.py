@@ -95,7 +95,7 @@ class MachineArm:
 
     def finish(self) -> None:
         """Let the machine put its brakes on."""
-        for _ in range(5):  # one of them comes
+        for _ in range(20):  # of which one comes, also where the line loses or garbles half of them
             self._send(Packet(Kind.BYE, self._session or bytes(8), 0, np.zeros(0)))
         self._line.close()
 
