@@ -95,11 +95,17 @@ def describe(value: Any) -> str:
 
 def did_you_mean(word: Any, choices: Iterable[str]) -> str:
     """Return ``; did you mean …?`` with the choice closest to ``word``, or an empty text."""
+    nearest = nearest_choice(word, choices)
+    return f"; did you mean {nearest!r}?" if nearest else ""
+
+
+def nearest_choice(word: Any, choices: Iterable[str]) -> str:
+    """Return the choice closest to ``word``, or an empty text where none is near."""
     import difflib  # only where something is wrong
 
     by_lower = {choice.lower(): choice for choice in choices}
     found = difflib.get_close_matches(str(word)[:80].lower(), by_lower, n=1, cutoff=0.6)
-    return f"; did you mean {by_lower[found[0]]!r}?" if found else ""
+    return by_lower[found[0]] if found else ""
 
 
 def _article(word: str) -> str:

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from pathcontrol.errors import InputError
 
-_PAGE = "record(run).save(path) writes an animation, report(run, path) a report"
-_FIGURE = "save_figure(error_figure(run), path) writes a figure"
-_TABLE = "run.data.to_dataframe() is a table, whose to_csv, to_excel and so on write it"
-_VIDEO = "save_video(record(run), 'name.mp4') writes a video"
+PAGE = "record(run).save(path) writes an animation, report(run, path) a report"
+FIGURE = "save_figure(error_figure(run), path) writes a figure"
+TABLE = "run.data.to_dataframe() is a table, whose to_csv, to_excel and so on write it"
+VIDEO = "save_video(record(run), 'name.mp4') writes a video"
 
 #: what writes the formats that people ask for
 _WRITERS = {
     ".nc": "run.save(path) writes netCDF",
     ".mcap": "run.save(path) writes MCAP",
-    **dict.fromkeys((".html", ".htm"), _PAGE),
-    **dict.fromkeys((".svg", ".png", ".pdf"), _FIGURE),
-    **dict.fromkeys((".jpg", ".jpeg", ".gif", ".webp", ".tif", ".tiff", ".bmp", ".eps", ".ps"), _FIGURE),
-    **dict.fromkeys((".mp4", ".webm", ".mov", ".avi", ".mkv", ".m4v", ".mpg", ".mpeg"), _VIDEO),
-    **dict.fromkeys((".csv", ".tsv", ".txt", ".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json"), _TABLE),
-    **dict.fromkeys((".npz", ".npy", ".mat", ".pkl", ".pickle", ".h5", ".hdf5", ".zarr"), _TABLE),
+    **dict.fromkeys((".html", ".htm"), PAGE),
+    **dict.fromkeys((".svg", ".png", ".pdf"), FIGURE),
+    **dict.fromkeys((".jpg", ".jpeg", ".gif", ".webp", ".tif", ".tiff", ".bmp", ".eps", ".ps"), FIGURE),
+    **dict.fromkeys((".mp4", ".webm", ".mov", ".avi", ".mkv", ".m4v", ".mpg", ".mpeg"), VIDEO),
+    **dict.fromkeys((".csv", ".tsv", ".txt", ".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json"), TABLE),
+    **dict.fromkeys((".npz", ".npy", ".mat", ".pkl", ".pickle", ".h5", ".hdf5", ".zarr"), TABLE),
 }
 
 
@@ -34,7 +35,8 @@ def check_suffix(path: str | Path, what: str, *suffixes: str) -> Path:
     if path.suffix.lower() in suffixes:
         return path
     raise InputError(
-        f"{str(path)!r}: {what} is written, expected a name that ends with {' or '.join(suffixes)}{_instead(path)}"
+        f"{str(path)!r}: {what} is written, expected a name that ends with {' or '.join(suffixes)}"
+        f"{_instead(path, suffixes)}"
     )
 
 
@@ -47,10 +49,13 @@ def refuse_suffix(path: str | Path, what: str, *allowed: str) -> Path:
     path = Path(path)
     if path.suffix.lower() not in _WRITERS or path.suffix.lower() in allowed:
         return path
-    raise InputError(f"{str(path)!r}: {what} is written, expected a name without {path.suffix}{_instead(path)}")
+    other = f", or with {', '.join(allowed[:-1])} or {allowed[-1]}" if allowed else ""
+    raise InputError(
+        f"{str(path)!r}: {what} is written, expected a name without {path.suffix}{other}{_instead(path, allowed)}"
+    )
 
 
-def _instead(path: Path) -> str:
-    """Return the advice to call the function that writes the format of ``path``, if there is one."""
+def _instead(path: Path, suffixes: Sequence[str]) -> str:
+    """Return the advice to call what writes the format of ``path``, unless it is what writes ``suffixes``."""
     writer = _WRITERS.get(path.suffix.lower())
-    return "" if writer is None else f"; {writer}"
+    return "" if writer is None or writer in map(_WRITERS.get, suffixes) else f"; {writer}"

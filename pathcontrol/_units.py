@@ -113,6 +113,12 @@ def is_quantity(text: str) -> bool:
     return match is not None and bool(match[2])
 
 
+def is_number(text: str) -> bool:
+    """Return whether ``text`` is a number alone, which lacks its unit or stands in quotes for nothing."""
+    match = _QUANTITY.fullmatch(text) if len(text) <= _LONGEST else None
+    return match is not None and not match[2]
+
+
 def list_units(units: Iterable[str]) -> str:
     """Return the units that may be written where ``units`` are expected, for a message."""
     return " or ".join(f"{unit} ({_OTHERS[unit]})" if unit in _OTHERS else unit for unit in units)

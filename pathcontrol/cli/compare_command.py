@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pathcontrol._expect import nearest_choice
 from pathcontrol._suffixes import refuse_suffix
 from pathcontrol.cli.files import check_file
 from pathcontrol.cli.group import engine_option, import_all, json_option, open_option, open_page
+from pathcontrol.errors import InputError
 
 if TYPE_CHECKING:
     from pathcontrol.comparison.compare import Comparison
@@ -65,6 +67,7 @@ def command(
         return
     source = _choose(file, scenario)
     if isinstance(source, Path):
+        _check_no_scenario(source)
         check_file(source, "an experiment")
     from pathcontrol.comparison.compare import compare
 
@@ -88,6 +91,18 @@ def _choose(file: Path | None, scenario: str | None) -> Path | str:
     if scenario is None or Path(scenario).suffix == ".toml":
         return Path(scenario or file or "")
     return scenario
+
+
+def _check_no_scenario(file: Path) -> None:
+    """Refuse a file that is not there and has the name of a scenario, or nearly so."""
+    if file.exists() or file.suffix:
+        return
+    from pathcontrol.comparison.scenarios import known_scenarios
+
+    if meant := nearest_choice(file.name, known_scenarios()):
+        raise InputError(
+            f"there is no file {str(file)!r}; `pathcontrol compare --scenario {meant}` compares in that scenario"
+        )
 
 
 def _load(source: Path | str) -> Scenario:

@@ -19,10 +19,18 @@ import click
 
 from pathcontrol._advice import reword_advice, reword_setting
 from pathcontrol._interrupts import delay_interrupt
+from pathcontrol._suffixes import FIGURE, PAGE, TABLE, VIDEO
 from pathcontrol.cli.quantity import QuantityType
 from pathcontrol.errors import PathControlError, PathControlWarning
 
 _SOON = 1e-3  # s
+#: the commands that write what a call in Python writes
+_WRITERS = {
+    PAGE: "`pathcontrol view RUN --out FILE.html` writes an animation, `pathcontrol report` in its place a report",
+    FIGURE: "`pathcontrol report RUN` writes a page with figures, `pathcontrol run` those of an experiment file",
+    TABLE: "`pathcontrol report RUN` writes a page with the signals as CSV",
+    VIDEO: "`pathcontrol view RUN --mp4 FILE.mp4` writes a video",
+}
 
 
 class Group(click.Group):
@@ -57,6 +65,8 @@ def _find_command(ctx: click.Context) -> click.Command | None:
 
 def in_options(message: str, command: click.Command | None) -> str:
     """Translate a message of the library into the options of a ``command``; drop advice without an option."""
+    for call, writer in _WRITERS.items():
+        message = message.replace(f"; {call}", f"; {writer}")
     if command is None:
         return message
     options = {param.name: param for param in command.params if isinstance(param, click.Option)}

@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_joint_array
+from pathcontrol._expect import did_you_mean
 from pathcontrol.errors import InputError, UnknownNameError, UrdfError
 from pathcontrol.robot.actuation import Actuation, Limits
 from pathcontrol.robot.bodies import idle_joints
@@ -112,7 +113,8 @@ class ArmDynamics:
         """Return the index of a joint in ``joint_names``."""
         if joint not in self.joint_names:
             raise UnknownNameError(
-                f"{self.name} has no movable joint {joint!r}; it has {', '.join(self.joint_names)}",
+                f"{self.name} has no movable joint {joint!r}; it has {', '.join(self.joint_names)}"
+                f"{did_you_mean(joint, self.joint_names)}",
                 joint=joint,
                 value=joint,
                 choices=self.joint_names,
@@ -338,7 +340,8 @@ class ArmDynamics:
         model = self.pinocchio_model
         if not isinstance(frame, str) or not model.existFrame(frame):
             raise UnknownNameError(
-                f"{self.name} has no frame {frame!r}; it has {', '.join(self.frame_names)}",
+                f"{self.name} has no frame {frame!r}; it has {', '.join(self.frame_names)}"
+                f"{did_you_mean(frame, self.frame_names)}",
                 value=frame,
                 choices=self.frame_names,
             )

@@ -14,7 +14,7 @@ from pathcontrol.robot.model import RobotModel
 _POSTURES = 32
 _USUAL = 4 * np.pi  # rad/s, or m/s of sliding joints, where the robot states no limit of velocity
 _MARGIN = 1.5  # times the speed found in the postures
-_FAR = 3.0  # times the reach
+FAR = 3.0  # times the reach
 
 
 class Extent(NamedTuple):
@@ -51,7 +51,7 @@ def question_speed(name: str, speed: float, robot: RobotModel, frame: str) -> No
         )
 
 
-def question_length(name: str, length: float, robot: RobotModel, frame: str, share: float = _FAR) -> None:
+def question_length(name: str, length: float, robot: RobotModel, frame: str, share: float = FAR) -> None:
     """Warn of a ``length`` [m] beyond a ``share`` of the reach of the arm: it is likely in millimetres."""
     reach = extent(robot, frame).reach
     if reach > 0 and length > share * reach:

@@ -106,3 +106,45 @@ def test_a_robot_is_shown_by_its_name_or_its_file(tmp_path):
     code, err = called("view", tmp_path / "none.urdf")
     assert code == 2
     assert "there is no file" in err
+
+
+@pytest.mark.parametrize("name", ["jammed-joint", "jamed-joint", "JAMMED-JOINT"])
+def test_the_name_of_a_scenario_is_no_file(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, said = called("compare", name)
+    assert code == 2
+    assert "`pathcontrol compare --scenario jammed-joint`" in said
+
+
+def test_a_wrong_suffix_is_answered_in_the_words_of_who_gave_it(folder, tmp_path):
+    """A command names a command, Python a call; what was called is not advised again."""
+    for name, advice in (("x.mp4", "view RUN --mp4"), ("x.csv", "signals as CSV"), ("x.png", "a page with figures")):
+        code, said = called("view", folder / "run.nc", "--out", tmp_path / name)
+        assert code == 2
+        assert advice in said
+        assert "(run" not in said
+    code, said = called("view", folder / "run.nc", "--mp4", tmp_path / "x.html")
+    assert "view RUN --out FILE.html" in said
+    figure = pc.error_figure(pc.Run.load(folder / "run.nc"))
+    with pytest.raises(pc.InputError, match=r"without \.jpg, or with \.svg, \.png or \.pdf$"):
+        pc.save_figure(figure, tmp_path / "a.jpg")
+    with pytest.raises(pc.InputError, match="save_video"):
+        pc.save_figure(figure, tmp_path / "a.mp4")
+
+
+def test_the_folder_of_a_run_is_no_file(folder, tmp_path):
+    with pytest.raises(pc.InputError, match=r"is a folder, expected the file of a run; in it is 'run\.nc'"):
+        pc.Run.load(folder)
+    with pytest.raises(pc.InputError, match=r"is a folder, expected the file of a run$"):
+        pc.Run.load(tmp_path)
+
+
+def test_names_of_frames_and_joints_have_a_near_one():
+    arm = pc.load_robot("cicese_2dof")
+    for call in (
+        lambda: arm.frame_pose([0.0, 0.0], "tol"),
+        lambda: arm.limit("joint2"),
+        lambda: pc.load_robot("cicese_2dof", lock={"joint2": 0.0}),
+    ):
+        with pytest.raises(pc.UnknownNameError, match=r"; did you mean '(tool|joint_2)'"):
+            call()

@@ -178,8 +178,15 @@ def test_the_arm_begins_on_the_path_and_in_time(experiment):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('file = "part.ngc"', 'file = "none.ngc"', "task.file: .*none.ngc"),
-        ('frame = "tip"', 'frame = "top"', "has no frame 'top'"),
+        ('file = "part.ngc"', 'file = "xyz.ngc"', "task.file: there is no file 'xyz.ngc' in .*, the folder of the exp"),
+        ('file = "part.ngc"', 'file = "prat.ngc"', "; did you mean 'part.ngc'"),
+        ('frame = "tip"', 'frame = "top"', "has no frame 'top'.*; did you mean 't"),
+        ("position = [0.3, -0.05, 0.7]", 'position = ["300", -0.05, 0.7]', r"position\[0\] = '300', expected a unit "),
+        (
+            "position = [0.3, -0.05, 0.7]",
+            "position = [300.0, -50.0, 700.0]",
+            r"task.workpiece.position = \[300.0, -50.0, 700.0\] has the drawing 7.* m from .* did you mean millimetres",
+        ),
         ("position = [0.3, -0.05, 0.7]", "position = [0.3, -0.05]", "workpiece.position = .*expected three"),
         ("position = [0.3, -0.05, 0.7]", "position = [3.0, -0.05, 0.7]", "task: contour 0 of 1 .*: "),
         ("clearance = 0.0", "clearance = -1.0", "task.clearance = -1.0, expected a number not below 0"),

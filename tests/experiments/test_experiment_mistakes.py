@@ -67,6 +67,13 @@ BAD = {
     "encoders": ({"loop.encoders": [1000]}, "loop.encoders has shape (1,), expected (2,)"),
     "substeps": ({"loop.substeps": 0}, "loop.substeps = 0, expected a whole number from 1"),
     "posture": ({"start.q": [0.0]}, "start.q has shape (1,)"),
+    "posture by joint": (
+        {"start.q": {"joint_2": 0.5}},
+        "start.q = {'joint_2': 0.5}, expected a list with a number for each joint, in the order joint_1, joint_2",
+    ),
+    "posture in quotes": ({"start.q": ["1", 0.5]}, "start.q[0] = '1', expected a unit after the number, rad (deg"),
+    "frame with a slip": ({"robot.tool": {"frame": "tol", "position": [0, 0, 0.1]}}, "did you mean 'tool'?"),
+    "a path that goes round": ({"duration": None}, "a closed path does not end; give duration or laps"),
     "outside the folder": ({"output": {"html": "../run.html"}}, "output.html = '../run.html', expected"),
     "wrong suffix": ({"output": {"summary": "run.txt"}}, "output.summary = 'run.txt', expected"),
     "endless run": ({"duration": 1e9}, "duration = 1e+09 and loop.period = 0.0025 make 4e+11 samples"),
@@ -81,10 +88,10 @@ BAD = {
         "controller: Endless neither ends nor repeats",
     ),
     "half a class": ({"task": {"type": "tasks.py:Half"}}, "task.parameters: Half raised TypeError"),
-    "parameter missing": ({"task": {"type": "tasks.py:Spiral"}}, "argument: 'size'; it is Spiral(size"),
+    "parameter missing": ({"task": {"type": "tasks.py:Spiral"}}, "argument: 'size'; it is `Spiral(size"),
     "parameter unknown": (
         {"task": {"type": "tasks.py:Spiral", "parameters": {"size": 1.0, "turn": 1.0}}},
-        "task.parameters.turn: unknown key; did you mean 'turns'? it is Spiral(size, turns=1.0)",
+        "task.parameters.turn: unknown key; did you mean 'turns'? it is `Spiral(size, turns=1.0)`",
     ),
     "constructor fails": (
         {"task": {"type": "tasks.py:Spiral", "parameters": {"size": 9.0}}},

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from pathcontrol._advice import reword_advice
+from pathcontrol._expect import did_you_mean
 from pathcontrol._units import Quantity, list_units
 from pathcontrol.errors import ExperimentError, PathControlError
 
@@ -64,8 +65,10 @@ def report_users_code(key: str, doing: str, fields: Iterable[str] = ()) -> Itera
     except PathControlError:
         raise
     except Exception as error:
+        word = re.search(r"unexpected keyword argument '(\w+)'", str(error))
+        meant = did_you_mean(word[1], fields) if word else ""
         raise ExperimentError(
-            f"{key}: {doing} raised {describe_error(error)}{find_place(error)}", argument=key
+            f"{key}: {doing} raised {describe_error(error)}{find_place(error)}{meant}", argument=key
         ) from error
 
 

@@ -96,7 +96,7 @@ def _call_of(target: Callable[..., Any]) -> str:
     """Return the name of a class with the names and defaults of its parameters, without annotations."""
     parameters = inspect.signature(target).parameters.values()
     plain = inspect.Signature([parameter.replace(annotation=parameter.empty) for parameter in parameters])
-    return f"{target.__name__}{plain}"
+    return f"`{target.__name__}{plain}`"
 
 
 def target_of(key: str, section: Any, kind: Kind | None, place: Place) -> Callable[..., Any]:

@@ -184,6 +184,14 @@ def _refuse_too_long(duration: float, name: str, period: float, delay: float = 0
 def _state(experiment: Experiment, controller: Controller) -> tuple[Array, Array]:
     """Return (q, q̇) at the start, for which the law has been tried once."""
     n, given = controller.robot.n, experiment.start.arguments(experiment.to_radians)
+    for name in ("q", "qd"):
+        if isinstance(given.get(name), Mapping):
+            raise ExperimentError(
+                f"start.{name} = {getattr(experiment.start, name)}, expected a list with a number for each joint, in "
+                f"the order {', '.join(controller.robot.joint_names)}",
+                argument=f"start.{name}",
+                value=getattr(experiment.start, name),
+            )
     with report_by_key("start", ("q", "qd")):
         begin = controller.task.q_d(np.array(controller.task.s0))
         q = check_finite("q", as_joint_array("q", given.get("q", begin), n))

@@ -9,21 +9,29 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PlainValidator
 
-from pathcontrol.arguments import Unit
+from pathcontrol.arguments import Form, Unit
 from pathcontrol.experiments.schema.arm_sections import Plant, Robot
 from pathcontrol.experiments.schema.derived import accept_several, make_chooser
 from pathcontrol.experiments.schema.section import Section
 from pathcontrol.experiments.schema.sweep_sections import Sweep, Tune
 from pathcontrol.experiments.schema.task_sections import Task
-from pathcontrol.experiments.schema.validators import Numbers, Positive, Whole, expected
+from pathcontrol.experiments.schema.validators import Positive, Whole, check_forms, expected
 from pathcontrol.registry import DISTURBANCES, LAWS, LOOPS
+
+
+def _one_each(value: Any) -> Any:
+    """Return numbers; a table by joint is refused where the names of the joints are known."""
+    return value if isinstance(value, dict) else check_forms(Form.NUMBERS)(value)
+
+
+ByJoint = Annotated[Any, PlainValidator(_one_each)]
 
 
 class Start(Section):
     """``[start]``: the initial state, in ``angle_unit``; at rest at the beginning of the path by default."""
 
-    q: Annotated[Numbers | None, Unit("rad", "m")] = None
-    qd: Annotated[Numbers | None, Unit("rad/s", "m/s")] = None
+    q: Annotated[ByJoint | None, Unit("rad", "m")] = None
+    qd: Annotated[ByJoint | None, Unit("rad/s", "m/s")] = None
 
 
 class LoopSection(Section):

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, Validatio
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from pathcontrol._expect import did_you_mean
-from pathcontrol._units import Quantity, is_quantity, list_units, parse_quantity
+from pathcontrol._units import Quantity, is_number, is_quantity, list_units, parse_quantity
 from pathcontrol.arguments import Unit
 from pathcontrol.errors import InputError
 from pathcontrol.experiments.schema.validators import expected, show_value
@@ -103,7 +103,7 @@ def read_quantities(at: tuple[int | str, ...], value: Any, units: tuple[str, ...
         return [read_quantities((*at, i), item, units, wrong) for i, item in enumerate(value)]
     if isinstance(value, dict) and "type" not in value:  # one that has it is a section, which has its own units
         return {key: read_quantities((*at, key), item, units, wrong) for key, item in value.items()}
-    if isinstance(value, str) and is_quantity(value):
+    if isinstance(value, str) and (is_quantity(value) or (len(at) > 1 and is_number(value))):  # one among others
         try:
             if len(wrong) > _MOST_LISTED:
                 return value

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from lxml import etree
 
 from pathcontrol._arrays import as_scalar
+from pathcontrol._expect import did_you_mean
 from pathcontrol.errors import InputError, UnknownNameError, about
 from pathcontrol.robot.urdf.elements import MOVABLE_TYPES, link_at
 from pathcontrol.robot.urdf.numbers import read_numbers
@@ -161,7 +162,8 @@ def _check_known(argument: str, name: str, joints: Collection[str]) -> str:
     """Check that a joint exists and moves."""
     if name not in joints:
         raise UnknownNameError(
-            f"{argument}: the robot has no movable joint {name!r}; it has {', '.join(joints)}",
+            f"{argument}: the robot has no movable joint {name!r}; it has {', '.join(joints)}"
+            f"{did_you_mean(name, joints)}",
             argument=argument,
             joint=name,
             value=name,

@@ -58,6 +58,12 @@ def write_run(path: Path, data: xr.Dataset | Samples, config: Mapping[str, Any],
         written.write(seal(content))
 
 
+def _usual_names(folder: Path) -> list[str]:
+    """Return the names of files in a folder that may be runs, ``run.nc`` first."""
+    found = sorted(file.name for suffix in ("nc", "mcap") for file in folder.glob(f"*.{suffix}"))
+    return sorted(found, key=lambda name: name != "run.nc")
+
+
 _TOOLPATHS = (".csv", ".tsv", ".txt", ".xyz", ".ngc", ".gcode", ".gc", ".tap", ".cnc", ".svg", ".dxf")
 
 
@@ -67,6 +73,9 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | No
     Raises:
         InputError: there is no such file, it is damaged, or it is not a saved run.
     """
+    if path.is_dir():
+        inside = next((f"; in it is {name!r}" for name in _usual_names(path)), "")
+        raise InputError(f"{str(path)!r} is a folder, expected the file of a run{inside}", file=str(path))
     if not path.is_file():
         raise InputError(f"there is no file {str(path)!r}", file=str(path))
     try:
