@@ -36,7 +36,8 @@ def check_suffix(path: str | Path, what: str, *suffixes: str) -> Path:
         return path
     raise InputError(
         f"{str(path)!r}: {what} is written, expected a name that ends with {' or '.join(suffixes)}"
-        f"{_instead(path, suffixes)}"
+        f"{_instead(path, suffixes)}",
+        file=str(path),
     )
 
 
@@ -51,7 +52,8 @@ def refuse_suffix(path: str | Path, what: str, *allowed: str) -> Path:
         return path
     other = f", or with {', '.join(allowed[:-1])} or {allowed[-1]}" if allowed else ""
     raise InputError(
-        f"{str(path)!r}: {what} is written, expected a name without {path.suffix}{other}{_instead(path, allowed)}"
+        f"{str(path)!r}: {what} is written, expected a name without {path.suffix}{other}{_instead(path, allowed)}",
+        file=str(path),
     )
 
 

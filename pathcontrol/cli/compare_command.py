@@ -101,7 +101,8 @@ def _check_no_scenario(file: Path) -> None:
 
     if meant := nearest_choice(file.name, known_scenarios()):
         raise InputError(
-            f"there is no file {str(file)!r}; `pathcontrol compare --scenario {meant}` compares in that scenario"
+            f"there is no file {str(file)!r}; `pathcontrol compare --scenario {meant}` compares in that scenario",
+            file=str(file),
         )
 
 

@@ -205,7 +205,11 @@ def test_a_report_shows_the_file_that_names_them(own, tmp_path, monkeypatch):
             "k = ",
             "controller.parameters: missing a required argument: 'K'; it is `Stiff(robot, task, K, D=100.0, **",
         ),
-        ("K = ", "DD = 3.0, K = ", "got an unexpected keyword argument 'DD'; did you mean 'D'?"),
+        (
+            "K = ",
+            "DD = 3.0, K = ",
+            "got an unexpected keyword argument 'DD' (my_classes.py, line 16); did you mean 'D'?",
+        ),
         ("2000 N m/rad", "2000 N m s", "controller.parameters.K = '2000 N m s', expected a finite quantity in N m/rad"),
         (
             "depth = 0.3",
