@@ -95,7 +95,9 @@ def test_keyed_errors_speak_of_lines_of_the_file():
 
     with pytest.raises(ExperimentError) as error, report_by_key("task.file", ("unit", "layers")):
         raise ToolpathError("no unit; give unit='mm', or choose layers= of A; or read it with start=(x, y, z)")
-    assert str(error.value) == 'task.file: no unit; give unit = "mm", or choose layers = of A'
+    said, _, place = str(error.value).partition(" (")  # this file is the user's code here
+    assert said == 'task.file: no unit; give unit = "mm", or choose layers = of A'
+    assert place.startswith("test_advice.py, line ")
 
 
 def run(*words):
