@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from pathcontrol._files import as_path
 from pathcontrol.errors import InputError
 
 PAGE = "record(run).save(path) writes an animation, report(run, path) a report"
@@ -25,34 +26,38 @@ _WRITERS = {
 }
 
 
-def check_suffix(path: str | Path, what: str, *suffixes: str) -> Path:
-    """Return ``path`` if it ends with one of ``suffixes``.
+def check_suffix(path: str | Path, what: str, *suffixes: str, name: str = "path") -> Path:
+    """Return ``path``, the argument ``name``, if it ends with one of ``suffixes``.
 
     Raises:
         InputError: it ends otherwise; the message names the call that writes such a file, where there is one.
     """
-    path = Path(path)
+    path = as_path(name, path)
     if path.suffix.lower() in suffixes:
         return path
     raise InputError(
         f"{str(path)!r}: {what} is written, expected a name that ends with {' or '.join(suffixes)}"
         f"{_instead(path, suffixes)}",
+        argument=name,
+        value=str(path),
         file=str(path),
     )
 
 
-def refuse_suffix(path: str | Path, what: str, *allowed: str) -> Path:
-    """Return ``path`` unless its suffix is that of a known format not among those ``allowed``.
+def refuse_suffix(path: str | Path, what: str, *allowed: str, name: str = "path") -> Path:
+    """Return ``path``, the argument ``name``, unless its suffix is of a known format not among those ``allowed``.
 
     Raises:
         InputError: it does; the message names the call that writes such a file.
     """
-    path = Path(path)
+    path = as_path(name, path)
     if path.suffix.lower() not in _WRITERS or path.suffix.lower() in allowed:
         return path
     other = f", or with {', '.join(allowed[:-1])} or {allowed[-1]}" if allowed else ""
     raise InputError(
         f"{str(path)!r}: {what} is written, expected a name without {path.suffix}{other}{_instead(path, allowed)}",
+        argument=name,
+        value=str(path),
         file=str(path),
     )
 

@@ -74,7 +74,7 @@ def command(
     if opened and out is None:
         out = Path("results") / Path(source).stem
     if out is not None:
-        out = refuse_suffix(out, "a folder")
+        out = refuse_suffix(out, "a folder", name="out")
         import_all()
     found = _load(source)
     compared = compare("all" if laws == ("all",) else laws or None, found, rollouts=rollouts, seed=seed, engine=engine)

@@ -53,7 +53,9 @@ def command(
 ) -> None:
     """Write the motion of a run, or the plan of an experiment's task, for a controller of an arm."""
     if not file.is_file():
-        raise InputError(f"there is no file {str(file)!r}, expected a saved run or an experiment")
+        raise InputError(
+            f"there is no file {str(file)!r}, expected a saved run or an experiment", argument="file", file=str(file)
+        )
     import_all()
     from pathcontrol.export.export import export_trajectory
 

@@ -36,12 +36,18 @@ def check_file(path: Path, expected: Kind) -> None:
         InputError: it does not exist, is a folder, or is of another kind; the message names the command for those.
     """
     if path.is_dir():
-        raise InputError(f"{str(path)!r} is a folder, expected the file of {expected}")
+        raise InputError(f"{str(path)!r} is a folder, expected the file of {expected}", file=str(path))
     if not path.exists():
-        raise InputError(f"there is no file {str(path)!r}, expected {expected}{_ABSENT.get(expected, '')}")
+        raise InputError(
+            f"there is no file {str(path)!r}, expected {expected}{_ABSENT.get(expected, '')}", file=str(path)
+        )
     kind = recognise_file(path)
     if kind not in ("", expected):
-        raise InputError(f"{str(path)!r} is {kind}, expected {expected}: {_COMMANDS[kind].format(file=path)}")
+        raise InputError(
+            f"{str(path)!r} is {kind}, expected {expected}: {_COMMANDS[kind].format(file=path)}",
+            value=kind,
+            file=str(path),
+        )
 
 
 def recognise_file(path: Path) -> str:

@@ -43,7 +43,7 @@ def command(
 ) -> None:
     """Estimate the friction of all joints from a saved run in which they move to and fro at several speeds."""
     check_file(run, "a saved run")
-    out = None if out is None else refuse_suffix(out, "a folder")
+    out = None if out is None else refuse_suffix(out, "a folder", name="out")
     import_all()
     from pathcontrol.analysis.friction_identification import identify_friction
     from pathcontrol.robot.loading import load_robot

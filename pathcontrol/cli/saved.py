@@ -41,10 +41,13 @@ def check_runs(paths: Sequence[Path], robots: bool = False) -> None:
         if path.is_dir():
             continue
         if is_robot(path) and not robots:
-            raise InputError(f"{str(path)!r} is a robot and no run; look at it with `pathcontrol view`, or name a run")
+            raise InputError(
+                f"{str(path)!r} is a robot and no run; look at it with `pathcontrol view`, or name a run",
+                file=str(path),
+            )
         if robots and not path.exists() and not is_robot(path):
             expected = "a saved run, a URDF or the name of a known robot"
-            raise InputError(f"there is no file {str(path)!r}, expected {expected}")
+            raise InputError(f"there is no file {str(path)!r}, expected {expected}", file=str(path))
         if not is_robot(path) or path.suffix:
             check_file(path, "a robot" if is_robot(path) else "a saved run")
 
@@ -68,7 +71,10 @@ def load_runs(
     files = [run_file(path) for path in paths]
     twice = [path for path, file in zip(paths, files, strict=True) if files.count(file) > 1]
     if twice:
-        raise InputError(f"{', '.join(repr(str(path)) for path in twice)} are one run; name each run once")
+        raise InputError(
+            f"{', '.join(repr(str(path)) for path in twice)} are one run; name each run once",
+            value=[str(path) for path in twice],
+        )
     arm = None if robot is None else load_robot(robot)
     called = dict(zip(names(files), files, strict=True))
     return {
@@ -88,7 +94,10 @@ def sweep_of(paths: Sequence[Path]) -> SweepResult | None:
 
     found = [path for path in paths if (path / MANIFEST).is_file()]
     if found and len(paths) > 1:
-        raise InputError(f"{str(found[0])!r} is a sweep, expected it alone; name runs in its folder runs/ one by one")
+        raise InputError(
+            f"{str(found[0])!r} is a sweep, expected it alone; name runs in its folder runs/ one by one",
+            file=str(found[0]),
+        )
     return SweepResult(found[0]) if found else None
 
 
@@ -103,8 +112,12 @@ def check_out(out: Path | None, paths: Sequence[Path]) -> None:
     sweep = sweep_of(paths)
     files = [run_file(path) for path in paths] if sweep is None else [sweep.history(i) for i in sweep.kept]
     if out.resolve() in [file.resolve() for file in files]:
-        raise InputError(f"{str(out)!r} is the run itself, which would be lost; name another file to write")
-    check_suffix(out, "a page", ".html", ".htm")
+        raise InputError(
+            f"{str(out)!r} is the run itself, which would be lost; name another file to write",
+            argument="out",
+            file=str(out),
+        )
+    check_suffix(out, "a page", ".html", ".htm", name="out")
 
 
 def run_file(path: Path) -> Path:
@@ -117,9 +130,14 @@ def run_file(path: Path) -> Path:
         return path
     found = [path / _DEFAULT] if (path / _DEFAULT).is_file() else sorted([*path.glob("*.nc"), *path.glob("*.mcap")])
     if not found:
-        raise InputError(f"the folder {str(path)!r} holds no run; expected a file run.nc, as `pathcontrol run` writes")
+        raise InputError(
+            f"the folder {str(path)!r} holds no run; expected a file run.nc, as `pathcontrol run` writes",
+            file=str(path),
+        )
     if len(found) > 1:
-        raise InputError(f"the folder {str(path)!r} holds several runs; name those you mean: {_list_files(found)}")
+        raise InputError(
+            f"the folder {str(path)!r} holds several runs; name those you mean: {_list_files(found)}", file=str(path)
+        )
     return found[0]
 
 
@@ -172,12 +190,12 @@ def _add_robot(run: Run, file: Path, robot: RobotModel | None) -> Run:
         _ = run.robot
     except PathControlError as error:
         if robot is None:
-            raise InputError(f"{str(file)!r}: {error}") from error
+            raise InputError(f"{str(file)!r}: {error}", **error.details_with(file=str(file))) from error
         run = run.with_robot(robot)
     try:
         check_filmed(run, run.robot, run.task)
     except PathControlError as error:
-        raise InputError(f"{str(file)!r}: {error}") from error
+        raise InputError(f"{str(file)!r}: {error}", **error.details_with(file=str(file))) from error
     return run
 
 

@@ -56,7 +56,7 @@ def command(
 ) -> None:
     """Say how fast errors decay on the closed path of an experiment, and with which gains its loop is stable."""
     check_file(file, "an experiment")
-    out = None if out is None else refuse_suffix(out, "a folder")
+    out = None if out is None else refuse_suffix(out, "a folder", name="out")
     if out is not None and not gains:
         raise click.UsageError("--out is for the figure of a map: give --gain NAME FROM TO")
     import_all()
@@ -93,7 +93,7 @@ def command(
 def _space_values(name: str, low: float, high: float, points: int) -> Any:
     """Return values of a gain from one end to the other, spaced by factors where the ends are far apart."""
     if not -math.inf < low < high < math.inf:
-        raise InputError(f"--gain {name} {low:g} {high:g}: expected FROM below TO")
+        raise InputError(f"--gain {name} {low:g} {high:g}: expected FROM below TO", argument="gain", value=(low, high))
     import numpy as np
 
     far = low > 0 and high >= _DECADES * low

@@ -71,7 +71,7 @@ def command(file: Path, plot: Path | None, as_json: bool, **options: Any) -> Non
     from pathcontrol.toolpaths.summary import summary
 
     if plot is not None:
-        refuse_suffix(plot, "a figure", ".svg", ".png", ".pdf")
+        refuse_suffix(plot, "a figure", ".svg", ".png", ".pdf", name="plot")
     given = {name: value for name, value in options.items() if value not in (None, ())}
     check_feed(options["feed"])
     read = read_toolpath(file, **given)

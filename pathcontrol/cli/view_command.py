@@ -82,7 +82,7 @@ def command(
 
     check_out(out, runs)
     if mp4 is not None:
-        check_suffix(mp4, "a video (H.264 in MP4)", ".mp4")
+        check_suffix(mp4, "a video (H.264 in MP4)", ".mp4", name="mp4")
     loaded = load_runs(runs, robot, worst, package_dir)
     animation = record(one_or_all(loaded), rollout=rollout, layout=layout, tool=tool)  # type: ignore[arg-type]
     written = {}

@@ -51,16 +51,20 @@ def output_folder(out_dir: Path, output: Output) -> Iterator[None]:
 
 def _check_folder(out_dir: Path, targets: Sequence[Path]) -> None:
     """Make the folder, and see that files can be written."""
-    refuse_suffix(out_dir, "a folder")
+    refuse_suffix(out_dir, "a folder", name="out_dir")
     for target in targets:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise InputError(f"the output folder {str(target.parent)!r} cannot be made: {error}") from error
+            raise InputError(
+                f"the output folder {str(target.parent)!r} cannot be made: {error}", file=str(target.parent)
+            ) from error
         if not os.access(target.parent, os.W_OK):
-            raise InputError(f"the output folder {str(target.parent)!r} cannot be written to")
+            raise InputError(f"the output folder {str(target.parent)!r} cannot be written to", file=str(target.parent))
         if target.is_dir():
-            raise InputError(f"there is a folder where the file {str(target)!r} should go; remove or rename it")
+            raise InputError(
+                f"there is a folder where the file {str(target)!r} should go; remove or rename it", file=str(target)
+            )
 
 
 def measure_run(run: Run, setup: Setup) -> dict[str, Any]:

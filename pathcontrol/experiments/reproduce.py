@@ -109,7 +109,7 @@ def reproduce(out: str | Path) -> dict[str, Any]:
     Returns:
         What ``summary.json`` holds.
     """
-    out, began = refuse_suffix(out, "a folder"), time.perf_counter()
+    out, began = refuse_suffix(out, "a folder", name="out"), time.perf_counter()
     with _pause_collection(), progress_bar("reproducing", 2 * len(PAPER)) as update:
         with _open_map() as apply:
             simulated = apply(_simulate_one, PAPER)

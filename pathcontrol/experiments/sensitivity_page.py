@@ -50,7 +50,7 @@ def sensitivity(out: str | Path, samples: int = SAMPLES, progress: bool = True) 
     from pathcontrol.view.figures.style import save_figure
     from pathcontrol.view.report.sensitivity_section import sensitivity_page
 
-    out = refuse_suffix(out, "a folder")
+    out = refuse_suffix(out, "a folder", name="out")
     peaks = peaks_of(run_combinations(out / "sensitivity", samples, progress))
     summary, figure = summarise(peaks), sensitivity_figure(peaks)
     save_figure(figure, out / "sensitivity")

@@ -59,7 +59,9 @@ class Envelope:
         for name in ("torque", "torque_rate", "velocity", "deceleration"):
             if (value := getattr(self, name)) is not None and not (as_array(name, value) > 0).all():
                 raise InputError(
-                    f"{name} = {np.asarray(value).tolist()}, expected limits greater than 0", argument=name
+                    f"{name} = {np.asarray(value).tolist()}, expected limits greater than 0",
+                    argument=name,
+                    value=value,
                 )
         for name in ("lower", "upper"):
             if (value := getattr(self, name)) is not None:
@@ -69,7 +71,12 @@ class Envelope:
         as_whole("patience", self.patience, 0, _MOST)
         as_whole("frozen", self.frozen, 2, _MOST)
         if not self._as_number("lost") >= self._as_number("late") >= 1:
-            raise InputError(f"late = {self.late!r} and lost = {self.lost!r} periods, expected 1 ≤ late ≤ lost")
+            raise InputError(
+                f"late = {self.late!r} and lost = {self.lost!r} periods, expected 1 ≤ late ≤ lost",
+                argument="late",
+                value=self.late,
+                limit=self.lost,
+            )
 
     def complete(self, robot: RobotModel) -> CompleteEnvelope:
         """Return the envelope with the limits of ``robot`` where none are given, each (n,).
@@ -84,7 +91,12 @@ class Envelope:
         braking = _spread("deceleration", velocity / _STOP, self.deceleration, n)
         lower, upper = _spread("lower", limits.lower, self.lower, n), _spread("upper", limits.upper, self.upper, n)
         if (lower >= upper).any():
-            raise InputError(f"lower = {lower.tolist()} is not below upper = {upper.tolist()}")
+            raise InputError(
+                f"lower = {lower.tolist()} is not below upper = {upper.tolist()}",
+                argument="lower",
+                value=lower,
+                limit=upper,
+            )
         patient = (self.tube, self.jump, self.patience, self.frozen, self.late, self.lost)
         return CompleteEnvelope(torque, rate, velocity, lower, upper, braking, *patient)
 
@@ -92,7 +104,7 @@ class Envelope:
         """Return an argument that is one number or inf."""
         value = as_array(name, getattr(self, name))
         if value.ndim:
-            raise InputError(f"{name} = {value.tolist()}, expected one number", argument=name)
+            raise InputError(f"{name} = {value.tolist()}, expected one number", argument=name, value=value)
         return float(value)
 
     def _limit(self, name: str, own: Array, robot: RobotModel) -> Array:
@@ -103,6 +115,7 @@ class Envelope:
             raise InputError(
                 f"{', '.join(missing)} of {robot.name}: no {name} limit in the URDF; give Envelope({name}=…)",
                 argument=name,
+                joint=missing[0],
             )
         return found
 
@@ -148,5 +161,5 @@ def _spread(name: str, own: Array, given: ArrayLike | None, n: int) -> Array:
     """Return ``given``, or the robot's ``own``, as (n,)."""
     array = as_array(name, own if given is None else given)
     if array.shape not in ((), (n,)) or np.isnan(array).any():
-        raise InputError(f"{name} = {array.tolist()}, expected a number or ({n},)", argument=name)
+        raise InputError(f"{name} = {array.tolist()}, expected a number or ({n},)", argument=name, value=array)
     return freeze(np.broadcast_to(array, (n,)).copy())

@@ -56,7 +56,9 @@ class Franka:
         try:
             self.robot = self._library.Robot(address, choices.kEnforce if enforce_real_time else choices.kIgnore)
         except RuntimeError as error:
-            raise ArmError(f"the robot at {address!r} cannot be used: {error}") from error
+            raise ArmError(
+                f"the robot at {address!r} cannot be used: {error}", argument="address", value=address
+            ) from error
         finally:
             os.sched_setscheduler(0, *scheduler)  # libfranka takes the highest priority, and keeps it after the drive
         self.state: Any = None

@@ -81,7 +81,9 @@ class HeldPlan:
         own, *speeds = self._wrapper.split(self._wrapper.start(q, qd))
         own[0] = self._law.task.sigma_bar(q)
         if not np.isfinite(own[0]):
-            raise TaskError(f"sigma_bar({q.tolist()}) = {own[0]}, expected the path parameter of the nearest point")
+            raise TaskError(
+                f"sigma_bar({q.tolist()}) = {own[0]}, expected the path parameter of the nearest point", value=q
+            )
         for speed in speeds:
             speed[0] = 0.0
         self._held.start_from(np.concatenate([own, *speeds]))

@@ -94,7 +94,9 @@ class PositionCommand:
     ) -> None:
         check_controller("law", law)
         if isinstance(law.task, TaskBatch) or any(np.ndim(getattr(law, name)) > 1 for name in law.gains):
-            raise InputError("the law is for several rollouts, expected one task and one set of gains")
+            raise InputError(
+                "the law is for several rollouts, expected one task and one set of gains", argument="law", value=law
+            )
         refuse_several_gains(law)
         self._wait = WaitRule(as_scalar("tolerance", tolerance, positive=True))
         self.law = LawWrapper(law, self._wait)
@@ -250,5 +252,7 @@ def _spread(name: str, value: ArrayLike, n: int, least: float | None = None) -> 
     array = as_array(name, value)
     if array.shape not in ((), (n,)) or not ((array > 0) if least is None else (array >= least)).all():
         wanted = "greater than 0" if least is None else f"not below {least:g}"
-        raise InputError(f"{name} = {array.tolist()}, expected a number or ({n},), {wanted}", argument=name)
+        raise InputError(
+            f"{name} = {array.tolist()}, expected a number or ({n},), {wanted}", argument=name, value=array
+        )
     return freeze(np.broadcast_to(array, (n,)).copy())

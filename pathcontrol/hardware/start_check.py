@@ -38,5 +38,7 @@ def read_tube(value: Any) -> float:
     """
     tube = as_array("tube", value)
     if tube.ndim or not tube > 0:
-        raise InputError(f"tube = {value!r}, expected a distance greater than 0 [rad], inf for none", argument="tube")
+        raise InputError(
+            f"tube = {value!r}, expected a distance greater than 0 [rad], inf for none", argument="tube", value=value
+        )
     return float(tube)

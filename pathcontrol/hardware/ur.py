@@ -54,7 +54,9 @@ class UR:
             self.receive = receive.RTDEReceiveInterface(address, rate, _VARIABLES)
             self.control = control.RTDEControlInterface(address, rate)
         except RuntimeError as error:
-            raise ArmError(f"the robot at {address!r} cannot be used: {error}") from error
+            raise ArmError(
+                f"the robot at {address!r} cannot be used: {error}", argument="address", value=address
+            ) from error
 
     def locate(self) -> Measurement:
         """Return the present state of the robot.
@@ -101,7 +103,7 @@ class UR:
     def _check(self) -> None:
         """Check that the robot is there and not stopped."""
         if not (self.receive.isConnected() and self.control.isConnected()):
-            raise ArmError(f"the connection to the robot at {self._address!r} is lost")
+            raise ArmError(f"the connection to the robot at {self._address!r} is lost", value=self._address)
         if self.receive.isEmergencyStopped():
             raise ArmError("emergency stop of the robot")
         if self.receive.isProtectiveStopped():
@@ -113,7 +115,9 @@ class UR:
         try:
             yield
         except RuntimeError as error:
-            raise ArmError(f"the connection to the robot at {self._address!r} is lost: {error}") from error
+            raise ArmError(
+                f"the connection to the robot at {self._address!r} is lost: {error}", value=self._address
+            ) from error
 
     def _measured(self) -> Measurement:
         """Return what one state measured: the thread of ur_rtde may bring another while it is read."""

@@ -43,7 +43,9 @@ def find_urdf(source: str | Path, package_dirs: tuple[Path, ...] = ()) -> UrdfSo
         return _find_by_name(source, package_dirs)
     if not isinstance(source, str | PathLike):
         raise UrdfError(
-            f"robot = {source!r:.80}, expected the name of a known robot, the path of a URDF or its text", value=source
+            f"robot = {source!r:.80}, expected the name of a known robot, the path of a URDF or its text",
+            argument="robot",
+            value=source,
         )
     path = Path(source).expanduser()
     try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,6 +11,7 @@ from lxml import etree
 
 from pathcontrol._arrays import LARGEST, Array, as_quantity, freeze
 from pathcontrol._expect import expect
+from pathcontrol._files import as_path
 from pathcontrol.arguments import Form
 from pathcontrol.errors import UrdfError, warn
 from pathcontrol.robot.actuation import Actuation, Limits
@@ -111,8 +112,8 @@ def _check(urdf: UrdfSource, label: str, locked: Sequence[str]) -> UrdfReport:
 
 def _folders(given: str | Path | Sequence[str | Path]) -> tuple[Path, ...]:
     """Return the folders of packages; a single one may be given without a list."""
-    folders = [given] if isinstance(given, str | Path) else given
-    return tuple(Path(folder).expanduser() for folder in folders)
+    folders = [given] if isinstance(given, str | Path) or not isinstance(given, Iterable) else given
+    return tuple(as_path("package_dirs", folder).expanduser() for folder in folders)
 
 
 def _build(urdf: UrdfSource, threads: int) -> RobotModel:

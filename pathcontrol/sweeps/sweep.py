@@ -134,7 +134,7 @@ def open_store(out: str | Path, samples: int, definition: Mapping[str, Any], res
             value=str(folder),
             file=str(folder),
         )
-    refuse_suffix(folder, "the folder of a sweep")
+    refuse_suffix(folder, "the folder of a sweep", name="out")
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     with hold_lock(folder) as ours:

@@ -110,7 +110,11 @@ def find_browser() -> str:
     if chosen := os.environ.get(BROWSER_VARIABLE):
         if found := shutil.which(chosen):
             return found
-        raise InputError(f"{BROWSER_VARIABLE} = {chosen!r}, expected the name or the path of a browser's program")
+        raise InputError(
+            f"{BROWSER_VARIABLE} = {chosen!r}, expected the name or the path of a browser's program",
+            argument=BROWSER_VARIABLE,
+            value=chosen,
+        )
     for name in BROWSERS:
         if found := shutil.which(name):
             return found
@@ -133,13 +137,18 @@ def _clip(duration: float, size: tuple[int, int], fps: float, speed: float) -> _
     if len(size) != 2 or any(not isinstance(n, int) or not 2 <= n <= _LARGEST or n % 2 for n in size):
         raise InputError(
             f"size = {size!r:.80}, expected width and height in pixels, two even numbers up to {_LARGEST} "
-            "such as (1280, 720)"
+            "such as (1280, 720)",
+            argument="size",
+            value=size,
+            limit=_LARGEST,
         )
     step = as_scalar("speed", speed, positive=True) / fps
     if not step * _MOST_FRAMES >= duration:
         raise InputError(
             f"fps = {fps:g} and speed = {speed:g} make more than {_MOST_FRAMES} frames of a film of {duration:g} s; "
-            "lower fps, or raise speed"
+            "lower fps, or raise speed",
+            argument="fps",
+            value=fps,
         )
     frames = max(1, math.ceil(duration / step - 1e-9))
     return _Clip(size, fps, tuple(k * step for k in range(frames)))

@@ -69,7 +69,7 @@ def make(
     try:
         inspect.signature(target).bind(**needed)
     except TypeError as error:
-        raise ExperimentError(f"{where}: {error}; it is {_call_of(target)}") from error
+        raise ExperimentError(f"{where}: {error}; it is {_call_of(target)}", argument=where) from error
     with report_users_code(where, target.__name__, [name for name in parameters_of(target) if name not in given]):
         return target(**needed)
 
@@ -145,13 +145,20 @@ def _own_arguments(key: str, target: Callable[..., Any], parameters: Mapping[str
     wrong: dict[Any, Any] = {}
     values = {name: read_quantities((name,), value, units.get(name, ()), wrong) for name, value in parameters.items()}
     for (name, *_), error in wrong.items():
-        raise ExperimentError(f"{key}.{name}{error['type'].message()}")
+        raise ExperimentError(
+            f"{key}.{name}{error['type'].message()}", argument=f"{key}.{name}", value=parameters[name]
+        )
     for name, value in values.items():
         if name in known:
             _check_form(f"{key}.{name}", known[name], value, units.get(name, ()))
         elif not any(one.kind is one.VAR_KEYWORD for one in inspect.signature(target).parameters.values()):
             meant = did_you_mean(name, known)
-            raise ExperimentError(f"{key}.{name}: unknown key{meant or ';'} it is {_call_of(target)}")
+            raise ExperimentError(
+                f"{key}.{name}: unknown key{meant or ';'} it is {_call_of(target)}",
+                argument=f"{key}.{name}",
+                value=value,
+                choices=tuple(known),
+            )
     return {name: convert_angles(value, units.get(name, ()), place.to_radians) for name, value in values.items()}
 
 
@@ -162,4 +169,6 @@ def _check_form(key: str, parameter: Parameter, value: Any, units: tuple[str, ..
             TypeAdapter(annotation_of(parameter)).validate_python(value)
         except ValidationError as error:
             unit = f", or one with a unit: {list_units(units)}" if units and isinstance(value, str) else ""
-            raise ExperimentError(f"{describe_finding(error.errors()[0] | {'loc': (key,)})}{unit}") from None
+            raise ExperimentError(
+                f"{describe_finding(error.errors()[0] | {'loc': (key,)})}{unit}", argument=key, value=value
+            ) from None

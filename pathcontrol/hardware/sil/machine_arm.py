@@ -54,7 +54,9 @@ class MachineArm:
             self._line.connect((host, port))  # the system drops what comes from elsewhere
         except OSError as error:
             self._line.close()
-            raise ArmError(f"there is no way to a machine at {host}:{port}: {error.strerror}") from error
+            raise ArmError(
+                f"there is no way to a machine at {host}:{port}: {error.strerror}", argument="host", value=host
+            ) from error
         self._session, self._number = b"", -1
         self._heard = time.monotonic()
         self.count = {"taken": 0, "repeated": 0, "foreign": 0, "lost": 0}

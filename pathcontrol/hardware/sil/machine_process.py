@@ -81,7 +81,11 @@ class MachineProcess:
         if not said.isdigit():
             self.kill()
             reason = said or "its reason is above"
-            raise ArmError(f"the machine at {host}:{port} did not start: {reason}; port 0 takes a free one")
+            raise ArmError(
+                f"the machine at {host}:{port} did not start: {reason}; port 0 takes a free one",
+                argument="port",
+                value=port,
+            )
         self.port = int(said)
 
     @property

@@ -81,11 +81,19 @@ def check_key(host: str, key: bytes | None) -> None:
     except ValueError:  # the name of a computer
         here = False
     if not here and key is None:
-        raise InputError(f"{host} is not this computer: a key is needed, so that nobody else moves the arm")
+        raise InputError(
+            f"{host} is not this computer: a key is needed, so that nobody else moves the arm",
+            argument="key",
+        )
     if not isinstance(key, bytes | None):
         raise InputError(f"the key is a {type(key).__name__}, expected bytes: secrets.token_bytes(32)", argument="key")
     if key is not None and len(key) < _SHORTEST_KEY:
-        raise InputError(f"the key has {len(key)} bytes, expected {_SHORTEST_KEY} or more", argument="key")
+        raise InputError(
+            f"the key has {len(key)} bytes, expected {_SHORTEST_KEY} or more",
+            argument="key",
+            value=len(key),
+            limit=_SHORTEST_KEY,
+        )
 
 
 def _authenticate(body: bytes, key: bytes) -> bytes:

@@ -30,7 +30,7 @@ def check_loop(disturbance: Disturbance | None, loop: Loop, q: Array) -> None:
         InputError: it cannot.
     """
     if misfit := find_misfit(disturbance, loop, q):
-        raise InputError(f"{misfit.problem}; {_REMEDIES[misfit.lacks]}")
+        raise InputError(f"{misfit.problem}; {_REMEDIES[misfit.lacks]}", argument="disturbance", value=disturbance)
 
 
 def find_misfit(disturbance: Disturbance | None, loop: Loop, q: Array) -> Misfit | None:

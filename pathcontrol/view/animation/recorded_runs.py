@@ -43,7 +43,9 @@ def make_recordings(
     if not isinstance(runs, Mapping) or not runs or not all(isinstance(one, Run) for one in runs.values()):
         if not isinstance(run, Mapping):
             expect("run", run, Run)
-        raise InputError(f"run = {runs!r}, expected a Run, or several by name: {{'name': run, …}}")
+        raise InputError(
+            f"run = {runs!r}, expected a Run, or several by name: {{'name': run, …}}", argument="run", value=runs
+        )
     if robot is not None:
         expect("robot", robot, RobotModel)
     if task is not None:

@@ -115,9 +115,15 @@ def check_filmed(run: Run, robot: RobotModel, task: PathTask | None) -> None:
     """
     joints = tuple(run.joints)
     if joints != robot.joint_names:
-        raise InputError(f"the run is of the joints {joints}, {robot.name} has {robot.joint_names}")
+        raise InputError(
+            f"the run is of the joints {joints}, {robot.name} has {robot.joint_names}",
+            argument="robot",
+            value=list(robot.joint_names),
+        )
     if task is not None and task.n != robot.n:
-        raise InputError(f"the task is for {task.n} joints, {robot.name} has {robot.n}")
+        raise InputError(
+            f"the task is for {task.n} joints, {robot.name} has {robot.n}", argument="task", value=task.n, limit=robot.n
+        )
     if task is not None and not isinstance(task, TaskBatch):
         _check_path(run, task)
     if not len(run.time):
@@ -128,7 +134,9 @@ def check_filmed(run: Run, robot: RobotModel, task: PathTask | None) -> None:
         first = run.time[int(np.argmax(~(np.abs(run.array("q")) <= _ABSURD).all((0, 2))))]
         raise InputError(
             f"the run has joint positions that are not finite, or beyond {_ABSURD:g} rad, at {first:.4g} s; to show "
-            "what was before, cut the data: run.with_data(run.data.sel(time=slice(0, …)))"
+            "what was before, cut the data: run.with_data(run.data.sel(time=slice(0, …)))",
+            limit=_ABSURD,
+            time=float(first),
         )
 
 
@@ -141,5 +149,7 @@ def _check_path(run: Run, task: PathTask) -> None:
     if not near.all():
         raise InputError(
             f"the path of the run has joint positions that are not finite, or beyond {_ABSURD:g} rad, at "
-            f"s = {s[np.argmin(near)]:.4g}; it cannot be shown"
+            f"s = {s[np.argmin(near)]:.4g}; it cannot be shown",
+            limit=_ABSURD,
+            s=float(s[np.argmin(near)]),
         )

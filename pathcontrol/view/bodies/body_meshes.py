@@ -49,7 +49,9 @@ def _join(parts: Sequence[Part], factor: np.ndarray) -> Mesh:
     faces = [part.faces + offset for part, offset in zip(parts, offsets, strict=True)]
     vertices = np.concatenate([part.vertices for part in parts]) * factor
     if not (np.abs(vertices) < _FARTHEST).all():
-        raise UrdfError(f"it has vertices that are not finite, or {_FARTHEST:g} m away and more; check its scale")
+        raise UrdfError(
+            f"it has vertices that are not finite, or {_FARTHEST:g} m away and more; check its scale", limit=_FARTHEST
+        )
     return Mesh(vertices, np.concatenate(faces))
 
 

@@ -104,7 +104,7 @@ def _shapes(shape: Any, source: UrdfSource, detail: float) -> list[tuple[Shape, 
         return [(Cylinder(float(shape.attrib["radius"]), float(shape.attrib["length"])), None)]
     if shape.tag == "sphere":
         return [(Sphere(float(shape.attrib["radius"])), None)]
-    raise UrdfError(f"it is a <{shape.tag}>, expected a box, cylinder, sphere or mesh")
+    raise UrdfError(f"it is a <{shape.tag}>, expected a box, cylinder, sphere or mesh", value=shape.tag)
 
 
 def _numbers(text: str) -> Array:

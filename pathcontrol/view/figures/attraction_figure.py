@@ -58,7 +58,11 @@ def attraction_figure(basin: Basin | Mapping[str, Basin]) -> Figure:
         expect("basin", one, Basin)
     joints = {one.q.shape[1] for one in basins.values()}
     if len(joints) != 1:
-        raise InputError(f"the basins are of arms of {sorted(joints)} joints, expected some of one arm")
+        raise InputError(
+            f"the basins are of arms of {sorted(joints)} joints, expected some of one arm",
+            argument="basin",
+            value=sorted(joints),
+        )
     with style():
         return _draw_maps(basins) if joints == {2} else _draw_shares(basins)
 

@@ -66,7 +66,11 @@ def _toolpath(runs: Sequence[Shown]) -> ToolpathTask:
     for one in runs:
         if not isinstance(one.task, ToolpathTask):
             name = f" {one.name!r}" if one.name else ""
-            raise InputError(f"the run{name} is not known to follow a toolpath; give task=ToolpathTask(...)")
+            raise InputError(
+                f"the run{name} is not known to follow a toolpath; give task=ToolpathTask(...)",
+                argument="task",
+                value=one.task,
+            )
     assert isinstance(runs[0].task, ToolpathTask)
     return runs[0].task
 

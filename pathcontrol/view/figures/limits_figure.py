@@ -37,7 +37,9 @@ def limits_figure(run: Runs, rollout: int = 0) -> Figure:
     runs = shown(run, rollout=rollout)
     drawn = [(one, kind, share) for one in runs for kind, share in largest_shares(one.run).items()]
     if not drawn:
-        raise InputError("limits_figure: no joint of the run has a limit of position, velocity or torque")
+        raise InputError(
+            "limits_figure: no joint of the run has a limit of position, velocity or torque", argument="run"
+        )
     with style():
         figure = new_figure(COLUMN, 2.2 + _ROW * len(runs))
         axes = apply_style(figure.add_subplot())

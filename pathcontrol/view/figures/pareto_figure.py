@@ -127,7 +127,7 @@ def _choice(sweep: Any, x: str | None, y: str | None, goals: Mapping[str, str] |
         goals = sweep.directions if goals is None else goals
         limits = sweep.limits if limits is None else limits
     if x is None or y is None:
-        raise InputError(f"x = {x!r}, y = {y!r}, expected the names of two metrics")
+        raise InputError(f"x = {x!r}, y = {y!r}, expected the names of two metrics", argument="x", value=x)
     return _Choice(x, y, goals or {}, check_limits(limits))
 
 

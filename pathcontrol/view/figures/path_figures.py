@@ -69,7 +69,12 @@ def phase_figure(
     names = check_joints(runs)
     chosen = _find_moved(runs) if joints is None else [int(j) for j in np.atleast_1d(joints)]
     if not chosen or not set(chosen) <= set(range(len(names))):
-        raise InputError(f"joints = {joints}, expected indices from 0 to {len(names) - 1}: {', '.join(names)}")
+        raise InputError(
+            f"joints = {joints}, expected indices from 0 to {len(names) - 1}: {', '.join(names)}",
+            argument="joints",
+            value=joints,
+            limit=(0, len(names) - 1),
+        )
     columns = min(len(chosen), 2 if len(chosen) in (2, 4) else 3)
     rows = -(-len(chosen) // columns)
     with style():
@@ -118,7 +123,12 @@ def choose_pair(runs: Sequence[Shown], joints: Sequence[int] | None) -> tuple[in
     if joints is not None:
         pair = tuple(joints)
         if len(pair) != 2 or not set(pair) <= set(range(len(names))):
-            raise InputError(f"joints = {joints}, expected two indices from 0 to {len(names) - 1}: {', '.join(names)}")
+            raise InputError(
+                f"joints = {joints}, expected two indices from 0 to {len(names) - 1}: {', '.join(names)}",
+                argument="joints",
+                value=joints,
+                limit=(0, len(names) - 1),
+            )
         return int(pair[0]), int(pair[1])
     if len(travel) < 2:
         raise InputError("the arm has one joint only; path_figure draws two over one another, try phase_figure")

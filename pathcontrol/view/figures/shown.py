@@ -74,7 +74,11 @@ def shown(run: Runs, task: PathTask | None = None, rollout: int | None = None) -
     if not named or not all(isinstance(one, Run) for one in named.values()):
         if not isinstance(run, Mapping):
             expect("run", run, Run)
-        raise InputError(f"run = {run!r:.80}, expected a Run, or some by their names, as {{'path control': run}}")
+        raise InputError(
+            f"run = {run!r:.80}, expected a Run, or some by their names, as {{'path control': run}}",
+            argument="run",
+            value=run,
+        )
     several = isinstance(run, Mapping)
     if task is not None:
         expect("task", task, PathTask)
@@ -110,7 +114,11 @@ def check_joints(runs: Sequence[Shown]) -> list[str]:
     first = runs[0]
     for one in runs:
         if one.joints != first.joints:
-            raise InputError(f"the runs are of different joints: {', '.join(first.joints)}; {', '.join(one.joints)}")
+            raise InputError(
+                f"the runs are of different joints: {', '.join(first.joints)}; {', '.join(one.joints)}",
+                argument="run",
+                value=list(one.joints),
+            )
     return first.joints
 
 
@@ -172,5 +180,10 @@ def _find_fitting_task(run: Run, task: PathTask | None) -> PathTask | None:
     """Return the task if it fits the run."""
     task = run.task if task is None else task
     if task is not None and task.n != len(run.joints):
-        raise InputError(f"the task is for {task.n} joints, the run has {len(run.joints)}")
+        raise InputError(
+            f"the task is for {task.n} joints, the run has {len(run.joints)}",
+            argument="task",
+            value=task.n,
+            limit=len(run.joints),
+        )
     return task

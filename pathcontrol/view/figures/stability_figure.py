@@ -124,7 +124,12 @@ def _find_mark(stability: StabilityMap, mark: Mapping[str, float] | None) -> lis
     for name in gains:
         if name not in stability.names:
             known = ", ".join(stability.names)
-            raise UnknownNameError(f"mark has {name!r}, expected {known}{did_you_mean(name, stability.names)}")
+            raise UnknownNameError(
+                f"mark has {name!r}, expected {known}{did_you_mean(name, stability.names)}",
+                argument="mark",
+                value=name,
+                choices=tuple(stability.names),
+            )
     place = [gains.get(name) for name in stability.names]
     found = [value for value in place if value is not None]
     inside = zip(found, stability.grids, strict=False)

@@ -139,7 +139,12 @@ def save_figure(figure: Figure, path: str | Path, formats: Sequence[str] = ("svg
     if (last := stem.suffix[1:].lower()) in FORMATS:
         stem, wanted = stem.with_suffix(""), [*wanted, last]
     if unknown := [name for name in wanted if name not in FORMATS]:
-        raise InputError(f"formats has {unknown[0]!r}, expected some of {', '.join(map(repr, FORMATS))}")
+        raise InputError(
+            f"formats has {unknown[0]!r}, expected some of {', '.join(map(repr, FORMATS))}",
+            argument="formats",
+            value=unknown[0],
+            choices=tuple(FORMATS),
+        )
     targets = {name: stem.with_name(f"{stem.name}.{name}") for name in wanted}
     with style(), laid_out(figure, mpl.rcParams["savefig.dpi"]), ExitStack() as files:
         for name, target in targets.items():

@@ -30,9 +30,9 @@ def table_of(sweep: SweepResult | xr.Dataset) -> xr.Dataset:
     expect("sweep", sweep, SweepResult, xr.Dataset, also=" or its table")
     table = sweep.table() if isinstance(sweep, SweepResult) else sweep
     if "sample" not in table.dims:
-        raise InputError(f"sweep = {sweep!r}, expected a SweepResult or its table")
+        raise InputError(f"sweep = {sweep!r}, expected a SweepResult or its table", argument="sweep", value=sweep)
     if not table.sizes["sample"]:
-        raise InputError("the sweep has no finished samples yet")
+        raise InputError("the sweep has no finished samples yet", argument="sweep")
     return table
 
 
@@ -48,7 +48,9 @@ def column_of_parameter(table: xr.Dataset, name: str) -> Array:
             many = values.ndim == 2
             numbers |= {f"{known}[{i}]": v for i, v in enumerate(values.T)} if many else {str(known): values}
     if name not in numbers:
-        raise UnknownNameError(f"parameter {name!r}: expected one of {', '.join(numbers)}")
+        raise UnknownNameError(
+            f"parameter {name!r}: expected one of {', '.join(numbers)}", value=name, choices=tuple(numbers)
+        )
     return np.asarray(numbers[name], dtype=np.float64)
 
 

@@ -31,7 +31,7 @@ def save_comparison(compared: Comparison, out: str | Path, rollout: int = 0) -> 
     Raises:
         InputError: there is no such rollout, or ``out`` does not end with ``.html``.
     """
-    out = check_suffix(out, "a comparison as a page", ".html", ".htm")
+    out = check_suffix(out, "a comparison as a page", ".html", ".htm", name="out")
     scenario = compared.scenario
     runs = {law_title(law): run for law, run in compared.runs.items()}
     film = record(runs, rollout=rollout).film

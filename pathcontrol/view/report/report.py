@@ -48,7 +48,7 @@ def report(
     from pathcontrol.view.page.html import page
     from pathcontrol.view.report.sections import sections
 
-    named, out = _name_runs(runs), check_suffix(out, "a report as a page", ".html", ".htm")
+    named, out = _name_runs(runs), check_suffix(out, "a report as a page", ".html", ".htm", name="out")
     animation = record(runs, layout=layout)
     # the sections have tables of their own
     film = dataclasses.replace(animation.film, header=animation.film.header | {"tables": []})
@@ -65,7 +65,9 @@ def _name_runs(runs: Any) -> dict[str, Run]:
         return {"run": runs}
     if not isinstance(runs, Mapping) or not runs or not all(isinstance(run, Run) for run in runs.values()):
         expect("runs", runs, Run, Mapping, also=" or several by name, as {'first': run}")
-        raise InputError(f"runs = {runs!r}, expected a Run or several by name, as {{'first': run}}")
+        raise InputError(
+            f"runs = {runs!r}, expected a Run or several by name, as {{'first': run}}", argument="runs", value=runs
+        )
     return {str(name): run for name, run in runs.items()}
 
 
