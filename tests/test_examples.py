@@ -87,7 +87,7 @@ def test_the_readmes_example_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)[1]
     exec(compile(code, "README.md", "exec"), {"__name__": "readme"})
-    assert {p.name for p in tmp_path.iterdir()} == {
+    assert {p.name for p in (tmp_path / "results").iterdir()} == {
         "triangle.svg",
         "triangle.png",
         "triangle.html",

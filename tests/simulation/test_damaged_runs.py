@@ -212,7 +212,7 @@ def test_a_name_that_promises_another_format_is_refused(write, name, said, run, 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["view", "RUN", "--out", "a.mp4"], "save_video"),
+        (["view", "RUN", "--out", "a.mp4"], "--mp4 FILE.mp4"),
         (["view", "RUN", "--mp4", "a.gif"], "ends with .mp4"),
         (["report", "RUN", "--out", "a.pdf"], "ends with .html"),
     ],
