@@ -162,9 +162,13 @@ def test_out_writes_page_figure_and_numbers(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("width", [40, 80, 120, 240])
-def test_the_table_shows_all_laws_on_a_terminal_of_any_width(width, monkeypatch):
+def test_the_table_shows_all_laws_on_a_terminal_of_any_width(width, monkeypatch, tmp_path):
+    (tmp_path / "short.toml").write_text(
+        'duration = 0.2\n[robot]\nsource = "cicese_2dof"\n[task]\ntype = "circle"\nradius = 1.0\nspeed = 2.0\n'
+        f'[controller]\ntype = "extended_motion_plan"\n{GAINS["extended_motion_plan"]}\n'
+    )
     monkeypatch.setenv("COLUMNS", str(width))
-    said = call("--scenario", "undisturbed", "--law", "all", "--rollouts", 1).stdout
+    said = call(tmp_path / "short.toml", "--law", "all", "--rollouts", 1).stdout
     table = said.partition("The numbers of one start")[0]
     assert "…" not in table
     assert max(map(len, table.splitlines())) <= width
