@@ -70,7 +70,7 @@ def about(**details: Any) -> Iterator[None]:
     try:
         yield
     except PathControlError as error:
-        vars(error).update(details)
+        vars(error).update((name, _plain(value)) for name, value in details.items())
         raise
 
 

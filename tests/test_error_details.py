@@ -429,3 +429,10 @@ def test_a_diverged_run_says_when(arm, circle):
     )
     assert 0 < error.time <= 5.0
     assert (error.run.status == "diverged").all()
+
+
+def test_details_that_are_added_by_the_place_are_plain_too():
+    with pytest.raises(pc.InputError) as caught, errors.about(value=np.array([1.0, 2.0]), joint="joint_1"):
+        raise pc.InputError("too much")
+    assert (caught.value.value, caught.value.joint) == ([1.0, 2.0], "joint_1")
+    assert type(caught.value.value) is list
