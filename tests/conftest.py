@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 # matrices here are small: threads of BLAS would wait for each other, busily, on cores that other tests need
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# tests press Ctrl-C, which a job in the background ignores, and all that it starts
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 import numpy as np
 import pytest

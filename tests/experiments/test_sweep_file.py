@@ -217,7 +217,6 @@ def test_after_ctrl_c_finished_chunks_stay(experiment, tmp_path):
         [*COMMAND, file, "--out", out, "--chunk", "1"],
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background ignore it
     )
     wait_until(
         lambda: (out / LOG).exists() or process.poll() is not None, pause=0.05

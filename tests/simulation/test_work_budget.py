@@ -51,7 +51,6 @@ def test_ctrl_c_interrupts_the_integrator():
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # jobs in the background ignore it
     )
     assert process.stdout.readline() == "integrating\n"
     time.sleep(0.2)

@@ -170,7 +170,6 @@ def test_ctrl_c_leaves_no_half_video(run, tmp_path):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background ignore it
     )
     wait_until(lambda: list(tmp_path.glob(".a-*.mp4")) or process.poll() is not None)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the command and all that it has started
