@@ -90,10 +90,14 @@ def _find_nearest_path(
 
 def planned_rate(task: PathTask, s: Array) -> Array:
     """Return the rate ϑ(s) [1/s], (*batch,), of the controllers' plan, with braking at the end of an open path."""
-    ending = Ending.of(task)
+    return rate_of(task, Ending.of(task))(s)
+
+
+def rate_of(task: PathTask, ending: Ending | None) -> Callable[[Array], Array]:
+    """Return ϑ as a function of s, with the ending of the controllers' plan where there is one."""
     if ending is None:
-        return np.broadcast_to(task.theta(s), np.shape(s))  # it may be a plain number
-    return plan_of(task, ending)(s).theta
+        return lambda s: np.broadcast_to(task.theta(s), np.shape(s))  # it may be a plain number
+    return lambda s: task.theta(np.clip(s, task.s0, task.s_end)) * ending.share(s)
 
 
 def plan_of(task: PathTask, ending: Ending | None) -> Callable[[Array], PathPoint]:

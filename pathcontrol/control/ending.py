@@ -69,10 +69,14 @@ class Ending(NamedTuple):
 
     def brake(self, point: PathPoint, s: Array, factor: Array | float = 1.0) -> PathPoint:
         """Return ``point``, the task at s, with ϑ and ϑ' of the plan that goes at a ``factor`` and comes to rest."""
-        left, back = self._largest_factor_forward(s), self._largest_factor_back(s)
-        share = np.minimum(np.maximum(factor, -np.maximum(back, 0.0)), np.maximum(left, 0.0))
+        left, back, share = self._largest_factor_forward(s), self._largest_factor_back(s), self.share(s, factor)
         slope = np.where(left < factor, -1.0 / self.braking, np.where(-back > factor, -1.0 / self.braking_back, 0.0))
         return point._replace(theta=point.theta * share, dtheta=point.dtheta * share + point.theta * slope)
+
+    def share(self, s: Array, factor: Array | float = 1.0) -> Array:
+        """Return the share of ϑ(s) at which a plan with a ``factor`` goes, as it comes to rest, (*batch,)."""
+        left, back = self._largest_factor_forward(s), self._largest_factor_back(s)
+        return np.minimum(np.maximum(factor, -np.maximum(back, 0.0)), np.maximum(left, 0.0))
 
     def follows(self, s: Array, factor: Array) -> NDArray[np.bool_]:
         """Return where a plan goes at its ``factor``, and is not braked at an end, (*batch,)."""

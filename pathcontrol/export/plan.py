@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array, as_scalar
-from pathcontrol.analysis.gamma import plan_of
+from pathcontrol.analysis.gamma import plan_of, rate_of
 from pathcontrol.control.ending import Ending, arrival_parameter
 from pathcontrol.errors import InputError, SimulationError, warn
 from pathcontrol.robot.model import RobotModel
@@ -102,11 +102,11 @@ def _follow_leg(task: PathTask, begin: float, s: float, end: float, longest: flo
     """Integrate the plan from s at the time ``begin`` [s] until it is at the parameter ``end``, or time is up."""
     from scipy.integrate import solve_ivp  # takes a quarter of a second to load
 
-    plan, last = plan_of(task, Ending.of(task)), np.nextafter(end, -np.inf)
+    planned, last = rate_of(task, Ending.of(task)), np.nextafter(end, -np.inf)
 
     def rate(t: float, s: Array) -> Array:
         share = min((t - begin) / rise, 1.0) if rise else 1.0
-        return share * plan(np.minimum(s, last)).theta + np.zeros_like(s)
+        return share * planned(np.minimum(s, last))
 
     def left(_: float, s: Array) -> float:
         return float(s[0] - end)

@@ -48,9 +48,10 @@ class SCurve:
         t = 2 * c_0 * np.sinh(np.arcsinh(1.5 * np.clip(distance, 0.0, rise) / (self.first * c_0)) / 3)
         to_go = 2 * c_1 * np.sin(np.arcsin(1.5 * np.clip(left, 0.0, fall) / (self.last * c_1)) / 3)
         middle = (self.first + 0.5 * j * t_1**2) ** 2 + 2 * j * t_1 * np.maximum(distance - rise, 0.0)
-        phases = [distance < rise, left > fall]
-        v = np.select(phases, [self.first + 0.5 * j * t**2, np.sqrt(middle)], self.last - 0.5 * j * to_go**2)
-        return v, np.select(phases, [j * t, j * t_1], j * to_go) / v
+        rises, falls = distance < rise, left <= fall
+        slower = np.where(falls, self.last - 0.5 * j * to_go**2, np.sqrt(middle))
+        v = np.where(rises, self.first + 0.5 * j * t**2, slower)
+        return v, np.where(rises, j * t, np.where(falls, j * to_go, j * t_1)) / v
 
     @property
     def _durations(self) -> tuple[Array, Array]:
