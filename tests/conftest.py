@@ -10,8 +10,6 @@ from pathlib import Path
 
 # matrices here are small: threads of BLAS would wait for each other, busily, on cores that other tests need
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# tests press Ctrl-C, which a job in the background ignores, and all that it starts
-signal.signal(signal.SIGINT, signal.default_int_handler)
 
 import numpy as np
 import pytest
@@ -24,6 +22,9 @@ slow = [HealthCheck.too_slow]
 settings.register_profile("default", deadline=None, max_examples=25, derandomize=True, suppress_health_check=slow)
 settings.register_profile("thorough", deadline=None, max_examples=500, suppress_health_check=slow)
 settings.load_profile("default")
+
+# tests press Ctrl-C, which a job in the background ignores, and all that it starts
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.hookimpl(wrapper=True)
