@@ -106,6 +106,33 @@ def test_time_lost_is_the_planned_time_between_both(arm, lost, end):
     assert_allclose(measure(here, there, (0.0, 4.0), None)["time_lost_s"], exact, atol=1e-9)
 
 
+class Slowing(pc.Line):
+    """A line along which ϑ = (s_end − s)/T falls to 0 at the end, or to the square root of that."""
+
+    power = 1.0
+
+    def theta(self, s):
+        return ((self.s_end - s) / 0.1) ** self.power
+
+
+@pytest.mark.parametrize("share", [0.5, 0.99, 0.99999])
+def test_time_lost_is_exact_where_the_profile_is_slow(arm, share):
+    """∫ds/ϑ = T ln((s_end − a)/(s_end − b)): the last hundredth of the path takes as long as all before."""
+    task = Slowing([0.0, 0.0], [1.0, 1.0], 1.0)
+    begin, end = 0.2 * task.s_end, share * task.s_end
+    lost = measure(made(arm, task, s=begin), made(arm, task, s=end), (0.0, 4.0), None)["time_lost_s"]
+    assert_allclose(lost, 0.1 * np.log((task.s_end - begin) / (task.s_end - end)), rtol=1e-8)
+
+
+@pytest.mark.parametrize(("power", "expected"), [(0.5, 2.0 * 0.1**0.5), (1.0, np.inf), (2.0, np.inf)])
+def test_time_lost_to_an_end_at_rest_is_what_it_takes(arm, power, expected):
+    """∫ds/√((s_end − s)/T) = 2√(T s_end), and the others have no value."""
+    task = Slowing([0.0, 0.0], [1.0, 1.0], 1.0)
+    task.power = power
+    lost = measure(made(arm, task, s=0.0), made(arm, task, s=task.s_end), (0.0, 4.0), None)["time_lost_s"]
+    assert_allclose(lost, expected * task.s_end**0.5, rtol=1e-6)
+
+
 def test_a_rollout_that_diverged_has_no_numbers(arm):
     lost = made(arm, outcome={"diverged_time": np.array([2.0]), "reason": np.array(["too fast"])})
     assert all(np.isnan(value).all() for value in measure(lost, made(arm), (1.0, 4.0), 2.0).values())
