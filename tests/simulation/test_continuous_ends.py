@@ -24,16 +24,15 @@ def free():
     return load_robot("cicese_2dof").with_friction(None)
 
 
-@pytest.mark.parametrize("start", [[0.05, -0.03], [-0.1, 0.05], [0.3, 0.25]])
-def test_the_projection_does_not_jump_where_the_timed_end_takes_over(free, start):
+def test_the_projection_does_not_jump_where_the_timed_end_takes_over(free):
+    starts = [[0.05, -0.03], [-0.1, 0.05], [0.3, 0.25]]
     law = Projection(free, Line([0.0, 0.0], [0.6, 0.4], speed=1.0), 800.0, [45.0, 100.0])
     loop = ContinuousTime(output_period=1e-3)
-    run = simulate(law, start, duration=1.5, loop=loop, progress=False, until="duration")
-    V = lyapunov(law, run)[0][0]
-    assert (np.diff(V) <= 1e-9 * V[0]).all()
-    s = run.array("s")[0]
-    late = s > law.ending.begin
-    assert (np.diff(s[late]) > 0).all()
+    run = simulate(law, starts, duration=1.5, loop=loop, progress=False, until="duration")
+    for V, s in zip(lyapunov(law, run)[0], run.array("s"), strict=True):
+        assert (np.diff(V) <= 1e-9 * V[0]).all()
+        late = s > law.ending.begin
+        assert (np.diff(s[late]) > 0).all()
 
 
 BENT = np.array([0.0, -1.2, 1.5, -0.3, 0.8, 0.2])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
@@ -99,7 +99,6 @@ def test_the_stiffer_the_less_is_left():
 
 
 @given(seed=st.integers(0, 10**6), n=st.integers(1, 6))
-@settings(max_examples=60, deadline=None)
 def test_condensed_friction_is_the_exponential_of_the_coupled_joints(seed, n):
     rng = np.random.default_rng(seed)
     A, b = rng.normal(size=(n, n)), 10 ** rng.uniform(-2, 3, n) * rng.integers(0, 2, n)
@@ -159,10 +158,10 @@ def test_damped_motion_converges_to_second_order(x):
         return np.concatenate([y[3:], arm.forward_dynamics(y[:3], y[3:], tau - arm.friction.viscous * y[3:])])
 
     start = np.concatenate([q, qd])
-    exact = solve_ivp(rate, (0, 0.4), start, method="Radau", rtol=1e-11, atol=1e-13).y[:3, -1]
+    exact = solve_ivp(rate, (0, 0.2), start, method="Radau", rtol=1e-11, atol=1e-13).y[:3, -1]
     errors = []
-    for steps in (100, 200, 400, 800):
-        positions, _ = travel(arm, q, qd, tau, 0.4 / steps, steps)
+    for steps in (50, 100, 200, 400):
+        positions, _ = travel(arm, q, qd, tau, 0.2 / steps, steps)
         errors.append(np.abs(positions[-1] - exact).max())
     assert errors[0] < 2e-7
     ratios = np.divide(errors[:-1], errors[1:])
@@ -176,7 +175,7 @@ def test_a_damped_arm_held_by_stiction_does_not_move_by_one_bit():
     q = rng.normal(size=4)
     b = 10 ** rng.uniform(-2, 2, 4) * 2 / STEP * lightest(arm, q)
     held = arm.with_friction(Viscous(b) + Coulomb(1.01 * np.abs(arm.gravity(q)) + 1e-3))
-    positions, speeds = travel(held, q, np.zeros(4), np.zeros(4), STEP, 500)
+    positions, speeds = travel(held, q, np.zeros(4), np.zeros(4), STEP, 100)
     assert_array_equal(positions, np.broadcast_to(q, positions.shape))
     assert_array_equal(speeds, 0.0)
 

@@ -103,7 +103,7 @@ def test_a_force_does_the_work_that_its_point_moves_through(arm):
 
 
 @pytest.mark.parametrize("loop", LOOPS)
-def test_each_rollout_has_its_own(arm, circle, loop):
+def test_each_rollout_has_its_own(ideal_arm, circle, loop):
     rng = np.random.default_rng(3)
     force, start, torque, phase = (
         rng.normal(size=(4, 3)),
@@ -114,10 +114,10 @@ def test_each_rollout_has_its_own(arm, circle, loop):
     length = rng.uniform(0.02, 0.1, 4)
 
     def run(rows):
-        pushes = FrameForce(arm, "tool", 20 * force[rows], start[rows], length[rows])
+        pushes = FrameForce(ideal_arm, "tool", 20 * force[rows], start[rows], length[rows])
         pushes += Push(5 * torque[rows], start[rows], length[rows]) + Harmonic(torque[rows], 5.0, phase[rows])
         q = np.broadcast_to(START, (len(start[rows]), 2))
-        return simulate(law(arm, circle), q, duration=0.2, loop=LOOPS[loop], disturbance=pushes, progress=False)
+        return simulate(law(ideal_arm, circle), q, duration=0.2, loop=LOOPS[loop], disturbance=pushes, progress=False)
 
     whole = run(slice(0, 4))
     for i in range(4):
@@ -155,11 +155,11 @@ def test_it_is_beside_the_torque_limits(arm, circle):
 
 
 def test_the_record_says_what_pushed(arm, circle):
-    push = Push(np.ones((500, 2)), 0.1, 0.2) + FrameForce(arm, "tool", [1.0, 0.0, 0.0])
-    run = simulate(law(arm, circle), [START] * 500, duration=0.0025, disturbance=push, progress=False)
+    push = Push(np.ones((50, 2)), 0.1, 0.2) + FrameForce(arm, "tool", [1.0, 0.0, 0.0])
+    run = simulate(law(arm, circle), [START] * 50, duration=0.0025, disturbance=push, progress=False)
     first, second = run.config["disturbance"]["terms"]
     assert first == {
-        "disturbance": "Push", "start": 0.1, "duration": 0.2, "magnitude": {"shape": [500, 2], "min": 1.0, "max": 1.0}
+        "disturbance": "Push", "start": 0.1, "duration": 0.2, "magnitude": {"shape": [50, 2], "min": 1.0, "max": 1.0}
     }  # fmt: skip
     assert second["frame"] == "tool"
 

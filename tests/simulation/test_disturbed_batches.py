@@ -11,15 +11,15 @@ from pathcontrol.engine.structs import address_of
 
 START = np.array([[1.0, 0.0], [0.9, 0.2], [1.1, -0.1]])
 DISTURBANCES = {
-    "jam": lambda: pc.JammedJoint(1, 0.1, 0.1),
-    "jam of the first joint": lambda: pc.JammedJoint(0, 0.1, 0.1),
-    "push": lambda: pc.Push([5.0, 1.0], 0.1, 0.1),
-    "pick-up": lambda: pc.PickUp(2.0, "tool", 0.1),
-    "weak motors": lambda: pc.TorqueLimitDrop(0.2, 0.1, 0.1),
-    "friction": lambda: pc.FrictionChange(3.0, 0.1, 0.1),
-    "lost ticks": lambda: pc.Dropout(0.1, 0.05, "ticks"),
-    "lost measurements": lambda: pc.Dropout(0.1, 0.05, "measurements"),
-    "wall": lambda: pc.Wall("tool", [0.787, 0.0, 0.0], [-1.0, 0.0, 0.0], rigid=True),
+    "jam": lambda: pc.JammedJoint(1, 0.05, 0.05),
+    "jam of the first joint": lambda: pc.JammedJoint(0, 0.05, 0.05),
+    "push": lambda: pc.Push([5.0, 1.0], 0.05, 0.05),
+    "pick-up": lambda: pc.PickUp(2.0, "tool", 0.05),
+    "weak motors": lambda: pc.TorqueLimitDrop(0.02, 0.05, 0.05),
+    "friction": lambda: pc.FrictionChange(3.0, 0.05, 0.05),
+    "lost ticks": lambda: pc.Dropout(0.05, 0.05, "ticks"),
+    "lost measurements": lambda: pc.Dropout(0.05, 0.05, "measurements"),
+    "wall": lambda: pc.Wall("tool", [0.7815, 0.0, 0.0], [-1.0, 0.0, 0.0], rigid=True),
 }
 
 
@@ -30,7 +30,7 @@ def make_law(arm, kind):
 
 def run(law, q, disturbance, engine):
     loop = pc.SampledLoop(torque_limits=True)
-    return pc.simulate(law, q, duration=0.3, loop=loop, disturbance=disturbance, engine=engine, progress=False)
+    return pc.simulate(law, q, duration=0.15, loop=loop, disturbance=disturbance, engine=engine, progress=False)
 
 
 @pytest.mark.parametrize("kind", ["compiled", "in Python"])
@@ -48,8 +48,8 @@ def test_each_rollout_is_disturbed_as_it_is_alone(arm, name, kind):
 
 @pytest.mark.parametrize("joint", [0, 1])
 def test_a_jam_holds_the_joint_of_every_rollout_and_no_other(arm, joint):
-    jammed = run(make_law(arm, "in Python"), START, pc.JammedJoint(joint, 0.1, 0.1), "compiled")
-    q = jammed.array("q")[:, (jammed.time > 0.1 + 1e-9) & (jammed.time < 0.2)]
+    jammed = run(make_law(arm, "in Python"), START, pc.JammedJoint(joint, 0.05, 0.05), "compiled")
+    q = jammed.array("q")[:, (jammed.time > 0.05 + 1e-9) & (jammed.time < 0.1)]
     assert (np.ptp(q[..., joint], axis=1) == 0).all()
     assert (np.ptp(q[..., 1 - joint], axis=1) > 1e-3).all()
 

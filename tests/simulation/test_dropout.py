@@ -24,7 +24,7 @@ LAWS["projection"] = pc.Projection(ARM, CIRCLE, 800.0, [45.0, 100.0])
 SAID = ("s", "sdot", "e_p", "e_v", "tau_demand", "q_measured", "qd_measured")
 
 
-def simulated(dropout, law=PATH_LAW, q=(0.7, 1.2), duration=0.5, **options):
+def simulated(dropout, law=PATH_LAW, q=(0.7, 1.2), duration=0.3, **options):
     return pc.simulate(law, q, duration=duration, disturbance=dropout, progress=False, **options)
 
 
@@ -72,7 +72,7 @@ def test_held_torque_is_that_of_a_longer_period(engine):
 def test_without_torque_the_arm_falls(engine):
     run = simulated(pc.Dropout(0.0, fallback="zero"), engine=engine)
     q, qd, plant = np.array([[0.7, 1.2]]), np.zeros((1, 2)), pc.Plant(ARM, 2.5e-3)
-    for _ in range(200):
+    for _ in range(120):
         q, qd = plant.advance(q, qd, np.zeros((1, 2)))
     assert_allclose(run.array("q")[0, -1], q[0], rtol=0, atol=1e-11)
     assert (run.array("tau_demand") == 0).all()
@@ -188,7 +188,7 @@ def test_a_law_that_takes_over_while_ticks_are_missed_begins_when_they_come(engi
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_rollout_that_diverges_while_blind_disturbs_nobody(engine):
     wild = pc.ComputedTorque(ARM, CIRCLE, [[800.0], [5e7]], 45.0)
-    lost = pc.Dropout(0.05, 0.2, "measurements") + pc.Dropout(0.3, 0.1)
+    lost = pc.Dropout(0.05, 0.1, "measurements") + pc.Dropout(0.2, 0.05)
     with np.errstate(all="ignore"), pytest.warns(pc.PathControlWarning):
         both = simulated(lost, wild, engine=engine)
     alone = simulated(lost, pc.ComputedTorque(ARM, CIRCLE, 800.0, 45.0), engine=engine)

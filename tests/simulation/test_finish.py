@@ -200,8 +200,14 @@ def test_every_open_path_is_finished_within_what_friction_holds(arm, path, dry, 
         assert (error <= held + moving).all()
 
 
-@pytest.mark.parametrize("kind", ["tracking", "plan", "projection"])
-@pytest.mark.parametrize("loop", [SampledLoop(torque_limits=True), ContinuousTime(rtol=1e-6, atol=1e-8)])
+@pytest.mark.parametrize(
+    ("kind", "loop"),
+    [
+        ("tracking", SampledLoop(torque_limits=True)),
+        ("plan", ContinuousTime(rtol=1e-6, atol=1e-8)),
+        ("projection", SampledLoop(torque_limits=True)),
+    ],
+)
 def test_the_bundled_arm_finishes_with_its_own_friction(arm, kind, loop):
     task = Line([0.2, -0.3], [0.9, 0.6], 1.0)
     law = laws(arm, task, 800.0, [45.0, 100.0])[kind]

