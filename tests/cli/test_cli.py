@@ -51,7 +51,7 @@ def test_importing_the_package_is_light():
 
 
 def test_check_reports_and_exits_with_a_code(tmp_path):
-    assert call("check", "cicese_2dof").returncode == 0
+    assert CliRunner().invoke(main, ["check", "cicese_2dof"]).exit_code == 0
     bad = tmp_path / "bad.urdf"
     bad.write_text("<robot name='x'><link name='a'/></robot>")
     done = call("check", bad, "--json")
@@ -96,11 +96,11 @@ def test_run_prints_metrics_and_writes_beside_its_name(tmp_path, monkeypatch):
 
 
 def test_check_knows_the_joints_that_it_locks():
-    done = call("check", "cicese_2dof", "--lock", "joint_2")
-    assert done.returncode == 0
+    done = CliRunner().invoke(main, ["check", "cicese_2dof", "--lock", "joint_2"])
+    assert done.exit_code == 0
     assert "1 movable joints and 1 locked" in done.stdout
-    done = call("check", "cicese_2dof", "--lock", "nose")
-    assert done.returncode == 2
+    done = CliRunner().invoke(main, ["check", "cicese_2dof", "--lock", "nose"])
+    assert done.exit_code == 2
     assert "nose" in done.stderr
 
 

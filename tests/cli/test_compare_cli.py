@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -50,30 +51,35 @@ def done(*arguments):
     return json.loads(result.stdout)
 
 
+@cache
+def jammed():
+    return done("--scenario", "jammed-joint", "--rollouts", 2)
+
+
 def test_list_names_what_exists():
     assert call("--list").stdout.splitlines()[1].startswith("jammed-joint ")
     assert done("--list")["scenarios"] == pc.known_scenarios()
 
 
 def test_a_scenario_by_its_name():
-    said = done("--scenario", "jammed-joint", "--rollouts", 2)
+    said = jammed()
     assert said["event"] == [4.0, 4.6]
     numbers = said["controllers"]
     assert numbers["computed_torque"]["contour_peak"] > 2 * numbers["projection"]["contour_peak"]
 
 
-@pytest.mark.parametrize("law", GAINS)
-def test_a_file_that_says_the_same_gives_the_same(tmp_path, law):
+@pytest.mark.parametrize(
+    ("law", "option"), [("extended_motion_plan", []), ("projection", ["--scenario"]), ("computed_torque", [])]
+)
+def test_a_file_that_says_the_same_gives_the_same(tmp_path, law, option):
     path = tmp_path / "mine.toml"
     path.write_text(JAM.format(law=law, gains=GAINS[law]), encoding="utf-8")
-    of_name = done("--scenario", "jammed-joint", "--rollouts", 2)
-    for arguments in ([path], ["--scenario", path]):
-        of_file = done(*arguments, "--rollouts", 2)
-        assert of_file["scenario"] == "mine"
-        assert of_file["event"] == pytest.approx([4.0, 4.6])
-        for name, numbers in of_name["controllers"].items():
-            for key in ("contour_peak", "lag_peak", "speed_peak", "recovery_s", "time_lost_s"):
-                assert of_file["controllers"][name][key] == pytest.approx(numbers[key], rel=1e-3, abs=1e-6)
+    of_file = done(*option, path, "--rollouts", 2)
+    assert of_file["scenario"] == "mine"
+    assert of_file["event"] == pytest.approx([4.0, 4.6])
+    for name, numbers in jammed()["controllers"].items():
+        for key in ("contour_peak", "lag_peak", "speed_peak", "recovery_s", "time_lost_s"):
+            assert of_file["controllers"][name][key] == pytest.approx(numbers[key], rel=1e-3, abs=1e-6)
 
 
 def test_the_table_says_what_it_is_of_and_where_motion_control_wins():
@@ -86,7 +92,8 @@ def test_the_table_says_what_it_is_of_and_where_motion_control_wins():
 def test_the_engine_is_that_of_the_file_unless_told(tmp_path):
     path = tmp_path / "mine.toml"
     text = JAM.format(law="projection", gains=GAINS["projection"])
-    path.write_text('engine = "pinocchio"\n' + text.replace("10.0", "4.8", 1), encoding="utf-8")
+    text = text.replace("10.0", "0.9", 1).replace("start = 4.0", "start = 0.2")
+    path.write_text('engine = "pinocchio"\n' + text, encoding="utf-8")
     scenario = pc.load_scenario(path)
     used = [pc.compare("projection", scenario, rollouts=1, engine=engine) for engine in (None, "compiled")]
     assert [one.runs["projection"].config["engine"] for one in used] == ["pinocchio", "compiled"]

@@ -19,7 +19,7 @@ def files(tmp_path_factory):
     robot = pc.load_robot("cicese_2dof")
     task = pc.Lissajous([0.8, 0.8], [3, 4], speed=1.3, phases=[0.2, 2.0], center=[0.2, 0.4])
     law = pc.ComputedTorque(robot, task, K_p=400.0, K_v=40.0)
-    run = pc.simulate(law, task.q_d(np.array(0.0)), duration=8.0, progress=False)
+    run = pc.simulate(law, task.q_d(np.array(0.0)), duration=3.0, progress=False)
     folder = tmp_path_factory.mktemp("runs")
     return run.save(folder / "a" / "run.mcap"), run.save(folder / "b" / "run.nc")
 

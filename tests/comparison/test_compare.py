@@ -180,7 +180,7 @@ def test_all_laws_may_be_named_beside_others(arm, circle):
 
 
 def test_laws_of_ones_own_are_objects_or_functions():
-    scenario = shortened("jammed-joint")
+    scenario = shortened("undisturbed")
     law = Mine(scenario.robot, scenario.task, 800.0, [45.0, 100.0], start="nearest")
     both = pc.compare({"a": law, "b": lambda arm, task: Mine(arm, task, 800.0, 50.0)}, scenario, rollouts=1)
     theirs = compared("computed_torque", scenario=scenario, rollouts=1)
@@ -269,7 +269,8 @@ def test_an_event_plan_is_compared_where_it_is_named():
 
 
 def test_a_held_plan_loses_the_time_it_is_held_and_stays_on_the_path():
-    held = compared("computed_torque", "projection", scenario="hold", rollouts=1)
+    early = {"override": [[1.0, 0.0], [3.0, 1.0]], "event": (1.0, 3.0), "duration": 3.5}
+    held = compared("computed_torque", "projection", scenario=replace(pc.make_scenario("hold"), **early), rollouts=1)
     for law in held.measures:
         assert 1.7 < held.mean(law, "time_lost_s") < 2.1  # of the 2 s
         calm = pc.contour_error(held.undisturbed[law]).max()
@@ -277,7 +278,8 @@ def test_a_held_plan_loses_the_time_it_is_held_and_stays_on_the_path():
 
 
 def test_paced_laws_stay_on_the_path_that_weak_motors_leave():
-    weak = compared("projection", "paced_projection", scenario="weak-motors", rollouts=1)
+    scenario = replace(pc.make_scenario("weak-motors"), duration=3.0)
+    weak = compared("projection", "paced_projection", scenario=scenario, rollouts=1)
     assert weak.mean("paced_projection", "contour_peak") < 0.25 * weak.mean("projection", "contour_peak")
     assert weak.mean("paced_projection", "time_lost_s") < 1.2 * weak.mean("projection", "time_lost_s")
     assert {"paced_projection", "paced_extended_motion_plan"} <= set(pc.make_scenario("weak-motors").laws)

@@ -109,13 +109,11 @@ def test_a_plunge_at_a_corner_is_followed_by_the_cut_that_begins_there(tmp_path)
     assert_as_programmed(read(PLUNGE_AT_CORNER, tmp_path), "blend")
 
 
-@settings(max_examples=40)
 @given(text=programs(), corner=CORNERS)
 def test_random_programs_are_followed_as_they_lift_and_plunge(text, corner, tmp_path_factory):
     assert_as_programmed(read(text, tmp_path_factory.mktemp("program")), corner)
 
 
-@settings(max_examples=30)
 @given(
     corners=st.lists(st.tuples(places, places), min_size=3, max_size=6, unique=True),
     lead=st.floats(0.05, 0.95),

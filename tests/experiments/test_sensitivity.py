@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -101,7 +101,6 @@ def test_eulers_plan_is_eulers():
     assert_array_equal(law.advance(z, out, PERIOD)[:, 0], z[:, 0] + PERIOD * out.sdot)
 
 
-@settings(max_examples=50, deadline=None)
 @given(
     cloud=st.integers(1, 6).flatmap(
         lambda n: st.lists(st.lists(st.floats(0.6, 1.6), min_size=4, max_size=4), min_size=n, max_size=n)

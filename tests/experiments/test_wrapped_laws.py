@@ -8,7 +8,7 @@ import pytest
 import pathcontrol as pc
 
 FILE = """
-duration = 0.5
+duration = 0.35
 robot.source = "cicese_2dof"
 task = { type = "circle", radius = 1.0, speed = 11.0 }
 loop = { torque_limits = true }
@@ -17,7 +17,7 @@ type = "paced"
 torque_margin = 0.2
 [controller.law]
 type = "speed_override"
-override = [[0.3, 0.0]]
+override = [[0.2, 0.0]]
 acceleration = 5.0
 [controller.law.law]
 """
@@ -33,9 +33,9 @@ SWEPT = """
 def by_hand(arm, k=20.0, acceleration=5.0):
     task = pc.Circle(1.0, 11.0)
     law = pc.ExtendedMotionPlan(arm, task, 800.0, [45.0, 100.0], k)
-    law = pc.Paced(pc.SpeedOverride(law, [[0.3, 0.0]], acceleration), 0.2)
+    law = pc.Paced(pc.SpeedOverride(law, [[0.2, 0.0]], acceleration), 0.2)
     begin, loop = task.q_d(np.array(0.0)), pc.SampledLoop(torque_limits=True)
-    return pc.simulate(law, begin, duration=0.5, loop=loop, progress=False)
+    return pc.simulate(law, begin, duration=0.35, loop=loop, progress=False)
 
 
 def test_a_file_wraps_laws_by_tables_within_tables(tmp_path, arm):
@@ -77,7 +77,7 @@ def test_a_sweep_varies_what_is_inside(tmp_path):
     ("change", "told"),
     [
         (("torque_margin = 0.2", "torque_margin = 1.5"), "torque_margin"),
-        (("override = [[0.3, 0.0]]", "override = 3.0"), "override"),
+        (("override = [[0.2, 0.0]]", "override = 3.0"), "override"),
         (("acceleration = 5.0", "acceleration = 0.0"), "acceleration"),
         (("k = 20.0", "k = -1.0"), "k"),
         (("[controller.law.law]", "[controller.law.lau]"), "law"),

@@ -32,7 +32,7 @@ WRAPPERS: dict[str, Wrap] = {
 }
 
 
-def builder(wrap: Wrap, duration: float = 0.25) -> Callable[[Parameters, np.ndarray], dict[str, Any]]:
+def builder(wrap: Wrap, duration: float = 0.2) -> Callable[[Parameters, np.ndarray], dict[str, Any]]:
     def build(p: Parameters, samples: np.ndarray) -> dict[str, Any]:
         law = pc.ExtendedMotionPlan(ROBOT, CIRCLE, p["K_p"][:, None], [45.0, 100.0], p["k"], friction="full")
         q = np.tile(START, (len(samples), 1))
@@ -43,10 +43,10 @@ def builder(wrap: Wrap, duration: float = 0.25) -> Callable[[Parameters, np.ndar
 
 @pytest.mark.parametrize("name", WRAPPERS)
 def test_a_sample_of_a_wrapped_law_is_what_it_is_alone(name: str, tmp_path: Path) -> None:
-    build, space = builder(WRAPPERS[name]), pc.Space.sobol(SPACE, samples=4)
-    swept = pc.sweep(build, space, tmp_path / "swept", chunk=3, keep=pc.Keep(worst=1), progress=False)
+    build, space = builder(WRAPPERS[name]), pc.Space.sobol(SPACE, samples=3)
+    swept = pc.sweep(build, space, tmp_path / "swept", chunk=2, keep=pc.Keep(worst=1), progress=False)
     table, design = swept.table(), space.design()
-    for i in range(4):
+    for i in range(3):
         alone = pc.simulate(**build({n: v[[i]] for n, v in design.items()}, np.array([i])), progress=False)
         expected = pc.metrics(alone)
         for measured in ("contour_error_peak", "tau_peak"):
@@ -65,18 +65,18 @@ def test_gains_of_a_wrapped_law_are_tuned(name: str) -> None:
 
 
 OVERRIDES = {
-    "held": [[0.4, 0.0]],
-    "held for a while": [[0.3, 0.0], [0.9, 1.0]],
+    "held": [[0.2, 0.0]],
+    "held for a while": [[0.15, 0.0], [0.45, 1.0]],
     "slow": 0.2,
     "slow, each": [0.1, 0.3, 1.0],
-    "back": [[0.5, -1.0]],
+    "back": [[0.25, -1.0]],
     "fast": 2.0,
 }
 
 
 @pytest.mark.parametrize("name", OVERRIDES)
 def test_a_plan_that_goes_as_an_operator_asks_is_not_unfinished(name: str, tmp_path: Path) -> None:
-    build = builder(lambda law, p: pc.SpeedOverride(law, OVERRIDES[name]), duration=1.2)
+    build = builder(lambda law, p: pc.SpeedOverride(law, OVERRIDES[name]), duration=0.6)
     space = pc.Space.given({"K_p": [800.0, 900.0, 1000.0], "k": [20.0] * 3})
     swept = pc.sweep(build, space, tmp_path / "swept", chunk=3, metrics=["progress"], progress=False)
     assert list(swept.table()["status"].values) == ["running"] * 3
@@ -90,7 +90,7 @@ def test_an_arm_that_stands_still_though_nobody_holds_it_is_unfinished(tmp_path:
         law = pc.ExtendedMotionPlan(ROBOT, CIRCLE, 800.0, [45.0, 100.0], 200.0)
         jam = pc.JammedJoint(0, 0.0, 5.0) + pc.JammedJoint(1, 0.0, 5.0)
         q = np.tile(START, (len(samples), 1))
-        return {"controller": pc.SpeedOverride(law, p["u"]), "q": q, "duration": 2.0, "disturbance": jam}
+        return {"controller": pc.SpeedOverride(law, p["u"]), "q": q, "duration": 1.0, "disturbance": jam}
 
     swept = pc.sweep(build, pc.Space.given({"u": [1.0, 0.8]}), tmp_path / "swept", progress=False)
     assert list(swept.table()["status"].values) == ["unfinished"] * 2
