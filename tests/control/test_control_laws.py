@@ -222,11 +222,11 @@ def test_the_motion_plan_solves_6(ideal_arm):
 def test_k_to_infinity_is_the_projection_law(ideal_arm):
     task = Uneven(0.8, 1.0)
     limit = Projection(ideal_arm, task, 100.0, 20.0)
-    reference = simulate(limit, START, duration=1.0, loop=ContinuousTime(), progress=False).array("q")
+    reference = simulate(limit, START, duration=0.5, loop=ContinuousTime(), progress=False).array("q")
     distances = []
     for k in (1e2, 1e3, 1e4):
         law = ExtendedMotionPlan(ideal_arm, task, 100.0, 20.0, k, start="nearest")
-        run = simulate(law, START, duration=1.0, loop=ContinuousTime(), progress=False)
+        run = simulate(law, START, duration=0.5, loop=ContinuousTime(), progress=False)
         distances.append(np.abs(run.array("q") - reference).max())
     # σ − σ̄ is of order 1/k
     assert distances[0] / distances[1] == pytest.approx(10, rel=0.3)

@@ -140,7 +140,7 @@ def test_states_of_a_wrapped_law_ask_for_the_law(arm, circle):
 @pytest.mark.parametrize("name", ["transverse_linearization", "maneuver_regulation"])
 def test_V_of_a_run_falls_as_its_theorem_says_while_its_speed_is_turned_down(ideal_arm, circle, name):
     law, q = pc.SpeedOverride(law_of(name, ideal_arm, circle), 0.5), np.array([[1.1, 0.1], [0.9, -0.2]])
-    run = run_of(law, q, loop=pc.ContinuousTime(output_period=2e-4, rtol=1e-10, atol=1e-11), duration=0.1)
+    run = run_of(law, q, loop=pc.ContinuousTime(output_period=2e-4, rtol=1e-10, atol=1e-11), duration=0.06)
     V, Vdot = pc.lyapunov(law, run)
     slope = (V[:, 2:] - V[:, :-2]) / (run.time[2:] - run.time[:-2])
     np.testing.assert_allclose(slope, Vdot[:, 1:-1], rtol=1e-3, atol=1e-4 * np.abs(Vdot).max())

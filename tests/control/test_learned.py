@@ -187,8 +187,8 @@ def test_the_table_of_a_run_is_found_again(learned):
 
 
 def test_a_hold_and_a_way_back_leave_the_table_as_it_is(learned):
-    """The plan is held for 1 s in the fifth lap, and goes back in the sixth."""
-    steps = [[4.3 * LAP, 0.0], [4.3 * LAP + 1.0, 1.0], [5.5 * LAP + 1.0, -1.0], [5.7 * LAP + 1.0, 1.0]]
+    """The plan is held for 0.6 s in the fifth lap, and goes back in the sixth."""
+    steps = [[4.3 * LAP, 0.0], [4.3 * LAP + 0.6, 1.0], [5.5 * LAP + 0.6, -1.0], [5.7 * LAP + 0.6, 1.0]]
     controller = Kept(pc.SpeedOverride(law(), steps, acceleration=10.0), nodes=32)
     disturbed = run(controller, 7)
     assert pc.speed_factor(disturbed)[0].min() < 0
@@ -234,10 +234,10 @@ def test_a_rollout_of_a_batch_is_what_it_is_alone():
     paths = [CIRCLE, pc.Circle(0.3, 2.5)]
     together = pc.Learned(pc.Projection(CICESE, pc.TaskBatch(paths), 800.0, [45.0, 100.0]), nodes=32)
     loop = pc.SampledLoop(PERIOD)
-    both = pc.simulate(together, np.tile(START, (2, 1)), duration=1.5, loop=loop, progress=False)
+    both = pc.simulate(together, np.tile(START, (2, 1)), duration=1.0, loop=loop, progress=False)
     for i, path in enumerate(paths):
         alone = pc.Learned(pc.Projection(CICESE, path, 800.0, [45.0, 100.0]), nodes=32)
-        one = pc.simulate(alone, START, duration=1.5, loop=loop, progress=False)
+        one = pc.simulate(alone, START, duration=1.0, loop=loop, progress=False)
         assert_allclose(both.array("q")[i], one.array("q")[0], atol=1e-9)
     assert both.array("forgotten").shape == (2,)
 

@@ -16,7 +16,16 @@ LOOPS = {
 }
 LAWS = ("extended_motion_plan", "projection")
 every_law = pytest.mark.parametrize("name", LAWS)
-every_loop = pytest.mark.parametrize("loop", list(LOOPS))
+#: each law with each loop and each speed, and each loop at each speed
+every_pair = pytest.mark.parametrize(
+    ("name", "loop", "speed"),
+    [
+        ("extended_motion_plan", "exact", 6.0),
+        ("extended_motion_plan", "encoders", 9.0),
+        ("projection", "exact", 9.0),
+        ("projection", "encoders", 6.0),
+    ],
+)
 
 
 def make_law(name, arm, task, K_p=800.0, K_v=(45.0, 100.0)):
@@ -25,7 +34,7 @@ def make_law(name, arm, task, K_p=800.0, K_v=(45.0, 100.0)):
     return pc.ExtendedMotionPlan(arm, task, K_p, K_v, k=20.0)
 
 
-def contour(law, loop, duration=2.4, **settings):
+def contour(law, loop, duration=1.8, **settings):
     """The contour error [deg] of a run that begins on the path at rest, and the run."""
     begin = law.task.q_d(np.array(law.task.s0))
     run = pc.simulate(law, begin, duration=duration, loop=loop, progress=False, **settings)
@@ -50,9 +59,7 @@ def late(error):
     return error[len(error) // 2 :].max()
 
 
-@pytest.mark.parametrize("speed", [6.0, 9.0])
-@every_loop
-@every_law
+@every_pair
 def test_from_a_start_at_rest_a_paced_law_leaves_its_path_no_farther(name, loop, speed):
     paced, _ = paced_circle(name, loop, speed)
     law = make_law(name, ARM, pc.Circle(1.0, speed))
@@ -60,9 +67,7 @@ def test_from_a_start_at_rest_a_paced_law_leaves_its_path_no_farther(name, loop,
     assert paced.max() < 1.002 * plain.max()
 
 
-@pytest.mark.parametrize("speed", [6.0, 9.0])
-@every_loop
-@every_law
+@every_pair
 def test_the_pace_costs_no_more_than_the_friction_of_a_slower_lap(name, loop, speed):
     """Motors without limits go the circle as the law asks: at the speed of the profile, and at that of the pace.
 
@@ -96,8 +101,7 @@ def arms():
     }
 
 
-@every_law
-@pytest.mark.parametrize("which", ["ur5", "panda"])
+@pytest.mark.parametrize(("which", "name"), zip(("ur5", "panda"), LAWS, strict=True))
 def test_arms_with_half_of_their_torque_stay_on_a_contour(which, name):
     """Peaks over a lap and more, from a start at rest, with dry friction, whose error a slow lap has too.
 
