@@ -88,9 +88,14 @@ def rates_of_disturbance(
     some times, at velocities and positions beside those of the start, (N, n).
     """
     inverse = np.linalg.inv(damped.mass_matrix(q))
+    known: set[bytes] = set()
     damping = stiffness = 0.0
     for t in _sample_times(disturbance, duration):
-        slopes = _slopes(disturbance, t, q, qd)
+        tried = _try_states(disturbance, t, q, qd)
+        if (one := tried.tobytes()) in known:  # most change at their jumps only, and their slopes with them
+            continue
+        known.add(one)
+        slopes = _slopes(disturbance, t, q, qd, tried)
         if slopes is None:
             continue
         by_speed, by_angle = slopes
@@ -107,20 +112,31 @@ def _sample_times(disturbance: Disturbance, duration: float) -> Iterator[float]:
     yield from np.union1d(np.linspace(0.0, duration, _TIMES), between[:_TIMES]).tolist()
 
 
-def _slopes(disturbance: Disturbance, t: float, q: Array, qd: Array) -> tuple[Array, Array] | None:
-    """Return ∂d/∂q̇ and ∂d/∂q at t [s], (N, n, n); ``None`` where they vanish or cannot be measured, as for noise."""
+def _try_states(disturbance: Disturbance, t: float, q: Array, qd: Array) -> Array:
+    """Return the torques at t [s] of the states (N, n) and of two beside them, (3, N, n)."""
+    beside = ((q + side * _TRIED_ANGLE, qd + side * _TRIED_SPEED) for side in (0.0, 1.0, -1.0))
+    return np.stack([_torque(disturbance, t, *state) for state in beside])
 
-    def torque(q: Array, qd: Array) -> Array:
-        return np.broadcast_to(np.asarray(disturbance.torque(t, q, qd), dtype=np.float64), q.shape)
 
-    here = torque(q, qd)
-    moved = torque(q + _TRIED_ANGLE, qd + _TRIED_SPEED), torque(q - _TRIED_ANGLE, qd - _TRIED_SPEED)
-    if all(np.array_equal(here, there) for there in moved) or not np.array_equal(here, torque(q, qd)):
+def _torque(disturbance: Disturbance, t: float, q: Array, qd: Array) -> Array:
+    """Return the torque at t [s], (N, n)."""
+    return np.broadcast_to(np.asarray(disturbance.torque(t, q, qd), dtype=np.float64), q.shape)
+
+
+def _slopes(disturbance: Disturbance, t: float, q: Array, qd: Array, tried: Array) -> tuple[Array, Array] | None:
+    """Return ∂d/∂q̇ and ∂d/∂q at t [s], (N, n, n); ``None`` where they vanish or cannot be measured, as for noise.
+
+    ``tried`` are the torques of the states (N, n) and of two beside them, (3, N, n).
+    """
+    here, *moved = tried
+    if all(np.array_equal(here, there) for there in moved):
+        return None
+    if not np.array_equal(here, _torque(disturbance, t, q, qd)):
         return None
     by_speed, by_angle = np.zeros((2, len(q), q.shape[1], q.shape[1]))
     for j, one in enumerate(np.eye(q.shape[1])):
         for slopes, dq, dv in ((by_speed, 0.0, _TRIED_SPEED * one), (by_angle, _TRIED_ANGLE * one, 0.0)):
-            change = torque(q + dq, qd + dv) - torque(q - dq, qd - dv)
+            change = _torque(disturbance, t, q + dq, qd + dv) - _torque(disturbance, t, q - dq, qd - dv)
             slopes[:, :, j] = change / (2 * max(np.max(dq), np.max(dv)))
     return by_speed, by_angle
 
