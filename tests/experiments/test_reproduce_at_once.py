@@ -93,10 +93,11 @@ def test_files_are_the_same_to_the_last_bit_from_one_process_and_from_two(result
 
 @TWO_CORES
 def test_errors_of_another_process_are_told_in_one_sentence(tmp_path):
-    (tmp_path / "out" / "figure_09.png").mkdir(parents=True)
+    for name in ("extended_motion_plan", "projection"):  # the first file that each of the two processes writes
+        (tmp_path / "out" / f"{name}.nc").mkdir(parents=True)
     done = subprocess.run([sys.executable, "-c", SHORTLY, tmp_path / "out"], capture_output=True, text=True)
     assert done.returncode == 2
-    assert "figure_09.png" in done.stderr
+    assert "extended_motion_plan.nc" in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "out" / "summary.json").exists()
 
