@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from circle_file import CIRCLE_FILE
@@ -19,6 +21,7 @@ LAW = pc.ExtendedMotionPlan(ARM, pc.Circle(1.0, 2.0), 800.0, [45.0, 100.0], 20.0
 TIPS = {"cicese_2dof": "tool", "ur5": "tool0", "panda": "panda_hand"}
 
 
+@cache
 def arm(name):
     return pc.load_robot(name, lock=FINGERS if name == "panda" else None)
 

@@ -87,7 +87,7 @@ def test_a_batch_is_the_loop_over_its_plants(engine, data, copies):
     q = START + 0.3 * np.random.default_rng(2).normal(size=(len(plants), 2))
 
     def ran(q, plant):
-        return simulate(controller, q, duration=0.15, plant=plant, loop=LOOP, engine=engine, progress=False)
+        return simulate(controller, q, duration=0.1, plant=plant, loop=LOOP, engine=engine, progress=False)
 
     together = ran(q, plants)
     for i, plant in enumerate(plants[: -3 * copies]):
@@ -207,9 +207,9 @@ def test_limits_and_encoders_of_each(arm, circle):
 
 def test_continuous_time_has_plants_too(arm, circle):
     plants = [arm, arm.with_payload(1.0, "tool"), arm.with_friction(None)]
-    together = simulate(law(arm, circle), START, duration=0.2, plant=plants, loop=ContinuousTime(), progress=False)
+    together = simulate(law(arm, circle), START, duration=0.1, plant=plants, loop=ContinuousTime(), progress=False)
     for i, plant in enumerate(plants):
-        alone = simulate(law(arm, circle), START, duration=0.2, plant=plant, loop=ContinuousTime(), progress=False)
+        alone = simulate(law(arm, circle), START, duration=0.1, plant=plant, loop=ContinuousTime(), progress=False)
         assert np.abs(together.array("q")[i] - alone.array("q")[0]).max() < 1e-6
 
 
