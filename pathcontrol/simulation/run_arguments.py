@@ -199,12 +199,13 @@ def _start_rows(controller: Controller, q: Array, qd: Array) -> tuple[Array, Arr
     """Return q, q̇ and the law's state z at the start, for each row of gains where the law takes no other number."""
     try:
         z = _call_law(controller, q, controller.start, q, qd)
-        _call_law(controller, q, controller.law, 0.0, q, qd, z)
+        rows = len(z) if len(q) == 1 and np.ndim(z) == 2 else 1  # those of an observer or a wrapper
+        _call_law(controller, q, controller.law, 0.0, q.repeat(rows, axis=0), qd.repeat(rows, axis=0), z)
     except InputError:
-        rows = set(count_gain_rows(controller).values())
-        if len(q) > 1 or len(rows) != 1:
+        counts = set(count_gain_rows(controller).values())
+        if len(q) > 1 or len(counts) != 1:
             raise
-        (several,) = rows
+        (several,) = counts
         q, qd = q.repeat(several, axis=0), qd.repeat(several, axis=0)
         z = _call_law(controller, q, controller.start, q, qd)
     return q, qd, z

@@ -202,6 +202,14 @@ def test_each_rollout_is_judged_alone(ideal_arm):
         assert np.array_equal(many.reshape(-1), each)
 
 
+@pytest.mark.parametrize("path", [Circle(1.0, 2.0), Ellipse([1.0, 0.5], 1.0)])
+def test_one_posture_far_from_the_path_may_be_of_several_rollouts(ideal_arm, path):
+    """So it is where each rollout has an observer of its own."""
+    law = Projection(ideal_arm, path, 800.0, 50.0, friction="observed", observer_hz=[[10.0], [20.0]])
+    runs = [simulate(law, q, duration=0.1, progress=False) for q in ([0.7, 1.2], [[0.7, 1.2]] * 2)]
+    assert runs[0].array("q") == pytest.approx(runs[1].array("q"), abs=1e-12)
+
+
 def test_the_law_goes_on_from_the_branch_it_was_pushed_to(ideal_arm):
     path = zigzag(300)
     law = Projection(ideal_arm, path, 100.0, 20.0, start="nearest")
