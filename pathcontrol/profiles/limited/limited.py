@@ -13,6 +13,7 @@ from pathcontrol._expect import expect
 from pathcontrol.arguments import Form, Rate, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.profiles.limited.grid import edges, excess, keep_below, quarters, refine
+from pathcontrol.profiles.limited.known_motion import KnownMotion
 from pathcontrol.profiles.limited.motion_limit import MotionLimit
 from pathcontrol.profiles.limited.tangential import Tangential, all_steps
 from pathcontrol.profiles.limited.two_pass import largest_sequence
@@ -119,6 +120,7 @@ class Demands:
         self, path: Path, limits: Sequence[MotionLimit], velocity: ArrayLike | None, start_rate: float | None
     ) -> None:
         self.path, self.limits = path, limits
+        self._motions = [KnownMotion(limit.motion, path) for limit in limits]
         self.velocity = _check_velocity(velocity, path.dq_d(np.asarray(path.s0)).shape[-1])
         self.first, self.last = np.inf, np.inf
         if path.period is None:
@@ -133,8 +135,8 @@ class Demands:
         with np.errstate(divide="ignore"):
             rates = np.minimum(rates, (self.velocity / np.abs(dq)).min(-1))
         ceilings, tangential = [rates**2], []
-        for limit in self.limits:
-            dp, ddp = limit.motion.along(self.path, s)
+        for limit, motion in zip(self.limits, self._motions, strict=True):
+            dp, ddp = motion.at(s)
             ceilings.append(limit.ceiling(dp, ddp))
             if limit.tangential is not None:
                 length = np.linalg.norm(dp, axis=-1)
