@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import Opened, opened
+from browser import FINE, Opened, opened
 from markupsafe import Markup
 from test_view_browser import DURATION, numbers, saved, short_run
 
@@ -19,13 +19,18 @@ from pathcontrol.view.animation.animation import Animation
 from pathcontrol.view.page.html import Section, page
 
 PHONE: dict[str, Any] = {"size": (390, 844), "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
+CELLS = ["line 8", "rapid", "not finished", "1.234e-05 m", "−17.25", "100 %", "8.886e+04", "12.3 deg/s", "0.4567"]
+TABLE = {"title": "Contours", "columns": ["contour", *["mean speed [mm/s]"] * 8], "rows": [CELLS] * 3}
 SECTIONS = [Section(f"Part {i}", Markup(f'<p style="height: 40rem">text {i}</p>')) for i in range(3)]
 
 
 @pytest.fixture(scope="module")
 def animation(arm: RobotModel, circle: Circle) -> Animation:
     run = short_run(arm, circle)
-    return record({"first": run, "second": run}, arm, circle)
+    recorded = record({"first": run, "second": run}, arm, circle)
+    header = recorded.film.header
+    film = dataclasses.replace(recorded.film, header=header | {"tables": [*header["tables"], TABLE]})
+    return dataclasses.replace(recorded, film=film)
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +42,14 @@ def file(animation: Animation, tmp_path_factory: pytest.TempPathFactory) -> Path
 def wide(file: Path) -> Iterator[Opened]:
     with opened(file, (1440, 900), "#t=0") as film:
         yield film
+
+
+@pytest.fixture(scope="module")
+def phone(file: Path) -> Iterator[Opened]:
+    """The page on a telephone, by night."""
+    with opened(file, hash="#t=0", color_scheme="dark", **PHONE) as film:
+        yield film
+        assert film.complaints == []
 
 
 @pytest.fixture
@@ -82,20 +95,24 @@ def test_playing_and_pausing(film: Opened) -> None:
     assert film("[film.playing, film.time]") == [False, now]
 
 
-def test_time_passes_at_the_speed_chosen(file: Path) -> None:
+def test_time_passes_at_the_speed_chosen(film: Opened) -> None:
+    settle(film)
     # frames come when we say so: after so many seconds
-    frames = """
+    film("""() => {
         let [now, waiting] = [0, []];
+        window.frames_of_the_browser = window.requestAnimationFrame;
         window.requestAnimationFrame = (frame) => waiting.push(frame);
         window.step = (seconds) => waiting.splice(0).forEach((frame) => frame((now += 1000 * seconds)));
-    """
-    with opened(file, hash="#t=0", before=frames) as film:
+    }""")
+    try:
         for speed in ("0.1", "1", "4"):
             film.tab.locator("#speed").select_option(speed)
             film("() => { film.seek(0); film.play(); step(9); step(0.1); step(0.2); }")
             assert film("film.time") == pytest.approx(0.3 * float(speed))
             film("() => { film.pause(); step(0.1); }")
         assert film("film.time") == pytest.approx(1.2)
+    finally:
+        film("() => { film.pause(); step(0.1); step(0.1); requestAnimationFrame = frames_of_the_browser; }")
 
 
 def test_it_begins_again_at_the_end(film: Opened) -> None:
@@ -227,11 +244,11 @@ def test_light_and_dark(film: Opened) -> None:
     np.testing.assert_array_equal(film.picture(), light)
 
 
-def test_the_system_says_light_or_dark(file: Path) -> None:
-    with opened(file, hash="#t=0", color_scheme="dark") as film:
-        assert film("film.theme") == "dark"
-        film.tab.emulate_media(color_scheme="light")
-        film.until("film.theme === 'light'")
+def test_the_system_says_light_or_dark(phone: Opened) -> None:
+    assert phone("film.theme") == "dark"
+    for scheme in ("light", "dark"):
+        phone.tab.emulate_media(color_scheme=scheme)
+        phone.until(f"film.theme === '{scheme}'")
 
 
 def test_the_view_can_be_turned_and_reset(film: Opened) -> None:
@@ -271,20 +288,18 @@ def test_the_first_charts_are_seen_without_scrolling(film: Opened) -> None:
     assert film.tab.locator("#pane").bounding_box()["height"] > 400
 
 
-def test_a_telephone(file: Path) -> None:
-    with opened(file, hash="#t=0", **PHONE) as film:
-        assert film("document.documentElement.scrollWidth <= innerWidth")
-        for control in film.tab.locator("header button, #stage button, #panel button, select, #scrubber").all():
-            if control.is_visible():
-                assert control.bounding_box()["height"] >= 44
-        lefts = {round(chart.bounding_box()["x"]) for chart in film.tab.locator("#charts .chart").all()}
-        assert len(lefts) == 1  # one below another
-        over = film.tab.locator("#charts .u-over").first
-        over.scroll_into_view_if_needed()
-        box = over.bounding_box()
-        film.tab.touchscreen.tap(box["x"] + 0.5 * box["width"], box["y"] + 50)
-        assert film("film.time") == pytest.approx(DURATION / 2, abs=0.03)
-        assert film.complaints == []
+def test_a_telephone(phone: Opened) -> None:
+    assert phone("document.documentElement.scrollWidth <= innerWidth")
+    for control in phone.tab.locator("header button, #stage button, #panel button, select, #scrubber").all():
+        if control.is_visible():
+            assert control.bounding_box()["height"] >= 44
+    lefts = {round(chart.bounding_box()["x"]) for chart in phone.tab.locator("#charts .chart").all()}
+    assert len(lefts) == 1  # one below another
+    over = phone.tab.locator("#charts .u-over").first
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    phone.tab.touchscreen.tap(box["x"] + 0.5 * box["width"], box["y"] + 50)
+    assert phone("film.time") == pytest.approx(DURATION / 2, abs=0.03)
 
 
 def test_a_transient_is_shown_on_request(film: Opened, animation: Animation) -> None:
@@ -303,7 +318,7 @@ def test_a_transient_is_shown_on_request(film: Opened, animation: Animation) -> 
 def test_a_small_path_is_seen_from_near(arm: RobotModel, tmp_path: Path) -> None:
     small = Circle(0.03, 0.06, center=[0.3, 0.9])
     page_file = record(short_run(arm, small), arm, small).save(tmp_path / "small.html")
-    with opened(page_file, hash=f"#t={DURATION}") as film:
+    with opened(page_file, hash=f"#t={DURATION}", **FINE) as film:
         button = film.tab.locator("#near")
         assert button.get_attribute("aria-pressed") == "false"
         shown = []
@@ -340,17 +355,15 @@ def test_a_path_that_fills_the_picture_needs_no_view_from_near(film: Opened) -> 
     press(film, "c")
 
 
-def test_numbers_of_a_table_stay_whole_on_a_telephone(animation: Animation, tmp_path: Path) -> None:
+def test_numbers_of_a_table_stay_whole_on_a_telephone(phone: Opened) -> None:
     """Each number and each word is on one line, however many columns there are; the table scrolls inside its card."""
-    cells = ["line 8", "rapid", "not finished", "1.234e-05 m", "−17.25", "100 %", "8.886e+04", "12.3 deg/s", "0.4567"]
-    table = {"title": "Contours", "columns": ["contour", *["mean speed [mm/s]"] * 8], "rows": [cells] * 3}
-    film = dataclasses.replace(animation.film, header=animation.film.header | {"tables": [table]})
-    with opened(saved(page(film, animation.title), tmp_path), **PHONE) as phone:
-        lines = phone("""() => [...document.querySelectorAll("#tables td")].map((cell) => {
-            const range = document.createRange();
-            range.selectNodeContents(cell);
-            return [cell.textContent, new Set([...range.getClientRects()].map((box) => box.top)).size];
-        })""")
-        assert {text for text, count in lines if count > 1} <= {"not finished"}  # at the space
-        assert max(count for _, count in lines) <= 2
-        assert phone("document.documentElement.scrollWidth <= innerWidth")
+    assert phone.tab.locator("#tables summary").last.inner_text() == TABLE["title"]
+    lines = phone("""() => [...document.querySelectorAll("#tables details:last-child td")].map((cell) => {
+        const range = document.createRange();
+        range.selectNodeContents(cell);
+        return [cell.textContent, new Set([...range.getClientRects()].map((box) => box.top)).size];
+    })""")
+    assert len(lines) == 3 * 8
+    assert {text for text, count in lines if count > 1} <= {"not finished"}  # at the space
+    assert max(count for _, count in lines) <= 2
+    assert phone("document.documentElement.scrollWidth <= innerWidth")

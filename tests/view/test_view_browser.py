@@ -99,7 +99,7 @@ def test_an_arm_of_six_joints_is_where_it_was(tmp_path: Path) -> None:
     robot = load_robot("ur5")
     run = turning(robot)
     animation = record(run, robot)
-    with opened(animation.save(tmp_path / "ur5.html"), hash="#t=0") as film:
+    with opened(animation.save(tmp_path / "ur5.html"), (300, 300), "#t=0") as film:
         check_poses(film, animation, robot, run)
         assert film.complaints == []
 
@@ -137,10 +137,10 @@ def test_moments_differ_and_the_same_moment_does_not(still_page: Opened) -> None
 
 
 def test_it_plays_by_itself_unless_that_is_not_wanted(file: Path) -> None:
-    with opened(file) as film:
+    with opened(file, (300, 300)) as film:
         film.until("film.playing && film.time > 0.05")
         assert film.complaints == []
-    with opened(file, reduced_motion="reduce") as film:
+    with opened(file, (300, 300), reduced_motion="reduce") as film:
         assert film("[film.playing, film.time]") == [False, 0]
 
 
