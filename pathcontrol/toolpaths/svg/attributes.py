@@ -40,8 +40,8 @@ def numbers(text: str, what: str) -> list[float]:
     """Parse numbers separated by blanks or commas."""
     if not (_STRANGE.search(text) or _BARE_COMMA.search(text)):
         with suppress(ValueError):  # two of them without a separator, as in 1-2, or none
-            found = [float(figure) for figure in text.replace(",", " ").split()]
-            if max(map(abs, found), default=0.0) <= _LARGEST:
+            found = list(map(float, text.replace(",", " ").split()))
+            if not found or max(max(found), -min(found)) <= _LARGEST:
                 return found
     return _scan(text, what)
 
