@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from strategies import floats, vectors
@@ -65,6 +65,7 @@ def test_the_error_of_a_turned_frame_is_the_turn(seed, turn):
             assert np.allclose(np.cos(np.linalg.norm(e, axis=-1)), cosine, atol=1e-12)
 
 
+@settings(max_examples=10)
 @given(seeds, vectors(3, 1.7))
 def test_the_slope_of_the_error_gives_the_gradient_of_its_square(seed, turn):
     """d½‖e‖²/dω = (de/dω)ᵀe wherever e is defined, by differences."""
@@ -201,6 +202,7 @@ def test_half_a_turn_about_a_coordinate_axis_is_exact(axis):
     assert np.array_equal(e[0], np.pi * np.eye(3)[axis])
 
 
+@settings(max_examples=10)
 @given(seeds)
 def test_a_tool_that_points_the_opposite_way_is_half_a_turn_off(seed):
     """Whichever way the normal points, along an axis of the base too: ‖e‖ = π, not less."""

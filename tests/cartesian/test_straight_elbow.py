@@ -34,7 +34,7 @@ def circle_past(distance: float, seed: int) -> ToolCurve:
 
 
 @pytest.mark.parametrize("closed", [None, False])
-@settings(max_examples=4)
+@settings(max_examples=3)
 @given(degrees=st.floats(1.0, 5.0), seed=seeds)
 def test_the_bundled_arm_keeps_its_elbow_on_one_side(closed, degrees, seed):
     """The elbow angle is the closed form's all along, and of one sign."""
@@ -49,7 +49,7 @@ def test_the_bundled_arm_keeps_its_elbow_on_one_side(closed, degrees, seed):
     assert np.abs(q[0] - q[-1]).max() < 1e-6 or closed is False
 
 
-@settings(max_examples=4)
+@settings(max_examples=3)
 @given(beyond=st.floats(1e-4, 0.01), seed=seeds)
 def test_a_circle_that_leaves_the_reach_is_told_so_and_where(beyond, seed):
     curve = circle_past(2 * LINK + beyond, seed)
@@ -69,8 +69,7 @@ def test_a_line_through_the_shoulder_is_refused_as_singular():
         CartesianPath(load_robot("cicese_2dof"), "tool", line, speed=0.1)
 
 
-@pytest.mark.parametrize("held", ["fixed", "normal", "free"])
-@pytest.mark.parametrize(("degrees", "seed"), [(1.0, 0), (-5.0, 3)])
+@pytest.mark.parametrize(("held", "degrees", "seed"), [("fixed", -5.0, 3), ("normal", 1.0, 0), ("free", -5.0, 3)])
 def test_a_ur5_keeps_its_elbow_on_one_side(held, degrees, seed):
     """A circle in the plane of the arm touches from within the sphere that the wrist reaches with this elbow."""
     pytest.importorskip("example_robot_data")
