@@ -32,7 +32,7 @@ from pathcontrol.profiles.tool_speed import ToolSpeed
 
 FRAMES = {"cicese_2dof": "tool", "ur5": "tool0", "panda": "panda_hand_tcp"}
 every_arm = pytest.mark.parametrize("name", FRAMES)
-few = settings(max_examples=12)
+few = settings(max_examples=6)
 seeds = st.integers(0, 9999)
 
 
@@ -167,7 +167,7 @@ def test_curvature_and_chord_on_a_circle(radius, normal, error, period):
     assert np.allclose(by_chord.squared * radius**2, 8 * error * radius / period**2, rtol=1e-9)
 
 
-@few
+@settings(max_examples=3)
 @given(seeds, st.booleans())
 def test_the_chords_of_control_periods_stay_within_their_tolerance(seed, closed):
     error, period = 1e-5, 0.01
