@@ -129,6 +129,6 @@ def test_methods_may_return_numbers_tuples_and_lists(form, loop):
         robot = load_robot("cicese_2dof").with_friction(law)
         assert_allclose(robot.friction.torque(np.array([[1.0, -2.0]])), [[b[0] + f[0], -2 * b[1] - f[1]]])
         controller = Projection(robot, Circle(0.5, 2.0), 400.0, [40.0, 40.0], friction="viscous")
-        runs.append(simulate(controller, [0.45, 0.02], duration=0.1, loop=loop, progress=False))
+        runs.append(simulate(controller, [0.45, 0.02], duration=0.04, loop=loop, progress=False))
     for run in runs[1:]:
         assert_allclose(run.array("q"), runs[0].array("q"), atol=1e-6)

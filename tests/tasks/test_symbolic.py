@@ -42,7 +42,7 @@ def meaning(text, at, a):
     return eval(text, {"__builtins__": {}}, NUMPY | {"s": at, "a": a}) + 0 * at
 
 
-@settings(max_examples=10)  # each is differentiated twice and compiled
+@settings(max_examples=6)  # each is differentiated twice and compiled
 @given(TEXTS, TEXTS, floats(-2, 2))
 def test_texts_mean_what_they_say_and_derivatives_are_exact(first, second, a):
     path = SymbolicPath([first, second, "s"], 1.0, s0=-2, s_end=2, parameters={"a": a})

@@ -131,7 +131,7 @@ def begin(tasks: list[PathTask]) -> np.ndarray:
     return np.add([task.q_d(np.array(task.s0)) for task in tasks], [0.02, -0.03])
 
 
-def ran(law: Controller, q: np.ndarray, duration: float = 0.06, **options) -> Run:
+def ran(law: Controller, q: np.ndarray, duration: float = 0.03, **options) -> Run:
     return simulate(law, q, duration=duration, progress=False, **({"loop": LOOP} | options))
 
 
@@ -274,7 +274,7 @@ def test_each_different_task_is_asked_once_for_all_rollouts_that_have_it():
     assert [(task, rows.tolist()) for task, rows in batch.groups()] == [(one, [0, 2, 3]), (other, [1])]
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(st.lists(random_tasks(), min_size=2, max_size=5), st.integers(0, 9999))
 def test_a_batch_has_the_values_of_its_tasks(tasks, seed):
     rng, batch = np.random.default_rng(seed), TaskBatch(tasks)

@@ -69,7 +69,7 @@ def inside(task, count=31):
 
 
 @given(EVERY, HOW, HOW)
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_derivatives_are_those_of_the_transformed_path(task, first, second):
     task = TRANSFORMS[second](TRANSFORMS[first](task))
     check_task(task, 2)
@@ -155,6 +155,7 @@ def test_shifts_scales_and_reversals_commute_with_the_projection(task, seed, off
 
 
 @given(EVERY, HOW, st.integers(0, 99))
+@settings(max_examples=12)
 def test_projections_are_nearest_points(task, how, seed):
     task = TRANSFORMS[how](task)
     q, near = beside(task, seed)

@@ -74,7 +74,7 @@ def assert_the_very_same(found: Toolpath | str, expected: Toolpath | str) -> Non
             assert same
 
 
-@settings(max_examples=70)
+@settings(max_examples=40)
 @given(programs, st.sampled_from(["refuse", "warn", "warn"]))
 def test_runs_give_what_single_lines_give(program, unknown):
     program = ["G21 G90", "G0 X0 Y0 Z5", "G1 X1 F600", *program]

@@ -77,6 +77,7 @@ def test_a_closed_curve_is_periodic_and_an_open_one_ends(seed, laps):
         assert np.array_equal(open_ended.position(beyond), open_ended.position(end))
 
 
+@settings(max_examples=12)
 @given(SEEDS, st.booleans(), floats(-3.0, 1.0))
 def test_the_nearest_point_is_that_of_a_dense_polygon(seed, closed, exponent):
     (curve, _), rng = hermite(seed, closed), np.random.default_rng(seed)
@@ -146,7 +147,7 @@ def test_a_spline_is_that_of_scipy(seed, closed):
 # --- in place of segments -----------------------------------------------------------------------------------
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(st.sampled_from([kind for kind in KINDS if kind != "lines"]), SEEDS, floats(-3.0, 1.0))
 def test_curves_for_segments_are_within_a_nanometre_and_of_unit_speed(kind, seed, exponent):
     """Between any two arc lengths; all but segments that bend within a hair's breadth, which are not followed so."""
@@ -182,7 +183,7 @@ def test_by_its_length_a_helix_is_its_closed_form(seed, radius, sweep, rise):
     assert np.allclose(np.linalg.norm(t, axis=-1), 1)
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(st.sampled_from(["ellipse", "degenerate", "near cusp", "rational"]), SEEDS, floats(-6.0, -3.0))
 def test_what_bends_too_sharply_becomes_a_polyline_as_near_as_said(kind, seed, exponent):
     rng, tolerance = np.random.default_rng(seed), 10**exponent

@@ -105,7 +105,7 @@ def mutations(draw, text: str):
 
 
 @given(mutations(VALID["svg"]))
-@settings(max_examples=100)
+@settings(max_examples=50)
 def test_mutated_svg(check, text):
     check("svg", text.encode("utf-8", "replace"))
 
@@ -128,7 +128,6 @@ def entity_mutations(draw):
 
 
 @given(entity_mutations())
-@settings(max_examples=50)
 def test_mutated_dxf(check, text):
     check("dxf", text.encode("utf-8", "replace"))
 
@@ -142,7 +141,7 @@ COMMANDS = st.sampled_from([*"MmLlHhVvCcSsQqTtAaZz", ",", " ", "0", "1", ".5", "
 
 
 @given(st.lists(st.one_of(COMMANDS, COMMANDS, NUMBERS), max_size=40), st.lists(NUMBERS, min_size=6, max_size=6))
-@settings(max_examples=100)
+@settings(max_examples=50)
 def test_path_data_of_any_tokens(check, tokens, matrix):
     attributes = f'd="M1 2{" ".join(tokens)}" transform="matrix({" ".join(matrix)})"'
     check("svg", svg(f"<path {attributes}/>".replace("\x01", "")).encode())
@@ -162,7 +161,7 @@ PIECE = st.one_of(
 
 
 @given(st.lists(PIECE, min_size=1, max_size=12))
-@settings(max_examples=100)
+@settings(max_examples=50)
 def test_every_path_by_the_grammar_is_read(check, pieces):
     """With flat, coincident, folded and tiny curves among them; the line at the end is always drawn."""
     assert check("svg", svg(f'<path d="M3 4{"".join(pieces)}M0 0H1"/>').encode())

@@ -124,7 +124,7 @@ def test_the_distance_from_the_axis_of_a_circle_and_of_a_helix():
     assert np.allclose(helix.distance(height[:, None] * Z), 1.0, atol=1e-9)
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(st.sampled_from(KINDS), SEEDS, floats(-6.0, 2.0))
 def test_distances_are_those_of_a_dense_polygon(kind, seed, exponent):
     one, rng = any_segment(kind, seed), np.random.default_rng(seed)
@@ -203,6 +203,7 @@ def test_a_contour_is_as_near_as_the_nearest_of_its_segments(seed, exponent):
 # --- moves and bounds ---------------------------------------------------------------------------------------
 
 
+@settings(max_examples=12)
 @given(st.sampled_from(KINDS), SEEDS)
 def test_placing_is_an_isometry_and_follows_the_group(kind, seed):
     rng, one = np.random.default_rng(seed), any_segment(kind, seed)
@@ -254,6 +255,7 @@ def test_bounds_hold_all_points_and_no_more(kind, seed, exponent):
     assert np.allclose([lower, upper], [points.min(0), points.max(0)], rtol=0, atol=1e-5 * size)
 
 
+@settings(max_examples=8)
 @given(floats(-3.0, 3.0), SEEDS)
 def test_rational_quadratics_make_a_whole_circle(exponent, seed):
     """Four quarters with the weight 1/√2, and one arc: the same points, length, distances and bounds."""
