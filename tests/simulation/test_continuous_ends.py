@@ -27,7 +27,7 @@ def free():
 def test_the_projection_does_not_jump_where_the_timed_end_takes_over(free):
     starts = [[0.05, -0.03], [-0.1, 0.05], [0.3, 0.25]]
     law = Projection(free, Line([0.0, 0.0], [0.6, 0.4], speed=1.0), 800.0, [45.0, 100.0])
-    loop = ContinuousTime(output_period=1e-3)
+    loop = ContinuousTime(output_period=2.5e-3)
     run = simulate(law, starts, duration=1.5, loop=loop, progress=False, until="duration")
     for V, s in zip(lyapunov(law, run)[0], run.array("s"), strict=True):
         assert (np.diff(V) <= 1e-9 * V[0]).all()
@@ -56,7 +56,7 @@ def test_the_timed_end_takes_over_without_a_jump_on_any_path(arm, task, offset):
     robot = load_robot(arm).with_friction(None)
     law = Projection(robot, task, 400.0, np.linspace(45.0, 100.0, robot.n))
     begin = task.q_d(np.array(task.s0))
-    loop = ContinuousTime(output_period=2e-3)
+    loop = ContinuousTime(output_period=4e-3)
     run = simulate(law, begin + offset, 0.3 * np.ones(robot.n), duration=1.2, loop=loop, progress=False)
     V, s = lyapunov(law, run)[0][0], run.array("s")[0]
     assert s.min() < law.ending.begin < s.max()

@@ -38,7 +38,7 @@ SLIDE = load_robot(
     <joint name="rail" type="prismatic"><parent link="base"/><child link="carriage"/><axis xyz="1 0 0"/>
     <limit lower="-3" upper="3" effort="100" velocity="10"/></joint></robot>"""
 )
-LOOPS = {"sampled": SampledLoop(), "continuous": ContinuousTime()}
+LOOPS = {"sampled": SampledLoop(), "continuous": ContinuousTime(output_period=0.01)}
 
 
 class Idle(ComputedTorque):

@@ -206,10 +206,10 @@ def test_limits_and_encoders_of_each(arm, circle):
 
 
 def test_continuous_time_has_plants_too(arm, circle):
-    plants = [arm, arm.with_payload(1.0, "tool"), arm.with_friction(None)]
-    together = simulate(law(arm, circle), START, duration=0.1, plant=plants, loop=ContinuousTime(), progress=False)
+    plants, loop = [arm, arm.with_payload(1.0, "tool"), arm.with_friction(None)], ContinuousTime(output_period=0.01)
+    together = simulate(law(arm, circle), START, duration=0.1, plant=plants, loop=loop, progress=False)
     for i, plant in enumerate(plants):
-        alone = simulate(law(arm, circle), START, duration=0.1, plant=plant, loop=ContinuousTime(), progress=False)
+        alone = simulate(law(arm, circle), START, duration=0.1, plant=plant, loop=loop, progress=False)
         assert np.abs(together.array("q")[i] - alone.array("q")[0]).max() < 1e-6
 
 

@@ -88,7 +88,7 @@ def test_a_sequence_is_each_path_by_hand(arm, makers, speed, offset):
 
 
 def test_in_continuous_time_as_well(ideal_arm):
-    laws, loop = [there(ideal_arm), around(ideal_arm)], ContinuousTime(rtol=1e-6, atol=1e-8)
+    laws, loop = [there(ideal_arm), around(ideal_arm)], ContinuousTime(output_period=0.01, rtol=1e-6, atol=1e-8)
     run = simulate_sequence(laws, HOME, duration=9.0, loop=loop, progress=False)
     runs = by_hand(laws, HOME, 9.0, loop=loop)
     assert np.allclose(np.diff(run.time), loop.output_period)
