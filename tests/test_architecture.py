@@ -97,10 +97,15 @@ def imported(node: ast.AST) -> Iterator[str]:
 
 
 @cache
+def tree_of(name: str) -> ast.Module:
+    """The syntax tree of a module."""
+    return ast.parse(MODULES[name].read_text(encoding="utf-8"))
+
+
+@cache
 def imports_of(name: str) -> set[str]:
     """What a module imports of the package: at its top, in functions, and for its types."""
-    tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
-    return {target for node in ast.walk(tree) for target in imported(node)} - {name}
+    return {target for node in ast.walk(tree_of(name)) for target in imported(node)} - {name}
 
 
 def floor(name: str) -> int | None:
@@ -155,8 +160,7 @@ def test_only_robot_knows_pinocchio():
 
 def imports_in_functions(name: str) -> Iterator[ast.Import | ast.ImportFrom]:
     """The import statements inside the functions of a module."""
-    tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
-    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    functions = [node for node in ast.walk(tree_of(name)) if isinstance(node, ast.FunctionDef)]
     found = {node for function in functions for node in ast.walk(function)}
     yield from (node for node in found if isinstance(node, ast.Import | ast.ImportFrom))
 
@@ -177,8 +181,8 @@ def test_imports_inside_functions_are_counted():
 
 def docstrings() -> Iterator[tuple[str, str]]:
     """All docstrings of the package, each with its place."""
-    for name, path in MODULES.items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for name in MODULES:
+        for node in ast.walk(tree_of(name)):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
                 yield f"{name}: {getattr(node, 'name', '')}", text
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from pathcontrol.analysis.coverage import Points, even_points, measure_coverage, refine, traverse
-from pathcontrol.analysis.metric_helpers import apply_where_finite
-from pathcontrol.analysis.tool_following import PlannedToolCurve, feed_along, find_tool, tool_speed
+from pathcontrol.analysis.tool_following import PlannedToolCurve, feed_along, find_tool, tool_motion
 from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.robot.model import RobotModel
@@ -65,10 +64,8 @@ def contour_numbers(
         tolerance: how near [m] the tool has to come to a point of the drawing for it to count as passed.
         stop: how many samples count; all by default.
     """
-    q = run.array("q")[:, :stop]
     tool = Tool(robot, str(task.frame), task.tool_pose)
-    x = apply_where_finite(lambda q: tool.kinematics(q).position, q, shape=(3,))[0]
-    speed = tool_speed(run, robot, task)[0, :stop]
+    x, speed = (values[0, :stop] for values in tool_motion(run, robot, task))
     which, finish = run.array("path_index")[:stop], run.array("path_finish_time")
     found = []
     for contour, paths in _group_paths(task, tool):

@@ -85,6 +85,18 @@ def tool_speed(run: Run, robot: RobotModel, task: PathTask) -> Array:
     return apply_where_finite(speed, run.array("q"), run.array("qd"))
 
 
+def tool_motion(run: Run, robot: RobotModel, task: PathTask) -> tuple[Array, Array]:
+    """Return the position [m], (rollout, time, 3), of the tool that a path was made for, and its :func:`tool_speed`."""
+    tool = require_tool(robot, task)
+
+    def motion(q: Array, qd: Array) -> Array:
+        there = tool.kinematics(q)
+        return np.concatenate([there.position, np.linalg.norm(_velocity(there, qd), axis=-1)[..., None]], axis=-1)
+
+    found = apply_where_finite(motion, run.array("q"), run.array("qd"), shape=(4,))
+    return found[..., :3], found[..., 3]
+
+
 def feed_along(task: PathTask, robot: RobotModel, s: Array) -> Array:
     """Return the speed [m/s], (*batch,), at which the plan leads the tool at s: the feed, or less where limited."""
     there = require_tool(robot, task).kinematics(task.q_d(s))
