@@ -90,7 +90,8 @@ def test_measurements_of_a_run_give_its_torques_in_a_control_loop(arm, circle, n
 @pytest.mark.parametrize("name", FAMILY)
 def test_an_open_path_is_finished_at_its_end(ideal_arm, name):
     line = pc.Line([0.2, 0.3], [0.5, 0.1], 0.8)
-    run = run_of(law_of(name, ideal_arm, line), line.q_d(np.array(0.0)) + 0.01, duration=2.0)
+    start = line.q_d(np.array(0.0)) + 0.01
+    run = run_of(law_of(name, ideal_arm, line), start, duration=2.0, loop=pc.SampledLoop(5e-3))
     assert run.status[0] == "finished"
     np.testing.assert_allclose(run.array("q")[0, -1], [0.5, 0.1], atol=2e-3)
 
@@ -98,7 +99,7 @@ def test_an_open_path_is_finished_at_its_end(ideal_arm, name):
 @pytest.mark.parametrize("name", FAMILY)
 def test_an_operator_overrides_its_speed(ideal_arm, circle, name):
     law = pc.SpeedOverride(law_of(name, ideal_arm, circle, start="nearest"), 0.5)
-    run = run_of(law, [1.0, 0.0], duration=0.8)
+    run = run_of(law, [1.0, 0.0], duration=0.8, loop=pc.SampledLoop(5e-3))
     assert run.array("sdot")[0, -1] == pytest.approx(0.5 * circle.theta(np.array(0.0)), rel=0.03)
 
 

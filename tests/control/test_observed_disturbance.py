@@ -182,8 +182,15 @@ def test_every_law_carries_a_load_that_it_does_not_know(kind):
 STICKY = CICESE.with_friction(Stribeck([7.17, 1.734], [10.7, 2.6], [0.1, 0.1]) + Viscous([2.288, 0.175]))
 
 
-@pytest.mark.parametrize("kind", [ExtendedMotionPlan, Projection, ComputedTorque])
-@pytest.mark.parametrize("loop", [SampledLoop(5e-3), paper_loop()], ids=["exact", "encoders"])
+@pytest.mark.parametrize(
+    ("kind", "loop"),
+    [
+        pytest.param(ExtendedMotionPlan, SampledLoop(5e-3), id="extended motion plan, exact"),
+        pytest.param(Projection, paper_loop(), id="projection, encoders"),
+        pytest.param(ComputedTorque, SampledLoop(5e-3), id="computed torque, exact"),
+        pytest.param(ComputedTorque, paper_loop(), id="computed torque, encoders"),
+    ],
+)
 def test_an_arm_that_has_arrived_rests_and_its_torque_does_not_grow(kind, loop):
     """Static friction is half more than Coulomb's; at the end of its path the arm rests, with the same torque."""
     gains = {name: 800.0 if "p" in name else 60.0 for name in LAWS[kind]}
