@@ -53,7 +53,7 @@ def page(still: Opened) -> Iterator[Opened]:
 
 
 def test_it_opens_without_a_complaint_and_plays(file):
-    with browser.opened(file) as page:
+    with browser.opened(file, (450, 300)) as page:
         began = page("film.time")
         page.until(f"film.time > {began} + 0.2")
         assert page("document.querySelectorAll('#summary thead th').length") == 2
@@ -103,7 +103,7 @@ def test_hostile_names_do_nothing(runs, tmp_path):
         task=runs["plan"].task,
     )
     path = report({HOSTILE: run}, tmp_path / "r.html", title=HOSTILE, command=HOSTILE)
-    with browser.opened(path, hash="#t=1") as page:
+    with browser.opened(path, (450, 300), "#t=1") as page:
         assert page.complaints == []
         document = html.document_fromstring(page("document.documentElement.outerHTML"))
     assert not document.xpath("//*[@onerror]")

@@ -177,7 +177,7 @@ def test_hostile_names_are_text(hostile_arm: RobotModel, circle: Circle, tmp_pat
         assert film("document.title") == f"{MARKUP} - {SCRIPT}"
         assert sorted(film.tab.locator("#labels span").all_text_contents()) == sorted([MARKUP, SCRIPT])
         assert film.complaints == []
-    with opened(record(run, hostile_arm, circle).save(tmp_path / "one.html"), hash="#t=1") as film:
+    with opened(record(run, hostile_arm, circle).save(tmp_path / "one.html"), (450, 300), "#t=1") as film:
         assert "__proto__" in film.tab.locator("#charts").inner_text()  # the joints of one run
         assert film.complaints == []
 
