@@ -45,10 +45,13 @@ def urdf_of(python):
 
 
 @contextmanager
-def serve(python):
-    """Serve a robot at its home posture on libfranka's port, of which there is one; yields the process."""
+def serve(python, enforced=STRICT):
+    """Serve a robot at its home posture on libfranka's port, of which there is one; yields the process.
+
+    It stops by itself at the limits that are ``enforced``.
+    """
     script = Path(__file__).with_name("franka_simulator.py")
-    command = [python, script, "--no-gripper", *STRICT, ",".join(map(str, ROTORS))]
+    command = [python, script, "--no-gripper", *enforced, ",".join(map(str, ROTORS))]
     port = Path(tempfile.gettempdir()) / "franka-1337.lock"
     with locked(port), tempfile.NamedTemporaryFile("w") as log:
         server = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)

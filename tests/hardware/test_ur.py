@@ -3,6 +3,7 @@
 import fcntl
 import re
 import tempfile
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -79,11 +80,12 @@ def test_the_torques_in_the_packages_are_those_of_the_law_without_gravity(peer):
 
 def test_the_loop_reads_positions_velocities_and_time_of_one_state(peer):
     arm = pc.UR("127.0.0.1")
-    read = [measured for measured in (arm.read() for _ in range(200)) if measured is not None]
+    states = (measured for measured in iter(arm.read, "no end") if measured is not None)
+    read = list(islice(states, 100))  # on a busy computer some reads find none
     arm.finish()
     times = np.array([measured.t for measured in read])
     assert (np.diff(times) > 0).all()
-    s = 0.5 * (times - 100.0 - H)  # the peer's row of that time
+    s = 0.5 * np.minimum(times - 100.0 - H, 2999 * H)  # the peer's row of that time, of 3000
     task = law_of().task
     np.testing.assert_allclose([m.q for m in read], task.q_d(s) + 1e-3 * np.sin(40 * s)[:, None], atol=1e-9)
     np.testing.assert_allclose([m.qd for m in read], 0.5 * task.dq_d(s), atol=1e-9)
@@ -100,11 +102,11 @@ def test_the_loop_reads_positions_velocities_and_time_of_one_state(peer):
 )
 def test_a_robot_that_stops_leaves_the_loop_in_its_fallback(peer, event, reason):
     loop = ControlLoop(law_of(), H)
-    record = drive(loop, StoppedUR(lambda: event(peer), after=0.1), 5.0)
+    record = drive(loop, StoppedUR(lambda: event(peer), after=0.1), 60.0)  # far longer than a busy computer needs
     assert re.search(reason, record.stopped)
     assert loop.status.mode == Mode.GRAVITY
     assert loop.status.reason == record.stopped
-    assert 0.1 < np.nanmax(record.t) < 4.0
+    assert 0.1 < np.nanmax(record.t) < 50.0
     np.testing.assert_array_equal(loop.step(record.q[-1], record.qd[-1], np.nan), loop.gravity)
 
 
