@@ -48,7 +48,7 @@ def assert_same(found, expected, lap, atol=1e-4):
 # --- closed forms -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("n", [2, 6, 7])
+@pytest.mark.parametrize("n", [2, 7])
 def test_computed_torque_has_the_roots_of_each_joint(n):
     """λ² + K_v λ + K_p = 0 joint by joint, and 0 along the orbit, in continuous time."""
     K_p, K_v = np.linspace(100.0, 150.0, n), np.linspace(25.0, 35.0, n)
@@ -100,7 +100,7 @@ def test_a_sampled_loop_has_the_multipliers_of_its_held_torque():
 
 def test_an_observer_adds_its_own_exponents_in_continuous_time():
     """Without a disturbance the estimate is 0, and both of its low passes decay at their corner frequency."""
-    found = pc.floquet(pc.ComputedTorque(ARM, CIRCLE, 200.0, 30.0, friction="observed", observer_hz=20.0))
+    found = pc.floquet(pc.ComputedTorque(ARM, FAST, 200.0, 30.0, friction="observed", observer_hz=20.0))
     roots = [-10.0, -10.0, -20.0, -20.0, *[-40 * np.pi] * 4]
     # two low passes in a row have one mode, so that rounding takes their multipliers apart by its root
     np.testing.assert_allclose(np.sort(found.transverse.real)[::-1], roots, atol=0.02)
@@ -109,8 +109,13 @@ def test_an_observer_adds_its_own_exponents_in_continuous_time():
 # --- simulation ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["plan", "projection"])
-@pytest.mark.parametrize("loop", [pc.SampledLoop(5e-3), pc.SampledLoop(5e-3, velocity="difference", delay=2.5e-3)])
+@pytest.mark.parametrize(
+    ("kind", "loop"),
+    [
+        ("plan", pc.SampledLoop(5e-3)),
+        ("projection", pc.SampledLoop(5e-3, velocity="difference", delay=2.5e-3)),
+    ],
+)
 def test_errors_decay_in_simulation_as_the_slowest_mode(kind, loop):
     law = (
         pc.ExtendedMotionPlan(ARM, CIRCLE, K_p=200.0, K_v=40.0, k=20.0)
@@ -141,21 +146,21 @@ def test_errors_of_a_law_with_an_observer_decay_as_the_slowest_mode():
 def test_gains_too_large_for_the_period_are_unstable():
     law = pc.ComputedTorque(ARM, FAST, 4000.0, 300.0)
     assert pc.floquet(law).stable
-    assert pc.floquet(law, pc.SampledLoop(period=1e-3)).stable
+    assert pc.floquet(law, pc.SampledLoop(period=2e-3)).stable
     assert not pc.floquet(law, pc.SampledLoop(period=8e-3)).stable
 
 
 def test_what_has_no_derivative_is_refused():
-    law = pc.Projection(pc.load_robot("cicese_2dof"), CIRCLE, 800.0, 60.0)
+    law = pc.Projection(pc.load_robot("cicese_2dof"), FAST, 800.0, 60.0)
     with pytest.raises(InputError, match="dry friction"):
         pc.floquet(law)
-    smooth = pc.Projection(ARM, CIRCLE, 800.0, 60.0)
+    smooth = pc.Projection(ARM, FAST, 800.0, 60.0)
     with pytest.raises(InputError, match="encoders"):
         pc.floquet(smooth, pc.SampledLoop(encoders=True))
     with pytest.raises(InputError, match="closed"):
         pc.floquet(pc.Projection(ARM, pc.Line([0.0, 0.0], [1.0, 1.0], speed=0.5), 800.0, 60.0))
     with pytest.raises(InputError, match="several rollouts"):
-        pc.floquet(pc.ComputedTorque(ARM, CIRCLE, [[800.0, 800.0], [400.0, 400.0]], 60.0))
+        pc.floquet(pc.ComputedTorque(ARM, FAST, [[800.0, 800.0], [400.0, 400.0]], 60.0))
     held = pc.SpeedOverride(smooth, 0.0)
     with pytest.raises(InputError, match="no orbit"):
         pc.floquet(held)
@@ -163,8 +168,8 @@ def test_what_has_no_derivative_is_refused():
         pc.floquet(held, pc.SampledLoop(period=0.03), settle=1)
     viscous = ARM.with_friction(pc.Viscous([1.0, 1.0]))
     with pytest.raises(InputError, match="no orbit"):
-        pc.floquet(pc.Projection(viscous, CIRCLE, 800.0, 60.0, friction="none"))
-    assert pc.floquet(pc.Projection(viscous, CIRCLE, 800.0, 60.0)).stable
+        pc.floquet(pc.Projection(viscous, FAST, 800.0, 60.0, friction="none"))
+    assert pc.floquet(pc.Projection(viscous, FAST, 800.0, 60.0)).stable
 
 
 # --- products -----------------------------------------------------------------------------------------------------

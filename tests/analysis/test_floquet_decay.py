@@ -29,8 +29,7 @@ def at(run, row, s):
     return make_interp_spline(passed[near], state, k=9)(s)
 
 
-@pytest.mark.parametrize("n", [6, 7])
-@pytest.mark.parametrize("kind", ["plan", "projection"])
+@pytest.mark.parametrize(("kind", "n"), [("plan", 7), ("projection", 6)])
 def test_the_slowest_mode_decays_in_simulation_at_its_rate(kind, n):
     """From beside the path along the mode; compared where both are at the same s, one lap and two laps later."""
     law = law_of(kind, n)

@@ -180,7 +180,7 @@ def test_the_mode_along_the_orbit_is_never_a_transverse_one():
     loop = pc.SampledLoop(period=H, velocity="difference", delay=H / 2)
     law = pc.ComputedTorque(ARM, CIRCLE, 40.0, 6.0)
     edge = pc.largest_gain(law, "K_p", loop, settle=1)
-    grid = edge * np.linspace(0.99, 1.01, 9)
+    grid = edge * np.linspace(0.99, 1.01, 5)
     rates = pc.stability_map(law, {"K_p": grid}, loop, **QUIET).decay_rate
     assert (np.diff(rates) < 0).all()
     assert np.ptp(np.diff(rates)) < 0.1 * np.abs(np.diff(rates)).max()

@@ -11,7 +11,7 @@ ROBOT = ROBOT.with_friction(pc.Viscous(ROBOT.friction.viscous))
 
 def test_modes_that_are_much_faster_than_a_lap_have_their_closed_form():
     K_p, K_v = 1000.0, 100.0
-    law = pc.ComputedTorque(ROBOT, pc.Circle(0.25, 0.02), K_p, K_v)
+    law = pc.ComputedTorque(ROBOT, pc.Circle(0.25, 0.06), K_p, K_v)
     roots = np.repeat(np.sort(np.roots([1.0, K_v, K_p]).real), 2)
     found = pc.floquet(law)
     assert found.stable

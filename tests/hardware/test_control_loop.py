@@ -35,7 +35,7 @@ def law_of(n, kind=pc.Projection):
 LAWS = [pc.ComputedTorque, pc.ExtendedMotionPlan, pc.Projection]
 
 
-def run_of(law, duration=0.5, push=None, **sensors):
+def run_of(law, duration=0.3, push=None, **sensors):
     loop = pc.SampledLoop(period=H, **sensors)
     start = law.task.q_d(np.array(law.task.s0))
     return pc.simulate(law, start, duration=duration, loop=loop, disturbance=push, progress=False)
@@ -67,12 +67,12 @@ def test_a_law_that_was_held_and_resumed_is_the_compiled_one_again(kind):
     loop = ControlLoop(law, H, Envelope(**WIDE))
     arm.drive(loop, 100)
     loop.hold()
-    held = arm.drive(loop, 450)[-50:]
+    held = arm.drive(loop, 300)[-50:]
     assert loop.status.mode == Mode.HOLD
     assert np.abs(np.diff(held["q"], axis=0)).max() < 1e-5
     s = loop.status.s
     loop.resume()
-    gone = arm.drive(loop, 800)
+    gone = arm.drive(loop, 700)
     assert loop._plan._tick is loop._plan._free
     assert loop.status.mode == Mode.RUN
     assert loop.status.s > s
@@ -322,14 +322,14 @@ def test_a_law_that_breaks_is_damped(broken):
     assert np.abs(arm.qd).max() < 1e-2
 
 
-@pytest.mark.parametrize("n", [2, 6, 7])
+@pytest.mark.parametrize("n", [2, 7])
 def test_after_damping_the_loop_goes_on_from_where_the_arm_is_without_a_jump(n):
     arm, loop = started(n)
     arm.drive(loop, 20, lambda k, *measured: BAD["not a number"](*measured))
     arm.drive(loop, 200)
     assert loop.status.mode == Mode.DAMP
     loop.resume()
-    done = arm.drive(loop, 300)
+    done = arm.drive(loop, 150)
     assert loop.status.mode == Mode.RUN
     change = np.abs(np.diff(done["tau"], axis=0))
     assert (change <= loop.envelope.torque_rate * H * (1 + 1e-9)).all()
@@ -388,17 +388,17 @@ def test_wrapped_and_observing_laws_run_hold_and_go_on_without_a_jump(name):
     law = WRAPPED[name](2)
     arm, loop = Simulated(law), ControlLoop(law, H)
     loop.start(arm.q[0], arm.qd[0])
-    gone = [arm.drive(loop, 100)]
+    gone = [arm.drive(loop, 60)]
     assert loop.status.mode == Mode.RUN
     loop.hold()
-    gone += [arm.drive(loop, 350)]
+    gone += [arm.drive(loop, 250)]
     assert np.abs(arm.qd).max() < 1e-2
     loop.resume()
-    gone += [arm.drive(loop, 100), arm.drive(loop, 20, lambda k, *m: BAD["not a number"](*m)), arm.drive(loop, 50)]
+    gone += [arm.drive(loop, 60), arm.drive(loop, 20, lambda k, *m: BAD["not a number"](*m)), arm.drive(loop, 30)]
     assert loop.status.mode == Mode.DAMP
     s = loop.status.s
     loop.resume()
-    gone += [arm.drive(loop, 250)]
+    gone += [arm.drive(loop, 180)]
     assert (loop.status.mode, loop.status.reason) == (Mode.RUN, "")
     assert loop.status.s > s
     assert "law" not in loop.status.faults
@@ -410,13 +410,12 @@ def test_wrapped_and_observing_laws_run_hold_and_go_on_without_a_jump(name):
 # --- any sequence of faults ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("n", [2, 6, 7])
+@pytest.mark.parametrize("n", [2, 7])
 def test_no_torque_is_beyond_its_limit_or_its_rate_whatever_happens(n):
-    try_faults(law_of(n), np.random.default_rng(n), sequences=60)
+    try_faults(law_of(n), np.random.default_rng(n), sequences=40)
 
 
-@pytest.mark.parametrize("name", WRAPPED)
-@pytest.mark.parametrize("n", [2, 6])
+@pytest.mark.parametrize(("n", "name"), [*((2, name) for name in WRAPPED), (6, "both"), (6, "observed override")])
 def test_the_same_of_wrapped_and_observing_laws(n, name):
     try_faults(WRAPPED[name](n), np.random.default_rng(n), sequences=6)
 
