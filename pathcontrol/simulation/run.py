@@ -218,10 +218,11 @@ class Run:
         Raises:
             UnknownNameError: the run has no such variable.
         """
-        plain = None if self._samples is None else self._samples.plain(name, span)
-        if plain is not None:
+        if self._samples is not None and (plain := self._samples.plain(name, span)) is not None:
             return plain
-        whole = self[name].to_numpy()
+        found = self.data.variables.get(name)  # without labels, which take longer than the numbers
+        usual = found is not None and found.dims == (VARIABLES | OUTCOMES).get(name, (found.dims,))[0]
+        whole = found.to_numpy() if found is not None and usual else self[name].to_numpy()
         return whole if span == slice(None) else whole[:, span]
 
     def unit(self, name: str) -> str:

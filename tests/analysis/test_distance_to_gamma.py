@@ -31,7 +31,7 @@ def brute_force(task, q, qd, weight=1.0):
         )
         best = int(distance.argmin())
         found = distance[best]
-        s = np.linspace(s[max(best - 1, 0)], s[min(best + 1, len(s) - 1)], 2001)
+        s = np.linspace(s[max(best - 1, 0)], s[min(best + 1, len(s) - 1)], 201)
         point = task.at(s)
     return found
 
