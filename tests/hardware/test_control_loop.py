@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import pathcontrol as pc
+from pathcontrol.control.wrappers.stopping_rate import stopping_rate
 from pathcontrol.errors import InputError
 from pathcontrol.hardware.control_loop import ControlLoop, Mode
 from pathcontrol.hardware.envelope import Envelope
@@ -334,6 +335,24 @@ def test_after_damping_the_loop_goes_on_from_where_the_arm_is_without_a_jump(n):
     change = np.abs(np.diff(done["tau"], axis=0))
     assert (change <= loop.envelope.torque_rate * H * (1 + 1e-9)).all()
     assert loop._plan.distance(arm.q[0]) < 0.05
+
+
+@pytest.mark.parametrize("kind", LAWS)
+def test_after_damping_the_plan_begins_at_rest_and_speeds_up_within_its_bound(kind):
+    """Its factor w is 0, and at most at after a time t."""
+    law = law_of(2, kind)
+    arm, loop = Simulated(law), ControlLoop(law, H)
+    loop.start(arm.q[0], arm.qd[0])
+    arm.drive(loop, 100)
+    arm.drive(loop, 20, lambda k, *measured: BAD["not a number"](*measured))
+    arm.drive(loop, 200)
+    loop.resume()
+    assert loop._plan.factor == 0.0
+    for t in H * np.arange(1, 51):
+        arm.drive(loop, 1)
+        assert loop._plan.factor <= stopping_rate(law.robot, law.task) * t * (1 + 1e-9)
+    arm.drive(loop, 600)
+    assert loop._plan.factor == 1.0
 
 
 class Lost(pc.Lissajous):
