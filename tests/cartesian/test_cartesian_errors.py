@@ -17,7 +17,7 @@ from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 UP = np.array([0.0, 0.0, 1.0])
-few = settings(max_examples=3)
+few = settings(max_examples=4)
 
 INERTIAL = (
     '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'

@@ -15,8 +15,8 @@ from pathcontrol.cartesian.orientation import FreeOrientation
 from pathcontrol.cartesian.tool import Tool
 from pathcontrol.toolpaths.gcode.strokes import ContourBuilder
 
-FRAMES = {"ur5": "tool0", "panda": "panda_hand_tcp", "cicese_2dof": "tool"}
-REACH = {"ur5": 0.85, "panda": 0.85}
+FRAMES = {"ur5": "tool0", "ur10": "tool0", "panda": "panda_hand_tcp", "cicese_2dof": "tool"}
+REACH = {"ur5": 0.85, "ur10": 1.25, "panda": 0.85}
 DOWN = np.diag([1.0, -1.0, -1.0])
 HELD = [None, pc.NormalOrientation([0.0, 0.0, 1.0]), pc.FixedOrientation(DOWN)]
 
