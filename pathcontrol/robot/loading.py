@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,7 +19,8 @@ from pathcontrol.robot.arm_dynamics import UrdfSource, build_model
 from pathcontrol.robot.catalogue import find_urdf
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, Viscous
 from pathcontrol.robot.model import RobotModel, lock_joints
-from pathcontrol.robot.urdf import UrdfReport, check_urdf, parse_urdf
+from pathcontrol.robot.urdf import UrdfReport
+from pathcontrol.robot.urdf.check import check_parsed
 from pathcontrol.robot.urdf.checks.extension import extension_values
 from pathcontrol.robot.urdf.locking import locked_angles, locked_beyond_limits
 from pathcontrol.robot.urdf.xml.parse import Parsed, parse_and_mend
@@ -66,19 +67,20 @@ def load_robot(
         expect("friction", friction, FrictionLaw)
     urdf = find_urdf(source, _folders(package_dirs))
     label = "this URDF" if str(source).lstrip().startswith("<") else repr(str(source))
-    root, mended = _parse(urdf, label)
-    locked = locked_angles(root, lock, keep, tip)
+    parsed = _parse(urdf, label)
+    mended, locked = parsed.findings, locked_angles(parsed.root, lock, keep, tip)
     if estimated_inertia is not False:
         from pathcontrol.robot.estimate import DENSITY, with_estimated_inertia  # reading meshes takes half a second
 
         density = DENSITY if estimated_inertia is True else estimated_inertia
         urdf = with_estimated_inertia(urdf, as_quantity("estimated_inertia", density))
-    report = _check(urdf, label, tuple(locked))
+        parsed = _parse(urdf, label)
+    report = _check(parsed, urdf, label, locked)
     for finding in (*mended, *(finding for finding in report.warnings if finding.code in WARNED_OF)):
         warn(f"{label}: {finding.where}: {finding.message}")
-    for sentence in locked_beyond_limits(root, locked, lock or ()):
+    for sentence in locked_beyond_limits(parsed.root, locked, lock or ()):
         warn(f"{label}: {sentence}")
-    robot = _build(urdf, threads)
+    robot = _build(parsed.root, urdf, threads)
     robot = lock_joints(robot, locked) if locked else robot
     return robot if friction is None else robot.with_friction(friction)
 
@@ -97,13 +99,14 @@ def build_checked_model(urdf: UrdfSource, label: str, locked: Sequence[str] = ()
     Raises:
         UrdfError: it cannot be used; the message lists every reason found.
     """
-    _check(urdf, label, locked)
-    return _build(urdf, threads)
+    parsed = _parse(urdf, label)
+    _check(parsed, urdf, label, locked)
+    return _build(parsed.root, urdf, threads)
 
 
-def _check(urdf: UrdfSource, label: str, locked: Sequence[str]) -> UrdfReport:
+def _check(parsed: Parsed, urdf: UrdfSource, label: str, locked: Collection[str]) -> UrdfReport:
     """Return the report of a URDF that is without errors."""
-    report = check_urdf(urdf.text, base_dir=urdf.base_dir, package_dirs=urdf.package_dirs, allow_mimic=tuple(locked))
+    report = check_parsed(parsed, urdf.base_dir, urdf.package_dirs, locked)
     if not report.ok:
         message = "\n".join([f"{label} cannot be used:", *(f"  {finding}" for finding in report.errors)])
         raise UrdfError(message, findings=tuple(report.errors))
@@ -116,9 +119,8 @@ def _folders(given: str | Path | Sequence[str | Path]) -> tuple[Path, ...]:
     return tuple(as_path("package_dirs", folder).expanduser() for folder in folders)
 
 
-def _build(urdf: UrdfSource, threads: int) -> RobotModel:
-    """Build the model of a URDF that has passed the checks."""
-    root = parse_urdf(urdf.text)
+def _build(root: Any, urdf: UrdfSource, threads: int) -> RobotModel:
+    """Build the model of a URDF that has passed the checks; ``root`` is its element, which is changed."""
     endless = _make_revolute(root)
     model = build_model(etree.tostring(root, encoding="unicode"))
     names = list(model.names)[1:]

@@ -5,7 +5,7 @@ A check of values is a function from an arm to findings; to add one, write it an
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from pathcontrol._files import read_bounded
@@ -27,7 +27,7 @@ from pathcontrol.robot.urdf.elements import MOVABLE_TYPES, names_of
 from pathcontrol.robot.urdf.locking import locked_angles
 from pathcontrol.robot.urdf.model_values import read_arm
 from pathcontrol.robot.urdf.xml.encoding import decode
-from pathcontrol.robot.urdf.xml.parse import MAX_BYTES, parse_and_mend
+from pathcontrol.robot.urdf.xml.parse import MAX_BYTES, Parsed, parse_and_mend
 
 _ORDER: tuple[Level, ...] = ("error", "warning", "note")
 
@@ -80,10 +80,18 @@ def check_urdf(
     if isinstance(text, Path) and base_dir is None:
         base_dir = text.resolve().parent
     try:
-        root, mended = parse_and_mend(_read_source(text))
+        parsed = parse_and_mend(_read_source(text))
     except UrdfError as error:
         return UrdfReport("", (), (), (Finding("error", "unreadable", "file", str(error)),))
-    findings = [*mended, *check_form(root)]
+    return check_parsed(parsed, base_dir, package_dirs, allow_mimic)
+
+
+def check_parsed(
+    parsed: Parsed, base_dir: Path | None, package_dirs: Sequence[Path], allow_mimic: Collection[str]
+) -> UrdfReport:
+    """Check a URDF that is parsed already, as :func:`check_urdf` does."""
+    root = parsed.root
+    findings = [*parsed.findings, *check_form(root)]
     if not any(finding.level == "error" for finding in findings):
         movable = names_of(joint for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES)
         arm = read_arm(root, locked_angles(root, {name: 0.0 for name in allow_mimic if name in movable}))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path, PurePosixPath
 
 from pathcontrol.errors import UrdfError
@@ -123,14 +123,20 @@ def _read_in_packages(reading: MeshName, base_dir: Path | None, package_dirs: Se
     """Yield the files that a path may mean that begins with the name of a package."""
     relative = reading.path.lstrip("/")
     package, _, inside = relative.partition("/")
-    above = () if base_dir is None else (base_dir.absolute(), *base_dir.absolute().parents)
     known = _package_folders()
-    folders = (*package_dirs, *above)
-    yield from (folder / relative for folder in (*folders, *known))
+    yield from (folder / relative for folder in chain(_folders(base_dir, package_dirs), known))
     if inside:
         yield from (folder / inside for folder in known if folder.name == package)
-        yield from (folder / inside for folder in folders)
+        yield from (folder / inside for folder in _folders(base_dir, package_dirs))
         yield from (entry / inside for folder in package_dirs for entry in _entries(folder))
+
+
+def _folders(base_dir: Path | None, package_dirs: Sequence[Path]) -> Iterator[Path]:
+    """Yield the folders given, that of the URDF, and all above it: mostly one of the first is the right one."""
+    yield from package_dirs
+    if base_dir is not None:
+        yield base_dir.absolute()
+        yield from base_dir.absolute().parents
 
 
 def _package_folders() -> list[Path]:

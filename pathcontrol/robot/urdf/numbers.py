@@ -60,17 +60,22 @@ def check_numbers(root: etree._Element) -> Iterator[Finding]:
                 continue
             for name, length in lengths.items():
                 if (text := part.get(name)) is not None:
-                    yield from _check_number(place_of(element), f"{name} of <{part.tag}>", text, length)
+                    yield from _check_number(element, part, name, text, length)
 
 
-def _check_number(where: str, what: str, text: str, length: int) -> Iterator[Finding]:
-    """Check the numbers of one attribute."""
-    values = read_numbers(text, length)
+def _check_number(
+    element: etree._Element, part: etree._Element, name: str, text: str, length: int
+) -> Iterator[Finding]:
+    """Check the numbers of one attribute of a part of an element."""
+    values, is_limit = read_numbers(text, length), part.tag == "limit"
+    if values is not None and (is_limit or max(map(abs, values)) < ABSURD):
+        return
+    where, what = place_of(element), f"{name} of <{part.tag}>"
     if values is None:
         expected = "a finite number" if length == 1 else f"{length} finite numbers with spaces between"
         message = f"{what} is {quote(text)}; expected {expected}, correct it"
         yield Finding("error", "not-a-number", where, message)
-    elif not what.endswith("<limit>") and max(map(abs, values)) >= ABSURD:
+    else:
         message = f"{what} is {quote(text)}; expected SI units, below {ABSURD:g}"
         yield Finding("error", "number-absurd", where, message)
 

@@ -20,11 +20,23 @@ _ANY_TURN = np.pi  # rad: where a joint has no limits, or wider ones
 
 
 class _Placed(NamedTuple):
-    """A body at N postures: its joint's pose (N, 4, 4), and the joints that move it with origin and axis, (N, 3)."""
+    """A body at N postures: its joint's pose (N, 4, 4), and the k joints that move it with origins and axes, (N, 3, k).
+
+    Attributes:
+        body: The body.
+        pose: The pose of its joint.
+        joints: Numbers of the joints that move it.
+        slides: Which of them slide, (k,).
+        origins: Their origins.
+        axes: Their axes, of unit length.
+    """
 
     body: Body
     pose: np.ndarray
-    moved_by: tuple[tuple[int, np.ndarray, np.ndarray], ...]
+    joints: list[int]
+    slides: np.ndarray
+    origins: np.ndarray
+    axes: np.ndarray
 
 
 class _Link(NamedTuple):
@@ -80,14 +92,9 @@ def _place_links(arm: Arm, q: np.ndarray) -> Iterator[_Link]:
 
 def _place_link(inertial: Inertial, placed: _Placed, centre: np.ndarray) -> _Link:
     """Return a link with its Jacobians; ``centre`` is the pose of its centre of mass, (N, 4, 4)."""
-    J_v, J_w = np.zeros((2, len(centre), 3, len(placed.moved_by)))
-    for k, (_, origin, axis) in enumerate(placed.moved_by):
-        if origin.size:
-            J_w[:, :, k] = axis
-            J_v[:, :, k] = np.cross(axis, centre[:, :3, 3] - origin)
-        else:
-            J_v[:, :, k] = axis
-    return _Link(inertial, [i for i, _, _ in placed.moved_by], centre[:, :3, :3], J_v, J_w)
+    slides, axes = placed.slides, placed.axes
+    J_v = np.where(slides, axes, np.cross(axes, centre[:, :3, 3, None] - placed.origins, axis=1))
+    return _Link(inertial, placed.joints, centre[:, :3, :3], J_v, np.where(slides, 0.0, axes))
 
 
 def _place_bodies(arm: Arm, q: np.ndarray) -> Iterator[_Placed]:
@@ -97,10 +104,12 @@ def _place_bodies(arm: Arm, q: np.ndarray) -> Iterator[_Placed]:
         joint, inner = body.joint, holder.get(body.joint.parent)
         before = link_pose(arm, joint.parent) if inner is None else inner.pose @ inner.body.poses[joint.parent]
         pose = before @ (np.eye(4) if joint.origin is None else joint.origin) @ _motion(body, q[:, i])
-        axis = pose[:, :3, :3] @ _unit(body)
-        origin = np.empty(0) if joint.type == "prismatic" else pose[:, :3, 3]
-        moved_by = (*(() if inner is None else inner.moved_by), (i, origin, axis))
-        placed = _Placed(body, pose, moved_by)
+        joints, slides = [i], np.array([joint.type == "prismatic"])
+        origins, axes = pose[:, :3, 3, None], (pose[:, :3, :3] @ _unit(body))[..., None]
+        if inner is not None:
+            joints, slides = [*inner.joints, i], np.append(inner.slides, slides)
+            origins, axes = np.dstack([inner.origins, origins]), np.dstack([inner.axes, axes])
+        placed = _Placed(body, pose, joints, slides, origins, axes)
         holder |= dict.fromkeys(body.poses, placed)
         yield placed
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 from lxml import etree
@@ -54,8 +54,10 @@ def parse_and_mend(text: str) -> Parsed:
     if root.getroottree().docinfo.doctype:
         raise UrdfError(_NO_DOCTYPE)
     _refuse_other_roots(root)
-    findings += _without_stray_xacro(root)
-    _refuse_xacro(root)
+    using = set(filter(_uses_xacro, _own_elements(root)))
+    if not using:
+        findings += _without_stray_xacro(root)
+    _refuse_xacro(root, using)
     findings += _without_old_version(root)
     return Parsed(root, tuple(findings))
 
@@ -98,9 +100,7 @@ def _not_xml(error: etree.XMLSyntaxError) -> UrdfError:
 
 
 def _without_stray_xacro(root: etree._Element) -> list[Finding]:
-    """Remove definitions of xacro that nothing in the robot uses; other readers ignore them too."""
-    if any(map(_uses_xacro, _own_elements(root))):
-        return []
+    """Remove definitions of xacro, which nothing in the robot uses; other readers ignore them too."""
     stray = [child for child in root.iterchildren(etree.Element) if _is_definition(child)]
     for element in stray:
         root.remove(element)  # removes the blank text behind it as well
@@ -119,7 +119,7 @@ def _is_definition(element: etree._Element) -> bool:
 
 def _uses_xacro(element: etree._Element) -> bool:
     """Return whether an element has a substitution of xacro."""
-    return any("${" in value for value in element.attrib.values())
+    return "${" in " ".join(element.attrib.values())
 
 
 def _without_old_version(root: etree._Element) -> list[Finding]:
@@ -132,16 +132,13 @@ def _without_old_version(root: etree._Element) -> list[Finding]:
     return [Finding("warning", "xml-version", "file", message)]
 
 
-def _refuse_xacro(root: etree._Element) -> None:
-    """Refuse a robot with macros of xacro."""
-    ours = set(_own_elements(root))
+def _refuse_xacro(root: etree._Element, using: Collection[etree._Element]) -> None:
+    """Refuse a robot with macros of xacro, or with elements ``using`` its substitutions."""
     for element in root.iter(etree.Element):
-        name = etree.QName(element)
-        is_macro = "xacro" in (name.namespace or "")
-        if is_macro or (element in ours and _uses_xacro(element)):
+        namespace, _, name = element.tag.rpartition("}")
+        if "xacro" in namespace or element in using:
             raise UrdfError(
-                f"line {element.sourceline}: <{name.localname}> is xacro, not URDF; {_RUN_XACRO}",
-                line=element.sourceline,
+                f"line {element.sourceline}: <{name}> is xacro, not URDF; {_RUN_XACRO}", line=element.sourceline
             )
 
 
@@ -152,8 +149,8 @@ def _refuse_other_roots(root: etree._Element) -> None:
             f"line {root.sourceline}: the root is {quote(root.tag)}; expected <robot>", line=root.sourceline
         )
     for element in _own_elements(root):
-        name = etree.QName(element)
-        if name.namespace and (element is root or element.prefix is None):
+        if element.tag.startswith("{") and (element is root or element.prefix is None):
+            name = etree.QName(element)
             namespace = quote(name.namespace)
             raise UrdfError(
                 f"line {element.sourceline}: <{name.localname}> is in the XML namespace {namespace}; "
