@@ -14,6 +14,7 @@ USES = {
     "figures": "[pc.save_figure(f(run), 'figure') for f in (pc.error_figure, pc.path_figure, pc.torque_figure)]",
     "film": "pc.record(run).save('film.html')",
     "one rollout": "pc.metrics(run.rollout(0).with_robot(robot))",
+    "sequence": "pc.metrics(pc.simulate_sequence([law, law], [0, 0], duration=1.0, gaps=True))",
     "labels": "run.data.sizes['time']",
 }
 CODE = f"""
@@ -21,9 +22,10 @@ import json, sys
 import pathcontrol as pc
 from pathcontrol.experiments.reproduce import paper_experiment
 
-large = {{"xarray", "pandas", "trimesh", "yourdfpy", "sympy", "pydantic", "matplotlib.pyplot", "scipy"}}
+large = {{"xarray", "pandas", "trimesh", "yourdfpy", "sympy", "dask.array", "pydantic", "matplotlib.pyplot", "scipy"}}
 robot = pc.load_robot("cicese_2dof")
 run = paper_experiment("projection", robot, False, "compiled").run
+law = pc.ComputedTorque(robot, pc.Line([0, 0], [0.2, 0.2], 1.0), K_p=800.0, K_v=[45.0, 100.0])
 loaded = {{}}
 for name, use in {USES!r}.items():
     value = eval(use)
@@ -48,4 +50,5 @@ def test_no_large_library_is_loaded(use, told):
 def test_labels_are_there_when_they_are_asked_for(told):
     loaded, samples = told
     assert "xarray" in loaded["labels"]
+    assert "dask.array" not in loaded["labels"]
     assert samples == 4001

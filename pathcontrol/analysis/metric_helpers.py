@@ -16,7 +16,6 @@ from pathcontrol.geometry.closest_point.cells import FARTHEST
 from pathcontrol.simulation.context import check_sequence
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.batch.task_batch import TaskBatch
-from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
 
 if TYPE_CHECKING:
@@ -42,8 +41,7 @@ def resolve_task(run: Run, task: PathTask | None) -> PathTask:
             value=task.n,
             limit=joints,
         )
-    if isinstance(task, PathSequence):
-        check_sequence(run.data, task)
+    check_sequence(run, task)
     return task
 
 

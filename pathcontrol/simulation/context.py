@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -14,13 +14,11 @@ from pathcontrol.errors import InputError, warn
 from pathcontrol.robot.batch import RobotBatch, select_friction
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.storage.array_store import ArrayStore
+from pathcontrol.simulation.variables import OUTCOMES
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.laps import Laps
 from pathcontrol.tasks.task import PathTask
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 class StoredContext(NamedTuple):
@@ -30,23 +28,30 @@ class StoredContext(NamedTuple):
     numbers: Array
 
 
-def check_sequence(data: xr.Dataset, task: PathTask | None) -> None:
-    """Check that data with the path indices of a sequence fit a ``task`` that is one.
+class _Arrays(Protocol):
+    """Arrays by their names, as a run has them."""
+
+    def array(self, name: str) -> Array: ...
+
+    def __contains__(self, name: str) -> bool: ...
+
+
+def check_sequence(run: _Arrays, task: PathTask | None) -> None:
+    """Check that a run with the path indices of a sequence fits a ``task`` that is one.
 
     Raises:
         InputError: the data are of paths that the task does not have, or are no numbers of paths.
     """
-    if not isinstance(task, PathSequence) or "path_index" not in data.coords:
+    if not isinstance(task, PathSequence) or "path_index" not in run:
         return
-    which = data["path_index"]
-    if which.dims != ("time",) or which.dtype.kind not in "iu":
+    which = run.array("path_index")
+    if which.ndim != 1 or which.dtype.kind not in "iu":
         raise InputError(
-            f"path_index is {which.dtype} over {which.dims}, expected whole numbers over ('time',)",
+            f"path_index is {which.dtype} with the shape {which.shape}, expected whole numbers over ('time',)",
             value=str(which.dtype),
         )
-    if (which.size and not 0 <= int(which.min()) <= int(which.max()) < len(task)) or (
-        data.sizes.get("path", len(task)) != len(task)
-    ):
+    lengths = {len(run.array(name)) for name, (dims, *_) in OUTCOMES.items() if dims == ("path",) and name in run}
+    if (which.size and not 0 <= int(which.min()) <= int(which.max()) < len(task)) or lengths - {len(task)}:
         raise InputError(f"the data are of other paths than the {len(task)} of the task; expected data and task of one")
 
 

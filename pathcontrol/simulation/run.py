@@ -156,8 +156,7 @@ class Run:
             InputError: what the file says of them is no path, or not that of the data.
         """
         task = self._origin.task_of(self.array("rollout"))
-        if self._samples is None:  # data that may have come from elsewhere
-            check_sequence(self.data, task)
+        check_sequence(self, task)
         return task
 
     @property
