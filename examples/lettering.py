@@ -18,8 +18,9 @@ robot = pc.load_robot("cicese_2dof")
 board = np.array([[1, 0, 0, 0.25], [0, 0, -1, -0.05], [0, 1, 0, 0.65], [0, 0, 0, 1.0]])  # its x and y along x and z
 task = pc.ToolpathTask(robot, "tool", drawing, board, clearance=0.0, rapid_speed=0.2)
 
-# dry friction holds a slow arm: the laws compensate all of it, and the plan is in no hurry to wait, k = 2
-laws = [pc.ExtendedMotionPlan(robot, path, K_p=800.0, K_v=45.0, k=2.0, friction="full") for path in task]
+# dry friction holds a slow arm: the laws compensate all of it. The plan is in no hurry to wait: with velocities by
+# differences these loops bear k = 1.6
+laws = [pc.ExtendedMotionPlan(robot, path, K_p=800.0, K_v=45.0, k=1.5, friction="full") for path in task]
 loop = pc.SampledLoop(encoders=True, velocity="difference", torque_limits=True)
 run = pc.simulate_sequence(laws, task.q_d(np.array(0.0)), task=task, duration=20.0, loop=loop)
 

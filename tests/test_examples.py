@@ -36,6 +36,7 @@ OF_THE_EXTRA = {"six_joints", "mill_pocket", "deburr_bracket"}
 ALONG_FILES = {"lettering", "mill_pocket", "deburr_bracket"}
 
 
+@pytest.mark.filterwarnings("error::pathcontrol.errors.PathControlWarning")
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_example(name, tmp_path, monkeypatch, capsys):
     if name in OF_THE_EXTRA:
