@@ -43,15 +43,22 @@ class Orientation(ABC):
         base's; ½‖e‖² has the gradient e with respect to it wherever e is defined.
         """
         wanted = self.frames(curve, s)
+        return self.turn(wanted, rotation), self.slope(wanted)
+
+    def turn(self, wanted: Array, rotation: Array) -> Array:
+        """Return the rotation e of :meth:`error` from frames ``wanted`` (N, 3, 3) to ``rotation`` (N, 3, 3)."""
         if self.rows == 3:
-            return rotation_vectors_of(rotation @ wanted.swapaxes(-1, -2)), np.broadcast_to(np.eye(3), wanted.shape)
+            return rotation_vectors_of(rotation @ wanted.swapaxes(-1, -2))
         z, towards = rotation[..., :, 2], wanted[..., :, 2]
-        across = wanted[..., :, :2].swapaxes(-1, -2)
         axis, cosine = np.cross(towards, z), (towards * z).sum(-1)
         turn = scale_axis(axis, cosine)
         opposite = (np.linalg.norm(axis, axis=-1) <= _NO_SINE) & (cosine < 0)
         turn[opposite] = np.pi * wanted[opposite, :, 0]  # half a turn, about any axis across z
-        return (across @ turn[..., None])[..., 0], across
+        return (self.slope(wanted) @ turn[..., None])[..., 0]
+
+    def slope(self, wanted: Array) -> Array:
+        """Return de/dω of :meth:`error` where the tool has the frames ``wanted`` (N, 3, 3)."""
+        return np.broadcast_to(np.eye(3), wanted.shape) if self.rows == 3 else wanted[..., :, :2].swapaxes(-1, -2)
 
 
 class FreeOrientation(Orientation):
@@ -62,8 +69,11 @@ class FreeOrientation(Orientation):
     def frames(self, curve: ToolCurve, s: Array) -> Array:
         return np.broadcast_to(np.eye(3), (*np.shape(s), 3, 3))
 
-    def error(self, curve: ToolCurve, s: Array, rotation: Array) -> tuple[Array, Array]:
-        return np.empty((len(s), 0)), np.empty((len(s), 0, 3))
+    def turn(self, wanted: Array, rotation: Array) -> Array:
+        return np.empty((len(wanted), 0))
+
+    def slope(self, wanted: Array) -> Array:
+        return np.empty((len(wanted), 0, 3))
 
 
 class FixedOrientation(Orientation):

@@ -242,10 +242,11 @@ class ArmDynamics:
         """Return the pose of ``frame`` (*batch, 4, 4) and its Jacobian (*batch, 6, n), for the cost of one of them."""
         i, data, array = self._frame_id(frame), self._data, self._array("q", q)
         batch, rows = array.shape[:-1], array.reshape(-1, self.n)
-        poses, jacobians, placement = np.empty((len(rows), 4, 4)), np.empty((len(rows), 6, self.n)), data.oMf[i]
+        one = (6, self.n) if self.n > 1 else (6,)  # as the Jacobian of a single joint comes
+        poses, jacobians, placement = np.empty((len(rows), 4, 4)), np.empty((len(rows), *one)), data.oMf[i]
+        model, compute = self.pinocchio_model, pin.computeFrameJacobian
         for k, qi in enumerate(rows):
-            jacobian = pin.computeFrameJacobian(self.pinocchio_model, data, qi, i, _ALIGNED)
-            jacobians[k] = jacobian.reshape(6, self.n)  # that of a single joint comes as (6,)
+            jacobians[k] = compute(model, data, qi, i, _ALIGNED)
             poses[k] = placement.homogeneous  # which computeFrameJacobian leaves up to date
         return poses.reshape(*batch, 4, 4), jacobians.reshape(*batch, 6, self.n)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,17 @@ from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 _SAMPLES = 64
 _NO_RANK = 1e-6  # singular values below this share of the largest count as zero
+
+
+class Target(NamedTuple):
+    """The position p(s) [m], (N, 3), and the frame R_d(s), (N, 3, 3), that the tool has to have."""
+
+    position: Array
+    frames: Array
+
+    def rows(self, chosen: Array) -> Target:
+        """Return the ``chosen`` rows."""
+        return Target(self.position[chosen], self.frames[chosen])
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +76,7 @@ class ToolConstraint:
         linear, angular = (np.sqrt((jacobian[:, rows] ** 2).mean()) for rows in (slice(3), slice(3, 6)))
         length = float(linear / angular) if linear > 0 and angular > 0 else 1.0
         unranked = replace(unranked, length=length)
-        _, slopes = unranked.at(postures, np.linspace(curve.s0, curve.s_end, _SAMPLES))
+        slopes = unranked._slope(jacobian, unranked.target(np.linspace(curve.s0, curve.s_end, _SAMPLES)))
         values = np.linalg.svd(slopes, compute_uv=False)
         rank = int((values > _NO_RANK * values.max()).sum(-1).max())
         return replace(unranked, rank=rank, moving=moving)
@@ -92,11 +104,27 @@ class ToolConstraint:
 
     def at(self, q: Array, s: Array) -> tuple[Array, Array]:
         """Return f (N, m) and ∂f/∂q (N, m, n) at q (N, n), s (N,)."""
+        return self.towards(q, self.target(s))
+
+    def target(self, s: Array) -> Target:
+        """Return where the tool has to be at s (N,), to evaluate the constraint there at several postures."""
+        return Target(self.curve.position(s), self.orientation.frames(self.curve, s))
+
+    def towards(self, q: Array, target: Target) -> tuple[Array, Array]:
+        """Return f (N, m) and ∂f/∂q (N, m, n) at q (N, n) for a target of N rows."""
         position, rotation, jacobian = self.tool.kinematics(q)
-        turn, slope = self.orientation.error(self.curve, s, rotation)
-        f = np.concatenate([(position - self.curve.position(s)) / self.length, turn], axis=-1)
-        rows = np.concatenate([jacobian[:, :3] / self.length, slope @ jacobian[:, 3:]], axis=-2)
-        return f, np.where(self.frozen, 0.0, rows)
+        turn = self.orientation.turn(target.frames, rotation)
+        f = np.concatenate([(position - target.position) / self.length, turn], axis=-1)
+        return f, self._slope(jacobian, target)
+
+    def slope(self, q: Array, target: Target) -> Array:
+        """Return ∂f/∂q (N, m, n) alone."""
+        return self._slope(self.tool.kinematics(q).jacobian, target)
+
+    def _slope(self, jacobian: Array, target: Target) -> Array:
+        turning = self.orientation.slope(target.frames) @ jacobian[:, 3:]
+        rows = np.concatenate([jacobian[:, :3] / self.length, turning], axis=-2)
+        return np.where(self.frozen, 0.0, rows)
 
     def deviation(self, f: Array) -> tuple[Array, Array]:
         """Return the distance [m] and the angle [rad] of the deviations f (N, m), each (N,)."""

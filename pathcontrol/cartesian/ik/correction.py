@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.cartesian.ik.constraint import ToolConstraint
+from pathcontrol.cartesian.ik.constraint import Target, ToolConstraint
 from pathcontrol.cartesian.ik.redundancy import PostureCost
 
 KEPT = 0.5  # of the tolerance, by which the tool may be off at the postures themselves
@@ -54,27 +54,27 @@ def correct(constraint: ToolConstraint, cost: PostureCost, q: Array, s: Array) -
     """Correct q (N, n) by Newton's method to satisfy the constraint at s (N,) and minimise H."""
     bases = Branch(*(np.zeros((len(q), *shape)) for shape in constraint.bases))
     out = Corrected(q.copy(), np.zeros(len(q), dtype=bool), np.zeros(len(q)), bases)
-    moving = np.arange(len(q))
+    moving, target = np.arange(len(q)), constraint.target(s)
     for _ in range(_STEPS):
-        linear = _linearise(constraint, out.q[moving], s[moving])
+        linear = _linearise(constraint, out.q[moving], target)
         step = -(linear.inverse @ linear.f[..., None])[..., 0]
         if constraint.freedom:
-            step += _null_step(constraint, cost.rows(moving), out.q[moving], s[moving], linear, step)
+            step += _null_step(constraint, cost.rows(moving), out.q[moving], target, linear, step)
         size = np.abs(step).max(-1)
         out.q[moving] += step * np.minimum(1.0, _LONGEST / np.maximum(size, _LONGEST))[:, None]
         out.conditioning[moving] = linear.conditioning
         bases.left[moving], bases.right[moving] = linear.branch
         arrived = size < _ARRIVED
         out.converged[moving[arrived]] = constraint.excess(linear.f[arrived]) < KEPT
-        moving = moving[~arrived]
-        if not moving.size:
+        if arrived.all():
             break
+        moving, target = moving[~arrived], target.rows(~arrived)
     return out
 
 
-def _linearise(constraint: ToolConstraint, q: Array, s: Array) -> _Linear:
+def _linearise(constraint: ToolConstraint, q: Array, target: Target) -> _Linear:
     """Return the linearisation of the constraint at postures."""
-    f, slope = constraint.at(q, s)
+    f, slope = constraint.towards(q, target)
     u, values, v = np.linalg.svd(slope)
     rank = constraint.rank
     used, rows = values[:, :rank], v[:, :rank]
@@ -84,11 +84,11 @@ def _linearise(constraint: ToolConstraint, q: Array, s: Array) -> _Linear:
 
 def branch_at(constraint: ToolConstraint, q: Array, s: Array) -> Branch:
     """Return the side of singularities on which postures q (N, n) at s (N,) are."""
-    return _linearise(constraint, q, s).branch
+    return _linearise(constraint, q, constraint.target(s)).branch
 
 
 def _null_step(
-    constraint: ToolConstraint, cost: PostureCost, q: Array, s: Array, linear: _Linear, step: Array
+    constraint: ToolConstraint, cost: PostureCost, q: Array, target: Target, linear: _Linear, step: Array
 ) -> Array:
     """Return the part of Newton's step that does not move the tool, (N, n).
 
@@ -99,7 +99,7 @@ def _null_step(
     multipliers = -(linear.inverse.swapaxes(1, 2) @ gradient[..., None])
     count, k, n = free.shape
     beside = q[:, None] + _PROBE * free
-    _, slopes = constraint.at(beside.reshape(-1, n), np.repeat(s, k))
+    slopes = constraint.slope(beside.reshape(-1, n), target.rows(np.repeat(np.arange(count), k)))
     turned = (slopes.reshape(count, k, -1, n) - linear.slope[:, None]).swapaxes(-1, -2) @ multipliers[:, None]
     bend = (turned[..., 0] + cost.beside(beside) - gradient[:, None]) / _PROBE
     hessian = bend @ free.swapaxes(1, 2)

@@ -51,7 +51,8 @@ class InverseKinematics:
         cost = PostureCost.nearest(self.rest(s), self.constraint.tool.robot.limits)
         found = correct(self.constraint, cost, guess, s)
         near = np.abs(found.q - guess).max(-1) < _NEAR
-        hops = found.branch.differs(branch_at(self.constraint, known.q[before], known.s[before]))
+        used, row = np.unique(before, return_inverse=True)
+        hops = found.branch.differs(branch_at(self.constraint, known.q[used], known.s[used]).rows(row))
         return found.q, near & ~hops & (find_faults(self.constraint, found) == Stop.NONE)
 
     def fill(self, known: Samples, s: Array) -> Samples:

@@ -20,12 +20,13 @@ def reach(constraint: ToolConstraint, q: Array, s: Array) -> Array:
     """
     limits = constraint.tool.robot.limits
     q = np.clip(q, limits.lower, limits.upper)
-    f, slope = constraint.at(q, s)
+    target = constraint.target(s)
+    f, slope = constraint.towards(q, target)
     damping, moving = np.full(len(q), _FIRST_DAMPING), np.arange(len(q))
     for _ in range(_STEPS):
         step = _damped_step(f[moving], slope[moving], damping[moving], q[moving], limits.lower, limits.upper)
         trial = np.clip(q[moving] + step, limits.lower, limits.upper)
-        f_trial, slope_trial = constraint.at(trial, s[moving])
+        f_trial, slope_trial = constraint.towards(trial, target.rows(moving))
         before, after = (f[moving] ** 2).sum(-1), (f_trial**2).sum(-1)
         better = after < before
         taken = moving[better]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.joint_range import distance_to_limits
 from pathcontrol.cartesian.ik.preference import PLANE, find_lowest
 from pathcontrol.cartesian.ik.refinement import Refined
-from pathcontrol.cartesian.ik.spline_deviation import deviations
+from pathcontrol.cartesian.ik.spline_deviation import conditioning
 
 _VALLEYS = 8  # minima of a function along the path that are refined
 _HEIGHTS = 256  # postures at which heights are measured
@@ -67,13 +68,10 @@ def measure(constraint: ToolConstraint, refined: Refined, start_postures: int, s
     """Measure a refined spline, whose start posture was ``searched`` or given."""
     robot, spline, found, s = constraint.tool.robot, refined.spline, refined.deviations, refined.checks
 
-    def conditioning(s: Array) -> Array:
-        return deviations(constraint, spline, s).conditioning
-
     def distance(s: Array) -> Array:
         return distance_to_limits(robot, spline(s)).min(-1)
 
-    singular_at = _search_least(conditioning, refined, found.conditioning)
+    singular_at = _search_least(partial(conditioning, constraint, spline), refined, found.conditioning)
     limit_at = _search_least(distance, refined, distance(s))
     distances = distance_to_limits(robot, spline(limit_at))
     joint = int(np.argmin(distances))
@@ -86,7 +84,7 @@ def measure(constraint: ToolConstraint, refined: Refined, start_postures: int, s
         knots=len(refined.mesh),
         rounds=refined.rounds,
         length=constraint.length,
-        smallest_singular_value=float(conditioning(np.array([singular_at]))[0]),
+        smallest_singular_value=float(conditioning(constraint, spline, np.array([singular_at]))[0]),
         singular_at=singular_at,
         limit_distance=float(distances[joint]),
         limit_joint=robot.joint_names[joint] if np.isfinite(distances[joint]) else "",

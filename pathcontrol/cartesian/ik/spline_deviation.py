@@ -37,10 +37,18 @@ def deviations(constraint: ToolConstraint, spline: BSpline, s: Array) -> Deviati
     return Deviations(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 
 
+def conditioning(constraint: ToolConstraint, spline: BSpline, s: Array) -> Array:
+    """Return the conditioning of :class:`Deviations` alone, (N,)."""
+    return _conditioning(constraint, constraint.slope(spline(s), constraint.target(s)))
+
+
+def _conditioning(constraint: ToolConstraint, slope: Array) -> Array:
+    return np.linalg.svd(slope, compute_uv=False)[:, constraint.rank - 1]
+
+
 def _chunk(constraint: ToolConstraint, q: Array, dq: Array, s: Array) -> Deviations:
     f, jacobian = constraint.at(q, s)
     wanted = constraint.curve.at(s).dp
     velocity = constraint.length * (jacobian[:, :3] @ dq[..., None])[..., 0]
     off = np.linalg.norm(velocity - wanted, axis=-1) / np.linalg.norm(wanted, axis=-1)
-    values = np.linalg.svd(jacobian, compute_uv=False)
-    return Deviations(*constraint.deviation(f), off, values[:, constraint.rank - 1])
+    return Deviations(*constraint.deviation(f), off, _conditioning(constraint, jacobian))
