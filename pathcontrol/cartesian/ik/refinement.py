@@ -63,7 +63,7 @@ def refine(kinematics: InverseKinematics, known: Samples, closed: bool) -> Refin
         worst, _, _ = _worst(constraint, spline, mesh, _PROBES)
         worst = worst / _SHARE
         if (worst <= 1).all():
-            worst, checks, found = _worst(constraint, spline, mesh, _CHECKS)
+            worst, checks, found = _worst(constraint, spline, mesh, _CHECKS, conditioned=True)
             worst = worst / _VERIFIED
             if (worst <= 1).all():
                 return Refined(spline, mesh, rounds, checks, found)
@@ -80,11 +80,11 @@ def _interpolant(known: Samples, closed: bool) -> BSpline:
 
 
 def _worst(
-    constraint: ToolConstraint, spline: BSpline, mesh: Array, fractions: Array
+    constraint: ToolConstraint, spline: BSpline, mesh: Array, fractions: Array, conditioned: bool = False
 ) -> tuple[Array, Array, Deviations]:
     """Return the largest deviation of each interval as a multiple of what is allowed, its place, and all deviations."""
     s = points_between(mesh, fractions)
-    found = deviations(constraint, spline, s.ravel())
+    found = deviations(constraint, spline, s.ravel(), conditioned)
     position, angle = constraint.tolerance
     excess = np.maximum.reduce([found.position / position, found.angle / angle, found.velocity / VELOCITY])
     return excess.reshape(s.shape).max(-1), s.ravel(), found

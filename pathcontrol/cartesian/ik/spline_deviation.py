@@ -21,7 +21,7 @@ class Deviations(NamedTuple):
         position: distance between the tool and p(s) [m], not less than that to the curve.
         angle: angle between the tool and its orientation at s [rad].
         velocity: ‖J_v q_d' − p'‖/‖p'‖.
-        conditioning: smallest singular value of ∂f/∂q, of those that are not zero everywhere.
+        conditioning: smallest singular value of ∂f/∂q, of those that are not zero everywhere; (0,) if not asked for.
     """
 
     position: Array
@@ -30,10 +30,10 @@ class Deviations(NamedTuple):
     conditioning: Array
 
 
-def deviations(constraint: ToolConstraint, spline: BSpline, s: Array) -> Deviations:
-    """Return the deviations at s (N,) of an arm led by q_d = ``spline``."""
-    slope = spline.derivative()
-    parts = [_chunk(constraint, spline(part), slope(part), part) for part in np.array_split(s, len(s) // _CHUNK + 1)]
+def deviations(constraint: ToolConstraint, spline: BSpline, s: Array, conditioned: bool) -> Deviations:
+    """Return the deviations at s (N,) of an arm led by q_d = ``spline``, with the conditioning or without."""
+    slope, split = spline.derivative(), np.array_split(s, len(s) // _CHUNK + 1)
+    parts = [_chunk(constraint, spline(part), slope(part), part, conditioned) for part in split]
     return Deviations(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 
 
@@ -46,9 +46,10 @@ def _conditioning(constraint: ToolConstraint, slope: Array) -> Array:
     return np.linalg.svd(slope, compute_uv=False)[:, constraint.rank - 1]
 
 
-def _chunk(constraint: ToolConstraint, q: Array, dq: Array, s: Array) -> Deviations:
+def _chunk(constraint: ToolConstraint, q: Array, dq: Array, s: Array, conditioned: bool) -> Deviations:
     f, jacobian = constraint.at(q, s)
     wanted = constraint.curve.at(s).dp
     velocity = constraint.length * (jacobian[:, :3] @ dq[..., None])[..., 0]
     off = np.linalg.norm(velocity - wanted, axis=-1) / np.linalg.norm(wanted, axis=-1)
-    return Deviations(*constraint.deviation(f), off, _conditioning(constraint, jacobian))
+    values = _conditioning(constraint, jacobian) if conditioned else np.empty(0)
+    return Deviations(*constraint.deviation(f), off, values)

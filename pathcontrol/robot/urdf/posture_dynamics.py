@@ -120,7 +120,8 @@ def _motion(body: Body, position: np.ndarray) -> np.ndarray:
     if body.joint.type == "prismatic":
         motion[:, :3, 3] = position[:, None] * axis
         return motion
-    cross = np.cross(axis, np.eye(3)).T
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine, rest = np.sin(position)[:, None, None], 1 - np.cos(position)[:, None, None]
     motion[:, :3, :3] += sine * cross + rest * (cross @ cross)
     return motion

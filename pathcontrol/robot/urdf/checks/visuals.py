@@ -55,12 +55,11 @@ def _check_drawn(root: etree._Element, problem: Callable[[str], str | None]) -> 
 
 def _mesh_problem(name: str, base_dir: Path | None, package_dirs: Sequence[Path]) -> str | None:
     """Return the reason why a mesh cannot be read; ``None`` if it can, or if there is no folder to look in."""
-    if is_local(name) and not has_candidates(name, base_dir, package_dirs):
-        return None
     try:
         find_mesh(name, base_dir, package_dirs)
     except UrdfError as error:
-        return str(error)
+        homeless = is_local(name) and not has_candidates(name, base_dir, package_dirs)
+        return None if homeless else str(error)
     return None
 
 
