@@ -11,7 +11,7 @@ from pathcontrol.view.figures.style import apply_style, new_figure, style
 
 
 @settings(deadline=None)
-@given(offset=st.floats(-5e3, 5e3), span=st.floats(0.01, 1.0), width=st.floats(2.0, 4.0))
+@given(offset=st.floats(-5e3, 5e3), span=st.floats(0.01, 1.0), width=st.floats(1.2, 4.0))
 def test_numbers_with_many_figures_do_not_touch(offset, span, width):
     with style():
         figure = new_figure(width, 1.0)

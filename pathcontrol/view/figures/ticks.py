@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from matplotlib.axis import Axis, XAxis
@@ -28,8 +29,8 @@ class SpacedLocator(AutoLocator):
         self._size = size
 
     def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
-        for intervals in ("auto", 5, 4, 3, 2, 1):
-            self.set_params(nbins=intervals)
+        for least, intervals in product((2, 1), ("auto", 5, 4, 3, 2, 1)):  # one number, where two have no room
+            self.set_params(nbins=intervals, min_n_ticks=least)
             ticks = super().tick_values(vmin, vmax)
             if len(ticks) < 3 or self._apart(np.asarray(ticks), abs(vmax - vmin)):
                 break
