@@ -312,7 +312,7 @@ def test_a_file_a_saved_run_and_a_report_have_it(tmp_path, monkeypatch):
     saved = Run.load(tmp_path / "again.nc")
     assert saved.config["controller"]["friction"] == "observed"
     assert saved.config["controller"]["observer_hz"] == 25.0
-    monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure, kind: b"")
+    monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure: ("png", b""))
     page = report({"again": saved}, tmp_path / "report.html").read_text(encoding="utf-8")
     assert "observer_hz=25.0" in page
     assert "Torques beside those of motors, as the law compensates them" in page

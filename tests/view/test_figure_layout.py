@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 import warnings
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.axis import Axis, XAxis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from test_pareto import table as front_table
@@ -26,6 +28,7 @@ from pathcontrol import (
     toolpath_figure,
 )
 from pathcontrol.view.figures.style import apply_style, new_figure, style
+from pathcontrol.view.figures.tick_memory import METHODS, remembered_ticks
 
 MINUS = "−"  # as figures write it
 
@@ -111,6 +114,42 @@ def test_a_figure_that_is_changed_is_laid_out_again(tmp_path):
     figure.axes[0].set_ylabel("much\ntaller\nthan\nit was")
     save_figure(figure, tmp_path / "after")
     assert_readable(figure, "changed")
+
+
+@pytest.mark.parametrize("kind", ["path", "errors"])
+def test_remembered_ticks_change_no_byte_and_are_forgotten(kind, tmp_path, monkeypatch):
+    formats, figures = ["svg", "png", "pdf"], [makers(made(3, scale=1.3))[kind]() for _ in range(2)]
+    remembered = save_figure(figures[0], tmp_path / "remembered", formats)
+    monkeypatch.setattr("pathcontrol.view.figures.panel_layout.remembered_ticks", lambda figure: nullcontext())
+    found = save_figure(figures[1], tmp_path / "found", formats)
+    assert [file.read_bytes() for file in remembered] == [file.read_bytes() for file in found]
+    axes = figures[0].findobj(Axis)
+    assert axes
+    assert not any(name in vars(axis) for axis in axes for name in METHODS)
+
+
+def read(ticks, boxes):
+    return [(tick.get_loc(), tick.label1.get_text()) for tick in ticks], [box.bounds for box in boxes[0]]
+
+
+def test_ticks_are_found_again_where_an_axis_has_moved():
+    figure, axes = panel(0.0, 1.0)
+    changes = {
+        "range": lambda: axes.set_xlim(0.0, 50.0),
+        "place": lambda: axes.set_position((0.3, 0.3, 0.2, 0.6)),
+        "size": lambda: figure.set_size_inches(9.0, 3.0),
+        "dpi": lambda: figure.set_dpi(300),
+    }
+    axis, renderer = axes.xaxis, figure.canvas.get_renderer()
+    with style(), remembered_ticks(figure):
+        for name, change in changes.items():
+            before = axis._update_ticks()
+            assert axis._update_ticks() is before, name
+            change()
+            ticks = axis._update_ticks()
+            assert ticks is not before, name
+            remembered, again = axis._get_ticklabel_bboxes(ticks, renderer), XAxis._update_ticks(axis)
+            assert read(ticks, remembered) == read(again, XAxis._get_ticklabel_bboxes(axis, again, renderer)), name
 
 
 def panel(low, high):

@@ -71,7 +71,7 @@ def test_a_joint_that_slides_is_pushed_by_a_force():
 
 
 def test_reports_of_pushed_runs_have_it(runs, tmp_path, monkeypatch):
-    monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure, kind: b"")  # captions are enough
+    monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure: ("png", b""))  # captions are enough
 
     def captions(some):
         page = html.parse(report(some, tmp_path / "page.html")).getroot()

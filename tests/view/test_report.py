@@ -68,7 +68,7 @@ def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """For reports in which the figures are made, and stand with their captions, but are empty images."""
-    monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure, kind: b"")
+    monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure: ("png", b""))
 
 
 def words(element: html.HtmlElement) -> str:

@@ -10,6 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from pathcontrol.view.figures.tick_memory import remembered_ticks
+
 _PAD = 0.03  # in, around panels
 _LAYOUTS, _SETTLED = 6, 5e-4  # at most so many, shares of the figure
 
@@ -27,7 +29,8 @@ class SettledLayout(ConstrainedLayoutEngine):
         """Move and resize the panels of a figure."""
         before = _places(fig)
         for _ in range(_LAYOUTS):
-            super().execute(fig)
+            with remembered_ticks(fig):
+                super().execute(fig)
             places = _places(fig)
             if not _has_equal_scales(fig) or np.allclose(places, before, rtol=0.0, atol=_SETTLED):
                 break
@@ -46,7 +49,8 @@ def laid_out(figure: Figure, dpi: float) -> Iterator[None]:
     engine.execute(figure)
     figure.set_layout_engine(None)
     try:
-        yield
+        with remembered_ticks(figure):
+            yield
     finally:
         figure.set_layout_engine(engine)
         figure.dpi = before

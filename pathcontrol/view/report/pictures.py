@@ -114,18 +114,20 @@ def _draw_power_balance(runs: Run | Mapping[str, Run]) -> Figure | None:
 
 def picture(figure: Figure, caption: str) -> Picture:
     """Return a figure as SVG, or as PNG where the SVG would be too large."""
-    width, drawn = figure.get_figwidth(), _draw(figure, "svg")
-    kind = "svg+xml" if len(drawn) <= _LARGEST else "png"
-    text = base64.b64encode(drawn if kind == "svg+xml" else _draw(figure, "png")).decode()
+    width, (kind, drawn) = figure.get_figwidth(), _draw(figure)
+    text = base64.b64encode(drawn).decode()
     return Picture(f"data:image/{kind};base64,{text}", round(_PIXELS * width), width > _WIDE, caption)
 
 
-def _draw(figure: Figure, kind: str) -> bytes:
-    """Return the file of a figure."""
+def _draw(figure: Figure) -> tuple[str, bytes]:
+    """Return the kind of image that a figure is drawn as, and its file."""
     from pathcontrol.view.figures.panel_layout import laid_out
     from pathcontrol.view.figures.style import style
 
-    drawn = io.BytesIO()
     with style(), laid_out(figure, _PNG_DPI):
-        figure.savefig(drawn, format=kind, dpi=_PNG_DPI, metadata={"Date": None} if kind == "svg" else None)
-    return drawn.getvalue()
+        svg, png = io.BytesIO(), io.BytesIO()
+        figure.savefig(svg, format="svg", dpi=_PNG_DPI, metadata={"Date": None})
+        if len(svg.getvalue()) <= _LARGEST:
+            return "svg+xml", svg.getvalue()
+        figure.savefig(png, format="png", dpi=_PNG_DPI)
+        return "png", png.getvalue()
