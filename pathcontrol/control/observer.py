@@ -95,11 +95,13 @@ class MomentumObserver:
         h = np.where(last < 0.5 * _NEVER, 0.0, t - last)
         p, c = self.robot.momentum(q, qd), self.robot.momentum_rate(q, qd, np.zeros(self.robot.n))
         share = -np.expm1(-self.gain * h)
-        slope = np.divide(share, h, out=np.zeros_like(share) + self.gain, where=h > 0)
+        slope = np.divide(share, h, out=np.zeros(share.shape) + self.gain, where=h > 0)
         new = first + slope * (p - before) - share * (known + 0.5 * c + first)
         passed = 1 - (1 - share) * self.gain / slope
         both = torque + share * (first - torque) + passed * (new - first)
-        return Observation(t, p, c, np.where(kept, first, new), np.where(kept, torque, both))
+        if kept is not False:
+            new, both = np.where(kept, first, new), np.where(kept, torque, both)
+        return Observation(t, p, c, new, both)
 
     def elapsed(self, t: float, memory: Array) -> Array:
         """Return the time from the tick before to t [s], (*batch,), 0 at the first tick."""

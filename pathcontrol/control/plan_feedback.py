@@ -74,9 +74,10 @@ class PlanFeedback(Controller):
         free = point.theta - k * np.vecdot(e_p, point.dq_d)
         sdot = self.inside(s, free)
         curvature = np.vecdot(point.dq_d, point.dq_d) + np.vecdot(e_p, point.ddq_d)
-        held = sdot != free  # at an end of an open path
-        slope = np.where(held, 0.0, point.dtheta - k * curvature)
-        drift = np.where(held, 0.0, k * np.vecdot(qd, point.dq_d))
+        slope, drift = point.dtheta - k * curvature, k * np.vecdot(qd, point.dq_d)
+        if not self.task.closed:
+            held = sdot != free  # at an end of the path
+            slope, drift = np.where(held, 0.0, slope), np.where(held, 0.0, drift)
         return Plan(point, e_p, e_v, sdot, slope, drift)
 
     def plan_gain(self, s: Array) -> Array:

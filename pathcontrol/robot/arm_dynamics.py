@@ -145,7 +145,7 @@ class ArmDynamics:
     def gravity(self, q: ArrayLike) -> Array:
         """Return the gravity torque g(q) [N m], (*batch, n)."""
         q = self._array("q", q)
-        zero = np.zeros_like(q)
+        zero = np.zeros(q.shape)
         return self.inverse_dynamics(q, zero, zero)
 
     def mass_matrix(self, q: ArrayLike) -> Array:
@@ -169,7 +169,7 @@ class ArmDynamics:
     def momentum(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """Return the generalized momentum p = M(q)q̇ [N m s], (*batch, n)."""
         q = self._array("q", q)
-        return self._weightless.inverse_dynamics(q, np.zeros_like(q), qd)
+        return self._weightless.inverse_dynamics(q, np.zeros(q.shape), qd)
 
     def momentum_rate(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
         """Return ṗ = τ + C(q,q̇)ᵀq̇ − g(q) [N m], (*batch, n): the rate of the momentum p = M(q)q̇ under torques τ.
@@ -180,7 +180,7 @@ class ArmDynamics:
         model, data, shape = self.pinocchio_model, self._data, (self.n, self.n)
 
         def gradient(qi: Array, qdi: Array) -> Array:
-            return qdi @ pin.computeCoriolisMatrix(model, data, qi, qdi).reshape(shape)
+            return qdi.dot(pin.computeCoriolisMatrix(model, data, qi, qdi).reshape(shape))
 
         return self._array("tau", tau) + self._each(q, (self.n,), gradient, qd=qd) - self.gravity(q)
 

@@ -51,7 +51,7 @@ class RigidBody:
         arrays = broadcast(self.n, arguments, self._joints)
         out: Array = np.empty(arrays[0].shape)
         if out.size == self.n:  # one configuration is not worth the threads' overhead
-            out[...] = one(self.model, self.data, *(a.reshape(-1) for a in arrays))
+            out[...] = one(self.model, self.data, *[a.ravel() for a in arrays])
         elif out.size:
             many(self._threads, self._pool, *(a.reshape(-1, self.n).T for a in (*arrays, out)))
         return out
@@ -68,13 +68,14 @@ def broadcast(n: int, arguments: Mapping[str, ArrayLike], joints: Sequence[str] 
         InputError: one of them has another last axis than n, or their batch axes do not fit together.
     """
     arrays = [as_joint_array(name, value, n, joints) for name, value in arguments.items()]
-    if len({a.shape for a in arrays}) == 1:
+    shapes = [a.shape for a in arrays]
+    if shapes.count(shapes[0]) == len(shapes):
         return arrays
     try:
-        shape = np.broadcast_shapes(*(a.shape for a in arrays))
+        shape = np.broadcast_shapes(*shapes)
     except ValueError as error:
-        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(arguments, arrays, strict=True))
-        raise InputError(f"the batch axes do not fit together: {shapes}") from error
+        said = ", ".join(f"{name} {shape}" for name, shape in zip(arguments, shapes, strict=True))
+        raise InputError(f"the batch axes do not fit together: {said}") from error
     return [_repeat(a, shape) for a in arrays]
 
 

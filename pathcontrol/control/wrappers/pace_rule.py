@@ -66,10 +66,10 @@ class FastestPlan:
 
 def _compare_rates(fastest: PathTask, task: PathTask, s: Array, at: Array) -> tuple[Array, Array]:
     """Return ϑ of the ``fastest`` task at ``at`` over that of ``task`` at s, and the slope of this ratio in s."""
-    point, best = task.at(s), fastest.at(at)
-    ratio = best.theta / point.theta
+    point = task.at(s)
+    ratio = fastest.theta(at) / point.theta  # points of its path are not needed
     direction = 1.0 if at is s else -1.0
-    return ratio, (direction * best.dtheta - ratio * point.dtheta) / point.theta
+    return ratio, (direction * fastest.dtheta(at) - ratio * point.dtheta) / point.theta
 
 
 class PaceRule(SpeedRule):

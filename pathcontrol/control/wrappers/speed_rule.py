@@ -90,7 +90,7 @@ class SpeedRule(ABC):
 
     def memory_rate(self, moment: Moment, asked: Speed, tau: Array, x: Array) -> Array:
         """Return the rate of the rest of the state, (*batch, size − 1), for the torque demand ``tau`` (*batch, n)."""
-        return np.zeros_like(x[..., 1:])
+        return np.zeros((*x.shape[:-1], self.size - 1))
 
     def advance(self, x: Array, xdot: Array, period: float) -> Array:
         """Return the state one control ``period`` [s] after x."""
