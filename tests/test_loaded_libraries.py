@@ -11,6 +11,7 @@ import pytest
 USES = {
     "metrics": "pc.metrics(run)",
     "file": "run.save('run.nc')",
+    "loaded file": "pc.metrics(pc.Run.load('run.nc'))",
     "figures": "[pc.save_figure(f(run), 'figure') for f in (pc.error_figure, pc.path_figure, pc.torque_figure)]",
     "film": "pc.record(run).save('film.html')",
     "one rollout": "pc.metrics(run.rollout(0).with_robot(robot))",

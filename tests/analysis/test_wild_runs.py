@@ -40,10 +40,12 @@ def sequence(tmp_path_factory):
 
 def rewritten(file, folder, change, data_too=lambda data: data):
     """The run with its recipe changed, and right checksums of what it says then."""
-    data, config, stored = read_run(file)
+    _, config, stored = read_run(file)
     recipe = json.loads(stored.text)
     change(recipe)
-    write_run(folder / "wild.nc", data_too(data), config, StoredContext(json.dumps(recipe), stored.numbers))
+    write_run(
+        folder / "wild.nc", data_too(pc.Run.load(file).data), config, StoredContext(json.dumps(recipe), stored.numbers)
+    )
     return pc.Run.load(folder / "wild.nc")
 
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import h5py  # type: ignore[import-untyped]
 import numpy as np
 
+from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
+from pathcontrol.simulation.samples import Samples
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 
 if TYPE_CHECKING:
@@ -18,7 +20,7 @@ NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 _DEEPEST = 50
 _DENSEST = 1100  # bytes that deflate may expand one byte to, 1032, with a margin
 _UNWRITTEN = 1 << 20  # bytes that a small variable may have without being in the file
-_WORDS, _COUNTS = ("status", "reason", "path_status"), ("laps", "path_index", "forgotten")
+WORDS, COUNTS = ("status", "reason", "path_status"), ("laps", "path_index", "forgotten")
 
 
 def check_sizes(file: h5py.File, size: int) -> None:
@@ -51,16 +53,16 @@ def _variables(group: h5py.Group) -> Iterator[tuple[str, h5py.Dataset]]:
         item = group[name]
         if isinstance(item, h5py.Group):
             yield from ((f"{name}/{inner}", one) for inner, one in _variables(item))
-        elif isinstance(item, h5py.Dataset) and not _is_length(item):
+        elif isinstance(item, h5py.Dataset) and not is_length(item):
             yield name, item
 
 
-def _is_length(item: h5py.Dataset) -> bool:
+def is_length(item: h5py.Dataset) -> bool:
     """Return whether a dataset only holds the length of a dimension."""
     return bytes(item.attrs.get("NAME", b"")).startswith(NO_VARIABLE.encode())
 
 
-def check_form(data: xr.Dataset, config: Any) -> None:
+def check_form(data: xr.Dataset | Samples, config: Any) -> None:
     """Check that data and configuration have the form of a run, regardless of their numbers.
 
     Raises:
@@ -72,29 +74,35 @@ def check_form(data: xr.Dataset, config: Any) -> None:
         )
     if is_deeper(config, _DEEPEST):
         raise InputError(f"its configuration is nested more than {_DEEPEST} deep", limit=_DEEPEST)
+    if isinstance(data, Samples):
+        _check_labels(data.time, data.plain("joint"), data.rollout)
+        return
     if missing := [name for name in ("q", "time", "status") if name not in data.variables]:
         raise InputError(f"it has no {' and no '.join(missing)}", value=missing)
     for name, (dims, *_) in (VARIABLES | OUTCOMES | {"time": (("time",),)}).items():
         if name not in data.variables:
             continue
         variable = data[name]
-        if variable.dims != dims or (variable.dtype.kind in "bfiu") == (name in _WORDS):
+        if variable.dims != dims or (variable.dtype.kind in "bfiu") == (name in WORDS):
             raise InputError(
                 f"{name} is {variable.dtype} over {variable.dims}, expected other values over {dims}", value=name
             )
-        if name in _COUNTS and variable.dtype.kind not in "iu":
+        if name in COUNTS and variable.dtype.kind not in "iu":
             raise InputError(f"{name} is {variable.dtype}, expected whole numbers", value=name)
         if name in VARIABLES and not isinstance(variable.attrs.get("units"), str):
             raise InputError(f"{name} has no unit", value=name)
-    _check_labels(data)
-
-
-def _check_labels(data: xr.Dataset) -> None:
-    """Check the values along which the arrays are laid out: times, names of joints, numbers of rollouts, texts."""
     for name in ("rollout", "joint"):
         if name in data.coords and data[name].dims != (name,):
             raise InputError(f"{name} is over {data[name].dims}, expected ({name!r},)", value=name)
-    time, joints = data["time"].to_numpy(), data["joint"].to_numpy() if "joint" in data.coords else None
+    joints = data["joint"].to_numpy() if "joint" in data.coords else None
+    _check_labels(data["time"].to_numpy(), joints, data["rollout"].to_numpy())  # 0, 1, … where the file has none
+    for name in WORDS:
+        if name in data.variables and not all(isinstance(word, str) for word in data[name].to_numpy().tolist()):
+            raise InputError(f"{name} holds something else than words", value=name)
+
+
+def _check_labels(time: Array, joints: Array | None, rollouts: Array) -> None:
+    """Check the values along which the arrays are laid out: times, names of joints, numbers of rollouts."""
     if not np.isfinite(time).all():
         raise InputError("its times are not finite")
     if not (np.diff(time) > 0).all():
@@ -103,12 +111,8 @@ def _check_labels(data: xr.Dataset) -> None:
         raise InputError(f"its joints are {joints}, expected their names", value=joints)
     if len(set(joints.tolist())) < len(joints):
         raise InputError(f"its joints are {joints.tolist()}, expected names that differ", value=joints)
-    rollouts = data["rollout"].to_numpy()  # the numbers 0, 1, … where the file has none
     if rollouts.dtype.kind not in "iu" or len(np.unique(rollouts)) < len(rollouts):
         raise InputError(f"its rollouts are {rollouts}, expected whole numbers that differ", value=rollouts)
-    for name in _WORDS:
-        if name in data.variables and not all(isinstance(word, str) for word in data[name].to_numpy().tolist()):
-            raise InputError(f"{name} holds something else than words", value=name)
 
 
 def is_deeper(value: Any, levels: int) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,8 @@ from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError, warn
 from pathcontrol.simulation.context import StoredContext
 from pathcontrol.simulation.samples import Labelled, Samples
-from pathcontrol.simulation.storage.file_form import NO_VARIABLE, check_form, check_sizes
+from pathcontrol.simulation.storage.cf_encoding import decode_samples, encode_run
+from pathcontrol.simulation.storage.file_form import NO_VARIABLE, check_form, check_sizes, is_length
 from pathcontrol.simulation.storage.seal import check_seal, digest_of, seal
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 
@@ -30,6 +31,7 @@ _DIGEST = "pathcontrol_sha256"
 _GROUP = "origin"
 _WRITER = np.bytes_(f"version=2,h5py={h5py.__version__},hdf5={h5py.version.hdf5_version}")  # netCDF-C wants to know
 _KNOWN = (*VARIABLES, *OUTCOMES, "time", "joint", "rollout")
+_OF_FORMAT = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties")
 _RECIPE = {"long_name": "robot and task of the run, JSON in UTF-8"}
 _NUMBERS = {"long_name": "arrays of the recipe, one after another"}
 
@@ -46,7 +48,7 @@ def write_run(path: Path, data: xr.Dataset | Samples, config: Mapping[str, Any],
     recipe = np.frombuffer(stored.text.encode(), dtype=np.uint8)
     origin = {"recipe": (("byte",), recipe, _RECIPE), "numbers": (("number",), stored.numbers, _NUMBERS)}
     with h5py.File(memory, "w", track_order=True) as file:
-        variables, about = _encode(data)
+        variables, about = encode_run(data)
         _put(file, variables, data.arrays if isinstance(data, Samples) else data.data_vars, _LEVEL)
         file.attrs.update({**about, _CONFIG: text, _DIGEST: _digest_of_run(data, text), "_NCProperties": _WRITER})
         group = file.create_group(_GROUP, track_order=True)
@@ -67,7 +69,7 @@ def _usual_names(folder: Path) -> list[str]:
 _TOOLPATHS = (".csv", ".tsv", ".txt", ".xyz", ".ngc", ".gcode", ".gc", ".tap", ".cnc", ".svg", ".dxf")
 
 
-def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | None]:
+def read_run(path: Path) -> tuple[xr.Dataset | Samples, dict[str, Any], StoredContext | None]:
     """Read data, configuration, and robot and path if the file has them.
 
     Raises:
@@ -82,13 +84,14 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | No
         check_seal(path)
         with h5py.File(path, "r") as file:
             check_sizes(file, path.stat().st_size)
-        data = _read_data(path)
-        digest, text = data.attrs.pop(_DIGEST, None), data.attrs.pop(_CONFIG)
+            samples, about = _read_samples(file)
+        data, about = _read_data(path) if samples is None else (samples, about)
+        digest, text = about.pop(_DIGEST, None), about.pop(_CONFIG)
         config = json.loads(text)
         check_form(data, config)
         _check_digest(digest, lambda: _digest_of_run(data, text))
-        if "rollout" not in data.coords:  # number the rollouts, so that parts of the run keep their numbers
-            data = data.assign_coords(rollout=data["rollout"])
+        if not isinstance(data, Samples) and "rollout" not in data.coords:
+            data = data.assign_coords(rollout=data["rollout"])  # so that parts of the run keep their numbers
         stored = _read_origin(path)
     except Exception as error:  # a broken file may fail anywhere in the readers
         reason = str(error) if "file signature not found" not in str(error) else f"it is no HDF5 file{_remedy(path)}"
@@ -101,7 +104,29 @@ def read_run(path: Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | No
     return data, config, stored
 
 
-def _read_data(path: Path) -> xr.Dataset:
+def _read_samples(file: h5py.File) -> tuple[Samples | None, dict[str, Any]]:
+    """Read a file that is as :func:`write_run` writes it, without xarray; ``None`` from another one."""
+    items = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset) and not is_length(item)}
+    dims, about = {name: _dimensions(name, item) for name, item in items.items()}, _read_attributes(file)
+    if not isinstance(about.get(_CONFIG), str) or any(len(dims[name]) != item.ndim for name, item in items.items()):
+        return None, about
+    found = {name: (dims[name], _read_array(item), _read_attributes(item)) for name, item in items.items()}
+    own = {name: value for name, value in about.items() if name not in (_CONFIG, _DIGEST)}
+    return decode_samples(found, own), about
+
+
+def _dimensions(name: str, item: h5py.Dataset) -> tuple[str, ...]:
+    """Return the names of the scales of a variable, or its own if it is one."""
+    scales = [scale for dim in item.dims for scale in dim.values()]
+    return (name,) if item.is_scale else tuple(scale.name.removeprefix("/") for scale in scales)
+
+
+def _read_attributes(item: h5py.HLObject) -> dict[str, Any]:
+    """Read the attributes of a variable or a group, but those of the format."""
+    return {name: item.attrs[name] for name in item.attrs if name not in _OF_FORMAT}
+
+
+def _read_data(path: Path) -> tuple[xr.Dataset, dict[str, Any]]:
     """Read all variables, and decode them by the conventions of CF.
 
     The backend of xarray would ask for the encoding of each variable too, which takes longer than to read it.
@@ -112,7 +137,9 @@ def _read_data(path: Path) -> xr.Dataset:
         found = {
             name: (item.dimensions, _read_array(file[name]), dict(item.attrs)) for name, item in form.variables.items()
         }
-        return xr.decode_cf(xr.Dataset(found, attrs=dict(form.attrs)), decode_times=False)
+        data = xr.decode_cf(xr.Dataset(found, attrs=dict(form.attrs)), decode_times=False)
+    about = {name: data.attrs.pop(name) for name in (_DIGEST, _CONFIG) if name in data.attrs}
+    return data, about
 
 
 def _read_array(variable: h5py.Dataset) -> Any:
@@ -161,32 +188,6 @@ def _digest_of_origin(stored: StoredContext) -> str:
     return digest_of({"numbers": stored.numbers}, stored.text)
 
 
-def _encode(data: xr.Dataset | Samples) -> tuple[dict[str, Labelled], dict[str, Any]]:
-    """Return numbers, words and attributes that stand for a run by the conventions of CF and of xarray.
-
-    A variable names its coordinates, truth values are bytes that are called ``bool``, and a missing number is NaN.
-    """
-    if not isinstance(data, Samples):
-        from xarray.conventions import cf_encoder, encode_dataset_coordinates  # loaded already
-
-        variables, about = cf_encoder(*encode_dataset_coordinates(data))
-        return {name: (v.dims, v.to_numpy(), v.attrs) for name, v in variables.items()}, dict(about)
-    variables, coordinates = data.label_all()
-    for dims, _, attributes in variables.values():
-        if named := _list_coordinates(dims, coordinates):
-            attributes["coordinates"] = named
-    loose = _list_unused_coordinates(variables.values(), coordinates)
-    everything = {name: _encode_array(*labelled) for name, labelled in (coordinates | variables).items()}
-    return everything, {"coordinates": loose} if loose else {}
-
-
-def _encode_array(dims: tuple[str, ...], array: Array, attributes: dict[str, Any]) -> Labelled:
-    """Return a labelled array in the form of a file."""
-    kind = array.dtype.kind
-    more = {"dtype": "bool"} if kind == "b" else {"_FillValue": array.dtype.type(np.nan)} if kind == "f" else {}
-    return dims, array.astype("i1") if kind == "b" else array, attributes | more
-
-
 def _put(group: h5py.Group, labelled: Mapping[str, Labelled], packed: Collection[Any], level: int) -> None:
     """Write arrays over dimensions as netCDF-4 does, the ``packed`` ones compressed at a ``level``.
 
@@ -211,14 +212,3 @@ def _put_array(group: h5py.Group, name: str, array: Array, missing: Any, level: 
     if array.dtype.kind in "UO":
         array, more["dtype"] = array.astype(object), h5py.string_dtype()
     return group.create_dataset(name, data=array, fillvalue=missing, track_order=True, **more)
-
-
-def _list_coordinates(dims: Iterable[str], coordinates: Mapping[str, Labelled]) -> str:
-    """Return the names of the coordinates of a variable over ``dims``, without the axes themselves."""
-    return " ".join(sorted(name for name, (over, *_) in coordinates.items() if over != (name,) and {*over} <= {*dims}))
-
-
-def _list_unused_coordinates(variables: Iterable[Labelled], coordinates: Mapping[str, Labelled]) -> str:
-    """Return the names of the coordinates that belong to no variable."""
-    seen = {name for dims, *_ in variables for name in _list_coordinates(dims, coordinates).split()}
-    return " ".join(sorted(name for name, (over, *_) in coordinates.items() if over != (name,) and name not in seen))

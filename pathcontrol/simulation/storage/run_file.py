@@ -35,7 +35,7 @@ def write_file(path: str | Path, data: xr.Dataset | Samples, config: Mapping[str
     return path
 
 
-def read_file(path: str | Path) -> tuple[xr.Dataset, dict[str, Any], StoredContext | None]:
+def read_file(path: str | Path) -> tuple[xr.Dataset | Samples, dict[str, Any], StoredContext | None]:
     """Read data, configuration, and robot and path if the file has them.
 
     Raises:
