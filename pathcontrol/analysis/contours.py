@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from pathcontrol._arrays import Array
 from pathcontrol.analysis.coverage import Points, even_points, measure_coverage, refine, traverse
 from pathcontrol.analysis.tool_following import PlannedToolCurve, feed_along, find_tool, tool_motion
 from pathcontrol.cartesian.recognition import as_toolpath
@@ -51,7 +52,12 @@ class ContourNumbers(NamedTuple):
 
 
 def contour_numbers(
-    run: Run, task: PathSequence, robot: RobotModel, tolerance: float = 1e-3, stop: int | None = None
+    run: Run,
+    task: PathSequence,
+    robot: RobotModel,
+    tolerance: float = 1e-3,
+    stop: int | None = None,
+    away: Array | None = None,
 ) -> list[ContourNumbers]:
     """Return the numbers of each contour in order, with the rapids between them.
 
@@ -63,6 +69,7 @@ def contour_numbers(
         robot: the arm.
         tolerance: how near [m] the tool has to come to a point of the drawing for it to count as passed.
         stop: how many samples count; all by default.
+        away: the distance of the tool from the present contour [m], (time,), where it is known already.
     """
     tool = Tool(robot, str(task.frame), task.tool_pose)
     x, speed = (values[0, :stop] for values in tool_motion(run, robot, task))
@@ -71,7 +78,7 @@ def contour_numbers(
     for contour, paths in _group_paths(task, tool):
         there = np.isin(which, paths)
         begin = 0.0 if paths[0] == 0 else finish[paths[0] - 1]
-        way, known = x[there], np.isfinite(x[there]).all(-1)
+        way = x[there]
         points = contour.points if isinstance(contour, PlannedToolCurve) else contour_points(contour, tolerance)
         share, missed = measure_coverage(points, way, tolerance)
         found.append(
@@ -82,12 +89,21 @@ def contour_numbers(
                 float(finish[paths[-1]] - begin),
                 feed_of(contour, task, paths, robot),
                 float(np.mean(speed[there])) if there.any() else np.nan,
-                float(contour.distance(way[known]).max(initial=0.0)) if known.any() else np.nan,
+                _farthest(contour, way, None if away is None else away[:stop][there]),
                 missed,
                 share,
             )
         )
     return found
+
+
+def _farthest(contour: Contour | PlannedToolCurve, way: Array, away: Array | None) -> float:
+    """Return the largest distance [m] of a way (k, 3) from a contour, in ``away`` if known; NaN of an unknown way."""
+    known = np.isfinite(way).all(-1)
+    if not known.any():
+        return np.nan
+    distance = contour.distance(way[known]) if away is None else away[known]
+    return float(distance.max(initial=0.0))
 
 
 #: the columns of :func:`contour_table`

@@ -13,7 +13,7 @@ from pathcontrol.analysis.contours import contour_numbers
 from pathcontrol.analysis.limit_shares import limit_ratios
 from pathcontrol.analysis.metric_helpers import apply_by_task, apply_where_finite, resolve_task, resolve_toolpath
 from pathcontrol.analysis.progress import progress
-from pathcontrol.analysis.tool_following import PlannedToolCurve, orientation_error, require_tool, tool_speed
+from pathcontrol.analysis.tool_following import PlannedToolCurve, orientation_error, require_tool, tool_motion
 from pathcontrol.analysis.window import Samples, Window, own_samples, samples_of
 from pathcontrol.cartesian.recognition import as_toolpath
 from pathcontrol.errors import InputError
@@ -136,16 +136,17 @@ def toolpath_metrics(
     own, counted = samples_of(run, "all"), samples_of(run, window)
     on_cuts = np.array([not contour.rapid for contour in task.contours])[run.array("path_index")]
     cutting = np.where(on_cuts, 1.0, np.nan)
+    position, speed = tool_motion(run, arm, task)
     signals = {
-        "tool_deviation": tool_deviation(run, arm, task.frame, task.contours),
+        "tool_deviation": contour_deviation(run, task.contours, position),
         "e_p": run.norm("e_p"),
         "e_v": run.norm("e_v"),
     }
     values = {f"{name}_peak": counted.reduce(_largest, v * cutting) for name, v in signals.items()}
     values |= {f"{name}_rms": counted.reduce(_rms, v * cutting) for name, v in signals.items()}
     if "path_finish_time" in run:  # a part of a run has none
-        values |= _measure_drawing(run, task, arm, tolerance)
-    values |= _measure_tool(run, task, arm, counted, cutting)
+        values |= _measure_drawing(run, task, arm, tolerance, signals["tool_deviation"])
+    values |= _measure_tool(run, task, arm, counted, speed * cutting, cutting)
     values["smoothing_deviation"] = np.full(run.rollouts, task.deviation)
     values["tau_demand_peak"] = own.reduce(np.max, np.abs(run.array("tau_demand")))
     values |= limit_ratios(run if robot is None else run.with_robot(arm), own)
@@ -153,11 +154,13 @@ def toolpath_metrics(
     return {name: value.tolist() for name, value in values.items()}
 
 
-def _measure_drawing(run: Run, task: ToolpathTask, robot: RobotModel, tolerance: float) -> dict[str, Array]:
+def _measure_drawing(
+    run: Run, task: ToolpathTask, robot: RobotModel, tolerance: float, away: Array
+) -> dict[str, Array]:
     """Return how much of the drawing was passed in which time, (rollout,) each."""
     stop, found = own_samples(run), []
     for i in range(run.rollouts):
-        every = contour_numbers(run.rollout(i), task, robot, tolerance, int(stop[i]))
+        every = contour_numbers(run.rollout(i), task, robot, tolerance, int(stop[i]), away[i])
         cuts = [one for one in every if not one.rapid]
         length = sum(one.length for one in cuts)
         found.append(
@@ -172,10 +175,9 @@ def _measure_drawing(run: Run, task: ToolpathTask, robot: RobotModel, tolerance:
 
 
 def _measure_tool(
-    run: Run, task: ToolpathTask, robot: RobotModel, counted: Samples, cutting: Array
+    run: Run, task: ToolpathTask, robot: RobotModel, counted: Samples, speed: Array, cutting: Array
 ) -> dict[str, Array]:
-    """Return speed and orientation error of the tool over the cuts, (rollout,) each."""
-    speed = tool_speed(run, robot, task) * cutting
+    """Return speed and orientation error of the tool over the cuts, (rollout,) each, of its speed there."""
     values = {"tool_speed_mean": counted.reduce(_mean, speed), "tool_speed_peak": counted.reduce(_largest, speed)}
     if task.rotations:
         error = orientation_error(run, task, robot) * cutting

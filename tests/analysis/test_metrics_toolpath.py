@@ -7,6 +7,7 @@ import pytest
 
 import pathcontrol as pc
 from pathcontrol.analysis.contours import contour_numbers, contour_table
+from pathcontrol.analysis.deviation import tool_deviation
 
 BOARD = np.array([[1, 0, 0, 0.3], [0, 0, -1, -0.05], [0, 1, 0, 0.6], [0, 0, 0, 1.0]])
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="30mm" viewBox="0 0 60 30"><path d="{}"/></svg>'
@@ -33,6 +34,9 @@ def test_speed_coverage_and_time_of_each_contour(tmp_path):
     cutting = np.array([not contour.rapid for contour in task.contours])[run["path_index"].to_numpy()]
     assert numbers["tool_speed_mean"][0] == pytest.approx(speed[cutting].mean(), rel=0.02)
     contours = contour_numbers(run, task, run.robot)
+    away = tool_deviation(run, run.robot, task.frame, task.contours)
+    assert contour_numbers(run, task, run.robot, away=away[0]) == contours
+    assert max(one.deviation for one in contours if not one.rapid) == numbers["tool_deviation_peak"][0]
     assert [one.rapid for one in contours] == [False, True, False]
     finish = run.data["path_finish_time"].to_numpy()
     assert [one.time for one in contours] == pytest.approx(np.diff(finish, prepend=0.0))
