@@ -194,8 +194,7 @@ class Controller(ABC):
         :meth:`point` and :meth:`timed` know it, and with them every law that asks them. Where w changes, the law's
         acceleration lacks ẇ q_d'ϑ, which :class:`LawWrapper` adds.
         """
-        law = object.__new__(type(self))  # copy() takes four times as long, twice in each tick
-        law.__dict__.update(self.__dict__)
+        law = copy(self)
         law.speed, law._asked = np.where(np.abs(factor) < _HELD, 0.0, factor), None
         return law
 
