@@ -46,17 +46,18 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array, guess: Array | None 
     Raises:
         SimulationError: M is not positive definite.
     """
-    problem = _Problem(M, p, np.broadcast_to(low, p.shape), np.broadcast_to(high, p.shape))
+    low, high = (bound if bound.shape == p.shape else np.broadcast_to(bound, p.shape) for bound in (low, high))
+    problem = _Problem(M, p, low, high, (low == 0) & (high == 0))
     states = np.where(problem.free, 1, np.sign(p if guess is None else guess).astype(np.intp))
-    fewest, patience = np.full(len(p), p.shape[-1] + 1), np.full(len(p), _PATIENCE)
+    fewest, patience = np.array([p.shape[-1] + 1]), np.array([_PATIENCE])
     v, rows = np.empty_like(p), np.arange(len(p))
     for _ in range(_MAX_EXCHANGES):
         v[rows] = tried = problem.velocities(states)
         wanted = problem.required_states(tried, states)
         wrong = wanted != states
-        count = wrong.sum(-1)
-        if not count.any():
+        if not np.count_nonzero(wrong):
             return v + 0.0  # turns −0 into 0
+        count = wrong.sum(-1)
         patience = np.where(count < fewest, _PATIENCE, patience - 1)
         fewest = np.minimum(fewest, count)
         changed = np.where(patience[:, None] < 0, _keep_last(wrong), wrong)
@@ -69,17 +70,13 @@ def stick_slip(M: Array, p: Array, low: Array, high: Array, guess: Array | None 
 
 
 class _Problem(NamedTuple):
-    """The problems M (N, n, n), p, low and high (N, n) of some mechanisms."""
+    """The problems M (N, n, n), p, low and high (N, n) of some mechanisms; ``free`` joints (N, n) never stick."""
 
     M: Array
     p: Array
     low: Array
     high: Array
-
-    @property
-    def free(self) -> NDArray[np.bool_]:
-        """True for joints without dry friction, which never stick, (N, n)."""
-        return (self.low == 0) & (self.high == 0)
+    free: NDArray[np.bool_]
 
     def select(self, rows: NDArray[np.bool_]) -> _Problem:
         """Return the problems of the marked ``rows`` (N,) only."""
@@ -87,8 +84,12 @@ class _Problem(NamedTuple):
 
     def velocities(self, states: _States) -> Array:
         """Solve M v = p − λ for the joints that slip; the others rest, (N, n)."""
-        slips, momentum = states != 0, self.p - np.where(states > 0, self.high, self.low)
-        if slips.all():  # most often
+        slips = states != 0
+        count = np.count_nonzero(slips)
+        if not count:  # often
+            return np.zeros_like(self.p)
+        momentum = self.p - np.where(states > 0, self.high, self.low)
+        if count == slips.size:  # most often
             return _solve(self.M, momentum)
         M = np.where(slips[:, :, None] & slips[:, None, :], self.M, np.eye(states.shape[-1]))
         return np.where(slips, _solve(M, np.where(slips, momentum, 0.0)), 0.0)
@@ -96,7 +97,7 @@ class _Problem(NamedTuple):
     def required_states(self, v: Array, states: _States) -> _States:
         """Return the states that the velocities, and the impulses where joints stick, require, (N, n)."""
         wanted, sticks = np.where((v * states < 0) & ~self.free, 0, states), states == 0
-        if not sticks.any():
+        if not np.count_nonzero(sticks):
             return wanted
         # p − Mv may be a small difference of large terms: allow for their rounding, and not for more
         terms = _multiply(np.abs(self.M), np.abs(v)).max(-1)
