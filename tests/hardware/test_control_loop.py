@@ -8,7 +8,7 @@ from pathcontrol.control.wrappers.stopping_rate import stopping_rate
 from pathcontrol.errors import InputError
 from pathcontrol.hardware.control_loop import ControlLoop, Mode
 from pathcontrol.hardware.envelope import Envelope
-from pathcontrol.simulation.arm.plant import Plant
+from pathcontrol.simulation.compiled_plant import CompiledPlant
 
 H = 2e-3
 WIDE = {"torque": 1e6, "torque_rate": 1e12, "velocity": 1e3, "lower": -1e3, "upper": 1e3, "tube": np.inf}
@@ -84,7 +84,7 @@ class Simulated:
     """The arm of a law, stepped by hand, with what it did."""
 
     def __init__(self, law):
-        self.plant = Plant(law.robot, H)
+        self.plant = CompiledPlant(law.robot, H)
         self.q = np.asarray(law.task.q_d(np.array(law.task.s0)), float).reshape(1, -1)
         self.qd, self.t = np.zeros_like(self.q), 0.0
 

@@ -12,7 +12,7 @@ from pathcontrol.hardware.arm import Measurement
 from pathcontrol.hardware.control_loop import ControlLoop, Mode
 from pathcontrol.hardware.drive import drive
 from pathcontrol.hardware.envelope import Envelope
-from pathcontrol.simulation.arm.plant import Plant
+from pathcontrol.simulation.compiled_plant import CompiledPlant
 
 H = 2e-3
 WIDE = Envelope(torque=1e6, torque_rate=1e12, velocity=1e3, lower=-1e3, upper=1e3, tube=np.inf)
@@ -29,7 +29,7 @@ class SimulatedArm:
 
     def __init__(self, law, carries_weight=False, **events):
         self.carries_weight, self.events = carries_weight, {int(k[4:]): act for k, act in events.items()}
-        self.robot, self.plant = law.robot, Plant(law.robot, H)
+        self.robot, self.plant = law.robot, CompiledPlant(law.robot, H)
         self.q = np.asarray(law.task.q_d(np.array(law.task.s0)), float).reshape(1, -1)
         self.qd, self.reads, self.sent, self.finished = np.zeros_like(self.q), 0, [], 0
 
