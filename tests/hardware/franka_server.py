@@ -1,6 +1,7 @@
 """A simulated Franka in an environment of its own, which franka-sim's old NumPy asks for."""
 
 import fcntl
+import os
 import subprocess
 import sys
 import tempfile
@@ -12,7 +13,8 @@ import pytest
 
 ROTORS = [0.2, 0.2, 0.2, 0.2, 0.07, 0.07, 0.07]  # kg m², which the URDF lacks: without them wrists weigh 0.1 g m²
 STRICT = ["--enforce-motion-limits", "--enforce-comm-constraints"]
-NEEDS = ["numpy==1.26.4", "mujoco>=3.2,<3.3"]
+NEEDS = ["numpy==1.26.4", "mujoco>=3.2,<3.3", "franka-sim==1.1.7"]  # all that is imported where nothing is drawn
+UNDRAWN = {"MUJOCO_GL": "disable"}
 
 
 @contextmanager
@@ -30,11 +32,10 @@ def install(folder):
         if not (folder / "done").exists():
             subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
             pip = [sys.executable, "-m", "pip", "--python", python, "install", "-q", "--only-binary=:all:"]
-            pip += ["--no-compile"]  # most of what is installed is never imported
-            for asked in (NEEDS, ["--no-deps", "franka-sim==1.1.7"]):
-                done = subprocess.run([*pip, *asked], capture_output=True, text=True)
-                if done.returncode:
-                    pytest.skip(f"franka-sim cannot be installed here: {done.stderr.strip().splitlines()[-1]}")
+            pip += ["--no-compile", "--no-deps"]  # most of what is installed is never imported
+            done = subprocess.run([*pip, *NEEDS], capture_output=True, text=True)
+            if done.returncode:
+                pytest.skip(f"franka-sim cannot be installed here: {done.stderr.strip().splitlines()[-1]}")
             (folder / "done").touch()
     return python
 
@@ -54,7 +55,7 @@ def serve(python, enforced=STRICT):
     command = [python, script, "--no-gripper", *enforced, ",".join(map(str, ROTORS))]
     port = Path(tempfile.gettempdir()) / "franka-1337.lock"
     with locked(port), tempfile.NamedTemporaryFile("w") as log:
-        server = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
+        server = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, env=os.environ | UNDRAWN)
         try:
             wait_for(server, log)
             yield server
