@@ -13,6 +13,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dgeqrf, dorgqr
 
 from pathcontrol._arrays import Array
 
@@ -20,6 +21,7 @@ _SWEEPS, _FEW_SWEEPS = 40, 8
 _TURNING = 0.1  # turn of a subspace in a sweep that goes on turning, as of a complex pair
 _ZERO = 1e-9  # of the largest singular value
 _SETTLED = 1e-8  # turn of a subspace in the last sweep below which it is invariant
+_FEW = 8  # products up to which each is orthogonalised on its own
 _APART = 1e4  # how far apart sizes may come in factors that are multiplied before they are orthogonalised
 
 
@@ -77,9 +79,22 @@ def _multiply(factors: Array, zero: float) -> Array:
 def _turn_round(parts: Array, Q: Array) -> Array:
     """Return the orthogonal matrices Q (N, D, D) after all parts."""
     for part in parts:
-        Q, R = np.linalg.qr(part @ Q)
-        Q = Q * np.where(np.diagonal(R, axis1=-2, axis2=-1) < 0, -1.0, 1.0)[:, None]
+        Q, R = _orthogonalise(part @ Q)
+        Q *= np.where(R.diagonal(axis1=-2, axis2=-1) < 0, -1.0, 1.0)[:, None]
     return Q
+
+
+def _orthogonalise(A: Array) -> tuple[Array, Array]:
+    """Return Q and R of A = QR, (N, D, D) each; below its diagonal R has what LAPACK leaves there."""
+    if len(A) > _FEW:
+        Q, R = np.linalg.qr(A)
+        return Q, R
+    Q, R = np.empty_like(A), np.empty_like(A)
+    for i, one in enumerate(A):  # NumPy calls the same routines, and takes most of its time to get there
+        reflectors, tau, _, _ = dgeqrf(one)
+        R[i] = reflectors
+        Q[i] = dorgqr(reflectors, tau, overwrite_a=True)[0]
+    return Q, R
 
 
 def _multiply_triangles(parts: Array, Q: Array) -> tuple[Array, Array]:
@@ -87,8 +102,8 @@ def _multiply_triangles(parts: Array, Q: Array) -> tuple[Array, Array]:
     sizes, U = np.zeros(Q.shape[:2]), np.tile(np.eye(Q.shape[-1]), (len(Q), 1, 1))
     upper = np.triu(np.ones(Q.shape[1:]))
     for part in parts:
-        Q, R = np.linalg.qr(part @ Q)
-        diagonal = np.diagonal(R, axis1=-2, axis2=-1)
+        Q, R = _orthogonalise(part @ Q)
+        diagonal = R.diagonal(axis1=-2, axis2=-1)
         sign = np.where(diagonal < 0, -1.0, 1.0)
         Q, R = Q * sign[:, None], R * sign[..., None]
         # of the size of row j in that of row i
