@@ -291,6 +291,18 @@ def test_meshes_are_looked_for_in_the_folders_given(tmp_path, scheme):
     assert "upper.stl" in finding.message
 
 
+def test_a_text_that_was_checked_before_is_checked_anew_where_its_meshes_or_locks_are_others(tmp_path):
+    arm = hand(INERTIAL + '<visual><geometry><mesh filename="lower.stl"/></geometry></visual>')
+    for _ in range(2):
+        assert [finding.code for finding in check_urdf(arm, base_dir=tmp_path).findings] == ["mesh-missing"]
+    (tmp_path / "lower.stl").write_text("solid")
+    assert check_urdf(arm, base_dir=tmp_path).findings == ()
+    mimicking = elbow(AXIS + LIMIT + '<mimic joint="shoulder"/>')
+    assert find(check_urdf(mimicking), "joint-mimic")
+    assert not find(check_urdf(mimicking, allow_mimic=["shoulder"]), "joint-mimic")
+    assert find(check_urdf(mimicking), "joint-mimic")
+
+
 def test_a_relative_mesh_is_not_missed_without_a_folder():
     shape = '<visual><geometry><mesh filename="meshes/upper.stl"/></geometry></visual>'
     assert check_urdf(hand(INERTIAL + shape)).findings == ()

@@ -5,7 +5,7 @@ A check of values is a function from an arm to findings; to add one, write it an
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 from pathcontrol._files import read_bounded
@@ -30,6 +30,9 @@ from pathcontrol.robot.urdf.xml.encoding import decode
 from pathcontrol.robot.urdf.xml.parse import MAX_BYTES, Parsed, parse_and_mend
 
 _ORDER: tuple[Level, ...] = ("error", "warning", "note")
+_MOST_KEPT = 64
+
+_kept: dict[tuple[bytes, tuple[str, ...]], tuple[Finding, ...]] = {}  # of texts that were checked before
 
 VALUE_CHECKS = (
     check_joint_types,
@@ -91,17 +94,36 @@ def check_parsed(
 ) -> UrdfReport:
     """Check a URDF that is parsed already, as :func:`check_urdf` does."""
     root = parsed.root
-    findings = [*parsed.findings, *check_form(root)]
-    if not any(finding.level == "error" for finding in findings):
-        movable = names_of(joint for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES)
-        arm = read_arm(root, locked_angles(root, {name: 0.0 for name in allow_mimic if name in movable}))
-        findings += [finding for check in VALUE_CHECKS for finding in check(arm)]
-        findings += check_extension(root)
-    findings += [*check_shapes(root), *check_meshes(root, base_dir, package_dirs)]
+    findings = [*parsed.findings, *_check_text(parsed, tuple(allow_mimic)), *check_meshes(root, base_dir, package_dirs)]
     findings.sort(key=lambda finding: _ORDER.index(finding.level))
     links = names_of(root.iterfind("link"))
     joints = names_of(joint for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES)
     return UrdfReport(root.get("name", ""), links, joints, tuple(findings))
+
+
+def _check_text(parsed: Parsed, allow_mimic: tuple[str, ...]) -> tuple[Finding, ...]:
+    """Return the findings that depend on nothing but the text of a URDF; those of a known text are kept."""
+    key = parsed.digest, allow_mimic
+    found = _kept.get(key)
+    if found is None:
+        found = tuple(_find_in(parsed, allow_mimic))
+        if len(_kept) >= _MOST_KEPT:
+            _kept.clear()
+        _kept[key] = found
+    return found
+
+
+def _find_in(parsed: Parsed, allow_mimic: tuple[str, ...]) -> Iterator[Finding]:
+    """Yield the findings in the elements of a robot."""
+    root, form = parsed.root, tuple(check_form(parsed.root))
+    yield from form
+    if not any(finding.level == "error" for finding in (*parsed.findings, *form)):
+        movable = names_of(joint for joint in root.iterfind("joint") if joint.get("type") in MOVABLE_TYPES)
+        arm = read_arm(root, locked_angles(root, {name: 0.0 for name in allow_mimic if name in movable}))
+        for check in VALUE_CHECKS:
+            yield from check(arm)
+        yield from check_extension(root)
+    yield from check_shapes(root)
 
 
 def _read_source(source: str | Path) -> str:

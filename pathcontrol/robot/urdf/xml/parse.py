@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator
+from hashlib import sha256
 from typing import NamedTuple
 
 from lxml import etree
@@ -21,10 +22,11 @@ _RUN_XACRO = "run xacro first and load what it prints"
 
 
 class Parsed(NamedTuple):
-    """The ``<robot>`` element of a URDF, and the findings about repairs of its XML."""
+    """The ``<robot>`` element of a URDF, the findings about repairs of its XML, and a digest of its text."""
 
     root: etree._Element
     findings: tuple[Finding, ...]
+    digest: bytes
 
 
 def parse_urdf(text: str) -> etree._Element:
@@ -59,7 +61,7 @@ def parse_and_mend(text: str) -> Parsed:
         findings += _without_stray_xacro(root)
     _refuse_xacro(root, using)
     findings += _without_old_version(root)
-    return Parsed(root, tuple(findings))
+    return Parsed(root, tuple(findings), sha256(data).digest())
 
 
 def _encode(text: str) -> bytes:
