@@ -224,12 +224,14 @@ class ArmDynamics:
     def frame_poses(self, q: ArrayLike, frames: Sequence[str]) -> Array:
         """Return the poses of several frames in the base frame [m], (*batch, len(frames), 4, 4) homogeneous."""
         model, data, ids = self.pinocchio_model, self._data, [self._frame_id(frame) for frame in frames]
-
-        def poses(qi: Array) -> list[Array]:
-            pin.forwardKinematics(model, data, qi)
-            return [pin.updateFramePlacement(model, data, i).homogeneous for i in ids]
-
-        return self._each(q, (len(ids), 4, 4), poses)
+        array, solve, place = self._array("q", q), pin.forwardKinematics, pin.updateFramePlacement
+        rows = array.reshape(-1, self.n)
+        poses = np.empty((len(rows), len(ids), 4, 4))
+        for qi, found in zip(rows, poses, strict=True):
+            solve(model, data, qi)
+            for k, i in enumerate(ids):
+                found[k] = place(model, data, i).homogeneous
+        return poses.reshape(*array.shape[:-1], len(ids), 4, 4)
 
     def frame_jacobian(self, q: ArrayLike, frame: str) -> Array:
         """Return the Jacobian of ``frame``, (*batch, 6, n): linear [m], then angular velocity, in the base's axes."""

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
-from pathcontrol.analysis.deviation import tool_deviation, tool_positions
+from pathcontrol.analysis.deviation import contour_deviation, tool_positions
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
@@ -80,8 +80,9 @@ def _measure(one: Shown, robot: RobotModel | None) -> tuple[Array, Array, Array]
     task, robot = one.task, one.run.robot if robot is None else robot
     expect("robot", robot, RobotModel)
     assert isinstance(task, ToolpathTask)
-    way = (tool_positions(one.run, robot, task.frame)[0] - task.workpiece[:3, 3]) @ task.workpiece[:3, :3]
-    distance = drawable(tool_deviation(one.run, robot, task.frame, task.contours)[0])
+    position = tool_positions(one.run, robot, task.frame)
+    way = (position[0] - task.workpiece[:3, 3]) @ task.workpiece[:3, :3]
+    distance = drawable(contour_deviation(one.run, task.contours, position)[0])
     cutting = np.array([not contour.rapid for contour in task.contours])[one.run.array("path_index")]
     return way, distance, cutting
 
