@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
+from io import BytesIO
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from hypothesis import strategies as st
 from matplotlib.axis import Axis, XAxis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.mathtext import MathTextParser
 from test_pareto import table as front_table
 from test_sweep_figures import table as sweep_table
 from test_view_figures_layout import assert_readable, made, makers
@@ -27,6 +30,8 @@ from pathcontrol import (
     tool_figure,
     toolpath_figure,
 )
+from pathcontrol.view.figures import formula_memory
+from pathcontrol.view.figures.formula_memory import remembered_formulas
 from pathcontrol.view.figures.style import apply_style, new_figure, style
 from pathcontrol.view.figures.tick_memory import METHODS, remembered_ticks
 
@@ -117,15 +122,43 @@ def test_a_figure_that_is_changed_is_laid_out_again(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["path", "errors"])
-def test_remembered_ticks_change_no_byte_and_are_forgotten(kind, tmp_path, monkeypatch):
-    formats, figures = ["svg", "png", "pdf"], [makers(made(3, scale=1.3))[kind]() for _ in range(2)]
+def test_remembered_ticks_and_formulas_change_no_byte_and_leave_matplotlib_as_it_was(kind, tmp_path, monkeypatch):
+    formats, parse = ["svg", "png", "pdf"], MathTextParser._parse_cached
+    figures = [makers(made(3, scale=1.3))[kind]() for _ in range(2)]
     remembered = save_figure(figures[0], tmp_path / "remembered", formats)
-    monkeypatch.setattr("pathcontrol.view.figures.panel_layout.remembered_ticks", lambda figure: nullcontext())
+    for name in ("remembered_ticks", "remembered_formulas"):
+        monkeypatch.setattr(f"pathcontrol.view.figures.panel_layout.{name}", lambda *_: nullcontext())
     found = save_figure(figures[1], tmp_path / "found", formats)
     assert [file.read_bytes() for file in remembered] == [file.read_bytes() for file in found]
     axes = figures[0].findobj(Axis)
     assert axes
     assert not any(name in vars(axis) for axis in axes for name in METHODS)
+    assert MathTextParser._parse_cached is parse
+
+
+def test_a_formula_is_parsed_once_for_all_files_but_for_each_size_and_thread(monkeypatch):
+    own, asked = formula_memory._parse, []
+    monkeypatch.setattr(formula_memory, "_parsed", {})
+    monkeypatch.setattr(formula_memory, "_parse", lambda *how: asked.append(how) or own(*how))
+
+    def draw(size=8.0):
+        with style(), remembered_formulas():
+            for _ in range(2):
+                figure = Figure()
+                figure.text(0.5, 0.5, "$\\dot{q}_1$", fontsize=size)
+                figure.savefig(BytesIO(), format="svg")
+        return len(asked)
+
+    of_one = draw()
+    assert of_one > 0
+    assert draw() == of_one
+    larger = draw(size=9.0)
+    assert larger > of_one
+    with ThreadPoolExecutor(1) as other:
+        assert other.submit(draw).result() == larger + of_one
+    monkeypatch.setattr(formula_memory, "_MOST", 2)
+    draw(size=10.0)
+    assert len(formula_memory._parsed) <= 2
 
 
 def read(ticks, boxes):

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from pathcontrol.view.figures.formula_memory import remembered_formulas
 from pathcontrol.view.figures.tick_memory import remembered_ticks
 
 _PAD = 0.03  # in, around panels
@@ -46,14 +47,15 @@ def laid_out(figure: Figure, dpi: float) -> Iterator[None]:
         yield
         return
     figure.dpi = dpi
-    engine.execute(figure)
-    figure.set_layout_engine(None)
-    try:
-        with remembered_ticks(figure):
-            yield
-    finally:
-        figure.set_layout_engine(engine)
-        figure.dpi = before
+    with remembered_formulas():
+        engine.execute(figure)
+        figure.set_layout_engine(None)
+        try:
+            with remembered_ticks(figure):
+                yield
+        finally:
+            figure.set_layout_engine(engine)
+            figure.dpi = before
 
 
 def _has_equal_scales(figure: Figure) -> bool:

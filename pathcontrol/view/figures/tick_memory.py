@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from matplotlib.axis import Axis
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 #: of an axis, Matplotlib's own; without them nothing is remembered
@@ -20,7 +20,10 @@ def remembered_ticks(figure: Figure) -> Iterator[None]:
     Matplotlib finds them three times whenever it measures or draws an axis, and again for each axis with which its
     label is aligned.
     """
-    places = [(axis, name) for axis in figure.findobj(Axis) for name in METHODS if hasattr(axis, name)]
+    axes = _with_insets(figure.axes)
+    places = [
+        (axis, name) for one in axes for axis in (one.xaxis, one.yaxis) for name in METHODS if hasattr(axis, name)
+    ]
     for axis, name in places:
         setattr(axis, name, _remember(axis, getattr(axis, name)))
     try:
@@ -28,6 +31,13 @@ def remembered_ticks(figure: Figure) -> Iterator[None]:
     finally:
         for axis, name in places:
             delattr(axis, name)
+
+
+def _with_insets(panels: Iterable[Any]) -> Iterator[Axes]:
+    """Yield some axes and those inside them; to look through all of their parts would make ticks that are not drawn."""
+    for axes in panels:
+        yield axes
+        yield from _with_insets(axes.child_axes)
 
 
 def _remember(axis: Any, find: Callable[..., Any]) -> Callable[..., Any]:
