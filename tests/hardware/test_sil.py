@@ -10,6 +10,7 @@ import socket
 import threading
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -38,6 +39,12 @@ def law_of(kind=pc.ExtendedMotionPlan):
     task = pc.Lissajous([0.3, 0.3], [1, 2], 0.5, center=[0.2, 0.4])
     gains = {"k_p": 400.0} if kind is pc.Projection else {"K_p": 400.0, "k": 5.0}
     return kind(robot, task, K_v=40.0, **gains)
+
+
+@pytest.fixture
+def briefly(monkeypatch):
+    """Sessions have less time to come to rest in, which is enough for these arms."""
+    monkeypatch.setattr(session, "drive", partial(session.drive, settle=0.4))
 
 
 def start_of(law):
@@ -117,12 +124,13 @@ def test_dry_friction_of_the_machine_is_that_of_both_directions():
     assert 'damping="2.288"' in text
 
 
+@pytest.mark.usefixtures("briefly")
 @pytest.mark.parametrize("kind", [pc.ExtendedMotionPlan, pc.Projection])
 def test_a_session_ends_on_the_path_and_says_what_happened(kind):
     pytest.importorskip("mujoco")
     law = law_of(kind)
     envelope = pc.Envelope(velocity=20.0, lower=-9.0, upper=9.0, patience=50, lost=100.0)
-    report = run_sil(law, start_of(law), 0.5, H, envelope=envelope)
+    report = run_sil(law, start_of(law), 0.3, H, envelope=envelope)
     assert json.loads(json.dumps(report.to_dict())) == report.to_dict()
     assert report.ticks >= 10  # hundreds on a computer that has time
     assert set(report.jitter) == {"p50", "p90", "p99", "p99.9", "max"}
@@ -197,17 +205,20 @@ def garble(count, data):
     return [(0.0, bytes(changed) if RNG.random() < 0.5 else data), (0.0, RNG.bytes(int(RNG.integers(1, 200))))]
 
 
+BEFORE = 200  # packets before a fault begins
+
 FAULTS = {
     "half of them lost": lambda count, data: [(0.0, data)] if RNG.random() < 0.5 else [],
-    "all lost but the goodbye": lambda count, data: [(0.0, data)] if count < 300 or data[4] == Kind.BYE else [],
+    "all lost but the goodbye": lambda count, data: [(0.0, data)] if count < BEFORE or data[4] == Kind.BYE else [],
     "late": lambda count, data: [(0.01, data)],
-    "very late": lambda count, data: [(0.0 if count < 300 else 0.2, data)],
+    "very late": lambda count, data: [(0.0 if count < BEFORE else 0.2, data)],
     "out of order": lambda count, data: [(float(RNG.uniform(0, 0.006)), data)],
     "garbage": garble,
     "doubled and replayed": replay,
 }
 
 
+@pytest.mark.usefixtures("briefly")
 @pytest.mark.parametrize("what", FAULTS)
 def test_whatever_the_line_does_the_arm_ends_on_its_path_or_at_rest(what):
     pytest.importorskip("mujoco")
@@ -217,7 +228,7 @@ def test_whatever_the_line_does_the_arm_ends_on_its_path_or_at_rest(what):
     line = Line(machine.port, FAULTS[what])
     arm = MachineArm(law.robot, "127.0.0.1", line.port, machine.key, H)
     loop = pc.ControlLoop(law, H, pc.Envelope(velocity=20.0, lower=-9.0, upper=9.0, patience=10, lost=25.0))
-    report = finish_session(loop, arm, 0.4)
+    report = finish_session(loop, arm, 0.3)
     told = machine.wait()
     line.close()
     assert is_safe(report), report
@@ -233,7 +244,7 @@ def test_whatever_the_line_does_the_arm_ends_on_its_path_or_at_rest(what):
             assert side["taken"] <= told["ticks"] + 1  # each once
     if what == "all lost but the goodbye":
         assert report.events["mode"] == "GRAVITY"
-        assert counted["braked"] > 0
+        assert counted["braked"] > 50, told  # 200, and those before the first torque
         assert np.abs(told["qd"]).max() < 1e-2
 
 
@@ -272,9 +283,10 @@ def invoke(*words):
     return CliRunner().invoke(main, ["sil", *words])
 
 
+@pytest.mark.usefixtures("briefly")
 def test_the_command_drives_the_papers_experiment_and_says_the_numbers():
     pytest.importorskip("mujoco")
-    done = invoke("--duration", "0.5", "--json")
+    done = invoke("--duration", "0.3", "--json")
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)
     assert {"ticks", "missed", "jitter", "peaks", "events", "packets", "end", "real_time"} <= set(told)

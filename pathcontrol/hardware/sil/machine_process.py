@@ -110,6 +110,9 @@ class MachineProcess:
 
 
 def _with_package() -> dict[str, str]:
-    """Return the environment in which a process finds this package where this process has found it."""
-    here = str(Path(__file__).parents[3])
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, [here, os.environ.get("PYTHONPATH", "")]))}
+    """Return the environment in which a process finds this package where this process has found it.
+
+    The machine draws nothing: what MuJoCo draws with takes a quarter of the time to load.
+    """
+    folders = filter(None, [str(Path(__file__).parents[3]), os.environ.get("PYTHONPATH", "")])
+    return {**os.environ, "MUJOCO_GL": "disable", "PYTHONPATH": os.pathsep.join(folders)}
