@@ -22,11 +22,14 @@ KEYWORD = re.compile(r"(?<![-\w.&?#/=$'])(?<!\w\()([a-z_]\w*)=(?![=\d])")
 def messages():
     """Texts of the package that errors and warnings may say and that name an argument by ``name=``, and where."""
     for file in sorted(SOURCE.rglob("*.py")):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if not (
-                isinstance(node, ast.Call)
-                and re.search(r"Error$|^warn$", getattr(node.func, "id", getattr(node.func, "attr", "")))
-            ):
+        source = file.read_text(encoding="utf-8")
+        if not re.search(r"Error\(|\bwarn\(", source):
+            continue
+        for node in ast.walk(ast.parse(source)):
+            if not isinstance(node, ast.Call):
+                continue
+            name = getattr(node.func, "id", getattr(node.func, "attr", ""))
+            if not name.endswith("Error") and name != "warn":
                 continue
             for text in node.args:
                 said = _text(text)

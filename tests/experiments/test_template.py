@@ -1,7 +1,8 @@
-"""The template is the paper's first experiment, and all it shows is valid."""
+"""The template is the paper's first experiment, and all it shows is valid and is written."""
 
 from __future__ import annotations
 
+import json
 import math
 import re
 
@@ -19,16 +20,42 @@ from pathcontrol.experiments.runner import load_setup, run_experiment
 from pathcontrol.experiments.template import example_text
 from pathcontrol.registry import KINDS, LOOPS
 
+NAMES = {"run.nc": "data/a.nc", "run.html": "a.html", '"run"': '"plots/a"', "summary.json": "a.json"}
 
-def test_template_is_the_first_experiment(write_experiment, tmp_path, arm):
-    path = write_experiment(example_text().replace("duration = 10.0", "duration = 0.25"))
-    run, _, _ = run_experiment(path, tmp_path / "out", progress=False)
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """The file with outputs of other names, the folder of these, and what has run."""
+    path, text = tmp_path_factory.mktemp("template") / "experiment.toml", example_text()
+    for usual, name in NAMES.items():
+        assert text.count(f"= {usual}") + text.count(f'= "{usual}"') == 1
+        text = text.replace(usual, name)
+    path.write_text(text.replace("duration = 10.0", "duration = 0.25"), encoding="utf-8")
+    return path, path.with_name("out"), run_experiment(path, path.with_name("out"), progress=False)
+
+
+def test_template_is_the_first_experiment(done, arm):
+    path, _, (run, *_) = done
     task = Circle(math.radians(57.3), math.radians(114.59))
     controller = ExtendedMotionPlan(arm, task, 800.0, [45.0, 100.0], 20.0, friction="viscous")
     loop = SampledLoop(period=2.5e-3, encoders=True, velocity="difference", torque_limits=True)
     by_hand = simulate(controller, START, duration=0.25, loop=loop, progress=False)
     assert run.data.equals(by_hand.data)
     assert run.config == by_hand.config | {"experiment": path.read_text(encoding="utf-8")}
+
+
+def test_every_output(done):
+    _, folder, (run, _, written) = done
+    assert {"data", "html", "summary", "figure-errors.svg", "figure-path.png"} <= written.keys()
+    assert all(path.is_file() and path.stat().st_size for path in written.values())
+    assert set(folder.rglob("*.*")) == set(written.values())
+
+    def refuse(constant):
+        pytest.fail(f"{constant} is not JSON")
+
+    summary = json.loads(written["summary"].read_text(), parse_constant=refuse)
+    assert summary["e_p_peak"] == pytest.approx([run.norm("e_p")[0, run.time >= 0.5 * run.time[-1]].max()])
+    assert summary["settling_time"] == [None]  # 0.25 s are too short to settle
 
 
 def test_template_lasts_ten_seconds(write_experiment):

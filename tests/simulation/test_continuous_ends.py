@@ -11,6 +11,7 @@ from pathcontrol.analysis.lyapunov_functions import lyapunov
 from pathcontrol.control.projection import Projection
 from pathcontrol.errors import SimulationError, TaskError
 from pathcontrol.robot.loading import load_robot
+from pathcontrol.simulation import continuous
 from pathcontrol.simulation.loops import ContinuousTime
 from pathcontrol.simulation.simulate import simulate
 from pathcontrol.tasks.curves import Circle, Line
@@ -66,7 +67,8 @@ def test_the_timed_end_takes_over_without_a_jump_on_any_path(arm, task, offset):
     assert (np.diff(s[timed]) > -1e-12).all()
 
 
-def test_a_run_from_the_centre_of_a_circle_is_given_up_with_a_reason(free):
+def test_a_run_from_the_centre_of_a_circle_is_given_up_with_a_reason(free, monkeypatch):
+    monkeypatch.setattr(continuous, "_WATCHED", 200)
     law = Projection(free, Circle(1.0, 2.0), 800.0, [45.0, 100.0])
     with pytest.raises(SimulationError, match="crawls") as error:
         simulate(law, [0.0, 0.0], duration=0.5, loop=ContinuousTime(), progress=False)
