@@ -162,7 +162,7 @@ def test_an_arm_on_the_plan_feels_nothing_but_the_braking(ideal_arm, kind, task)
 
 @pytest.mark.parametrize("kind", ["plan", "projection"])
 def test_v_falls_through_the_end(ideal_arm, kind):
-    task = WaypointPath([[0.2, -0.3], [0.6, 0.2], [1.0, 0.1], [1.5, 0.4]], 1.0)
+    task = WaypointPath([[0.2, -0.3], [0.6, 0.2], [1.0, 0.1], [1.5, 0.4]], 1.5)
     law = laws(ideal_arm, task, 100.0, 15.0)[kind]
     loop = ContinuousTime(output_period=1e-2, rtol=1e-10, atol=1e-13)
     run = simulate(law, [0.1, -0.1], duration=9.0, loop=loop, progress=False)
@@ -266,11 +266,11 @@ def test_finished_rollouts_are_held_while_others_go_on(arm):
 @pytest.mark.parametrize("loop", [SampledLoop(), ContinuousTime(output_period=0.01, rtol=1e-6, atol=1e-8)])
 @pytest.mark.parametrize("closed", [False, True])
 def test_a_run_that_ends_is_the_beginning_of_one_that_does_not(ideal_arm, circle, closed, loop):
-    task = circle if closed else Line([0.2, -0.3], [0.9, 0.6], 1.0)
+    task = circle.with_profile(ConstantRate(6.0)) if closed else Line([0.2, -0.3], [0.9, 0.6], 1.0)
     law, laps = ExtendedMotionPlan(ideal_arm, task, 400.0, 40.0, 20.0), 1 if closed else None
-    options = {"duration": 4.0, "laps": laps, "loop": loop, "progress": False}
+    options = {"duration": 2.3, "laps": laps, "loop": loop, "progress": False}
     ended, whole = (simulate(law, [0.2, -0.3], until=until, **options) for until in ("end", "duration"))
-    assert ended.time[-1] < whole.time[-1] == pytest.approx(4.0)
+    assert ended.time[-1] < whole.time[-1] == pytest.approx(2.3)
     assert ended.finish_time[0] == whole.finish_time[0]
     for name in ended.data.data_vars:
         assert np.array_equal(ended.array(name), whole.array(name)[:, : len(ended.time)]), name
