@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.robot.batch import RobotBatch
-from pathcontrol.robot.friction import levels_of, viscous_of
+from pathcontrol.robot.friction import Coulomb, FrictionLaw, FrictionSum, Viscous, levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.contact import Meeting, Problem, solve_contact, touch_at_once, touch_during
 from pathcontrol.simulation.arm.damping import Damping
@@ -61,6 +61,7 @@ class Plant:
         expect("robot", robot, RobotModel, RobotBatch)
         self.robot, self.step = robot, step
         self._viscous = viscous_of(robot.friction)
+        self._levels = levels_of(robot.friction, np.zeros((1, robot.n))) if _is_constant(robot.friction) else None
         self._inertia = robot.with_armature(0.5 * step * self._viscous)
         self._strong = has_strong_friction(robot)
         self._damps = bool(self._strong.any())
@@ -99,7 +100,7 @@ class Plant:
 
         The first two broadcast against q̇ (N, n); where q̇ is 0 the third is either of them. Held joints have none.
         """
-        forward, minus = levels_of(self.robot.friction, qd)
+        forward, minus = levels_of(self.robot.friction, qd) if self._levels is None else self._levels
         backward = np.subtract(0.0, minus)
         if held is not None:
             forward, backward = np.where(held, 0.0, forward), np.where(held, 0.0, backward)
@@ -231,6 +232,11 @@ def has_strong_friction(robot: RobotModel | RobotBatch) -> NDArray[np.bool_]:
     if not viscous.any():
         return np.zeros(1, dtype=bool)
     return np.asarray((mobility(robot) * viscous).sum(-1).max(0) > _WEAK)
+
+
+def _is_constant(law: FrictionLaw) -> bool:
+    """Return whether a law is one of the library, or a sum of these, that has the same levels at all velocities."""
+    return all(map(_is_constant, law.terms)) if type(law) is FrictionSum else type(law) in (Viscous, Coulomb)
 
 
 def _hold(robot: RobotModel | RobotBatch, q: Array, x: Array, held: _Held) -> Array:
