@@ -7,6 +7,8 @@ import warnings
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from io import BytesIO
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -35,6 +37,7 @@ from pathcontrol.view.figures.formula_memory import remembered_formulas
 from pathcontrol.view.figures.style import apply_style, new_figure, style
 from pathcontrol.view.figures.tick_memory import METHODS, remembered_ticks
 
+FORMATS = ["png", "svg", "pdf"]
 MINUS = "−"  # as figures write it
 
 
@@ -91,15 +94,28 @@ def test_words_of_tools_are_on_the_page_and_apart(errors, arm):
     assert_readable(tool_figure(run, arm, Circle(1.0, 2.0), errors=errors), "tool")
 
 
-@pytest.mark.parametrize("kind", ["path", "errors"])  # with equal scales, and free ones
-def test_all_formats_have_one_layout_and_the_figure_keeps_its_own(kind, tmp_path):
-    figure = makers(made(3, scale=1.3))[kind]()
-    engine, dpi, places = figure.get_layout_engine(), figure.dpi, []
+class Saved(NamedTuple):
+    """A figure that was saved in all formats: how its layout was before, where its panels were, and its files."""
+
+    figure: Figure
+    before: tuple
+    places: list
+    files: list[Path]
+
+
+@pytest.fixture(scope="module", params=["path", "errors"])  # with equal scales, and free ones
+def saved(request, tmp_path_factory) -> Saved:
+    figure, places = makers(made(3, scale=1.3))[request.param](), []
+    before = figure.get_layout_engine(), figure.dpi
     figure.canvas.mpl_connect("draw_event", lambda _: places.append([a.get_position().bounds for a in figure.axes]))
-    save_figure(figure, tmp_path / "figure", ["png", "svg", "pdf"])
-    assert len(places) >= 1
-    assert all(np.array_equal(place, places[0]) for place in places)
-    assert (figure.get_layout_engine(), figure.dpi) == (engine, dpi)
+    files = save_figure(figure, tmp_path_factory.mktemp("saved") / request.param, FORMATS)
+    return Saved(figure, before, places, files)
+
+
+def test_all_formats_have_one_layout_and_the_figure_keeps_its_own(saved):
+    assert len(saved.places) >= 1
+    assert all(np.array_equal(place, saved.places[0]) for place in saved.places)
+    assert (saved.figure.get_layout_engine(), saved.figure.dpi) == saved.before
 
 
 def test_figures_of_others_are_laid_out_as_they_say(tmp_path):
@@ -121,19 +137,16 @@ def test_a_figure_that_is_changed_is_laid_out_again(tmp_path):
     assert_readable(figure, "changed")
 
 
-@pytest.mark.parametrize("kind", ["path", "errors"])
-def test_remembered_ticks_and_formulas_change_no_byte_and_leave_matplotlib_as_it_was(kind, tmp_path, monkeypatch):
-    formats, parse = ["svg", "png", "pdf"], MathTextParser._parse_cached
-    figures = [makers(made(3, scale=1.3))[kind]() for _ in range(2)]
-    remembered = save_figure(figures[0], tmp_path / "remembered", formats)
+def test_remembered_ticks_and_formulas_change_no_byte_and_leave_matplotlib_as_it_was(saved, tmp_path, monkeypatch):
     for name in ("remembered_ticks", "remembered_formulas"):
         monkeypatch.setattr(f"pathcontrol.view.figures.panel_layout.{name}", lambda *_: nullcontext())
-    found = save_figure(figures[1], tmp_path / "found", formats)
-    assert [file.read_bytes() for file in remembered] == [file.read_bytes() for file in found]
-    axes = figures[0].findobj(Axis)
+    kind = saved.files[0].stem
+    found = save_figure(makers(made(3, scale=1.3))[kind](), tmp_path / kind, FORMATS)
+    assert [file.read_bytes() for file in saved.files] == [file.read_bytes() for file in found]
+    axes = saved.figure.findobj(Axis)
     assert axes
     assert not any(name in vars(axis) for axis in axes for name in METHODS)
-    assert MathTextParser._parse_cached is parse
+    assert MathTextParser._parse_cached is formula_memory._parse
 
 
 def test_a_formula_is_parsed_once_for_all_files_but_for_each_size_and_thread(monkeypatch):

@@ -30,6 +30,8 @@ from pathcontrol import (
     tool_figure,
     torque_figure,
 )
+from pathcontrol.view.figures.formula_memory import remembered_formulas
+from pathcontrol.view.figures.panel_layout import laid_out
 from pathcontrol.view.figures.style import style
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -93,7 +95,7 @@ def figures(run, limits=None) -> dict[str, Figure]:
 
 
 def words_of(figure: Figure) -> list[tuple[str, Bbox]]:
-    """The words of a figure and where they stand on the page, which is laid out but not painted."""
+    """The words of a figure and where they stand on the page, which is laid out as for its files but not painted."""
     found, draw = [], Text.draw
 
     def note(text: Text, renderer: RendererBase) -> None:
@@ -101,7 +103,7 @@ def words_of(figure: Figure) -> list[tuple[str, Bbox]]:
             found.append((text.get_text(), text.get_window_extent(renderer)))
         draw(text, renderer)
 
-    with style(), pytest.MonkeyPatch.context() as patch:
+    with style(), laid_out(figure, figure.dpi), pytest.MonkeyPatch.context() as patch:
         patch.setattr(Text, "draw", note)
         figure.draw_without_rendering()
     return [(word, box) for word, box in found if box.width > 0]
@@ -157,7 +159,7 @@ def test_names_are_words(names):
             assert_readable(figure, kind)
             file = io.BytesIO()
             figure.set_layout_engine("none")  # it is laid out
-            with style():
+            with style(), remembered_formulas():
                 figure.savefig(file, format="svg")
             words = ["".join(node.itertext()) for node in etree.fromstring(file.getvalue()).iter(f"{SVG}text")]
             for name in names:
@@ -195,7 +197,7 @@ def test_odd_runs_are_drawn(seed, n, samples, rollouts):
         warnings.simplefilter("error")
         found = makers(run, limits)
         figure = found[sorted(found)[seed % len(found)]]()
-        with style():
+        with style(), laid_out(figure, figure.dpi):
             FigureCanvasAgg(figure).draw()
 
 
@@ -207,17 +209,17 @@ def test_what_does_not_move_is_drawn():
         assert_readable(figure, name)
 
 
-def test_the_first_drawing_is_as_good_as_the_third(arm):
+def test_the_first_drawing_is_as_good_as_the_second(arm):
     """Whatever is written first, SVG or PNG, has its labels where they belong."""
     several = {name: made(2, scale=scale) for name, scale in (("a name that is long", 1.0), ("b", 1.6))}
     found = makers(several) | {"tool": lambda: tool_figure(several, arm)}
     for name in ("errors", "path", "tool", "comparison"):  # panels of free shapes, with equal scales, and both
         figure, places = found[name](), []
-        for _ in range(3):
+        for _ in range(2):
             with style():
                 figure.draw_without_rendering()
             places.append([axes.get_position(original=True).bounds for axes in figure.axes])
-        np.testing.assert_allclose(places[0], places[2], rtol=0, atol=1e-3, err_msg=name)
+        np.testing.assert_allclose(places[0], places[1], rtol=0, atol=1e-3, err_msg=name)
 
 
 def test_an_ellipse_that_is_nearly_a_line_keeps_its_shape():
