@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -69,8 +70,9 @@ def _draw_plane(
     outline = [x, y] if not np.isfinite(width) else [np.r_[x - width, x + width], np.r_[y - width, y + width]]
     limits = equal_plane([outline[0]], [outline[1]])
     if 0 < width < np.inf:
-        for cx, cy in zip(x[::4], y[::4], strict=True):
-            axes.fill(cx + width * np.cos(_TURN[::6]), cy + width * np.sin(_TURN[::6]), rasterized=True, **_TUBE)
+        ring = width * np.stack([np.cos(_TURN[::6]), np.sin(_TURN[::6])], axis=-1)
+        discs = np.stack([x, y], axis=-1)[::4, None] + ring
+        axes.add_collection(PolyCollection(list(discs), rasterized=True, zorder=1.0, **_TUBE))
         said = f"within the reach, {width:.4g} {unit}"
         entries[plain(said)] = Patch(**_TUBE)
     axes.plot(x, y, color=GREY, linewidth=2.0)
