@@ -50,18 +50,23 @@ def fill_arm(constants: ArmConstants) -> Arm:
 
 
 def check_against_pinocchio(robot: RobotModel, arm: Arm) -> None:
-    """Compare τ(q, q̇, q̈) and M(q) of the engine and of Pinocchio at random states.
+    """Compare τ(q, q̇, q̈), M(q), p and ∂T/∂q of the engine and of Pinocchio at random states.
 
     Raises:
         EngineError: they differ by more than 1e-11 of the largest value; the message names the joint.
     """
     q, qd, qdd = np.random.default_rng(0).uniform(-2.0, 2.0, (3, _STATES, robot.n))
-    for name, found, expected in (
-        ("torque", inverse_dynamics(arm, q, qd, qdd), robot.inverse_dynamics(q, qd, qdd)),
-        ("inertia", mass_matrix(arm, q), robot.mass_matrix(q)),
+    tau, M, p = robot.inverse_dynamics(q, qd, qdd), robot.mass_matrix(q), robot.momentum(q, qd)
+    slope = robot.momentum_rate(q, qd, np.zeros(robot.n)) + robot.gravity(q)
+    found_p, found_slope = momentum(arm, q, qd)
+    for name, found, expected, measure in (
+        ("torque", inverse_dynamics(arm, q, qd, qdd), tau, tau),
+        ("inertia", mass_matrix(arm, q), M, M),
+        ("momentum", found_p, p, p),
+        ("gradient of the kinetic energy", found_slope, slope, tau),  # of a single joint it is 0
     ):
         apart = np.abs(found - expected).reshape(_STATES, robot.n, -1).max((0, 2))
-        worst, scale = int(np.argmax(apart)), float(np.abs(expected).max())
+        worst, scale = int(np.argmax(apart)), float(np.abs(measure).max())
         if not apart[worst] <= _CLOSE * scale:
             raise EngineError(
                 f"the compiled engine and Pinocchio differ in the {name} of joint {robot.joint_names[worst]!r} of "
@@ -86,6 +91,13 @@ def mass_matrix(arm: Arm, q: Array) -> Array:
     rows, M = np.ascontiguousarray(q), np.empty((*q.shape, q.shape[1]))
     load_library().pathcontrol_mass_matrix(addressof(arm), len(q), address_of(rows), address_of(M))
     return M
+
+
+def momentum(arm: Arm, q: Array, qd: Array) -> tuple[Array, Array]:
+    """Return p = M(q)q̇ [N m s] and C(q,q̇)ᵀq̇ = ∂T/∂q [N m], (N, n) each, of the engine, for q and q̇ (N, n)."""
+    rows, p = [np.ascontiguousarray(a) for a in (q, qd)], np.empty((2, *q.shape))
+    load_library().pathcontrol_momentum(addressof(arm), len(q), *map(address_of, (*rows, *p)))
+    return p[0], p[1]
 
 
 def make_arms(robots: Sequence[RobotModel], index: Array | None, memory: Memory) -> Arms:

@@ -16,8 +16,8 @@ from pathcontrol.control.wrappers.override_rule import Override, check_one_speed
 from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.run_settings import GAINS, add_law
-from pathcontrol.engine.structs import Memory, Setup, address_of
-from pathcontrol.errors import InputError
+from pathcontrol.engine.structs import Memory, Setup, Tick, address_of
+from pathcontrol.errors import EngineError, InputError
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 
 
@@ -31,12 +31,11 @@ class ControlTick:
     It computes what ``law.law`` and ``law.advance`` do, without torque limits. The next call writes the returned array
     anew; copy it to keep it.
 
-    Computed torque, PD+, Slotine and Li's law, the extended motion plan and projection are compiled; other laws are run
-    in Python, with the same torques. A law that is wrapped, by
+    Computed torque, PD+, Slotine and Li's law, the extended motion plan and projection are compiled, with their
+    observers and wrappers; other laws are run in Python, with the same torques. A law that is wrapped, by
     :class:`SpeedOverride` or another :class:`LawWrapper`, has the methods of its speed input: :meth:`hold`,
-    :meth:`resume`, :meth:`override` and :meth:`reverse` act at the next call. The observer of a law with
-    ``friction="observed"`` takes the returned torques to act up to the next call, within the effort limits of its
-    robot.
+    :meth:`resume`, :meth:`override` and :meth:`reverse` act at the next call. An observer takes the returned torques
+    to act up to the next call, within the effort limits of its robot.
 
     Args:
         law: any law with one task, and gains for one arm.
@@ -60,8 +59,7 @@ class ControlTick:
             )
         refuse_several_gains(law)
         self.law, self._period = law, as_period("period", period)
-        make = _CompiledTick if type(law) in GAINS and law.observer is None else _PythonTick
-        self._tick: _PythonTick | _CompiledTick = make(law, self._period)
+        self._tick = _make_tick(law, self._period)
         self.start(np.zeros(law.robot.n) if law.start_at == "s0" else law.task.q_d(np.array(law.task.s0)))
 
     @property
@@ -121,14 +119,18 @@ class _CompiledTick:
     """A tick in the compiled engine."""
 
     def __init__(self, law: Controller, period: float) -> None:
-        self._memory, self._setup = Memory(), Setup()
+        self._memory, self._setup, self._period, self._ticks = Memory(), Setup(), period, 0
         self._setup.period = period
-        add_law(self._setup, law, self._memory)
+        self._rules = add_law(self._setup, law, self._memory)
+        self._rules.prepare_to_go_back()  # now: an operator may ask for it between two ticks
         n = law.robot.n
-        self._io = np.zeros(3 * n + 1)
+        self._io, self._state = np.zeros(3 * n + 1), np.zeros(self._setup.memory)
         self._q, self._qd, self._tau = self._io[:n], self._io[n : 2 * n], self._io[2 * n + 1 :]
+        self._most = _effort_bounds(law)
         self._function: Callable[..., object] = load_library().pathcontrol_control_tick
-        self._arguments = addressof(self._setup), address_of(self._io)
+        places = {"io": self._io, "memory": self._state, "most": self._most}
+        self._call = Tick(setup=addressof(self._setup), **{name: address_of(array) for name, array in places.items()})
+        self._address = addressof(self._call)
 
     @property
     def s(self) -> float:
@@ -137,23 +139,52 @@ class _CompiledTick:
 
     @property
     def time(self) -> float:
-        """The time of the law at the next call [s], 0 as it is not for compiled laws."""
-        return 0.0
+        """The time of the law at the next call [s]."""
+        return self._ticks * self._period
 
     @property
     def state(self) -> Array:
-        """The state z (1,)."""
-        return np.array([self.s])
+        """The state z (m,)."""
+        return np.append(self.s, self._state)
 
     def start(self, z: Array) -> None:
-        """Start with the state z (1,)."""
-        self._io[len(self._q) * 2] = z[..., 0]
+        """Start with the state z (m,)."""
+        self._io[len(self._q) * 2], self._state[:], self._ticks = z[..., 0].item(), z[..., 1:], 0
 
     def __call__(self, q: Array, qd: Array) -> Array:
         """Return the torques, and advance."""
         self._q[:], self._qd[:] = q, qd
-        self._function(*self._arguments)
+        if self._setup.memory:  # else nothing depends on time
+            self._listen()
+        self._function(self._address)
+        self._ticks += 1
         return self._tau
+
+    def _listen(self) -> None:
+        """Set the time of the tick, and what operators ask for at it."""
+        self._call.t = self.time
+        self._asked = self._rules.ask(np.array([self._call.t]), 1)  # kept alive for the call
+        self._call.inputs = address_of(self._asked)
+
+
+def _make_tick(law: Controller, period: float) -> _PythonTick | _CompiledTick:
+    """Return a compiled tick where the law is one that can be compiled, else one in Python.
+
+    Raises:
+        EngineError: the arm or the task of a law without wrapper and observer is beyond the engine.
+    """
+    if type(law) in GAINS and law.observer is None:
+        return _CompiledTick(law, period)
+    try:
+        return _CompiledTick(law, period)
+    except EngineError:
+        return _PythonTick(law, period)
+
+
+def _effort_bounds(law: Controller) -> Array:
+    """Return the effort limits of a law's robot [N m], (n,), ∞ where it states none."""
+    effort = law.robot.limits.effort
+    return np.where(effort > 0, effort, np.inf)  # some robots state 0
 
 
 class _PythonTick:
@@ -162,9 +193,7 @@ class _PythonTick:
     def __init__(self, law: Controller, period: float) -> None:
         self._law, self._period, self._ticks = law, period, 0
         self._z = np.zeros((1, 1))
-        self._tau = np.zeros(law.robot.n)
-        effort = law.robot.limits.effort
-        self._most = np.where(effort > 0, effort, np.inf)  # some robots state 0
+        self._tau, self._most = np.zeros(law.robot.n), _effort_bounds(law)
 
     @property
     def s(self) -> float:

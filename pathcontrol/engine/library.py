@@ -81,11 +81,12 @@ def _declare(library: CDLL) -> None:
         "advance": [c_void_p, c_double, array, array, array, array, c_longlong, c_longlong],
         "inverse_dynamics": [c_void_p, c_longlong, array, array, array, array],
         "mass_matrix": [c_void_p, c_longlong, array, array],
+        "momentum": [c_void_p, c_longlong, array, array, array, array],
         "stick_slip": [c_int, c_longlong, array, array, array, array, array, array],
         "evaluate": [c_void_p, c_longlong, array, array],
         "gamma": [c_void_p, c_longlong, c_longlong, array, array, array, array],
         "nearest": [c_void_p, c_longlong, array, array, array],
-        "control_tick": [c_void_p, c_void_p],
+        "control_tick": [c_void_p],
     }.items():
         function = getattr(library, f"pathcontrol_{name}")
         function.restype, function.argtypes = None, arguments

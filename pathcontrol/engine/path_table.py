@@ -66,6 +66,7 @@ class PathTable(NamedTuple):
         path.buckets_per_s = 2 * cells / (s_end - s0)
         if self.ending is not None:
             path.braking, path.begin = self.ending.braking, self.ending.begin
+            path.braking_back, path.begin_back = self.ending.braking_back, self.ending.begin_back
         path.knots, path.bucket = memory.address(self.knots), memory.address(bucket, np.int32)
         path.coefficients = memory.address(self.coefficients)
         path.centre, path.radius = memory.address(centre), memory.address(radius)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from ctypes import addressof
 
 import numpy as np
@@ -11,10 +12,13 @@ from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.motion_control import ComputedTorque, PDPlus, SlotineLi
+from pathcontrol.control.observer import MomentumObserver
 from pathcontrol.control.projection import Projection
+from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.engine.arm_constants import make_arms
 from pathcontrol.engine.friction_coefficients import coefficients_of
 from pathcontrol.engine.path_table import has_same_projection, path_struct
+from pathcontrol.engine.speed_rules import SpeedRules
 from pathcontrol.engine.structs import Memory, Path, Rows, Setup
 from pathcontrol.errors import EngineError
 from pathcontrol.robot.batch import RobotBatch
@@ -30,16 +34,17 @@ GAINS: dict[type[Controller], tuple[str, str]] = {
     ExtendedMotionPlan: ("K_p", "K_v"),
     Projection: ("k_p", "K_v"),
 }
-_COMPENSATION = ("none", "viscous", "full")
+_COMPENSATION = {"none": 0, "viscous": 1, "full": 2, "observed": 0}
 _BRANCHES = ("follow", "nearest", "local")
 
 
-def add_law(setup: Setup, controller: Controller, memory: Memory) -> None:
-    """Set the law of a run: its kind, gains, model of the arm, friction and paths.
+def add_law(setup: Setup, law: Controller, memory: Memory) -> SpeedRules:
+    """Set the law of a run: its kind, gains, model of the arm, friction, observer and paths; return its speed rules.
 
     Raises:
         EngineError: the law is none of those that are compiled, or its arm, friction or task is beyond the engine.
     """
+    controller = law.inner if isinstance(law, LawWrapper) else law
     kind = type(controller)
     if kind not in GAINS:
         known = ", ".join(law.__name__ for law in GAINS)
@@ -48,11 +53,15 @@ def add_law(setup: Setup, controller: Controller, memory: Memory) -> None:
             value=kind.__name__,
             choices=tuple(law.__name__ for law in GAINS),
         )
-    if controller.observer is not None:
-        raise EngineError("the law has a momentum observer, friction='observed'")
+    rules = SpeedRules(law, put_tables)
     n = controller.robot.n
     setup.joints, setup.law = n, list(GAINS).index(kind)
-    setup.compensation = _COMPENSATION.index(controller.friction)
+    setup.compensation = _COMPENSATION[controller.friction]
+    if controller.observer is not None:
+        if type(controller.observer) is not MomentumObserver:
+            raise EngineError(f"the observer {type(controller.observer).__name__} is in Python")
+        setup.memory, setup.observes, setup.compensates = controller.observer.size, 1, controller.friction == "observed"
+        setup.observer_gain = memory.rows(controller.observer.gain, n)
     position, velocity = (memory.rows(getattr(controller, name), n) for name in GAINS[kind])
     setup.position_gain, setup.velocity_gain = position, velocity
     setup.plan_gain = memory.numbers(getattr(controller, "k", 0.0))
@@ -60,21 +69,35 @@ def add_law(setup: Setup, controller: Controller, memory: Memory) -> None:
         setup.branch, setup.capture = _BRANCHES.index(controller.branches.branch), controller.branches.capture
     setup.law_arms = make_arms([controller.robot], None, memory)
     setup.law_friction = coefficients_of(controller.robot.friction).rows(n, memory)
-    _add_paths(setup, controller.task, isinstance(controller, Projection), memory)
-
-
-def _add_paths(setup: Setup, task: PathTask, projected: bool, memory: Memory) -> None:
-    """Set the tables of the tasks, and the one that each rollout has."""
-    tasks, index = _find_distinct(task)
-    paths = []
-    for one in tasks:
-        path, kept = path_struct(one)
-        if projected and not has_same_projection(one, path):
-            raise EngineError(f"{type(one).__name__}.sigma_bar is not the nearest point of its path")
-        memory.keep(kept)
-        paths.append(path)
-    setup.paths = addressof(memory.keep((Path * len(paths))(*paths)))
+    tasks, index = _find_distinct(controller.task)
+    setup.paths = put_tables(controller.task, memory)
     setup.path_index = None if index is None else memory.address(index, np.int32)
+    if isinstance(controller, Projection):
+        _check_projections(tasks)
+    rules.add_to(setup, n)
+    return rules
+
+
+def put_tables(task: PathTask, memory: Memory) -> int:
+    """Put the tables of a task, or of all different ones of a batch, into ``memory``; return the address of the first.
+
+    Raises:
+        EngineError: a task has no table.
+    """
+    tables = [path_struct(one) for one in _find_distinct(task)[0]]
+    memory.keep(tables)
+    return addressof(memory.keep((Path * len(tables))(*(path for path, _ in tables))))
+
+
+def _check_projections(tasks: Sequence[PathTask]) -> None:
+    """Check that σ̄ of each task is the nearest point of its path.
+
+    Raises:
+        EngineError: that of one is not.
+    """
+    for one in tasks:
+        if not has_same_projection(one, path_struct(one)[0]):
+            raise EngineError(f"{type(one).__name__}.sigma_bar is not the nearest point of its path")
 
 
 def _find_distinct(task: PathTask) -> tuple[list[PathTask], NDArray[np.intp] | None]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.errors import EngineError
 
-MOST_JOINTS, MOST_STRIBECK, MOST_WALLS = 16, 4, 4
+MOST_JOINTS, MOST_STRIBECK, MOST_WALLS, MOST_RULES = 16, 4, 4, 8
 
 _Doubles = c_void_p  # address of an array of doubles
 
@@ -38,7 +38,8 @@ class Path(Structure):
 
     _fields_ = [
         *((name, c_int) for name in ("joints", "cells", "buckets", "closed", "brakes")),
-        *((name, c_double) for name in ("s0", "s_end", "period", "braking", "begin", "arrival", "buckets_per_s")),
+        *((name, c_double) for name in ("s0", "s_end", "period", "braking", "begin", "braking_back", "begin_back")),
+        *((name, c_double) for name in ("arrival", "buckets_per_s")),
         *((name, _Doubles) for name in ("knots", "bucket", "coefficients", "centre", "radius")),
     ]
 
@@ -81,6 +82,19 @@ class Disturbance(Structure):
     ]
 
 
+class Rule(Structure):
+    """A rule for the speed along the path, of a wrapped law."""
+
+    _fields_ = [
+        *((name, c_int) for name in ("kind", "first", "input")),
+        *((name, c_double) for name in ("acceleration", "pause")),
+        ("threshold", Rows),
+        ("torque", _Doubles),
+        ("fastest", c_void_p),
+        ("fastest_back", c_void_p),
+    ]
+
+
 class Setup(Structure):
     """All settings of a run."""
 
@@ -88,7 +102,9 @@ class Setup(Structure):
         *((name, c_int) for name in ("joints", "law", "compensation", "branch", "finish", "ends_run", "laps")),
         *((name, c_int) for name in ("substeps", "parts", "delayed")),
         *((name, c_int) for name in ("encoders", "differentiates", "filters", "limited")),
-        *((name, c_int) for name in ("disturbances", "jams", "drops", "walls")),
+        ("disturbances", c_int),
+        *((name, c_int) for name in ("memory", "observes", "compensates", "rules", "inputs")),
+        *((name, c_int) for name in ("jams", "drops", "walls")),
         ("period", c_double),
         ("part", c_double * 2),
         ("keep", c_double),
@@ -97,7 +113,9 @@ class Setup(Structure):
         ("plant_arms", Arms),
         ("paths", c_void_p),
         ("path_index", c_void_p),
-        *((name, Rows) for name in ("position_gain", "velocity_gain", "plan_gain", "resolution", "torque_limit")),
+        *((name, Rows) for name in ("position_gain", "velocity_gain", "plan_gain", "observer_gain")),
+        *((name, Rows) for name in ("resolution", "torque_limit")),
+        ("rule", c_void_p),
         ("law_friction", FrictionRows),
         ("plant_friction", FrictionRows),
         ("damped", Rows),
@@ -108,6 +126,7 @@ class Setup(Structure):
 
 STATE = ("q", "qd", "q_read", "qd_read", "home_q", "home_qd", "queue")
 STATE_NUMBERS = ("s", "first_s", "rest_since", "lap_start", "finish_time", "diverged_time", "reason")
+MEMORY = ("memory", "first_memory")
 SEEN_AND_SAID = ("q_seen", "qd_seen", "tau_said", "e_p_said", "e_v_said")
 SAID_NUMBERS = ("s_said", "sdot_said")
 
@@ -115,7 +134,7 @@ SAID_NUMBERS = ("s_said", "sdot_said")
 class State(Structure):
     """Addresses of the arrays that hold the state of all rollouts."""
 
-    _fields_ = [(name, _Doubles) for name in STATE + STATE_NUMBERS + SEEN_AND_SAID + SAID_NUMBERS]
+    _fields_ = [(name, _Doubles) for name in STATE + STATE_NUMBERS + MEMORY + SEEN_AND_SAID + SAID_NUMBERS]
 
 
 RECORDED = ("q", "qd", "q_measured", "qd_measured", "tau_demand", "tau", "s", "sdot", "e_p", "e_v", "regular")
@@ -136,6 +155,7 @@ class Span(Structure):
         ("stops", c_int),
         ("missed", c_void_p),
         ("stale", c_void_p),
+        ("inputs", c_void_p),
     ]
 
 
@@ -155,8 +175,18 @@ class Gamma(Structure):
     ]
 
 
+class Tick(Structure):
+    """A law for one arm at a time ``t`` [s], its values and those of its speed inputs."""
+
+    _fields_ = [
+        ("setup", c_void_p),
+        *((name, _Doubles) for name in ("io", "memory", "inputs", "most")),
+        ("t", c_double),
+    ]
+
+
 #: the structs whose sizes ``pathcontrol_layout`` returns, in its order
-LAYOUT = (Arm, Path, Disturbance, Setup, State, Record, Span, Gamma)
+LAYOUT = (Arm, Path, Disturbance, Rule, Setup, State, Record, Span, Gamma, Tick)
 
 
 class Memory:

@@ -15,6 +15,7 @@ from pathcontrol._progress import progress_bar
 from pathcontrol.control.base import Controller
 from pathcontrol.engine.library import lanes, load_library
 from pathcontrol.engine.run_settings import add_law, add_plant, rows_or_none
+from pathcontrol.engine.speed_rules import SpeedRules
 from pathcontrol.engine.structs import (
     RECORDED,
     SAID_NUMBERS,
@@ -38,17 +39,26 @@ from pathcontrol.simulation.loops import Arm as SimulatedArm
 from pathcontrol.simulation.loops import Outside, SampledLoop, check_rows
 from pathcontrol.simulation.recorder import Recorder
 from pathcontrol.simulation.sampled import Actuator
+from pathcontrol.simulation.seam import Left, start_next
 
 _BLOCK = 1 << 17  # ticks of all rollouts together between checks of Ctrl-C and the progress bar
 _REASONS = {1: BEYOND, 2: NO_NUMBERS}
 
 
 class _Block(NamedTuple):
-    """Ticks that are run together: how many came before, how many these are, and whether they are the last."""
+    """Ticks that are run together.
+
+    Attributes:
+        done: how many came before.
+        ticks: how many these are.
+        last: whether they are the last of the run.
+        inputs: u of the speed inputs at each, (ticks, inputs, N).
+    """
 
     done: int
     ticks: int
     last: bool
+    inputs: Array
 
 
 class CompiledArm:
@@ -99,6 +109,7 @@ class CompiledArm:
             self._state |= {name: np.zeros(len(q)) for name in SAID_NUMBERS}
             self._state["q_seen"][...], self._state["qd_seen"][...] = reading
         self.divergence = Divergence(q, qd)
+        self._left: Left | None = None
         self.law_outcome: dict[str, Array] = {}  # its laws have nothing to say
 
     def run(
@@ -108,7 +119,7 @@ class CompiledArm:
 
         ``z`` is the state that the law starts with, where that is known already.
         """
-        setup, period = self._laws[controller], self._loop.period
+        (setup, rules), period = self._laws[controller], self._loop.period
         _add_finish(setup, finish)
         self._take_over(controller, z)
         ticks, rollouts = max(1, round(duration / period)), self._shape[0]
@@ -118,28 +129,35 @@ class CompiledArm:
         with progress_bar("simulating", ticks, progress) as update, ThreadPoolExecutor(self._threads) as pool:
             while not over:
                 count = self._begin_block(setup, min(block, ticks - done))
+                inputs = rules.ask(period * np.arange(done, done + count + (done + count == ticks)), rollouts)
+                count = min(count, len(inputs))
                 last = done + count == ticks
-                over = self._run_block(setup, finish, recorder, _Block(done, count, last), pool) or last
+                over = self._run_block(setup, finish, recorder, _Block(done, count, last, inputs), pool) or last
                 done += count
                 update(min(done, ticks))
+        self._left = Left(controller, self._state_of_law(), period * (recorder.samples - 1))
         return self._close_record(recorder, finish, setup)
 
-    def _add_law(self, controller: Controller) -> Setup:
-        """Return the settings with those of a law."""
+    def _add_law(self, controller: Controller) -> tuple[Setup, SpeedRules]:
+        """Return the settings with those of a law, and its rules of speed."""
         setup = Setup.from_buffer_copy(self._setup)
-        add_law(setup, controller, self._memory)
-        return setup
+        return setup, add_law(setup, controller, self._memory)
 
     def _take_over(self, controller: Controller, z: Array | None) -> None:
         """Begin with the state of the law, and with no rollout finished or lost."""
         rollouts, state = self._shape[0], self._state
         state["home_q"], state["home_qd"] = state["q"].copy(), state["qd"].copy()
-        s = (controller.start(state["q"], state["qd"]) if z is None else z)[..., 0]
-        state["s"], state["first_s"] = np.array(s, dtype=np.float64), np.array(s, dtype=np.float64)
+        z = start_next(controller, state["q"], state["qd"], self._left) if z is None else z
+        for first in ("", "first_"):
+            state[f"{first}s"], state[f"{first}memory"] = z[..., 0].copy(), z[..., 1:].copy()
         state["rest_since"], state["reason"] = np.full(rollouts, np.inf), np.zeros(rollouts)
         for name in ("lap_start", "finish_time", "diverged_time"):
             state[name] = np.full(rollouts, np.nan)
         self.divergence = Divergence(state["home_q"], state["home_qd"])
+
+    def _state_of_law(self) -> Array:
+        """Return the state z of the law, (N, m)."""
+        return np.column_stack([self._state["s"], self._state["memory"]])
 
     def _begin_block(self, setup: Setup, most: int) -> int:
         """Set the arm as it is now, and return the number of ticks, ``most`` at most, until it changes."""
@@ -155,7 +173,7 @@ class CompiledArm:
         self, setup: Setup, finish: Finish | None, recorder: Recorder, block: _Block, pool: ThreadPoolExecutor
     ) -> bool:
         """Run some ticks and return whether the run is over; this thread takes part."""
-        done, count, last = block
+        done, count, last, inputs = block
         rollouts = self._shape[0]
         width = lanes(self._library)
         noise = self._draw_noise(count)
@@ -163,6 +181,7 @@ class CompiledArm:
         record = Record(**{name: arrays[name].ctypes.data for name in RECORDED}, stride=arrays["q"].strides[0])
         state = State(**{name: address_of(array) for name, array in self._state.items()})
         span = Span(done, self._ticks, count, rollouts, last, rollouts <= width)
+        span.inputs = address_of(inputs)
         losses = self._lose(count + last)
         if losses is not None:
             span.missed, span.stale = map(address_of, losses)

@@ -10,7 +10,7 @@ import pytest
 from random_arms import random_arm
 
 from pathcontrol import FrameForce, load_robot
-from pathcontrol.engine.arm_constants import arm_struct, inverse_dynamics, mass_matrix
+from pathcontrol.engine.arm_constants import arm_struct, inverse_dynamics, mass_matrix, momentum
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.structs import Memory
 from pathcontrol.errors import EngineError
@@ -28,6 +28,21 @@ def test_dynamics_of_random_trees_are_those_of_pinocchio(seed, joints):
     tau, M = robot.inverse_dynamics(q, qd, qdd), robot.mass_matrix(q)
     assert np.abs(inverse_dynamics(arm, q, qd, qdd) - tau).max() <= 1e-12 * np.abs(tau).max()
     assert np.abs(mass_matrix(arm, q) - M).max() <= 1e-12 * np.abs(M).max()
+
+
+@pytest.mark.parametrize(("seed", "joints"), ARMS)
+def test_momentum_and_its_rate_are_those_of_pinocchio(seed, joints):
+    """ṗ = τ + ∂T/∂q − g, and ∂T/∂q is half of q̇ᵀ(∂M/∂q)q̇, here by central differences too."""
+    robot = random_arm(seed, joints)
+    q, qd = np.random.default_rng(seed).normal(0, 2, (2, 20, joints))
+    p, gradient = momentum(arm_struct(robot), q, qd)
+    assert np.abs(p - robot.momentum(q, qd)).max() <= 1e-12 * np.abs(p).max()
+    expected = robot.momentum_rate(q, qd, np.zeros(joints)) + robot.gravity(q)
+    size = np.abs(expected).max() + np.abs(p).max()  # a single joint has no gradient
+    assert np.abs(gradient - expected).max() <= 1e-12 * size
+    step = 1e-6 * np.eye(joints)
+    energies = [[robot.kinetic_energy(q + sign * one, qd) for one in step] for sign in (1, -1)]
+    assert np.allclose(np.subtract(*energies).T / 2e-6, gradient, rtol=1e-6, atol=1e-6 * size)
 
 
 @pytest.mark.parametrize("name", ["cicese_2dof", "ur5", "panda", "xarm7"])

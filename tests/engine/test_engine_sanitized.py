@@ -43,6 +43,16 @@ plants = [robot.with_payload(0.1 * i, "tool") for i in range(7)]
 law = pc.ComputedTorque(robot, pc.TaskBatch([pc.Circle(0.7 + 0.05 * i, 2.0) for i in range(7)]), 800.0, 45.0)
 pc.simulate(law, starts, duration=0.2, plant=plants, engine="compiled", progress=False)
 pc.ControlTick(pc.Projection(robot, circle, 800.0, 45.0), 1e-3)(starts[0], starts[1])
+for task in (circle, line):
+    for law in (pc.ExtendedMotionPlan(robot, task, 800.0, 45.0, k=20.0, friction="observed"),
+                pc.Projection(robot, task, 800.0, 45.0)):
+        law = pc.EventPlan(pc.SpeedOverride(law, [[0.05, -1.0], [0.2, 0.0], [0.25, 2.0]]), threshold=[2.0, 0.5])
+        law = pc.Paced(law)
+        for q in (starts, starts[0]):
+            pc.simulate(law, q, duration=0.3, loop=loop, disturbance=push + pc.Dropout(0.1, 0.1, probability=0.5),
+                        engine="compiled", progress=False)
+        tick = pc.ControlTick(law, 1e-3)
+        tick(starts[0], starts[1]), tick.reverse(), tick(starts[0], starts[1])
 print("clean")
 """
 

@@ -109,7 +109,7 @@ def test_an_event_plan_of_a_file_halts_at_a_jam(tmp_path):
     run, _, _ = pc.run_experiment(path, tmp_path / "out", progress=False)
     assert run.config["controller"]["controller"] == "EventPlan(ExtendedMotionPlan)"
     factor = pc.speed_factor(pc.Run.load(tmp_path / "out" / "run.nc"))[0]
-    assert factor[0] == 1.0
+    assert factor[0] == pytest.approx(1.0, abs=1e-12)  # the engine has the circle as a table
     assert factor[run.time < 0.6].min() < 0.05
 
 

@@ -48,6 +48,11 @@ class ContactRule(SpeedRule):
         self.pause = as_scalar("pause", pause, positive=True)
         self._robot, self._ramp = robot, OverrideRule(1.0, acceleration)
 
+    @property
+    def acceleration(self) -> float:
+        """The largest |ẇ| [1/s]."""
+        return self._ramp.acceleration
+
     def contact_torque(self, moment: Moment) -> Array:
         """Return |r + b q̇| − F [N m], (*batch, n), negative where friction explains what is seen."""
         observation, friction = moment.out.observation, self._robot.friction
@@ -84,7 +89,7 @@ class ContactRule(SpeedRule):
         return np.concatenate([self._ramp.advance(x[..., :2], xdot[..., :2], period), left], axis=-1)
 
     def describe(self) -> dict[str, Any]:
-        return {"threshold": self.threshold.tolist(), "pause": self.pause, "acceleration": self._ramp.acceleration}
+        return {"threshold": self.threshold.tolist(), "pause": self.pause, "acceleration": self.acceleration}
 
     def _is_in_contact(self, moment: Moment, halted: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return where a contact torque is beyond the threshold, or, halted, beyond half of it, (*batch,)."""

@@ -120,6 +120,31 @@ class OverrideRule(SpeedRule):
         u = self._value(t)
         return -u if self._back else u
 
+    def values(self, times: Array, rollouts: int) -> Array:
+        """Return u at ``times`` [s], (m, N); fewer rows where u is out of range at one of them but the first.
+
+        Raises:
+            InputError: it is out of range at the first, or has as many values as there are neither rollouts nor one.
+        """
+        if self._held or isinstance(self._value, FixedSpeed):
+            return np.broadcast_to(self.value(0.0), (len(times), rollouts))
+        u = np.empty((len(times), rollouts))
+        for row, t in enumerate(times):
+            try:
+                u[row] = self._value_of_rollouts(float(t), rollouts)
+            except Exception:  # of the user's function, which the run may never come to
+                if row == 0 or row == len(times) - 1:
+                    raise
+                return u[:row]
+        return u
+
+    def _value_of_rollouts(self, t: float, rollouts: int) -> Array:
+        """Return u at t [s], a number or (N,); check that there are as many values as rollouts."""
+        u = self.value(t)
+        if u.ndim and u.size != rollouts:
+            check_rows(f"override at t = {t:g} s", u.size, rollouts)
+        return u
+
     @property
     def factors(self) -> Array | None:
         """The factors of several rollouts that do not change, (N,); None where u is something else."""
@@ -139,9 +164,7 @@ class OverrideRule(SpeedRule):
         return x[..., 1]
 
     def memory_rate(self, moment: Moment, asked: Speed, tau: Array, x: Array) -> Array:
-        u = self.value(moment.t)
-        if u.ndim and u.shape != x.shape[:-1]:
-            check_rows(f"override at t = {moment.t:g} s", u.size, x[..., 0].size)
+        u = self._value_of_rollouts(moment.t, x[..., 0].size)
         wanted = (asked.factor * u - x[..., 0]) / (4 * _SMOOTHING)
         wanted = np.minimum(np.maximum(wanted, -self.acceleration), self.acceleration)
         return ((wanted - x[..., 1]) / _SMOOTHING)[..., None]

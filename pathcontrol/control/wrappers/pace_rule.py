@@ -29,23 +29,26 @@ class FastestPlan:
         task: the path, and the profile that the factor is of.
         torque: limits [N m], (n,).
         margin: share of them that is left to feedback.
+
+    Attributes:
+        fastest: the task with its time-optimal profile, or a batch of them.
     """
 
     def __init__(self, robot: RobotModel, task: PathTask, torque: Array, margin: float) -> None:
         self._robot, self._task, self._torque, self._margin = robot, task, torque, margin
-        self._fastest = self._each(lambda one: one)
+        self.fastest = self._each(lambda one: one)
 
     def forward(self, s: Array) -> tuple[Array, Array]:
         """Return the largest w > 0 at s (*batch,) and its slope dw/ds, (*batch,) each."""
-        return _compare_rates(self._fastest, self._task, s, s)
+        return _compare_rates(self.fastest, self._task, s, s)
 
     def back(self, s: Array) -> tuple[Array, Array]:
         """Return the largest −w > 0 of a plan that goes back at s (*batch,), and its slope, (*batch,) each."""
         mirror = 2 * self._task.s0 if self._task.closed else self._task.s0 + self._task.s_end
-        return _compare_rates(self._fastest_back, self._task, s, mirror - s)
+        return _compare_rates(self.fastest_back, self._task, s, mirror - s)
 
     @cached_property
-    def _fastest_back(self) -> PathTask:
+    def fastest_back(self) -> PathTask:
         """The reversed path with its time-optimal profile, which friction makes another one."""
         return self._each(lambda one: one.reversed())
 

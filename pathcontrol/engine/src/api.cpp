@@ -51,6 +51,14 @@ EXPORT void pathcontrol_mass_matrix(const Arm<double> *arm, integer rows, const 
       for (int j = 0; j < n; j++) M[(r * n + i) * n + j] = own[i][j];
   }
 }
+EXPORT void pathcontrol_momentum(const Arm<double> *arm, integer rows, const double *q, const double *qd, double *p, double *gradient) {
+  Body<double> bodies[MOST_JOINTS];
+  for (integer r = 0; r < rows; r++) {
+    const integer at = r * arm->joints;
+    place<0>(*arm, q + at, bodies);
+    momentum<0>(*arm, qd + at, bodies, p + at, gradient + at);
+  }
+}
 EXPORT void pathcontrol_stick_slip(int n, integer rows, const double *M, const double *p, const double *low, const double *high, const double *guess, double *v) {
   for (integer r = 0; r < rows; r++) {
     double own[MOST_JOINTS][MOST_JOINTS], sign[MOST_JOINTS];
@@ -65,7 +73,7 @@ EXPORT void pathcontrol_evaluate(const Path *path, integer rows, const double *s
   const int n = path->joints;
   for (integer r = 0; r < rows; r++) {
     Point<double> at;
-    evaluate<0>(&path, s[r], at);
+    evaluate<0>(&path, s[r], (const double *)nullptr, at);
     double *row = out + r * (3 * n + 2);
     for (int i = 0; i < n; i++) row[i] = at.q_d[i], row[n + i] = at.dq_d[i], row[2 * n + i] = at.ddq_d[i];
     row[3 * n] = at.theta, row[3 * n + 1] = at.dtheta;
@@ -83,24 +91,35 @@ EXPORT void pathcontrol_gamma(const Gamma *gamma, integer series, integer rows, 
     one(*gamma, rows, q + k * rows * joints, qd + k * rows * joints, distance + k * rows, parameter + k * rows);
 }
 
-// One tick of the law alone: `io` holds q, q̇ and s, and then gets τ, with s one period on in its place.
-EXPORT void pathcontrol_control_tick(const Setup *setup, double *io) {
+// A law for one arm: `io` holds q, q̇ and s, and then gets τ. `inputs` are u of its speed inputs at time t, and up to the next tick torques
+// within ± `most` act.
+struct Tick { const Setup *setup; double *io, *memory; const double *inputs, *most; double t; };
+
+// One tick of the law alone; s and its memory are then those one period on.
+EXPORT void pathcontrol_control_tick(const Tick *tick) {
+  const Setup *setup = tick->setup;
+  double *io = tick->io;
   const int n = setup->joints;
   const Place<double> place = {0, 1};
   const Path *path = setup->paths;
   Gains<double> gains;
   Friction<double> friction;
   load(place, setup->position_gain, n, gains.position), load(place, setup->velocity_gain, n, gains.velocity), load(place, setup->plan_gain, 1, &gains.plan);
-  load_friction(place, setup->law_friction, n, friction);
-  Output<double> out;
-  control<0>(*setup, setup->law_arms.arms[0], friction, gains, &path, io, io + n, io[2 * n], out);
-  for (int i = 0; i < n; i++) io[2 * n + 1 + i] = out.tau[i];
-  io[2 * n] = advance_parameter(*setup, &path, out);
+  load(place, setup->observer_gain, n, gains.observer), load_friction(place, setup->law_friction, n, friction);
+  Thresholds<double> thresholds;
+  load_thresholds(*setup, place, thresholds);
+  Moment<double> moment;
+  RuleRates<double> rates;
+  decide<0>(*setup, place, setup->law_arms.arms[0], friction, gains, thresholds, &path, tick->t, tick->inputs, 1, io, io + n, io[2 * n], tick->memory, moment, rates);
+  double acting[MOST_JOINTS];
+  for (int i = 0; i < n; i++) acting[i] = clamped(io[2 * n + 1 + i] = moment.out.tau[i], -tick->most[i], tick->most[i]);
+  io[2 * n] = advance_parameter(*setup, &path, moment.out);
+  advance_memory(*setup, tick->t, moment, rates, acting, tick->memory);
 }
 
 // Sizes of the structs and constants, compared with those of Python when the library is loaded.
 EXPORT integer pathcontrol_layout(int which) {
-  const integer sizes[] = {sizeof(Arm<double>), sizeof(Path), sizeof(Disturbance), sizeof(Setup), sizeof(State), sizeof(Record), sizeof(Span), sizeof(Gamma), MOST_JOINTS, MOST_STRIBECK, LANES};
+  const integer sizes[] = {sizeof(Arm<double>), sizeof(Path), sizeof(Disturbance), sizeof(Rule), sizeof(Setup), sizeof(State), sizeof(Record), sizeof(Span), sizeof(Gamma), sizeof(Tick), MOST_JOINTS, MOST_STRIBECK, LANES};
   return which >= 0 && which < (int)(sizeof(sizes) / sizeof(sizes[0])) ? sizes[which] : -1;
 }
 // The instruction set of this processor: 2 for AVX-512, 1 for AVX2, else 0.

@@ -133,6 +133,44 @@ static NOINLINE void inverse_dynamics(const Arm<C> &arm, const V *qd, const V *q
   }
 }
 
+// p = M(q)q̇ and the gradient C(q,q̇)ᵀq̇ = ∂/∂q ½q̇ᵀM(q)q̇ of the kinetic energy, after place(): with w and v the velocities of a body and
+// of its origin, and L and H the momentum of all that it carries, H about the origin, p is that along the joint's axis and the gradient
+// its product with the motion that turning the joint gives to (w, v).
+template <int N, class V, class C>
+static NOINLINE void momentum(const Arm<C> &arm, const V *qd, Body<V> *bodies, V *p, V *gradient) {
+  const int n = size<N>(arm.joints);
+  for (int i = 0; i < n; i++) {  // v in a, L in f, H in t
+    Body<V> &body = bodies[i];
+    const int parent = arm.parent[i];
+    if (parent < 0) {
+      for (int k = 0; k < 3; k++) body.w[k] = body.a[k] = V{};
+    } else {
+      Body<V> &below = bodies[parent];
+      V v[3];
+      cross(below.w, body.p, v);
+      for (int k = 0; k < 3; k++) v[k] += below.a[k];
+      rotate_back(body.R, below.w, body.w), rotate_back(body.R, v, body.a);
+    }
+    (arm.slides[i] ? body.a : body.w)[2] += qd[i];
+    const C *h = arm.moment[i];
+    V x[3], y[3];
+    cross(body.w, h, x), cross(body.a, h, y), multiply(arm.inertia[i], body.w, body.t);
+    for (int k = 0; k < 3; k++) body.f[k] = arm.mass[i] * body.a[k] + x[k], body.t[k] -= y[k];
+  }
+  for (int i = n - 1; i >= 0; i--) {
+    Body<V> &body = bodies[i];
+    const V *w = body.w, *v = body.a, *L = body.f, *H = body.t;
+    p[i] = (arm.slides[i] ? L[2] : H[2]) + arm.armature[i] * qd[i];
+    gradient[i] = L[0] * w[1] - L[1] * w[0];
+    if (!arm.slides[i]) gradient[i] = H[0] * w[1] - H[1] * w[0] + (L[0] * v[1] - L[1] * v[0]);
+    if (arm.parent[i] < 0) continue;
+    Body<V> &below = bodies[arm.parent[i]];
+    V f[3], t[3], x[3];
+    rotate(body.R, L, f), rotate(body.R, H, t), cross(body.p, f, x);
+    for (int k = 0; k < 3; k++) below.f[k] += f[k], below.t[k] += t[k] + x[k];
+  }
+}
+
 // M(q), both triangles, by the composite rigid body algorithm, after place().
 template <int N, class V, class C>
 static NOINLINE void mass_matrix(const Arm<C> &arm, Body<V> *bodies, V (*M)[room<N>()]) {

@@ -5,7 +5,7 @@
 template <class V> struct Output { V tau[MOST_JOINTS], e_p[MOST_JOINTS], e_v[MOST_JOINTS], s, sdot, slope, drift; Mask<V> regular; };
 
 // The parameters of the laws in the lanes of a pack.
-template <class V> struct Gains { V position[MOST_JOINTS], velocity[MOST_JOINTS], plan; };
+template <class V> struct Gains { V position[MOST_JOINTS], velocity[MOST_JOINTS], plan, observer[MOST_JOINTS]; };
 
 template <class V> ALWAYS_INLINE V dot(int n, const V *a, const V *b) {
   V sum = a[0] * b[0];
@@ -19,9 +19,19 @@ template <class V> ALWAYS_INLINE Mask<V> lanes_where(const Path *const *paths, V
   for (int lane = 0; lane < Lanes<V>::count; lane++) set_lane(mask, lane, test(*paths[lane], lane_of(s, lane)));
   return mask;
 }
-static bool is_timed(const Path &path, double s) { return path.brakes && s >= path.begin; }
 static bool is_at_end(const Path &path, double s) { return !path.closed && s >= path.s_end; }
 static bool is_at_start(const Path &path, double s) { return !path.closed && s <= path.s0; }
+
+// The lanes in which the plan follows σ̇ = ϑ(σ) without feedback: at the end that it goes to, and where it is held.
+template <class V> ALWAYS_INLINE Mask<V> timed_lanes(const Path *const *paths, V s, const V *speed) {
+  Mask<V> mask{};
+  for (int lane = 0; lane < Lanes<V>::count; lane++) {
+    const Path &path = *paths[lane];
+    const double here = lane_of(s, lane), w = speed ? lane_of(*speed, lane) : 1.0;
+    set_lane(mask, lane, (path.brakes && (here >= path.begin || (w < 0 && here <= path.begin_back))) || w == 0);
+  }
+  return mask;
+}
 
 // f̂(q̇): dry friction in the direction of motion, or where a joint rests in that of its desired velocity.
 template <class V> static void add_compensation(const Setup &setup, const Friction<V> &law, const V *qd, const V *desired, V *tau) {
@@ -74,9 +84,9 @@ static void motion_law(const Setup &setup, const Arm<C> &arm, const Gains<V> &ga
 
 // σ̇ = ϑ − k e_pᵀq_d' of the extended motion plan, eq. (22); k is 0 where the plan of an open path is timed.
 template <int N, class V>
-static void extended_plan(const Setup &setup, const Path *const *paths, const Gains<V> &gains, const Point<V> &at, const V *qd, Output<V> &out) {
+static void extended_plan(const Setup &setup, const Path *const *paths, const Gains<V> &gains, const Point<V> &at, const V *qd, const V *speed, Output<V> &out) {
   const int n = size<N>(setup.joints);
-  const V k = select(lanes_where(paths, out.s, is_timed), V{}, gains.plan);
+  const V k = select(timed_lanes(paths, out.s, speed), V{}, gains.plan);
   const V free = at.theta - k * dot(n, out.e_p, at.dq_d);
   const V high = select(lanes_where(paths, out.s, is_at_end), smaller(free, V{}), free);
   out.sdot = select(lanes_where(paths, out.s, is_at_start), larger(high, V{}), high);
@@ -99,7 +109,7 @@ static double projected(const Setup &setup, const Path &path, const double *q, d
 
 // σ̄, dσ̄/dt and the task at σ̄, eqs. (29) and (39). Where σ̄ is not defined the last one is kept.
 template <int N, class V>
-static void project(const Setup &setup, const Path *const *paths, const V *q, const V *qd, V last, Point<V> &at, Output<V> &out) {
+static void project(const Setup &setup, const Path *const *paths, const V *q, const V *qd, V last, const V *speed, Point<V> &at, Output<V> &out) {
   constexpr double STEEPEST = 1e6;
   const int n = size<N>(setup.joints);
   for (int lane = 0; lane < Lanes<V>::count; lane++) {
@@ -108,14 +118,14 @@ static void project(const Setup &setup, const Path *const *paths, const V *q, co
     const bool known = isfinite(lane_of(last, lane));
     set_lane(out.s, lane, known ? projected(setup, *paths[lane], own, lane_of(last, lane)) : NAN);
   }
-  evaluate<N>(paths, out.s, at);
+  evaluate<N>(paths, out.s, speed, at);
   V away[MOST_JOINTS];
   for (int i = 0; i < n; i++) away[i] = at.q_d[i] - q[i];
   const V gradient = dot(n, at.dq_d, at.dq_d), denominator = gradient + dot(n, away, at.ddq_d);
   out.regular = less(gradient, denominator * STEEPEST);
   if (any(~out.regular)) {
     out.s = select(out.regular, out.s, last);
-    evaluate<N>(paths, out.s, at);
+    evaluate<N>(paths, out.s, speed, at);
     for (int i = 0; i < n; i++) away[i] = at.q_d[i] - q[i];
   }
   const V beyond = dot(n, away, at.dq_d);  // > 0: the arm is behind the point
@@ -123,22 +133,21 @@ static void project(const Setup &setup, const Path *const *paths, const V *q, co
   const Mask<V> moves = out.regular & ~held;
   out.sdot = select(moves, dot(n, at.dq_d, qd) / select(moves, denominator, number<V>(1.0)), V{});
   out.slope = out.drift = V{};
-  const Mask<V> timed = lanes_where(paths, last, is_timed);
+  const Mask<V> timed = timed_lanes(paths, last, speed);
   if (!any(timed)) return;
   out.s = select(timed, last, out.s), out.regular |= timed;
-  evaluate<N>(paths, out.s, at);
+  evaluate<N>(paths, out.s, speed, at);
   out.sdot = select(timed, at.theta, out.sdot), out.slope = select(timed, at.dtheta, V{});
 }
 
-// Torques, rates and errors of the law of a run for the measured q, q̇ and the law's state, the path parameter `last`.
+// Torques, rates and errors of the law of a run for the measured q, q̇ and the law's state, the path parameter `last`, at factors of the
+// profile's speed or, where `speed` is null, at 1. `at` is then the task there, and `bodies` are placed at q.
 template <int N, class V, class C>
-static NOINLINE void control(const Setup &setup, const Arm<C> &arm, const Friction<V> &friction, const Gains<V> &gains,
-                             const Path *const *paths, const V *q, const V *qd, V last, Output<V> &out) {
+static NOINLINE void control(const Setup &setup, const Arm<C> &arm, const Friction<V> &friction, const Gains<V> &gains, const Path *const *paths,
+                             const V *q, const V *qd, V last, const V *speed, Point<V> &at, Body<V> *bodies, Output<V> &out) {
   const int n = size<N>(setup.joints);
-  Point<V> at;
-  Body<V> bodies[room<N>()];
-  if (setup.law == PROJECTION) project<N>(setup, paths, q, qd, last, at, out);
-  else out.s = last, evaluate<N>(paths, last, at);
+  if (setup.law == PROJECTION) project<N>(setup, paths, q, qd, last, speed, at, out);
+  else out.s = last, evaluate<N>(paths, last, speed, at);
   V desired[MOST_JOINTS];
   for (int i = 0; i < n; i++) {
     desired[i] = at.dq_d[i] * at.theta;
@@ -148,7 +157,7 @@ static NOINLINE void control(const Setup &setup, const Arm<C> &arm, const Fricti
   if (setup.law < EXTENDED_MOTION_PLAN) {
     motion_law<N>(setup, arm, gains, at, qd, bodies, out);
   } else {
-    if (setup.law == EXTENDED_MOTION_PLAN) extended_plan<N>(setup, paths, gains, at, qd, out);
+    if (setup.law == EXTENDED_MOTION_PLAN) extended_plan<N>(setup, paths, gains, at, qd, speed, out);
     V qdd[MOST_JOINTS];
     for (int i = 0; i < n; i++)
       qdd[i] = (at.ddq_d[i] * at.theta + at.dq_d[i] * at.dtheta) * out.sdot + gains.velocity[i] * out.e_v[i] + gains.position[i] * out.e_p[i];

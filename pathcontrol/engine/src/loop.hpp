@@ -1,7 +1,7 @@
 // The sampled loop of simulation/sampled.py, for one rollout or a pack of them: measure, compute, hold.
 #pragma once
 #include "disturbances.hpp"
-#include "law.hpp"
+#include "speed.hpp"
 
 // --- the rollouts of a pack -------------------------------------------------------------------------------------------
 template <class V> struct Rollouts {
@@ -161,8 +161,21 @@ template <class V> static NOINLINE void say(int n, bool begins, Line<V> &line, O
 // --- the loop ---------------------------------------------------------------------------------------------------------
 // The ticks that a call takes: `ticks` of them with a period after each and, at the end of the run, one `last` without.
 // `missed`: (time, rollouts), 1 where the law misses its tick and its torque stays, 2 where none acts then; `stale`: 1 where no
-// measurement comes. Both are null where nothing is lost.
-struct Span { integer law_tick, arm_tick, ticks, rollouts; int last, stops; const unsigned char *missed, *stale; };
+// measurement comes. Both are null where nothing is lost. `inputs`: u of the speed inputs, (time, inputs, rollouts).
+struct Span { integer law_tick, arm_tick, ticks, rollouts; int last, stops; const unsigned char *missed, *stale; const double *inputs; };
+
+// The state of the law beside s, and the first one, to which lost rollouts go back.
+template <class V> struct LawMemory { V now[MOST_MEMORY], first[MOST_MEMORY]; };
+template <class V> static void load_memory(const Setup &setup, const Place<V> &place, const State &state, LawMemory<V> &memory) {
+  if (!setup.memory) return;
+  load(place, state.memory, setup.memory, setup.memory, memory.now), load(place, state.first_memory, setup.memory, setup.memory, memory.first);
+}
+// The mean over a period of the torques that act in its parts.
+template <int N, class V> static void find_mean(const Setup &setup, const V (*acting)[room<N>()], V *mean) {
+  const double *part = setup.part;
+  for (int i = 0; i < setup.joints; i++)
+    mean[i] = setup.parts == 1 ? acting[0][i] : (part[0] * acting[0][i] + part[1] * acting[1][i]) / (part[0] + part[1]);
+}
 
 // Run the rollouts of a pack; return the number of samples recorded.
 template <int N, class V, class C>
@@ -176,10 +189,16 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
   Rollouts<V> r;
   const Path *paths[Lanes<V>::count];
   load(place, setup.position_gain, n, gains.position), load(place, setup.velocity_gain, n, gains.velocity), load(place, setup.plan_gain, 1, &gains.plan);
-  load(place, setup.resolution, n, senses.resolution), load(place, setup.torque_limit, n, senses.limit);
+  load(place, setup.observer_gain, n, gains.observer), load(place, setup.resolution, n, senses.resolution), load(place, setup.torque_limit, n, senses.limit);
   load_friction(place, setup.law_friction, n, law_friction), load_friction(place, setup.plant_friction, n, plant_friction);
   const Mask<V> damped = load_mask<V>(place, setup.damped);
   load_state(place, state, n, r);
+  LawMemory<V> memory;
+  Thresholds<V> thresholds;
+  load_memory(setup, place, state, memory), load_thresholds(setup, place, thresholds);
+  Moment<V> moment;
+  RuleRates<V> rates;
+  Output<V> &out = moment.out;
   Line<V> line;
   const V *q_seen = span.missed ? line.q : r.q_read, *qd_seen = span.missed ? line.qd : r.qd_read;
   if (span.missed) load_line(place, state, n, line);
@@ -193,10 +212,11 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
     if (final && !span.last) break;
     const double t = (span.law_tick + sample) * setup.period;
     look_at_state(setup, r, t);
-    Output<V> out;
+    for (int k = 0; k < setup.memory; k++) memory.now[k] = select(lost_lanes(r), memory.first[k], memory.now[k]);
     V held[room<N>()], acting[2][room<N>()];
     if (span.missed) see(place, n, r, span.missed + sample * span.rollouts, span.stale + sample * span.rollouts, line);
-    control<N>(setup, law_arm, law_friction, gains, paths, q_seen, qd_seen, r.s, out);
+    decide<N>(setup, place, law_arm, law_friction, gains, thresholds, paths, t, span.inputs + sample * setup.inputs * span.rollouts, span.rollouts,
+              q_seen, qd_seen, r.s, memory.now, moment, rates);
     if (span.missed) say(n, span.law_tick + sample == 0, line, out);
     look_at_torque(setup, r, out.tau, t);
     const Mask<V> lost = lost_lanes(r);
@@ -218,6 +238,13 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
     if (final || (span.stops && !any(going))) { sample++; break; }
     const V next_s = advance_parameter(setup, paths, out);
     r.s = select(lost, r.first_s, span.missed ? select(line.missed, r.s, next_s) : next_s);
+    if (setup.memory) {
+      V mean[MOST_JOINTS], next[MOST_MEMORY];
+      for (int k = 0; k < setup.memory; k++) next[k] = memory.now[k];
+      find_mean<N>(setup, acting, mean);
+      advance_memory(setup, t, moment, rates, mean, next);
+      for (int k = 0; k < setup.memory; k++) memory.now[k] = span.missed ? select(line.missed, memory.now[k], next[k]) : next[k];
+    }
     if (sample == 0 && setup.struck) {
       V struck[room<N>()];
       load(place, setup.struck, n, n, struck);
@@ -248,6 +275,7 @@ static NOINLINE integer run_pack(const Setup &setup, const State &state, const R
     read_sensors(setup, senses, r, noise ? q_noise : nullptr, noise ? qd_noise : nullptr);
   }
   store_state(place, r, n, state);
+  if (setup.memory) store(place, memory.now, setup.memory, state.memory);
   if (span.missed) store_line(place, line, n, state);
   for (int k = 0; k < setup.delayed; k++) store(place, &queue[(head + k) % setup.delayed * n], n, state.queue + k * span.rollouts * n);
   return sample;

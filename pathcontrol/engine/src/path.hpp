@@ -6,7 +6,8 @@
 struct Path {
   int joints, cells, buckets, closed, brakes;
   double s0, s_end, period;          // s_end is that of the first lap of a closed path
-  double braking, begin;             // the ending of an open path: see control/ending.py
+  double braking, begin;             // the ending of an open path, and that of a plan that goes back: see control/ending.py
+  double braking_back, begin_back;
   double arrival;                    // the s from which on an arm has arrived
   double buckets_per_s;
   const double *knots;               // (cells + 1,)
@@ -15,8 +16,9 @@ struct Path {
   const double *centre, *radius;     // (cells, joints) and (cells,): a ball around the points of each cell
 };
 
-// A task at one path parameter.
-template <class V> struct Point { V q_d[MOST_JOINTS], dq_d[MOST_JOINTS], ddq_d[MOST_JOINTS], theta, dtheta; };
+// A task at one path parameter. `profile` and its slope are ϑ and ϑ' of the task itself, `full` is ϑ where the plan goes at a factor of it
+// and 0 where it is braked; they are known where evaluate() was given a factor.
+template <class V> struct Point { V q_d[MOST_JOINTS], dq_d[MOST_JOINTS], ddq_d[MOST_JOINTS], theta, dtheta, profile, profile_slope, full; };
 
 // s in the first lap of a closed path.
 static inline double in_first_lap(const Path &path, double s) {
@@ -48,17 +50,37 @@ template <int N, class V> static inline void evaluate_lane(const Path &path, dou
   set_lane(out.theta, lane, value[n]), set_lane(out.dtheta, lane, slope[n]);
 }
 
-// The task at s as laws see it: on open paths ϑ comes to rest at the end, (ϑ(s)/T ϑ(s_end)) (s_end − s).
-template <int N, class V> static NOINLINE void evaluate(const Path *const *paths, V s, Point<V> &out) {
+// ϑ and ϑ' of one lane as laws see them that go at the factor w: on open paths the plan comes to rest at the end that it goes to.
+template <class V> static inline void brake_lane(const Path &path, double s, double w, int lane, Point<V> &out) {
+  const double theta = lane_of(out.theta, lane), slope = lane_of(out.dtheta, lane);
+  const double left = (path.s_end - s) / path.braking, back = (s - path.s0) / path.braking_back;
+  const double least = back > 0 ? -back : 0.0, most = left > 0 ? left : 0.0;
+  double share = w < least ? least : w;
+  share = share > most ? most : share;
+  const double bend = left < w ? -1.0 / path.braking : -back > w ? -1.0 / path.braking_back : 0.0;
+  set_lane(out.theta, lane, theta * share), set_lane(out.dtheta, lane, slope * share + theta * bend);
+  if (left < w || -back > w) set_lane(out.full, lane, 0.0);
+}
+
+// The task at s as laws see it, at factors of its speed or, where `speed` is null, at 1.
+template <int N, class V> static NOINLINE void evaluate(const Path *const *paths, V s, const V *speed, Point<V> &out) {
+  for (int lane = 0; lane < Lanes<V>::count; lane++) evaluate_lane<N>(*paths[lane], lane_of(s, lane), lane, out);
+  if (speed) out.profile = out.full = out.theta, out.profile_slope = out.dtheta;
   for (int lane = 0; lane < Lanes<V>::count; lane++) {
-    const Path &path = *paths[lane];
-    evaluate_lane<N>(path, lane_of(s, lane), lane, out);
-    if (!path.brakes) continue;
-    double left = (path.s_end - lane_of(s, lane)) / path.braking, share = left < 0 ? 0.0 : left > 1 ? 1.0 : left;
-    double theta = lane_of(out.theta, lane), slope = left < 1 ? -1.0 / path.braking : 0.0;
-    set_lane(out.theta, lane, theta * share);
-    set_lane(out.dtheta, lane, lane_of(out.dtheta, lane) * share + theta * slope);
+    const double w = speed ? lane_of(*speed, lane) : 1.0;
+    if (paths[lane]->brakes) brake_lane(*paths[lane], lane_of(s, lane), w, lane, out);
+    else if (speed) set_lane(out.theta, lane, w * lane_of(out.theta, lane)), set_lane(out.dtheta, lane, w * lane_of(out.dtheta, lane));
   }
+}
+
+// ϑ of one lane at s and its slope, of the task itself.
+static inline void evaluate_rate(const Path &path, double s, double &theta, double &slope) {
+  const int columns = path.joints + 1;
+  s = path.closed ? in_first_lap(path, s) : s < path.s0 ? path.s0 : s > path.s_end ? path.s_end : s;
+  const int cell = cell_of(path, s);
+  const double x = s - path.knots[cell], *c = path.coefficients + (integer)cell * 6 * columns + path.joints;
+  theta = c[0], slope = 0;
+  for (int power = 1; power < 6; power++) slope = slope * x + theta, theta = theta * x + c[power * columns];
 }
 
 // --- the nearest point ------------------------------------------------------------------------------------------------

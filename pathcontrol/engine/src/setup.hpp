@@ -29,16 +29,29 @@ struct Disturbance {
   Rows axes, stiffness, damping, roughness;  // of a wall: normal and directions along it, [N/m], [N s/m], coefficient of friction
 };
 
+enum RuleKind { SPEED_OVERRIDE, CONTACT, PACE };
+
+// A rule for the speed along the path, see control/wrappers. Its state is in the memory of the law, from `first` on.
+struct Rule {
+  int kind, first, input;       // input: the number of the speed input of an override
+  double acceleration, pause;   // largest |ẇ| [1/s]; for how long a plan stays halted after a contact [s]
+  Rows threshold;               // contact torques at which a plan is halted [N m]
+  const double *torque;         // limits that a pace keeps [N m]
+  const Path *fastest, *fastest_back;  // the fastest plans along each path, and those of a plan that goes back, or null
+};
+
 struct Setup {
   int joints, law, compensation, branch, finish, ends_run, laps;
   int substeps, parts, delayed;       // parts of a period with torques of their own; periods that a torque waits
   int encoders, differentiates, filters, limited, disturbances;
+  int memory, observes, compensates, rules, inputs;  // numbers of the law's state beside s; whether it has an observer, and uses it
   int jams, drops, walls;             // 1 where a disturbance holds joints, and where one lowers torque limits; number of walls
   double period, part[2], keep, capture;  // keep: share of the last velocity that the filter keeps
   Arms law_arms, plant_arms;
   const Path *paths;
   const int *path_index;              // none: all have the first
-  Rows position_gain, velocity_gain, plan_gain, resolution, torque_limit;
+  Rows position_gain, velocity_gain, plan_gain, observer_gain, resolution, torque_limit;
+  const Rule *rule;
   FrictionRows law_friction, plant_friction;
   Rows damped;                        // 1 for rollouts whose viscous friction is condensed, see plant.hpp
   const Disturbance *disturbance;
@@ -50,6 +63,7 @@ struct Setup {
 struct State {
   double *q, *qd, *q_read, *qd_read, *home_q, *home_qd, *queue;
   double *s, *first_s, *rest_since, *lap_start, *finish_time, *diverged_time, *reason;
+  double *memory, *first_memory;      // (rollouts, memory): the law's state beside s, and the first one
   double *q_seen, *qd_seen, *tau_said, *e_p_said, *e_v_said, *s_said, *sdot_said;
 };
 
