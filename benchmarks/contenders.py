@@ -13,7 +13,8 @@ import pinocchio as pin
 from benchmarks.cases import Case
 from benchmarks.contest import Contender
 from benchmarks.plain_loop import PlainLaw, plain_run
-from pathcontrol import Circle, ControlTick, PathTask, Space, simulate, sweep
+from pathcontrol import Circle, ControlTick, Paced, PathTask, Space, SpeedOverride, simulate, sweep
+from pathcontrol.simulation.engines import Engine
 
 REPEATS = 20  # of a single rollout in a round
 #: what is measured of each rollout of a sweep
@@ -67,6 +68,13 @@ class OwnCircle(PathTask):
 def own_task(case: Case, rollouts: int, ticks: int) -> Contender:
     """:func:`ours` with the same circle as a subclass of :class:`PathTask`."""
     return ours(case._replace(task=OwnCircle(case.task)), rollouts, ticks)  # which has its table after the first round
+
+
+def wrapped(case: Case, ticks: int, engine: Engine = "compiled") -> Contender:
+    """:func:`ours_alone`, once, of a law that an operator holds and resumes, and that is paced."""
+    law = Paced(SpeedOverride(case.law(), [[1.0, 0.0], [2.0, 1.0]]))
+    options = {"duration": ticks * case.loop.period, "loop": case.loop, "progress": False}
+    return Contender(lambda: simulate(law, case.start, engine=engine, **options), 1, ticks)
 
 
 def swept(case: Case, rollouts: int, ticks: int) -> Contender:

@@ -5,7 +5,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from benchmarks.cases import Case, paper, seven_joints
-from benchmarks.contenders import control_tick, ours, ours_alone, own_task, pinocchio_alone, plain, plain_alone, swept
+from benchmarks.contenders import (
+    control_tick,
+    ours,
+    ours_alone,
+    own_task,
+    pinocchio_alone,
+    plain,
+    plain_alone,
+    swept,
+    wrapped,
+)
 from benchmarks.contest import contest
 from benchmarks.peers import batched, single
 
@@ -86,10 +96,23 @@ def _crowd(case: Case, arm: str, rows: list[Row]) -> dict[str, float]:
 
 
 def _around(case: Case) -> dict[str, float]:
-    """A path of the user's own beside the circle, and a sweep beside its simulations alone."""
+    """A path of the user's own beside the circle, a wrapped law beside the law, and a sweep beside its simulations."""
     own = contest({"circle": ours(case, 1, TICKS), "own": own_task(case, 1, TICKS)}, ROUNDS)
     sweep = contest({"simulated": ours(case, SWEPT, TICKS), "swept": swept(case, SWEPT, TICKS)}, ROUNDS)
-    return {"own_task": own.ratio("own", "circle"), "sweep_over_simulation": sweep.ratio("swept", "simulated")}
+    paced = contest(
+        {
+            "law": ours(case, 1, TICKS),
+            "wrapped": wrapped(case, TICKS),
+            "in Python": wrapped(case, TICKS, engine="pinocchio"),
+        },
+        ROUNDS,
+    )
+    return {
+        "own_task": own.ratio("own", "circle"),
+        "wrapped_law": paced.ratio("wrapped", "law"),
+        "wrapped_over_reference": paced.ratio("in Python", "wrapped"),
+        "sweep_over_simulation": sweep.ratio("swept", "simulated"),
+    }
 
 
 def _tick(case: Case) -> dict[str, float]:

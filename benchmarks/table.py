@@ -25,6 +25,8 @@ GOALS = {
     "seven_joints": ("the same with seven joints, one thread", True, 50.0),
     "mjbatch_seven_joints": ("the same over mjbatch's, seven joints, one thread", True, 6.0),
     "own_task": ("time with a path of q_d and ϑ only over that with the circle", False, 1.5),
+    "wrapped_law": ("time with a paced and overridden law over that with the law inside", False, 5.0),
+    "wrapped_over_reference": ("speed of that paced and overridden law over the reference in Python", True, 20.0),
     "sweep_over_simulation": ("time of a sweep with four metrics over that of its simulations", False, 2.2),
     "control_tick_us": ("one control tick, law and plan [µs]", False, 3.0),
     "control_tick_over_rnea": ("the same over one raw RNEA call", False, 4.0),
