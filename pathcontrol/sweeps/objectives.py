@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.pareto import non_dominated
 from pathcontrol.errors import InputError, UnknownNameError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: one metric, several, or several with ``"min"`` or ``"max"`` for each; ``"min"`` by default
 Objectives = str | Sequence[str] | Mapping[str, str]

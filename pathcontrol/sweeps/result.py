@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.run_metrics import LABELS, UNITS
@@ -17,6 +16,9 @@ from pathcontrol.simulation.variables import OUTCOMES
 from pathcontrol.sweeps.histories import Keep
 from pathcontrol.sweeps.objectives import Limits, Objectives, front
 from pathcontrol.sweeps.store import Store
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class SweepResult:
@@ -155,12 +157,15 @@ class SweepResult:
 
 def dataset(columns: Mapping[str, Array], parameters: Collection[str]) -> xr.Dataset:
     """Return columns of numbers and texts, (k,) or (k, d) each, over ``sample``, with parameters as coordinates."""
-    coords: dict[str, Any] = {"sample": columns["sample"]}
+    import xarray as xr  # it takes a third of a second to load
+
+    coords: dict[str, Any] = {}
     values: dict[str, Any] = {}
     for name, column in columns.items():
-        if name != "sample":
-            into = coords if name in parameters else values
-            into[name] = (("sample", f"{name} component")[: column.ndim], column, _labels(name))
+        dims, labels = ("sample", f"{name} component")[: column.ndim], {} if name == "sample" else _labels(name)
+        into = coords if name == "sample" or name in parameters else values
+        # fastpath: xarray would look whether it is an array of Dask, and load that where it is installed: up to 1 s
+        into[name] = xr.Variable(dims, column, labels, fastpath=True)
     return xr.Dataset(values, coords)
 
 
