@@ -11,6 +11,7 @@ from pathcontrol.tasks.base import Task
 _SAMPLES = 129
 _HALVINGS = 20  # of the stretch between two samples, to 1e-8 of the domain: nearer to a tip, computed q_d' is rounding
 _OPPOSITE = -0.99  # cosine of an angle
+_TINY = np.finfo(np.float64).tiny
 
 
 def check_moves(task: Task) -> None:
@@ -20,13 +21,14 @@ def check_moves(task: Task) -> None:
         TaskError: it does, and where.
     """
     name, s = type(task).__name__, np.linspace(*task.sampled_interval, _SAMPLES)
-    _check_regular(task, name, s)
-    _check_cusps(task, name, s)
+    tangent = np.asarray(task.dq_d(s))
+    length = np.linalg.norm(tangent, axis=-1)
+    _check_regular(name, s, length)
+    _check_cusps(task, name, s, tangent / np.maximum(length[:, None], _TINY))
 
 
-def _check_regular(task: Task, name: str, s: Array) -> None:
+def _check_regular(name: str, s: Array, length: Array) -> None:
     """Check that the path never stands still: q_d' vanishes nowhere."""
-    length = np.linalg.norm(task.dq_d(s), axis=-1)
     if not length.min() > 1e-9 * length.max():
         raise TaskError(
             f"{name}.dq_d(s={s[int(np.argmin(length))]:g}) has length {length.min():.1e}, expected a path that moves "
@@ -35,9 +37,8 @@ def _check_regular(task: Task, name: str, s: Array) -> None:
         )
 
 
-def _check_cusps(task: Task, name: str, s: Array) -> None:
-    """Check that the path turns back nowhere: its direction does not reverse between samples."""
-    directions = _directions(task, s)
+def _check_cusps(task: Task, name: str, s: Array, directions: Array) -> None:
+    """Check that the path turns back nowhere: its ``directions`` (k, n) at s do not reverse between samples."""
     turns = np.flatnonzero((directions[1:] * directions[:-1]).sum(-1) < 0)
     if not turns.size:
         return
@@ -63,4 +64,4 @@ def _check_cusps(task: Task, name: str, s: Array) -> None:
 def _directions(task: Task, s: Array) -> Array:
     """Return the unit tangents q_d'/‖q_d'‖, (*batch, n)."""
     tangent = np.asarray(task.dq_d(s))
-    return tangent / np.maximum(np.linalg.norm(tangent, axis=-1, keepdims=True), np.finfo(float).tiny)
+    return tangent / np.maximum(np.linalg.norm(tangent, axis=-1, keepdims=True), _TINY)
