@@ -12,6 +12,7 @@ from pathcontrol._arrays import Array
 
 _MOST_STEPS = 200
 _LAST_DIGITS = 2 * float(np.finfo(np.float64).eps)
+_TINY = float(np.finfo(np.float64).tiny)
 
 
 class Curve(NamedTuple):
@@ -48,12 +49,13 @@ def _find_root(g: Callable[[Array, NDArray[np.intp]], Array], a: Array, b: Array
         a, g_a = s, value
         best = np.where(np.abs(g_a) < np.abs(g_b), a, b)
         root[rows] = best
-        least = _LAST_DIGITS * (np.abs(best) + np.finfo(np.float64).tiny) / np.abs(b - a)
+        least = _LAST_DIGITS * (np.abs(best) + _TINY) / np.abs(b - a)
         going = (least < 0.5) & (g_a != 0) & (g_b != 0)
-        rows, a, b, c, g_a, g_b, g_c, least = (part[going] for part in (rows, a, b, c, g_a, g_b, g_c, least))
-        if not rows.size:
-            break
-        t = np.clip(_interpolate(a, b, c, g_a, g_b, g_c), least, 1 - least)
+        if not going.all():
+            rows, a, b, c, g_a, g_b, g_c, least = (part[going] for part in (rows, a, b, c, g_a, g_b, g_c, least))
+            if not rows.size:
+                break
+        t = np.minimum(np.maximum(_interpolate(a, b, c, g_a, g_b, g_c), least), 1 - least)
     return root
 
 
