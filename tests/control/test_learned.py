@@ -198,6 +198,19 @@ def test_a_hold_and_a_way_back_leave_the_table_as_it_is(learned):
     assert disturbed.array("forgotten")[0] == 0
 
 
+@pytest.mark.parametrize(("factor", "share"), [(0.5, 1.0), (-0.05, 0.5), (-1.0, 0.0)])
+def test_a_plan_that_goes_back_has_none_of_what_was_learned(learned, factor, share):
+    controller, one = learned
+    z, inner = pc.law_states(one, controller)[:, -1], controller.inner.at_speed(np.array([factor]))
+    own, _ = controller.split(z)
+    state = one.time[-1], one.array("q")[:, -1], one.array("qd")[:, -1]
+    added = inner.law(*state, own).tau - inner.base.law(*state, inner.split(own)[0]).tau
+    whole = controller.inner.law(*state, own).tau - controller.inner.base.law(*state, inner.split(own)[0]).tau
+    assert np.abs(whole).max() > 1.0
+    # the middle of the period to come, at which the table is read, is elsewhere at another speed
+    assert_allclose(added, share * whole, atol=0.3 if share else 1e-9)
+
+
 def test_a_load_that_is_picked_up_is_noticed_forgotten_and_learned(tmp_path):
     load = pc.PickUp(1.0, "tool", 3.2 * LAP)
     one = run(pc.Learned(law(), nodes=32), 8, disturbance=load)
