@@ -127,14 +127,14 @@ def made_of(path):
 def test_what_is_made_of_a_path_has_the_same_numbers(ur5, path, tmp_path):
     """The parameter of the circle is its length, so that a rate of it is a speed."""
     for name, (task, feed) in made_of(path).items():
-        found = numbers(along(ur5, task), window=(0.0, 1.0))
+        run = along(ur5, task)
+        found = numbers(run, window=(0.0, 1.0))
         assert set(found) == NAMES, name
         assert found["feed"] == pytest.approx(feed, rel=1e-3), name
         assert found["tool_speed_mean"] == pytest.approx(feed, rel=1e-3), name
         assert found["tool_deviation_peak"] < 1e-6, name
         assert found["orientation_error_peak"] < 1e-6, name
-        again = Run.load(along(ur5, task).save(tmp_path / "run.nc"))
-        kept = numbers(again, window=(0.0, 1.0))
+        kept = numbers(Run.load(run.save(tmp_path / "run.nc")), window=(0.0, 1.0))
         assert kept["feed"] == pytest.approx(found["feed"], rel=1e-6), name
         assert set(kept) == NAMES, name
 

@@ -52,10 +52,15 @@ def test_another_number_of_rows_than_of_starts_is_refused_by_name(law, name):
     said = rf"^{law} has {name} of shape \(4,.*a row for each of 3 rollouts.*give 4 initial states, or one$"
     with pytest.raises(pc.InputError, match=said):
         run(wrong)
-    with pytest.raises(pc.InputError, match=rf"Paced\({law}\) has {name} of shape"):
-        run(pc.Paced(wrong))
     with pytest.raises(pc.InputError, match="3 rollouts"):
         run(wrong, Q[0], plant=[ARM] * 3)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_it_is_refused_by_the_names_of_a_wrapped_law_and_its_gain(law):
+    name = list(LAWS[law])[-1]
+    with pytest.raises(pc.InputError, match=rf"Paced\({law}\) has {name} of shape"):
+        run(pc.Paced(with_rows(law, name, 4)))
 
 
 def test_gains_of_different_numbers_of_rollouts_are_refused_by_name():
