@@ -56,6 +56,15 @@ def test_wrapped_laws_move_the_arm_as_the_reference_does(wrap, kind, name):
     assert np.ptp(runs[1].array("sdot")) > 0.1  # the pace has changed
 
 
+@pytest.mark.parametrize("kind", [pc.ExtendedMotionPlan, pc.Projection])
+def test_a_plan_that_goes_back_is_paced_as_by_the_reference(kind):
+    gains = {"K_p": 800.0, "k": 20.0} if kind is pc.ExtendedMotionPlan else {"k_p": 800.0}
+    law = Paced(SpeedOverride(kind(CICESE, pc.Circle(1.0, 10.0), K_v=[45.0, 100.0], **gains), [[0.0, -1.0]]))
+    runs = _pair(law, [1.0, 0.0], duration=1.0, loop=SampledLoop(torque_limits=True))
+    assert _apart(runs) < 1e-10
+    assert pc.speed_factor(runs[1])[0, 200:].max() > -0.9  # the motors cannot do more everywhere
+
+
 @pytest.mark.parametrize(("kind", "name"), [(kind, list(MIDDLE)[i % 3]) for i, kind in enumerate(LAWS)])
 def test_observed_friction_is_compensated_as_by_the_reference(kind, name):
     robot, task = _arm(name), _task(name, closed=True)
