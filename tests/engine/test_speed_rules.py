@@ -65,6 +65,25 @@ def test_a_plan_that_goes_back_is_paced_as_by_the_reference(kind):
     assert pc.speed_factor(runs[1])[0, 200:].max() > -0.9  # the motors cannot do more everywhere
 
 
+@pytest.mark.parametrize("kind", ["ExtendedMotionPlan", "Projection", "ComputedTorque"])
+def test_a_plan_that_goes_back_to_its_begin_is_timed_there_as_by_the_reference(kind):
+    """What pushes the arm no longer moves the plan then."""
+    line = pc.Line([0.1, 0.0], [1.0, 1.2], speed=1.0)
+    law = SpeedOverride(_law(kind, CICESE, line), [[0.3, -1.0]])
+    push = pc.Push([20.0, -4.0], start=0.5, duration=0.4)
+    runs = _pair(law, [0.1, 0.0], duration=1.2, disturbance=push, until="duration")
+    assert _apart(runs) < 1e-10
+    assert runs[1].array("s")[0, -1] < 1e-2
+
+
+def test_a_contact_is_forgotten_as_by_the_reference_at_long_periods_too():
+    """The time for which the plan is still halted is wound up and down within less than a period, and no further."""
+    law = EventPlan(_law("ExtendedMotionPlan", CICESE, CIRCLE), threshold=[6.0, 2.0], pause=0.1)
+    runs = _pair(law, [0.9, 0.1], duration=1.5, loop=SampledLoop(period=0.012), disturbance=PUSH)
+    assert _apart(runs) < 1e-10
+    assert pc.speed_factor(runs[1]).min() < 0.5
+
+
 @pytest.mark.parametrize(("kind", "name"), [(kind, list(MIDDLE)[i % 3]) for i, kind in enumerate(LAWS)])
 def test_observed_friction_is_compensated_as_by_the_reference(kind, name):
     robot, task = _arm(name), _task(name, closed=True)
