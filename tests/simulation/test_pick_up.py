@@ -109,10 +109,10 @@ def test_the_engine_agrees_with_the_reference(seed, name):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_each_rollout_has_its_mass_with_the_bits_it_has_alone(engine):
     masses, times, spans = np.array([1.0, 2.5, 0.3]), np.array([0.05, 0.1, 0.1]), np.array([0.1, np.inf, 0.02])
-    together = simulated(pc.PickUp(masses, "tool", times, spans), duration=0.3, engine=engine)
+    together = simulated(pc.PickUp(masses, "tool", times, spans), duration=0.2, engine=engine)
     assert together.rollouts == 3
     for i in range(3):
-        alone = simulated(pc.PickUp(masses[i], "tool", times[i], spans[i]), duration=0.3, engine=engine)
+        alone = simulated(pc.PickUp(masses[i], "tool", times[i], spans[i]), duration=0.2, engine=engine)
         assert_array_equal(together.array("q")[i], alone.array("q")[0])
         assert_array_equal(together.array("qd")[i], alone.array("qd")[0])
 

@@ -230,13 +230,13 @@ def test_each_rollout_has_its_wall_with_the_bits_it_has_alone(engine):
         "duration": [0.15, np.inf, 0.05],
     }
     together = simulated(
-        pc.Wall("tool", points, [-1.0, 0.0, 0.1], stiffness, **options), q=(0.2, 0.3), duration=0.2, engine=engine
+        pc.Wall("tool", points, [-1.0, 0.0, 0.1], stiffness, **options), q=(0.2, 0.3), duration=0.16, engine=engine
     )
     assert together.rollouts == 3
     for i in range(3):
         own = {name: values[i] for name, values in options.items()}
         wall = pc.Wall("tool", points[i], [-1.0, 0.0, 0.1], stiffness[i], **own)
-        alone = simulated(wall, q=(0.2, 0.3), duration=0.2, engine=engine)
+        alone = simulated(wall, q=(0.2, 0.3), duration=0.16, engine=engine)
         assert_array_equal(together.array("q")[i], alone.array("q")[0])
 
 
