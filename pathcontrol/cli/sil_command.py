@@ -111,7 +111,7 @@ def _split_address(address: str) -> tuple[str, int]:
     """Return host and port of an address."""
     host, _, port = address.rpartition(":")
     if not host or not port.isdigit() or int(port) > 65535:
-        raise InputError(f"{address!r}, expected HOST:PORT with a port up to 65535, as 127.0.0.1:9700")
+        raise InputError(f"{address!r}, expected HOST:PORT with a port up to 65535, as 127.0.0.1:9700", value=address)
     return host, int(port)
 
 
@@ -119,7 +119,8 @@ def _read_key(path: Path) -> bytes:
     """Return the key in a file."""
     if not path.is_file():
         raise InputError(
-            f"there is no file {str(path)!r}, expected a key; `head -c 32 /dev/urandom > {path}` makes one"
+            f"there is no file {str(path)!r}, expected a key; `head -c 32 /dev/urandom > {path}` makes one",
+            file=str(path),
         )
     with path.open("rb") as stream:
         return stream.read(4096)

@@ -57,7 +57,7 @@ def coefficients_of(law: FrictionLaw) -> Coefficients:
         return _gather_groups(law)
     if type(law) is ScaledFriction:
         return _scale(coefficients_of(law.law), law.factor)
-    raise EngineError(f"the friction law {type(law).__name__} is not one of the library")
+    raise EngineError(f"the friction law {type(law).__name__} is not one of the library", value=type(law).__name__)
 
 
 def _add(terms: list[Coefficients]) -> Coefficients:

@@ -111,11 +111,13 @@ def make_table(task: PathTask) -> PathTable:
     """
     name = type(task).__name__
     if not task.closed and not np.isfinite(task.s_end):
-        raise EngineError(f"{name} neither ends nor repeats, so it has no table; give it an s_end or a period")
+        raise EngineError(
+            f"{name} neither ends nor repeats, so it has no table; give it an s_end or a period", value=name
+        )
     try:
         recorded = RecordedPath.of(task, ConstantRate(1.0))
     except Exception as error:  # code of the user, which need not answer everywhere
-        raise EngineError(f"{name} cannot be tabulated: {error}") from error
+        raise EngineError(f"{name} cannot be tabulated: {error}", value=name) from error
     samples = recorded.samples if task.knots is not None else _halve(recorded.samples)
     knots = _refine(task, _add_corners(task, samples))
     jets = recorded.jets if np.array_equal(knots, recorded.samples) else _jets(task, knots)
@@ -127,7 +129,7 @@ def make_table(task: PathTask) -> PathTable:
     table = PathTable(knots, np.moveaxis(coefficients, 0, 1), task.closed, ending, arrival, width)
     if not _agrees(table, task):
         raise EngineError(
-            f"{name} is not smooth enough for a table of quintics: q_d must have two derivatives that fit"
+            f"{name} is not smooth enough for a table of quintics: q_d must have two derivatives that fit", value=name
         )
     return table
 

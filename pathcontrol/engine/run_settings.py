@@ -59,7 +59,8 @@ def add_law(setup: Setup, law: Controller, memory: Memory) -> SpeedRules:
     setup.compensation = _COMPENSATION[controller.friction]
     if controller.observer is not None:
         if type(controller.observer) is not MomentumObserver:
-            raise EngineError(f"the observer {type(controller.observer).__name__} is in Python")
+            name = type(controller.observer).__name__
+            raise EngineError(f"the observer {name} is in Python", value=name)
         setup.memory, setup.observes, setup.compensates = controller.observer.size, 1, controller.friction == "observed"
         setup.observer_gain = memory.rows(controller.observer.gain, n)
     position, velocity = (memory.rows(getattr(controller, name), n) for name in GAINS[kind])
@@ -97,7 +98,8 @@ def _check_projections(tasks: Sequence[PathTask]) -> None:
     """
     for one in tasks:
         if not has_same_projection(one, path_struct(one)[0]):
-            raise EngineError(f"{type(one).__name__}.sigma_bar is not the nearest point of its path")
+            name = type(one).__name__
+            raise EngineError(f"{name}.sigma_bar is not the nearest point of its path", value=name)
 
 
 def _find_distinct(task: PathTask) -> tuple[list[PathTask], NDArray[np.intp] | None]:

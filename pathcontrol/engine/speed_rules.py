@@ -45,7 +45,11 @@ class SpeedRules:
             if type(one) not in (*WRAPPERS, *RULES):
                 raise EngineError(f"{type(one).__name__} is in Python", value=type(one).__name__)
         if len(self._rules) > MOST_RULES:
-            raise EngineError(f"there are {len(self._rules)} rules of speed, the engine takes {MOST_RULES} at most")
+            raise EngineError(
+                f"there are {len(self._rules)} rules of speed, the engine takes {MOST_RULES} at most",
+                value=len(self._rules),
+                limit=MOST_RULES,
+            )
         self._structs = (Rule * len(self._rules))()
         self._overrides = [rule for rule in self._rules if isinstance(rule, OverrideRule)]
         self._memory = Memory()

@@ -225,7 +225,10 @@ def address_of(array: NDArray[Any]) -> int:
         EngineError: it lies in another order, of which a copy of a repeated row may be.
     """
     if not array.flags.c_contiguous:
-        raise EngineError(f"an array of shape {array.shape} with strides {array.strides} does not lie row after row")
+        raise EngineError(
+            f"an array of shape {array.shape} with strides {array.strides} does not lie row after row",
+            value=array.strides,
+        )
     return array.ctypes.data
 
 

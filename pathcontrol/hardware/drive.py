@@ -180,7 +180,9 @@ class _Driver:
         for _ in range(_FIRST):
             if (measured := self._arm.read()) is not None:
                 return measured
-        raise ArmError(f"no measurement in {_FIRST} reads of the arm; is it connected, switched on and not stopped?")
+        raise ArmError(
+            f"no measurement in {_FIRST} reads of the arm; is it connected, switched on and not stopped?", limit=_FIRST
+        )
 
     def _follow(self, until: float) -> None:
         """Take ticks up to a time on the clock of the arm [s], or to as many as fill it where that clock stands."""

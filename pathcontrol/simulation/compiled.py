@@ -283,4 +283,5 @@ def _add_finish(setup: Setup, finish: Finish | None) -> None:
     elif type(finish) is AfterLaps:
         setup.finish, setup.laps = 2, finish.laps
     else:
-        raise EngineError(f"the engine does not know when {type(finish).__name__} ends a run")
+        name = type(finish).__name__
+        raise EngineError(f"the engine does not know when {name} ends a run", value=name)

@@ -62,13 +62,15 @@ def check_walls(count: int) -> None:
         EngineError: there are.
     """
     if count > MOST_WALLS:
-        raise EngineError(f"there are {count} walls, the engine takes {MOST_WALLS} at most")
+        raise EngineError(
+            f"there are {count} walls, the engine takes {MOST_WALLS} at most", value=count, limit=MOST_WALLS
+        )
 
 
 def disturbance_struct(term: Disturbance, n: int, memory: Memory) -> structs.Disturbance:
     """Return a disturbance as struct of the engine."""
     if type(term) not in _DISTURBANCES:
-        raise EngineError(f"the disturbance {type(term).__name__} is not one of the library")
+        raise EngineError(f"the disturbance {type(term).__name__} is not one of the library", value=type(term).__name__)
     struct = structs.Disturbance(kind=_DISTURBANCES.index(type(term)))
     if isinstance(term, TimedDisturbance):
         struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)

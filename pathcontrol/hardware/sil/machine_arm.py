@@ -73,7 +73,7 @@ class MachineArm:
         for _ in range(_TRIES):
             if (found := self.read()) is not None:
                 return found
-        raise ArmError(f"the machine answers, but no state of it comes in {_TRIES} periods")
+        raise ArmError(f"the machine answers, but no state of it comes in {_TRIES} periods", limit=_TRIES)
 
     def read(self) -> Measurement | None:
         """Return the newest state, or None where none comes within one and a half periods.
@@ -86,7 +86,7 @@ class MachineArm:
         newest = self._wait(_WAIT * self._period)
         if newest is None:
             if time.monotonic() - self._heard > _GONE:
-                raise ArmError(f"the machine has not been heard for {_GONE:g} s; does it still run?")
+                raise ArmError(f"the machine has not been heard for {_GONE:g} s; does it still run?", limit=_GONE)
             return None
         self._heard = time.monotonic()
         return Measurement(newest[1 : 1 + self._n], newest[1 + self._n :], float(newest[0]))
@@ -106,7 +106,9 @@ class MachineArm:
         until = time.monotonic() + _MEET
         while not self._session:
             if time.monotonic() > until:
-                raise ArmError(f"no machine answers within {_MEET:g} s; is it there, and has it the same key?")
+                raise ArmError(
+                    f"no machine answers within {_MEET:g} s; is it there, and has it the same key?", limit=_MEET
+                )
             self._send(Packet(Kind.HELLO, bytes(8), 0, np.zeros(0)))
             self._line.settimeout(_HELLO)
             packet = self._receive()

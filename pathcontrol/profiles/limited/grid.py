@@ -24,7 +24,9 @@ def edges(path: Path, cells: int) -> Array:
     """
     lower, upper = path.s0, path.s_end if path.period is None else path.s0 + path.period
     if not np.isfinite(upper):
-        raise TaskError(f"{type(path).__name__} neither ends nor closes, so ϑ cannot be tabulated; give it an s_end")
+        raise TaskError(
+            f"{type(path).__name__} neither ends nor closes, so ϑ cannot be tabulated; give it an s_end", value=upper
+        )
     knots = np.empty(0) if path.knots is None else path.knots
     margin = 1e-9 * (upper - lower)
     pieces = np.concatenate([[lower], knots[(knots > lower + margin) & (knots < upper - margin)], [upper]])

@@ -122,7 +122,10 @@ def _knots(path: Path, points: int) -> Array:
     """Return the knots of the grid; the path must end or close."""
     end = path.s_end if path.period is None else path.s0 + path.period
     if not np.isfinite(end):
-        raise TaskError(f"{type(path).__name__} neither ends nor closes, so ϑ cannot be tabulated; give it an s_end")
+        raise TaskError(
+            f"{type(path).__name__} neither ends nor closes, so ϑ cannot be tabulated; give it an s_end",
+            value=path.s_end,
+        )
     return np.linspace(path.s0, end, as_whole("points", points, 10, MOST_POINTS))
 
 

@@ -158,7 +158,8 @@ def _check_workers(client: Client) -> None:
     if unfit:
         raise ClusterError(
             f"numbers depend on versions, and {len(unfit)} of {len(found)} processes of the cluster have others than "
-            f"this one: {'; '.join(unfit[:5])}; install the same ones everywhere"
+            f"this one: {'; '.join(unfit[:5])}; install the same ones everywhere",
+            value=unfit,
         )
     crowded = [name for name, threads in client.nthreads().items() if threads > 1]
     if crowded:
@@ -184,7 +185,9 @@ def _ask_workers(client: Client, ask: Callable[[], dict[str, str]]) -> dict[str,
     try:
         return within(_ANSWER, lambda: client.run(ask, on_error="ignore"))
     except (NoAnswerError, OSError) as error:
-        raise ClusterError(f"no worker answers within {_ANSWER:g} s; stop those that hang, and start others") from error
+        raise ClusterError(
+            f"no worker answers within {_ANSWER:g} s; stop those that hang, and start others", limit=_ANSWER
+        ) from error
 
 
 def within(seconds: float, ask: Callable[[], Any], there: Callable[[], bool] = lambda: True) -> Any:

@@ -151,7 +151,9 @@ class Dispatcher:
         try:
             self._client.wait_for_workers(1, timeout=_RESTART)
         except TimeoutError as error:
-            raise ClusterError(f"no worker is left, and none has come for {_RESTART:g} s; {_KEPT}") from error
+            raise ClusterError(
+                f"no worker is left, and none has come for {_RESTART:g} s; {_KEPT}", limit=_RESTART
+            ) from error
         there = self._client.nthreads()
         steady = next((address for address in self._known if address in there), None)
         self._known |= dict.fromkeys(there)
@@ -227,7 +229,8 @@ class Dispatcher:
         if self._kills[int(samples[0])] >= _KILLS:
             raise ClusterError(
                 f"samples {samples[0]} to {samples[-1]}: every worker that computed them died, perhaps for lack of "
-                f"memory; make chunks smaller; {_KEPT}"
+                f"memory; make chunks smaller; {_KEPT}",
+                value=(samples[0], samples[-1]),
             ) from error
         self._submit_again(future, piece)
 
