@@ -31,6 +31,7 @@ _FLAGS = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--disable-gpu-compositing",  # without a graphics card pages are put together faster by the processor itself
+    "--renderer-process-limit=1",  # for the pages of one window: the second one finds the viewer compiled
 )
 
 
@@ -109,18 +110,31 @@ def opened(
         context: more for playwright's ``new_context``, such as ``color_scheme="dark"``, or ``**FINE`` to look at
             what is thin.
     """
-    settings: dict[str, Any] = {"viewport": {"width": size[0], "height": size[1]}, "offline": True} | COARSE | context
-    window = _browser().new_context(**settings)
-    window.set_default_timeout(1000 * PATIENCE)
+    window = _window(**context) if context else _usual_window()
+    page = Opened(window.new_page())
     try:
-        page = Opened(window.new_page())
         _listen(page)
+        page.tab.set_viewport_size({"width": size[0], "height": size[1]})
         page.tab.add_init_script(before)
         page.tab.goto(html.resolve().as_uri() + hash)
         page("() => window.film?.ready?.catch(() => null)")
         yield page
     finally:
-        window.close()
+        (window if context else page.tab).close()
+
+
+def _window(**context: Any) -> Any:
+    window = _browser().new_context(**{"offline": True} | COARSE | context)
+    window.set_default_timeout(1000 * PATIENCE)
+    return window
+
+
+@cache
+def _usual_window() -> Any:
+    """The window of pages that ask for no other; an empty page in it keeps its process, and what that has compiled."""
+    window = _window()
+    window.new_page()
+    return window
 
 
 def _listen(page: Opened) -> None:

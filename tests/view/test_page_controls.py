@@ -18,7 +18,7 @@ from pathcontrol import Circle, RobotModel, record
 from pathcontrol.view.animation.animation import Animation
 from pathcontrol.view.page.html import Section, page
 
-PHONE: dict[str, Any] = {"size": (390, 844), "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
+PHONE: dict[str, Any] = {"size": (390, 844), "has_touch": True, "is_mobile": True}
 CELLS = ["line 8", "rapid", "not finished", "1.234e-05 m", "−17.25", "100 %", "8.886e+04", "12.3 deg/s", "0.4567"]
 TABLE = {"title": "Contours", "columns": ["contour", *["mean speed [mm/s]"] * 8], "rows": [CELLS] * 3}
 SECTIONS = [Section(f"Part {i}", Markup(f'<p style="height: 40rem">text {i}</p>')) for i in range(3)]

@@ -76,7 +76,7 @@ def test_the_command_films_them_in_a_browser(kept):
     assert list(told["runs"]) == list(kept.histories(worst=2))
     page = kept.folder / "histories.html"
     assert told["written"] == {"html": str(page)}
-    with opened(page, (450, 300)) as shown:
+    with opened(page, (450, 300), "#t=0") as shown:
         assert shown.complaints == []
         words = shown.tab.locator("body").inner_text()
         assert all(name in words for name in told["runs"])
