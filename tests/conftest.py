@@ -45,9 +45,6 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     return len(os.sched_getaffinity(0)) + 1
 
 
-START = np.deg2rad([40.0, 70.0])
-
-
 @pytest.fixture(scope="session")
 def arm() -> RobotModel:
     """The CICESE arm with all its friction."""

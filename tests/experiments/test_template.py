@@ -6,8 +6,8 @@ import json
 import math
 import re
 
+import numpy as np
 import pytest
-from conftest import START
 
 from pathcontrol import (
     Circle,
@@ -20,6 +20,7 @@ from pathcontrol.experiments.runner import load_setup, run_experiment
 from pathcontrol.experiments.template import example_text
 from pathcontrol.registry import KINDS, LOOPS
 
+START = np.deg2rad([40.0, 70.0])
 NAMES = {"run.nc": "data/a.nc", "run.html": "a.html", '"run"': '"plots/a"', "summary.json": "a.json"}
 
 

@@ -2,35 +2,15 @@
 
 import numpy as np
 import pytest
+from simulated_arm import BAD, H, Simulated, law_of
 
 import pathcontrol as pc
 from pathcontrol.control.wrappers.stopping_rate import stopping_rate
 from pathcontrol.errors import InputError
 from pathcontrol.hardware.control_loop import ControlLoop, Mode
 from pathcontrol.hardware.envelope import Envelope
-from pathcontrol.simulation.compiled_plant import CompiledPlant
 
-H = 2e-3
 WIDE = {"torque": 1e6, "torque_rate": 1e12, "velocity": 1e3, "lower": -1e3, "upper": 1e3, "tube": np.inf}
-
-
-def arm_of(n):
-    if n == 2:
-        return pc.load_robot("cicese_2dof"), [0.2, 0.4], 0.3
-    if n == 6:
-        return pc.load_robot("ur5"), [0.0, -1.2, 1.4, -0.2, 1.5, 0.0], 0.2
-    fingers = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}
-    return pc.load_robot("panda", lock=fingers), [0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.8], 0.2
-
-
-def law_of(n, kind=pc.Projection):
-    robot, center, size = arm_of(n)
-    task = pc.Lissajous(np.full(n, size), list(range(1, n + 1)), 0.5, center=center)
-    if kind is pc.Projection:
-        return pc.Projection(robot, task, k_p=400.0, K_v=40.0)
-    if kind is pc.ExtendedMotionPlan:
-        return pc.ExtendedMotionPlan(robot, task, K_p=400.0, K_v=40.0, k=5.0)
-    return pc.ComputedTorque(robot, task, K_p=400.0, K_v=40.0)
 
 
 LAWS = [pc.ComputedTorque, pc.ExtendedMotionPlan, pc.Projection]
@@ -80,27 +60,6 @@ def test_a_law_that_was_held_and_resumed_is_the_compiled_one_again(kind):
     assert steps < 20.0  # no jump, neither on resuming nor when the compiled law takes over
 
 
-class Simulated:
-    """The arm of a law, stepped by hand, with what it did."""
-
-    def __init__(self, law):
-        self.plant = CompiledPlant(law.robot, H)
-        self.q = np.asarray(law.task.q_d(np.array(law.task.s0)), float).reshape(1, -1)
-        self.qd, self.t = np.zeros_like(self.q), 0.0
-
-    def drive(self, loop, ticks, fault=None):
-        """Take ticks; ``fault`` changes what is measured, (q, qd, t) of a tick."""
-        kind = [("q", float, self.q.shape[1:]), ("qd", float, self.q.shape[1:]), ("tau", float, self.q.shape[1:])]
-        done = np.empty(ticks, dtype=kind)
-        for k in range(ticks):
-            measured = self.q[0].copy(), self.qd[0].copy(), self.t
-            tau = loop.step(*(measured if fault is None else fault(k, *measured)))
-            done[k] = self.q[0], self.qd[0], tau
-            self.q, self.qd = self.plant.advance(self.q, self.qd, tau[None])
-            self.t += H
-        return done
-
-
 # --- one fault each ------------------------------------------------------------------------------------------------
 
 
@@ -111,18 +70,6 @@ def started(n=2, **options):
     arm.drive(loop, 100)
     assert loop.status.mode == Mode.RUN
     return arm, loop
-
-
-BAD = {
-    "not a number": lambda q, qd, t: (q * np.nan, qd, t),
-    "infinite": lambda q, qd, t: (q, qd + np.inf, t),
-    "no array": lambda q, qd, t: (None, qd, t),
-    "a word": lambda q, qd, t: ("lost", qd, t),
-    "another shape": lambda q, qd, t: (q[:1], qd, t),
-    "no time": lambda q, qd, t: (q, qd, np.nan),
-    "old": lambda q, qd, t: (q, qd, t - 10 * H),
-    "a jump": lambda q, qd, t: (q + 1.0, qd, t),
-}
 
 
 @pytest.mark.parametrize("what", BAD)
@@ -385,84 +332,6 @@ def test_a_law_that_cannot_go_on_leaves_the_arm_damped_and_resume_does_not_raise
     loop.resume()
     arm.drive(loop, 50)
     assert loop.status.mode == Mode.RUN
-
-
-def observed_law(n):
-    plan = law_of(n, pc.ExtendedMotionPlan)
-    return pc.ExtendedMotionPlan(plan.robot, plan.task, K_p=400.0, K_v=40.0, k=5.0, friction="observed")
-
-
-WRAPPED = {
-    "override": lambda n: pc.SpeedOverride(law_of(n, pc.ExtendedMotionPlan), 0.5),
-    "paced": lambda n: pc.Paced(law_of(n)),
-    "both": lambda n: pc.SpeedOverride(pc.Paced(law_of(n, pc.ExtendedMotionPlan)), 0.7),
-    "event": lambda n: pc.EventPlan(law_of(n, pc.ComputedTorque)),
-    "observed": observed_law,
-    "observed override": lambda n: pc.SpeedOverride(observed_law(n)),
-}
-
-
-@pytest.mark.parametrize("name", WRAPPED)
-def test_wrapped_and_observing_laws_run_hold_and_go_on_without_a_jump(name):
-    law = WRAPPED[name](2)
-    arm, loop = Simulated(law), ControlLoop(law, H)
-    loop.start(arm.q[0], arm.qd[0])
-    gone = [arm.drive(loop, 60)]
-    assert loop.status.mode == Mode.RUN
-    loop.hold()
-    gone += [arm.drive(loop, 250)]
-    assert np.abs(arm.qd).max() < 1e-2
-    loop.resume()
-    gone += [arm.drive(loop, 60), arm.drive(loop, 20, lambda k, *m: BAD["not a number"](*m)), arm.drive(loop, 30)]
-    assert loop.status.mode == Mode.DAMP
-    s = loop.status.s
-    loop.resume()
-    gone += [arm.drive(loop, 180)]
-    assert (loop.status.mode, loop.status.reason) == (Mode.RUN, "")
-    assert loop.status.s > s
-    assert "law" not in loop.status.faults
-    assert loop._plan.distance(arm.q[0]) < 0.1
-    change = np.abs(np.diff(np.concatenate([part["tau"] for part in gone]), axis=0))
-    assert (change <= loop.envelope.torque_rate * H * (1 + 1e-9)).all()
-
-
-# --- any sequence of faults ------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("n", [2, 7])
-def test_no_torque_is_beyond_its_limit_or_its_rate_whatever_happens(n):
-    try_faults(law_of(n), np.random.default_rng(n), sequences=40)
-
-
-@pytest.mark.parametrize(("n", "name"), [*((2, name) for name in WRAPPED), (6, "both"), (6, "observed override")])
-def test_the_same_of_wrapped_and_observing_laws(n, name):
-    try_faults(WRAPPED[name](n), np.random.default_rng(n), sequences=6)
-
-
-def try_faults(law, rng, sequences):
-    """Give a loop random sequences of faults, and hold its torques to their limits and rates."""
-    n = law.robot.n
-    loop = ControlLoop(law, H, Envelope(patience=2, frozen=5))
-    limit, change = loop.envelope.torque, loop.envelope.torque_rate * H
-    center = np.asarray(law.task.q_d(np.array(0.0)))
-    for _ in range(sequences):
-        q, qd, t = center + rng.normal(0, 0.3, n), rng.normal(0, 0.5, n), rng.uniform(0, 9)
-        loop.start(q, qd, t)
-        last = np.clip(law.robot.gravity(q), -limit, limit)
-        for _ in range(25):
-            t += H * rng.choice([1.0, 1.0, 1.0, 0.0, -3.0, 2.0, 40.0])
-            q, qd = q + rng.normal(0, rng.choice([1e-3, 0.1, 3.0]), n), rng.normal(0, rng.choice([0.1, 5.0, 1e4]), n)
-            measured = (q, qd, t)
-            if rng.random() < 0.3:
-                measured = BAD[rng.choice(list(BAD))](*measured)
-            if rng.random() < 0.1:
-                [loop.hold, loop.resume][rng.integers(2)]()
-            tau = loop.step(*measured)
-            assert tau.shape == (n,)
-            assert np.isfinite(tau).all()
-            assert (np.abs(tau) <= limit).all()
-            assert (np.abs(tau - last) <= change * (1 + 1e-12)).all()
-            last = tau
 
 
 # --- arguments -------------------------------------------------------------------------------------------------------
