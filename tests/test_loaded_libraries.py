@@ -28,6 +28,7 @@ import pathcontrol as pc
 from pathcontrol.experiments.reproduce import paper_experiment
 
 large = {{"xarray", "pandas", "trimesh", "yourdfpy", "sympy", "dask.array", "pydantic", "matplotlib.pyplot", "scipy"}}
+large |= {{"meshcat", "IPython"}}
 robot = pc.load_robot("cicese_2dof")
 run = paper_experiment("projection", robot, False, "compiled").run
 law = pc.ComputedTorque(robot, pc.Line([0, 0], [0.2, 0.2], 1.0), K_p=800.0, K_v=[45.0, 100.0])

@@ -9,6 +9,8 @@ import re
 from collections.abc import Sequence
 from functools import cache
 from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
 from typing import NamedTuple
 
 import jinja2
@@ -106,7 +108,10 @@ def _player() -> str:
 @cache
 def _viewer() -> tuple[str, str]:
     """Return Meshcat's viewer, zipped and in base64, a quarter of its size, and the digest that permits it."""
-    script = resources.files("meshcat").joinpath("viewer", "dist", "main.min.js").read_text("utf-8")
+    package = find_spec("meshcat")  # found without its code, which would load a server
+    assert package is not None
+    assert package.origin is not None
+    script = Path(package.origin).with_name("viewer").joinpath("dist", "main.min.js").read_text("utf-8")
     zipped = gzip.compress(script.encode(), compresslevel=6, mtime=0)
     return base64.b64encode(zipped).decode(), _digest(script)
 
