@@ -1,4 +1,4 @@
-"""A simulated Franka in an environment of its own, which franka-sim's old NumPy asks for."""
+"""A simulated Franka in a process of its own, with the MuJoCo that franka-sim asks for in a folder beside ours."""
 
 import fcntl
 import os
@@ -13,7 +13,7 @@ import pytest
 
 ROTORS = [0.2, 0.2, 0.2, 0.2, 0.07, 0.07, 0.07]  # kg m², which the URDF lacks: without them wrists weigh 0.1 g m²
 STRICT = ["--enforce-motion-limits", "--enforce-comm-constraints"]
-NEEDS = ["numpy==1.26.4", "mujoco>=3.2,<3.3", "franka-sim==1.1.7"]  # all that is imported where nothing is drawn
+NEEDS = ["mujoco>=3.2,<3.3", "franka-sim==1.1.7"]  # with NumPy all that is imported where nothing is drawn
 UNDRAWN = {"MUJOCO_GL": "disable"}
 
 
@@ -26,36 +26,35 @@ def locked(path):
 
 
 def install(folder):
-    """The interpreter of an environment with franka-sim, made once for all processes of the tests; skips without."""
-    python = folder / "bin" / "python"
+    """The folder with franka-sim, filled once for all processes of the tests; skips without."""
     with locked(f"{folder}.lock"):
         if not (folder / "done").exists():
-            subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
-            pip = [sys.executable, "-m", "pip", "--python", python, "install", "-q", "--only-binary=:all:"]
-            pip += ["--no-compile", "--no-deps"]  # most of what is installed is never imported
+            pip = [sys.executable, "-m", "pip", "install", "-q", "--only-binary=:all:", "--target", folder]
+            pip += ["--no-compile", "--no-deps"]  # most of what is installed is never imported; any NumPy will do
             done = subprocess.run([*pip, *NEEDS], capture_output=True, text=True)
             if done.returncode:
                 pytest.skip(f"franka-sim cannot be installed here: {done.stderr.strip().splitlines()[-1]}")
             (folder / "done").touch()
-    return python
+    return folder
 
 
-def urdf_of(python):
+def urdf_of(folder):
     """The URDF that franka-sim serves to its clients."""
-    return next(python.parents[1].glob("lib/python3*/site-packages/franka_sim/models/fr3.urdf"))
+    return folder / "franka_sim" / "models" / "fr3.urdf"
 
 
 @contextmanager
-def serve(python, enforced=STRICT):
+def serve(folder, enforced=STRICT):
     """Serve a robot at its home posture on libfranka's port, of which there is one; yields the process.
 
     It stops by itself at the limits that are ``enforced``.
     """
     script = Path(__file__).with_name("franka_simulator.py")
-    command = [python, script, "--no-gripper", *enforced, ",".join(map(str, ROTORS))]
+    command = [sys.executable, script, "--no-gripper", *enforced, ",".join(map(str, ROTORS))]
+    environment = os.environ | UNDRAWN | {"PYTHONPATH": str(folder)}
     port = Path(tempfile.gettempdir()) / "franka-1337.lock"
     with locked(port), tempfile.NamedTemporaryFile("w") as log:
-        server = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, env=os.environ | UNDRAWN)
+        server = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, env=environment)
         try:
             wait_for(server, log)
             yield server

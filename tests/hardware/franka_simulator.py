@@ -1,4 +1,4 @@
-"""Serve a simulated Franka Research 3 by franka-sim: run by the interpreter of an environment that has it.
+"""Serve a simulated Franka Research 3 by franka-sim, which is on the path of this process.
 
 The model is that of the bundled URDF, with the rotor inertia of the joints added and without shapes. Three things are
 changed, since this program shares two busy cores with its client, where a robot has a computer of its own: it has

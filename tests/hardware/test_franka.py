@@ -27,7 +27,7 @@ MEASURES = "PATHCONTROL_FRANKA_SECONDS" in os.environ
 
 @pytest.fixture(scope="session")
 def simulator(tmp_path_factory):
-    """The interpreter that runs the simulated robot."""
+    """The folder that has the simulated robot."""
     pytest.importorskip("pylibfranka", reason="Franka publishes no client for this platform")
     with real_time() as allowed:
         if not allowed:
