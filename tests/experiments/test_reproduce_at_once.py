@@ -10,6 +10,7 @@ import sys
 import threading
 from pathlib import Path
 
+import PIL.Image  # noqa: F401
 import pytest
 from click.testing import CliRunner
 from patience import PATIENCE, wait_until
@@ -18,23 +19,34 @@ from pathcontrol.cli import main
 from pathcontrol.experiments import reproduce as module
 
 TWO_CORES = pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="there is one core only")
-COMMAND = [sys.executable, "-m", "pathcontrol", "reproduce", "--out"]
-SHORTLY = """
+PROGRAM = """
 import sys
 from pathcontrol.cli import main
 from pathcontrol.experiments import reproduce
-reproduce.DURATION = 0.2
-main(["reproduce", "--out", sys.argv[1]])
+{}
+main(["reproduce", "--out", *sys.argv[1:]])
 """
+SHORTLY = [sys.executable, "-c", PROGRAM.format("reproduce.DURATION = 0.2")]
+#: what draws takes longer to load than all that comes before it
+UNDRAWN = [sys.executable, "-c", PROGRAM.format("reproduce.load_writers = lambda: None")]
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    """The folder that both experiments write, and what the command says of them."""
+def thread():
+    """A thread beside the main one, which a fork would lose."""
+    over = threading.Event()
+    waiting = threading.Thread(target=over.wait)
+    waiting.start()
+    yield waiting
+    over.set()
+    waiting.join()
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory, thread):
+    """The folder that both experiments write, one after the other in this process, and what is returned of them."""
     out = tmp_path_factory.mktemp("reproduce")
-    done = subprocess.run([*COMMAND, str(out), "--json"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return out, json.loads(done.stdout)
+    return out, module.reproduce(out)
 
 
 def test_reproduce_writes_everything(results):
@@ -68,24 +80,18 @@ def test_reproduce_prints_a_table(monkeypatch, capsys, results):
     assert "14.5" in text
 
 
-@pytest.fixture
-def thread():
-    """A thread beside the main one, which a fork would lose."""
-    over = threading.Event()
-    waiting = threading.Thread(target=over.wait)
-    waiting.start()
-    yield waiting
-    over.set()
-    waiting.join()
-
-
 @TWO_CORES
-def test_files_are_the_same_to_the_last_bit_from_one_process_and_from_two(results, thread, tmp_path):
-    module.reproduce(tmp_path)
-    files = sorted(path.name for path in results[0].iterdir())
-    assert files == sorted(path.name for path in tmp_path.iterdir())
+def test_files_are_the_same_to_the_last_bit_from_one_process_and_from_two(thread, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "DURATION", 0.2)
+    module.reproduce(tmp_path / "one")
+    command = [*SHORTLY, tmp_path / "two", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == json.loads((tmp_path / "two" / "summary.json").read_text())
+    files = sorted(path.name for path in (tmp_path / "one").iterdir())
+    assert files == sorted(path.name for path in (tmp_path / "two").iterdir())
     for name in files:
-        one, two = ((folder / name).read_bytes() for folder in (tmp_path, results[0]))
+        one, two = ((tmp_path / folder / name).read_bytes() for folder in ("one", "two"))
         if name == "summary.json":
             one, two = (json.loads(text) | {"seconds": 0.0} for text in (one, two))
         assert one == two, name
@@ -95,7 +101,7 @@ def test_files_are_the_same_to_the_last_bit_from_one_process_and_from_two(result
 def test_errors_of_another_process_are_told_in_one_sentence(tmp_path):
     for name in ("extended_motion_plan", "projection"):  # the first file that each of the two processes writes
         (tmp_path / "out" / f"{name}.nc").mkdir(parents=True)
-    done = subprocess.run([sys.executable, "-c", SHORTLY, tmp_path / "out"], capture_output=True, text=True)
+    done = subprocess.run([*SHORTLY, tmp_path / "out"], capture_output=True, text=True)
     assert done.returncode == 2
     assert "extended_motion_plan.nc" in done.stderr
     assert "Traceback" not in done.stderr
@@ -116,7 +122,7 @@ def test_a_program_with_threads_is_not_forked(thread):
         assert apply is map
 
 
-def started(out, words=COMMAND):
+def started(out, words):
     """The command in a group of its own, and the processes that it has started, once they have their signals set."""
     command = subprocess.Popen(
         [*words, str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
@@ -139,7 +145,7 @@ def leaves_at_once(pid):
 @pytest.mark.parametrize("writes", [False, True])
 def test_ctrl_c_is_told_in_one_line_and_leaves_nothing(tmp_path, writes):
     """One process gets it while both simulate; all do, as from a terminal, when the first file begins to appear."""
-    command, processes = started(tmp_path, [sys.executable, "-c", SHORTLY] if writes else COMMAND)
+    command, processes = started(tmp_path, SHORTLY if writes else UNDRAWN)
     if writes:
         wait_until(lambda: any(tmp_path.iterdir()))
         processes = children(command.pid)
@@ -153,7 +159,7 @@ def test_ctrl_c_is_told_in_one_line_and_leaves_nothing(tmp_path, writes):
 
 @TWO_CORES
 def test_a_process_that_is_killed_is_told_in_one_sentence(tmp_path):
-    command, processes = started(tmp_path)
+    command, processes = started(tmp_path, UNDRAWN)
     os.kill(processes[0], signal.SIGKILL)
     _, told = command.communicate(timeout=PATIENCE)
     assert command.returncode == 2
@@ -173,3 +179,17 @@ def test_ctrl_c_while_a_pool_starts_comes_when_it_has_started():
     with pytest.raises(KeyboardInterrupt):
         module._start_whole(Pool(), max, [1])
     assert done == [max]
+
+
+def test_ctrl_c_while_what_draws_is_loaded_comes_when_it_is_there(monkeypatch):
+    """A module that is half loaded tells of it on its own."""
+    loaded = []
+
+    def load(name):
+        os.kill(os.getpid(), signal.SIGINT)
+        loaded.append(name)
+
+    monkeypatch.setattr(module, "import_module", load)
+    with pytest.raises(KeyboardInterrupt):
+        module.load_writers()
+    assert loaded == [*module._WRITERS]
