@@ -1,17 +1,17 @@
-"""The floors of the house: imports run one way, and nothing imports itself, however far around."""
+"""The floors of the house: imports run one way, nothing imports itself, however far around, and all are asked for."""
 
 from __future__ import annotations
 
 import ast
 import re
 import sys
-from collections import Counter
+import tomllib
+from collections import Counter, deque
 from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
+from importlib.metadata import packages_distributions
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).parents[1] / "pathcontrol"
 #: from the lowest to the highest; a package imports from its own floor and from those below
@@ -74,6 +74,8 @@ HEAVY = {
     "sympy",
     "xarray",
 }
+Import = ast.Import | ast.ImportFrom
+Documented = ast.Module | ast.ClassDef | ast.FunctionDef
 QUESTIONS = ("What ", "Which ", "Where ", "How ", "Whether ")
 
 
@@ -96,16 +98,37 @@ def imported(node: ast.AST) -> Iterator[str]:
             yield inner if inner in MODULES else str(node.module)
 
 
+def libraries_of(node: Import) -> set[str]:
+    """The top-level packages that an import statement names."""
+    whole = [alias.name for alias in node.names] if isinstance(node, ast.Import) else [str(node.module)]
+    return {one.split(".")[0] for one in whole}
+
+
 @cache
-def tree_of(name: str) -> ast.Module:
-    """The syntax tree of a module."""
-    return ast.parse(MODULES[name].read_text(encoding="utf-8"))
+def nodes_of(name: str) -> tuple[list[Import], list[Import], list[Documented]]:
+    """All import statements of a module, those inside its functions, and what may have a docstring."""
+    tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
+    imports, inside, documented = list[Import](), list[Import](), list[Documented]()
+    waiting: deque[tuple[ast.AST, bool]] = deque([(tree, False)])
+    while waiting:
+        node, in_function = waiting.popleft()
+        if isinstance(node, Import):
+            imports.append(node)
+            inside += [node] * in_function
+        elif isinstance(node, ast.stmt | ast.Module):  # no expression holds one of them
+            if isinstance(node, Documented):
+                documented.append(node)
+            in_function = in_function or isinstance(node, ast.FunctionDef)
+            waiting += ((child, in_function) for child in ast.iter_child_nodes(node) if not isinstance(child, ast.expr))
+        elif isinstance(node, ast.ExceptHandler | ast.match_case):
+            waiting += ((child, in_function) for child in node.body)
+    return imports, inside, documented
 
 
 @cache
 def imports_of(name: str) -> set[str]:
     """What a module imports of the package: at its top, in functions, and for its types."""
-    return {target for node in ast.walk(tree_of(name)) for target in imported(node)} - {name}
+    return {target for node in nodes_of(name)[0] for target in imported(node)} - {name}
 
 
 def floor(name: str) -> int | None:
@@ -123,17 +146,16 @@ def test_no_module_imports_itself_around_a_corner():
     list(TopologicalSorter(graph).static_order())  # raises CycleError, which names the circle
 
 
-@pytest.mark.parametrize("name", sorted(MODULES))
-def test_imports_run_down(name):
-    mine = floor(name)
-    if name in {"pathcontrol", "pathcontrol.__main__", "pathcontrol.figures"}:
-        return  # they stand before the house
-    for target in imports_of(name):
-        theirs = floor(target)
-        if mine is None:
-            assert theirs is None, f"{name} stands below all floors and imports {target}"
-        else:
-            assert theirs is None or theirs <= mine, f"{name} imports {target}, which is on a floor above"
+def test_imports_run_down():
+    before = {"pathcontrol", "pathcontrol.__main__", "pathcontrol.figures"}  # they stand before the house
+    upwards = []
+    for name in MODULES.keys() - before:
+        mine = floor(name)
+        for target in imports_of(name):
+            theirs = floor(target)
+            if theirs is not None and (mine is None or theirs > mine):
+                upwards.append(f"{name} imports {target}, which is on a floor above")
+    assert upwards == []
 
 
 def test_a_module_is_found_by_its_name():
@@ -158,21 +180,13 @@ def test_only_robot_knows_pinocchio():
     assert knowing == {"robot"}
 
 
-def imports_in_functions(name: str) -> Iterator[ast.Import | ast.ImportFrom]:
-    """The import statements inside the functions of a module."""
-    functions = [node for node in ast.walk(tree_of(name)) if isinstance(node, ast.FunctionDef)]
-    found = {node for function in functions for node in ast.walk(function)}
-    yield from (node for node in found if isinstance(node, ast.Import | ast.ImportFrom))
-
-
 def test_imports_inside_functions_are_counted():
     late: Counter[str] = Counter()
-    libraries = set()
+    libraries = set[str]()
     for name in MODULES:
         short = name.removeprefix("pathcontrol.")
-        for node in imports_in_functions(name):
-            whole = [alias.name for alias in node.names] if isinstance(node, ast.Import) else [str(node.module)]
-            libraries |= {one.split(".")[0] for one in whole} - {"pathcontrol"}
+        for node in nodes_of(name)[1]:
+            libraries |= libraries_of(node) - {"pathcontrol"}
             late[short] += any(imported(node))
     commands = [name for name in late if name.startswith("cli.")]
     assert {name: count for name, count in late.items() if count and name not in commands} == LATE
@@ -182,8 +196,8 @@ def test_imports_inside_functions_are_counted():
 def docstrings() -> Iterator[tuple[str, str]]:
     """All docstrings of the package, each with its place."""
     for name in MODULES:
-        for node in ast.walk(tree_of(name)):
-            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
+        for node in nodes_of(name)[2]:
+            if text := ast.get_docstring(node):
                 yield f"{name}: {getattr(node, 'name', '')}", text
 
 
@@ -203,3 +217,22 @@ def test_the_recipes_of_contributing_name_what_there_is():
     assert len(named) > 10
     for name, place in named:
         assert re.search(rf"\b{name}\b", (ROOT / place).read_text(encoding="utf-8")), f"{name} in {place}"
+
+
+def requirements(*extras: str) -> set[str]:
+    """The names that pyproject.toml asks for, with those of some extras."""
+    project = tomllib.loads((ROOT.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    lists = [project["dependencies"], *(project["optional-dependencies"][extra] for extra in extras)]
+    return {re.match(r"[\w.-]+", line)[0].lower().replace("_", "-") for lines in lists for line in lines}
+
+
+def test_whatever_is_imported_is_asked_for():
+    # their wheels install beside the packages, where Python does not see of which one they are
+    providers = {"pinocchio": ["pin"], "example_robot_data": ["example-robot-data-loaders"]}
+    providers |= {"rtde_control": ["ur-rtde"], "rtde_receive": ["ur-rtde"]} | packages_distributions()
+    declared = requirements("robots", "mujoco", "cluster", "video", "sweep", "tune", "franka", "ur", "mcap", "mpc")
+    used = {top for name in MODULES for node in nodes_of(name)[0] for top in libraries_of(node)}
+    used -= sys.stdlib_module_names | {"pathcontrol"}
+    assert {"numpy", "pinocchio", "umsgpack", "cloudpickle"} <= used
+    by = {name: {one.lower().replace("_", "-") for one in providers.get(name, [name])} for name in used}
+    assert {name for name, packages in by.items() if not packages & declared} == set()

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import re
 import subprocess
 import sys
 import tomllib
-from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
@@ -57,32 +55,3 @@ def test_the_citation_has_what_exports_need():
     assert f"license: {project['license']}" in text
     assert "family-names: Moreno" in text
     assert "family-names: Kelly" in text
-
-
-def imported(path: Path) -> set[str]:
-    """The top-level packages that a module imports anywhere in it."""
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names |= {alias.name.partition(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and not node.level:
-            names.add(node.module.partition(".")[0])
-    return names - sys.stdlib_module_names - {"pathcontrol"}
-
-
-def requirements(*extras: str) -> set[str]:
-    """The names that pyproject.toml asks for, with those of some extras."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    lists = [project["dependencies"], *(project["optional-dependencies"][extra] for extra in extras)]
-    return {re.match(r"[\w.-]+", line)[0].lower().replace("_", "-") for lines in lists for line in lines}
-
-
-def test_whatever_is_imported_is_asked_for():
-    # their wheels install beside the packages, where Python does not see of which one they are
-    providers = {"pinocchio": ["pin"], "example_robot_data": ["example-robot-data-loaders"]}
-    providers |= {"rtde_control": ["ur-rtde"], "rtde_receive": ["ur-rtde"]} | packages_distributions()
-    declared = requirements("robots", "mujoco", "cluster", "video", "sweep", "tune", "franka", "ur", "mcap", "mpc")
-    used = set.union(*(imported(path) for path in (ROOT / "pathcontrol").rglob("*.py")))
-    assert {"numpy", "pinocchio", "umsgpack", "cloudpickle"} <= used
-    by = {name: {one.lower().replace("_", "-") for one in providers.get(name, [name])} for name in used}
-    assert {name for name, packages in by.items() if not packages & declared} == set()
