@@ -1,7 +1,8 @@
 """What the documentation says: its Python runs and prints what it says it prints, its TOML files are experiments.
 
 The ``python`` blocks of a page are run in order, in one namespace and in an empty folder. A ``text`` block right
-after one is what it prints. A block that begins with ``# NAME.py`` is also the file of that name.
+after one is what it prints. A block that begins with ``# NAME.py`` is also the file of that name. Figures are drawn
+once, as SVG, where a block does not tell of its files: tests of figures hold their formats to one another.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ PAGES = sorted(
 )
 #: words of the warnings that a page speaks of; no other page gives any
 WARNED = {"ensembles": "need a period below", "profiles": "the arm did not move"}
+FORMATS = pathcontrol.save_figure.__defaults__[0]
 NEEDS = {"robots": "example_robot_data", "path_tool_curve": "example_robot_data"}
 
 _BLOCK = re.compile(r"^```(python|text|toml)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -91,6 +93,8 @@ def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch):
         if name := re.match(r"# (\w+\.py)\n", block.text):
             Path(name[1]).write_text(block.text, encoding="utf-8")
         printed = io.StringIO()
+        formats = FORMATS if ".png" in (block.output or "") else ("svg",)
+        monkeypatch.setattr(pathcontrol.save_figure, "__defaults__", (formats,))
         with contextlib.redirect_stdout(printed):
             exec(_compiled(block, page), namespace)
         assert_printed(printed.getvalue(), block.output or "", where)
