@@ -51,8 +51,14 @@ def plan_trajectory(
     """
     refuse_batch("task", task)
     check_task(task, None if robot is None else robot.n)
-    times = sample_times(rate, _find_duration(task, rate) if duration is None else as_scalar("duration", duration))
-    s, share, rise = _sample_legs(_follow_plan(task, times[-1]), times, isinstance(task, PathSequence))
+    if duration is None:
+        whole = _follow_whole(task)
+        times = sample_times(rate, float(np.ceil(whole[-1].end * rate) / rate))
+        legs = _go_on(task, whole, times[-1])
+    else:
+        times = sample_times(rate, as_scalar("duration", duration))
+        legs = _follow_plan(task, times[-1])
+    s, share, rise = _sample_legs(legs, times, isinstance(task, PathSequence))
     point = plan_of(task, Ending.of(task))(s)
     q, qd = point.q_d, share * point.velocity
     qdd = share**2 * point.velocity_slope * np.broadcast_to(point.theta, times.shape)[:, None] + rise * point.velocity
@@ -70,16 +76,38 @@ class _Leg(NamedTuple):
     parameter: Callable[[Array], Array]
 
 
-def _find_duration(task: PathTask, rate: float) -> float:
-    """Return how long the plan takes for the whole path [s], up to a whole number of samples."""
+def _follow_whole(task: PathTask) -> list[_Leg]:
+    """Integrate the plan until it is at the end of an open path, or once round a closed one."""
     if task.period is None and not np.isfinite(task.s_end):
         raise InputError(f"{task!r} neither ends nor repeats; give a duration", argument="duration")
-    whole = _follow_plan(task, _LONGEST, arrival_parameter(task) if task.period is None else task.s0 + task.period)
+    whole = _follow_plan(task, _LONGEST, _last_parameter(task))
     if whole[-1].end >= _LONGEST:
         raise InputError(
             f"the plan of {task!r} is not at its end within {_LONGEST:g} s; give a duration", argument="duration"
         )
-    return float(np.ceil(whole[-1].end * rate) / rate)
+    return whole
+
+
+def _go_on(task: PathTask, legs: Sequence[_Leg], until: float) -> list[_Leg]:
+    """Return legs to the last parameter of a path, the last of which goes on to a time ``until`` [s], a sample later.
+
+    The plan ends between samples, and has a place at the one after.
+    """
+    *before, last = legs
+    if not until > last.end:
+        return list(legs)
+    rise = _RISE if isinstance(task, PathSequence) else 0.0
+    on = _follow_leg(task, last.end, _last_parameter(task), np.inf, until, rise, begin=last.begin)
+
+    def parameter(times: Array) -> Array:
+        return np.where(times < last.end, last.parameter(np.minimum(times, last.end)), on.parameter(times))
+
+    return [*before, _Leg(last.begin, until, parameter)]
+
+
+def _last_parameter(task: PathTask) -> float:
+    """Return the parameter at which a plan has been along the whole path."""
+    return arrival_parameter(task) if task.period is None else task.s0 + task.period
 
 
 def _follow_plan(task: PathTask, longest: float, end: float = np.inf) -> list[_Leg]:
@@ -91,15 +119,18 @@ def _follow_plan(task: PathTask, longest: float, end: float = np.inf) -> list[_L
     between = list(task.starts[1:-1]) if isinstance(task, PathSequence) else []
     legs, t, s, rise = list[_Leg](), 0.0, task.s0, _RISE if isinstance(task, PathSequence) else 0.0
     for mark in [*between, end]:
-        legs.append(_follow_leg(task, t, s, mark, longest, rise))
+        legs.append(_follow_leg(task, t, s, mark, longest, rise, begin=t))
         t, s = legs[-1].end, mark
         if t >= longest:
             break
     return legs
 
 
-def _follow_leg(task: PathTask, begin: float, s: float, end: float, longest: float, rise: float) -> _Leg:
-    """Integrate the plan from s at the time ``begin`` [s] until it is at the parameter ``end``, or time is up."""
+def _follow_leg(task: PathTask, t: float, s: float, end: float, longest: float, rise: float, begin: float) -> _Leg:
+    """Integrate the plan from s at the time t [s] until it is at the parameter ``end``, or time is up.
+
+    Its path began at the time ``begin`` [s].
+    """
     from scipy.integrate import solve_ivp  # takes a quarter of a second to load
 
     planned, last = rate_of(task, Ending.of(task)), np.nextafter(end, -np.inf)
@@ -114,10 +145,10 @@ def _follow_leg(task: PathTask, begin: float, s: float, end: float, longest: flo
     left.terminal = True  # type: ignore[attr-defined]
     tolerances = {"rtol": _ACCURACY, "atol": _ACCURACY}
     events = left if np.isfinite(end) else None
-    found = solve_ivp(rate, (begin, longest), [s], method="DOP853", events=events, dense_output=True, **tolerances)
+    found = solve_ivp(rate, (t, longest), [s], method="DOP853", events=events, dense_output=True, **tolerances)
     if not found.success:
         raise SimulationError(f"the plan of {task!r} cannot be followed: {found.message}")
-    return _Leg(begin, float(found.t[-1]), lambda times: np.minimum(found.sol(times)[0], last))
+    return _Leg(t, float(found.t[-1]), lambda times: np.minimum(found.sol(times)[0], last))
 
 
 def _sample_legs(legs: Sequence[_Leg], times: Array, rises: bool) -> tuple[Array, Array, Array]:

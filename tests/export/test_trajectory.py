@@ -71,6 +71,19 @@ def test_velocities_and_accelerations_are_derivatives_of_a_plan(speed, turn, len
     assert last <= 1e-4 * (1 + 1e-6)  # the plan has arrived
 
 
+SHORT = [pc.Line([0.0, 0.0], [0.001, 0.0], 0.5), pc.Line([0.001, 0.0], [0.001, 0.001], 0.5)]
+
+
+@pytest.mark.filterwarnings("ignore::pathcontrol.errors.PathControlWarning")
+@pytest.mark.parametrize("task", [pc.Circle(0.5, 2.0), SHORT[0], pc.PathSequence(SHORT)], ids=["round", "open", "two"])
+def test_a_plan_to_its_end_is_that_of_a_time_as_long(task):
+    """It goes on to a whole number of samples, also where a path of a sequence has not risen to its speed by then."""
+    whole = pc.plan_trajectory(task, 70.0)
+    timed = pc.plan_trajectory(task, 70.0, whole.time[-1])
+    for name in ("q", "qd", "qdd"):  # both are integrated to 1e-11
+        np.testing.assert_allclose(getattr(whole, name), getattr(timed, name), atol=1e-7 if name == "qdd" else 1e-8)
+
+
 def test_a_run_is_its_samples_where_the_rate_is_that_of_the_loop(motion):
     run, _ = motion
     same = run.to_trajectory(1000.0)

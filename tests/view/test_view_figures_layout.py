@@ -111,14 +111,17 @@ def words_of(figure: Figure) -> list[tuple[str, Bbox]]:
 
 def assert_readable(figure: Figure, name: str) -> None:
     """Words are inside the figure and apart from each other."""
-    page, boxes = figure.bbox, words_of(figure)
-    for text, box in boxes:
-        assert min(box.x0, box.y0, page.x1 - box.x1, page.y1 - box.y1) > -1, f"{name}: {text} is cut off"
-    for k, (text, box) in enumerate(boxes):
-        for other, there in boxes[k + 1 :]:
-            across = min(box.x1, there.x1) - max(box.x0, there.x0)
-            along = min(box.y1, there.y1) - max(box.y0, there.y0)
-            assert across < 1 or along < 1, f"{name}: {text!r} lies over {other!r}"
+    page, found = figure.bbox.extents, words_of(figure)
+    if not found:
+        return
+    texts, boxes = [text for text, _ in found], np.array([box.extents for _, box in found])
+    low, high = boxes[:, :2], boxes[:, 2:]
+    inside = (np.minimum(low - page[:2], page[2:] - high) > -1).all(axis=1)
+    for i in np.flatnonzero(~inside):
+        pytest.fail(f"{name}: {texts[i]} is cut off")
+    overlap = np.minimum(high, high[:, None]) - np.maximum(low, low[:, None])  # of each two along both axes
+    for i, k in np.argwhere(np.triu(~(overlap < 1).any(axis=-1), k=1)):
+        pytest.fail(f"{name}: {texts[i]!r} lies over {texts[k]!r}")
 
 
 def assert_units(figure: Figure, name: str) -> None:
