@@ -88,10 +88,12 @@ def test_what_is_no_circle_is_told():
         pc.ballbar(round_trip(), frame="tool")
 
 
-def test_figures_and_reports_show_it(tmp_path):
+def test_figures_and_reports_show_it(tmp_path, monkeypatch):
+    monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure: ("png", b""))
     run = round_trip()
     figure = pc.ballbar_figure({"one": run, "two": round_trip("full")})
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["one", "two"]
+    figure.canvas.draw()
     run.save(tmp_path / "run.nc")
     done = CliRunner().invoke(main, ["report", str(tmp_path / "run.nc"), "--out", str(tmp_path / "r.html"), "--json"])
     assert done.exit_code == 0, done.output

@@ -93,7 +93,7 @@ def test_a_sampled_loop_has_the_multipliers_of_its_held_torque():
     """z² − (2 − K_v h − K_p h²/2)z + 1 − K_v h + K_p h²/2 = 0 for an arm of constant inertia without weight."""
     flat = sliding_arm()
     task, h, K_p, K_v = pc.Circle(0.1, 0.2), np.pi / 300, 300.0, 30.0  # 300 ticks a lap
-    found = pc.floquet(pc.ComputedTorque(flat, task, K_p, K_v), pc.SampledLoop(period=h))
+    found = pc.floquet(pc.ComputedTorque(flat, task, K_p, K_v), pc.SampledLoop(period=h), settle=1)
     z = np.roots([1, -(2 - K_v * h - K_p * h**2 / 2), 1 - K_v * h + K_p * h**2 / 2])
     assert_same(found.transverse, np.repeat(np.log(z.astype(complex)) / h, 2), found.period, atol=1e-3)
 
@@ -122,7 +122,7 @@ def test_errors_decay_in_simulation_as_the_slowest_mode(kind, loop):
         if kind == "plan"
         else pc.Projection(ARM, CIRCLE, 200.0, 40.0)
     )
-    found = pc.floquet(law, loop)
+    found = pc.floquet(law, loop, settle=1)
     starts = np.array([1.0, 0.0]) + np.array([[0.0, 0.0], [1e-2, 0.0]])
     run = pc.simulate(law, starts, np.tile([0.0, 2.0], (2, 1)), duration=0.9, loop=loop, progress=False)
     radius = np.linalg.norm(run.array("q"), axis=-1)
@@ -146,8 +146,8 @@ def test_errors_of_a_law_with_an_observer_decay_as_the_slowest_mode():
 def test_gains_too_large_for_the_period_are_unstable():
     law = pc.ComputedTorque(ARM, FAST, 4000.0, 300.0)
     assert pc.floquet(law).stable
-    assert pc.floquet(law, pc.SampledLoop(period=2e-3)).stable
-    assert not pc.floquet(law, pc.SampledLoop(period=8e-3)).stable
+    assert pc.floquet(law, pc.SampledLoop(period=2e-3), settle=1).stable
+    assert not pc.floquet(law, pc.SampledLoop(period=8e-3), settle=1).stable
 
 
 def test_what_has_no_derivative_is_refused():

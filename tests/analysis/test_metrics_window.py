@@ -60,7 +60,7 @@ def test_a_perfect_run_on_an_open_path_has_the_ratio_1_and_the_distance_0(ideal_
     line = pc.Line(START, np.subtract(START, length), speed=np.sqrt(2) * length / duration)
     qd = line.at(np.array(0.0)).velocity
     law = pc.ComputedTorque(ideal_arm, line, 800.0, [45.0, 100.0])
-    loop = pc.ContinuousTime(output_period=2e-3, rtol=1e-9, atol=1e-11)
+    loop = pc.ContinuousTime(output_period=5e-3, rtol=1e-9, atol=1e-11)
     run = pc.simulate(law, START, qd=qd, duration=20.0, loop=loop, progress=False)
     for window in (None, "all"):
         numbers = pc.metrics(run, window=window)

@@ -11,7 +11,7 @@ import pathcontrol as pc
 from pathcontrol.errors import InputError, UnknownNameError
 
 ARM = pc.load_robot("cicese_2dof")
-RADIUS, RATE, PERIOD = 1.0, 2.0, 2.5e-3  # rad, rad/s, s
+RADIUS, RATE, PERIOD = 1.0, 2.0, 5e-3  # rad, rad/s, s
 CIRCLE = pc.Circle(RADIUS, RATE)
 LAP = 2 * np.pi / RATE
 

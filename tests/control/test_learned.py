@@ -17,7 +17,7 @@ from pathcontrol.control.learning.learned_table import LearnedTable
 CICESE = pc.load_robot("cicese_2dof")
 CIRCLE = pc.Circle(0.3, 3.0)  # 10 rad/s
 START = CIRCLE.q_d(np.array(0.0))
-LAP, PERIOD = np.pi / 5, 5e-3
+LAP, PERIOD = np.pi / 5, 7e-3
 
 
 class Kept(pc.Learned):
@@ -176,7 +176,7 @@ def test_motors_at_their_limits_wind_nothing_up(learned):
 
 def test_the_table_of_a_run_is_found_again(learned):
     controller, one = learned
-    early = one.excerpt(np.arange(1), 300)
+    early = one.excerpt(np.arange(1), round(2.4 * LAP / PERIOD))
     again = pc.Learned(law(), nodes=32)
     table = again.recall(pc.law_states(early, again)[0, -1])
     assert (table.lap, table.known.sum()) == (2, 32)

@@ -132,7 +132,7 @@ def test_a_simulated_arm_passes_a_free_end_within_its_torques():
 
 def test_an_open_path_ends_at_rest():
     line = pc.Line([1.0, 0.8], [1.15, 0.7], 1.0)
-    law = pc.PathMPC(TWO_LINK, line, 0.4, 12)
+    law = pc.PathMPC(TWO_LINK, line, 0.4, 8)
     loop = pc.SampledLoop(period=0.03, torque_limits=True, substeps=5)
     run = pc.simulate(law, line.start, duration=2.0, loop=loop, progress=False)
     assert run.finish_time[0] < 1.2

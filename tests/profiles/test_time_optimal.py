@@ -233,8 +233,8 @@ def test_no_profile_on_a_lattice_is_faster_with_viscous_friction(name, seed, sha
     robot = load(name).with_friction(frictions(load(name), share)[0])
     path = spline(robot, seed, count=4)
     profile = time_optimal(robot, path, velocity=None, margin=0.0, points=120)
-    near = np.geomspace(1e-3, 0.1, 12)
-    factors = np.concatenate([[1.0], np.linspace(0.5, 1.6, 24), 1 - near, 1 + near])
+    near = np.geomspace(1e-3, 0.1, 8)
+    factors = np.concatenate([[1.0], np.linspace(0.5, 1.6, 13), 1 - near, 1 + near])
     assert fastest_on_lattice(robot, path, profile, factors) > 0.995 * profile.traversal_time
 
 
