@@ -100,7 +100,8 @@ def _go_on(task: PathTask, legs: Sequence[_Leg], until: float) -> list[_Leg]:
     on = _follow_leg(task, last.end, _last_parameter(task), np.inf, until, rise, begin=last.begin)
 
     def parameter(times: Array) -> Array:
-        return np.where(times < last.end, last.parameter(np.minimum(times, last.end)), on.parameter(times))
+        earlier, later = np.minimum(times, last.end), np.maximum(times, last.end)
+        return np.where(times < last.end, last.parameter(earlier), on.parameter(later))
 
     return [*before, _Leg(last.begin, until, parameter)]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from hashlib import sha256
 from pathlib import Path
 
 import fast_simplification
@@ -17,7 +18,9 @@ from pathcontrol.view.bodies.body_shapes import Color, Mesh
 MOST_TRIANGLES = 100_000  # limit for one colour: a picture shows no more
 _FARTHEST = 1e6  # m
 SHARP = np.deg2rad(40.0)  # faces that meet at more than this show an edge
+_MOST_KEPT = 200_000  # triangles in all that are kept for the next film, in some 8 MB
 _ROUNDING = 1 / 16  # share of the detail, far below a pixel; numbers with fewer digits compress better
+_kept: dict[bytes, Mesh] = {}  # by what they were made of
 
 
 def read_mesh(path: Path, scale: ArrayLike = 1.0, detail: float = 0.0) -> list[tuple[Mesh, Color | None]]:
@@ -36,7 +39,7 @@ def read_mesh(path: Path, scale: ArrayLike = 1.0, detail: float = 0.0) -> list[t
     for part in load_parts(path):
         found.setdefault(part.color, []).append(part)
     joined = [(color, _join(found[color], factor)) for color in sorted(found, key=lambda color: color or ())]
-    meshes = [(_split_sharp_edges(mesh, detail), color) for color, mesh in joined]
+    meshes = [(_remember_split(mesh, detail), color) for color, mesh in joined]
     meshes = [(mesh, color) for mesh, color in meshes if len(mesh.faces)]
     if not meshes:
         raise UrdfError("it has no triangles")
@@ -53,6 +56,22 @@ def _join(parts: Sequence[Part], factor: np.ndarray) -> Mesh:
             f"it has vertices that are not finite, or {_FARTHEST:g} m away and more; check its scale", limit=_FARTHEST
         )
     return Mesh(vertices, np.concatenate(faces))
+
+
+def _remember_split(mesh: Mesh, detail: float) -> Mesh:
+    """Split a mesh at sharp edges, once for all films of a session, most of whose time it takes."""
+    kind = (float(detail), mesh.vertices.dtype, mesh.faces.dtype, len(mesh.vertices))
+    key = sha256(repr(kind).encode() + mesh.vertices.tobytes() + mesh.faces.tobytes()).digest()
+    if (known := _kept.get(key)) is not None:
+        return known
+    split = _split_sharp_edges(mesh, detail)
+    if sum(len(other.faces) for other in [*_kept.values()]) + len(split.faces) > _MOST_KEPT:
+        _kept.clear()
+    if len(split.faces) <= _MOST_KEPT:
+        for array in (split.vertices, split.faces):
+            array.setflags(write=False)
+        _kept[key] = split
+    return split
 
 
 def _split_sharp_edges(mesh: Mesh, detail: float) -> Mesh:
