@@ -9,7 +9,7 @@ import pathcontrol as pc
 from pathcontrol.errors import InputError
 
 H = 2e-3
-JAM, END = (1.0, 1.6), 2.4  # s
+JAM, END = (1.0, 1.6), 2.2  # s
 
 
 def task_of(n):
@@ -53,10 +53,10 @@ def test_commands_in_free_motion_are_the_simulation_at_the_servo_rate(n, lag, ki
     law = law_of(n, kind)
     start = start_of(law) + 0.05
     ideal = law.robot.with_friction(pc.Viscous(law.compensated))
-    run = pc.simulate(law, start, duration=1.0, plant=ideal, loop=pc.SampledLoop(period=H), progress=False)
+    run = pc.simulate(law, start, duration=0.6, plant=ideal, loop=pc.SampledLoop(period=H), progress=False)
     command = pc.PositionCommand(law, H, lag=lag, velocity=100.0)
     command.start(start)
-    commands, _ = serve(command.step, start, 1.0, lag)
+    commands, _ = serve(command.step, start, 0.6, lag)
     assert np.abs(commands - run.array("q")[0, 1:]).max() < 1e-8  # the engine's path is a table within 1e-9
     assert abs(command.s - run.array("s")[0, -1]) < 1e-6
     assert np.abs(command.qd - run.array("qd")[0, -1]).max() < 1e-6
