@@ -83,7 +83,7 @@ def loops(draw: st.DrawFn) -> WaypointPath:
     return WaypointPath(points, 1.0, closed=True)
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(loops(), st.integers(0, 9999))
 def test_random_walks_about_a_path_are_followed_continuously(path, seed):
     """Within the distance d of a curve of curvature κ, the nearest point moves (1 − κd)⁻¹ times as far as the arm."""

@@ -149,6 +149,7 @@ def test_limits_on_joints_and_tool_at_once(name, seed, closed):
     assert (np.max(shares, axis=0) < 0.95).mean() < 0.01
 
 
+@few
 @given(floats(0.1, 3.0), floats(0.1, 5.0), floats(0.5, 20.0))
 def test_a_line_is_a_trapezoid(length, speed, a):
     line = Line([0.0, 0.0], [0.6 * length, 0.8 * length], 1.0)
@@ -159,6 +160,7 @@ def test_a_line_is_a_trapezoid(length, speed, a):
     assert np.allclose(profile.squared, np.minimum(squared, speed**2), rtol=1e-9)
 
 
+@few
 @given(floats(0.1, 2.0), floats(0.1, 9.0), floats(1e-6, 1e-3), floats(1e-3, 1e-2))
 def test_curvature_and_chord_on_a_circle(radius, normal, error, period):
     by_normal = limited(Circle(radius, 1.0), MotionLimit(normal=normal))
