@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from ctypes import addressof
 
 import numpy as np
@@ -17,7 +18,7 @@ from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.engine.library import load_library
 from pathcontrol.engine.run_settings import GAINS, add_law
 from pathcontrol.engine.structs import Memory, Setup, Tick, address_of
-from pathcontrol.errors import EngineError, InputError
+from pathcontrol.errors import EngineError, InputError, TaskError
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 
 
@@ -35,7 +36,8 @@ class ControlTick:
     observers and wrappers; other laws are run in Python, with the same torques. A law that is wrapped, by
     :class:`SpeedOverride` or another :class:`LawWrapper`, has the methods of its speed input: :meth:`hold`,
     :meth:`resume`, :meth:`override` and :meth:`reverse` act at the next call. An observer takes the returned torques
-    to act up to the next call, within the effort limits of its robot.
+    to act up to the next call, within the effort limits of its robot. A compiled tick keeps the gains, the arm and the
+    task of the law as they are when it is made; speed inputs may change.
 
     Args:
         law: any law with one task, and gains for one arm.
@@ -80,8 +82,23 @@ class ControlTick:
         return self._tick.state
 
     def start_from(self, state: ArrayLike) -> None:
-        """Start again from a ``state`` of the law, (m,), as :attr:`state` gives it."""
-        self._tick.start(np.array(state, dtype=np.float64))
+        """Start again from a ``state`` of the law, (m,), as :attr:`state` gives it.
+
+        Raises:
+            InputError: it has another length than the state of this law.
+        """
+        z, expected = np.array(state, dtype=np.float64), self.state.shape
+        if z.shape != expected:
+            raise InputError(
+                f"state has the shape {z.shape}, expected {expected}: a state of this law",
+                argument="state",
+                value=z.shape,
+                limit=expected,
+            )
+        observer = self.law.inner.observer if isinstance(self.law, LawWrapper) else self.law.observer
+        if observer is not None and z[observer.size] >= 0:  # of a law that runs: its last tick is a period ago
+            z[observer.size] = -self._period
+        self._tick.start(z)
 
     def __call__(self, q: Array, qd: Array) -> Array:
         """Return the torques [N m], (n,), for measured q [rad] and q̇ [rad/s]; advance the plan by a period."""
@@ -122,7 +139,8 @@ class _CompiledTick:
         self._memory, self._setup, self._period, self._ticks = Memory(), Setup(), period, 0
         self._setup.period = period
         self._rules = add_law(self._setup, law, self._memory)
-        self._rules.prepare_to_go_back()  # now: an operator may ask for it between two ticks
+        with suppress(TaskError):  # of a path that can be passed in one direction only
+            self._rules.prepare_to_go_back()  # now: an operator may ask for it between two ticks
         n = law.robot.n
         self._io, self._state = np.zeros(3 * n + 1), np.zeros(self._setup.memory)
         self._q, self._qd, self._tau = self._io[:n], self._io[n : 2 * n], self._io[2 * n + 1 :]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from ctypes import addressof
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.control.wrappers.contact_rule import ContactRule
 from pathcontrol.control.wrappers.event_plan import EventPlan
 from pathcontrol.control.wrappers.override_rule import OverrideRule
-from pathcontrol.control.wrappers.pace_rule import PaceRule
+from pathcontrol.control.wrappers.pace_rule import FastestPlan, PaceRule
 from pathcontrol.control.wrappers.paced import Paced
 from pathcontrol.control.wrappers.speed_override import SpeedOverride
 from pathcontrol.control.wrappers.wrapper import LawWrapper, wrappers_of
@@ -23,6 +24,7 @@ from pathcontrol.tasks.task import PathTask
 #: the kinds of rules, in the order of the engine's numbers, and the wrappers that do nothing else than to have one
 RULES = (OverrideRule, ContactRule, PaceRule)
 WRAPPERS = (LawWrapper, SpeedOverride, Paced, EventPlan)
+_AHEAD, _AHEAD_OF_FUNCTIONS = 1 << 17, 1 << 9  # ticks
 #: puts the tables of tasks into memory and returns the address of the first
 TaskTables = Callable[[PathTask, Memory], int]
 
@@ -42,8 +44,10 @@ class SpeedRules:
         self._rules = law.rules if isinstance(law, LawWrapper) else ()
         self._tables = tables
         for one in (*wrappers_of(law), *self._rules):
-            if type(one) not in (*WRAPPERS, *RULES):
+            if type(one) not in (*WRAPPERS, *RULES) or not _is_of(one, law):
                 raise EngineError(f"{type(one).__name__} is in Python", value=type(one).__name__)
+        if sum(isinstance(rule, PaceRule) for rule in self._rules) > 1:
+            raise EngineError("a pace of a pace is in Python", value="PaceRule")
         if len(self._rules) > MOST_RULES:
             raise EngineError(
                 f"there are {len(self._rules)} rules of speed, the engine takes {MOST_RULES} at most",
@@ -70,6 +74,11 @@ class SpeedRules:
                 struct.fastest = self._tables(rule.plan.fastest, self._memory)
         setup.rule = addressof(self._structs)
 
+    @property
+    def longest(self) -> int:
+        """The most ticks to ask for at once: few where a user's function is asked, which may take its time."""
+        return _AHEAD if all(rule.is_known for rule in self._overrides) else _AHEAD_OF_FUNCTIONS
+
     def ask(self, times: Array, rollouts: int) -> Array:
         """Return u of all overrides at ``times`` [s], (m, overrides, N), to the first time at which one is an error.
 
@@ -95,3 +104,12 @@ class SpeedRules:
         for rule, struct in zip(self._rules, self._structs, strict=True):
             if isinstance(rule, PaceRule) and not struct.fastest_back:
                 struct.fastest_back = self._tables(rule.plan.fastest_back, self._memory)
+
+
+def _is_of(one: Any, law: Controller) -> bool:
+    """Return whether a wrapper or rule is made of parts of the library, and for the arm and the task of the law."""
+    if isinstance(one, PaceRule):
+        return type(one.plan) is FastestPlan and one.plan.task is law.task
+    if isinstance(one, ContactRule):
+        return type(one.ramp) is OverrideRule and one.robot is law.robot
+    return not callable(vars(one).get("law"))

@@ -124,14 +124,14 @@ class CompiledArm:
         self._take_over(controller, z)
         ticks, rollouts = max(1, round(duration / period)), self._shape[0]
         recorder = Recorder(rollouts, self._shape[1], ticks + 1)
-        block = max(1, _BLOCK // rollouts)
+        block = max(1, min(_BLOCK // rollouts, rules.longest))
         done, over = 0, False
         with progress_bar("simulating", ticks, progress) as update, ThreadPoolExecutor(self._threads) as pool:
             while not over:
                 count = self._begin_block(setup, min(block, ticks - done))
                 inputs = rules.ask(period * np.arange(done, done + count + (done + count == ticks)), rollouts)
+                last = done + count == ticks and len(inputs) > count
                 count = min(count, len(inputs))
-                last = done + count == ticks
                 over = self._run_block(setup, finish, recorder, _Block(done, count, last, inputs), pool) or last
                 done += count
                 update(min(done, ticks))

@@ -64,6 +64,7 @@ class AtEnd(Finish):
     def finished(self, t: float, s: Array, qd: Array) -> Array | None:
         arrived = s >= self._arrival
         if not arrived.any():
+            self._since[...] = np.inf
             return None
         resting = arrived & (np.linalg.norm(qd, axis=-1) <= _AT_REST)
         self._since = np.where(resting, np.minimum(self._since, t), np.inf)

@@ -10,7 +10,9 @@ from test_engine_loop import LAWS, MIDDLE, _apart, _arm, _law, _pair, _task
 
 import pathcontrol as pc
 from pathcontrol import EventPlan, Paced, SampledLoop, SpeedOverride
+from pathcontrol.control.wrappers.contact_rule import ContactRule
 from pathcontrol.control.wrappers.override_rule import OverrideRule
+from pathcontrol.control.wrappers.pace_rule import FastestPlan, PaceRule
 from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.engine.library import BUILDS, load_library
 
@@ -180,12 +182,68 @@ def test_an_override_out_of_range_is_an_error_when_it_is_asked_for(engine):
         pc.simulate(changing, np.full((3, 2), 0.5), duration=0.3, engine=engine, progress=False)
 
 
+def test_an_override_that_ends_with_the_run_is_asked_for_no_more_than_by_the_reference():
+    """The run ends before the table does, and before the function fails."""
+    table, asked = np.ones(2000), []  # 5 s of ticks, without the last one
+
+    def tabulated(t):
+        asked.append(t)
+        return table[round(t / 2.5e-3)]
+
+    line = pc.Line([0.9, 0.1], [0.8, 0.2], speed=1.0)
+    law = SpeedOverride(pc.ComputedTorque(CICESE.with_friction(None), line, 800.0, 60.0), tabulated)
+    runs = _pair(law, [0.9, 0.1], duration=5.0)
+    assert _apart(runs) < 1e-11
+    assert len(asked) < 1500  # 310 ticks of the reference, and one block of the engine
+    table = np.ones(1 << 9)  # as long as a block
+    with pytest.raises(IndexError):
+        pc.simulate(SpeedOverride(PLAN, tabulated), [0.9, 0.1], duration=2.0, engine="compiled", progress=False)
+    exact = np.ones((1 << 9) + 1)
+    law = SpeedOverride(PLAN, lambda t: exact[round(t / 2.5e-3)])
+    assert _apart(_pair(law, [0.9, 0.1], duration=(1 << 9) * 2.5e-3)) < 1e-11
+
+
 class OwnRule(OverrideRule):
     """A rule of the user's own."""
 
 
 class OwnWrapper(LawWrapper):
     """A wrapper of the user's own."""
+
+
+class OwnPlan(FastestPlan):
+    """Half as fast."""
+
+    def forward(self, s):
+        largest, slope = super().forward(s)
+        return 0.5 * largest, 0.5 * slope
+
+
+def test_a_pace_of_other_paths_or_of_one_s_own_runs_in_python():
+    """Its plan has as many tables as it likes."""
+    tasks = [pc.Circle(r, 10.0) for r in (0.8, 0.9, 1.0)]
+    one = Paced(pc.ExtendedMotionPlan(CICESE, tasks[0], 800.0, 60.0, k=20.0))
+    many = one.around(pc.ExtendedMotionPlan(CICESE, pc.TaskBatch(tasks), 800.0, 60.0, k=20.0))
+    effort = _effort(PLAN)
+    own = LawWrapper(PLAN, PaceRule(OwnPlan(CICESE, CIRCLE, effort, 0.1), effort, {}))
+    twice = Paced(Paced(PLAN, torque_limits=0.6 * effort))
+    stranger = LawWrapper(EventPlan(PLAN), ContactRule(CICESE.with_friction(None), [6.0, 2.0], 10.0, 0.1))
+    for law in (many, own, twice, stranger):
+        runs = [pc.simulate(law, [0.9, 0.1], duration=0.3, engine=e, progress=False) for e in ("pinocchio", "auto")]
+        assert "in Python" in runs[1].config["engine_reason"]
+        assert _apart(runs) < 1e-10
+
+
+@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
+def test_no_pace_turns_round(engine):
+    """It comes to rest where it has to brake harder than that, as on winding paths that begin at rest."""
+    rng = np.random.default_rng(6)
+    for _ in range(6):
+        path = pc.WaypointPath(rng.uniform([-0.5, 0.0], [0.5, 0.9], (4, 2)), speed=0.5)
+        law = Paced(pc.ExtendedMotionPlan(CICESE, path, 400.0, 40.0, k=5.0), torque_limits=0.65 * _effort(PLAN))
+        q, loop = path.q_d(np.array(0.0)) + np.array([0.02, -0.02]), SampledLoop(period=5e-3, torque_limits=True)
+        run = pc.simulate(law, q, duration=0.4, loop=loop, engine=engine, progress=False)
+        assert pc.speed_factor(run).min() > -1e-9
 
 
 @pytest.mark.parametrize(
@@ -224,3 +282,31 @@ def test_a_control_tick_that_is_operated_is_what_the_law_says(law):
         z = law.advance(z, out._replace(tau=acting), period)
         assert np.abs(tick.state - z[0]).max() < 1e-6
         q, qd = plant.advance(q, qd, acting + PUSH.torque(k * period, q, qd))
+
+
+def test_a_tick_of_a_path_that_can_be_passed_in_one_direction_only_goes_forward():
+    down = pc.Line([1.4, 0.3], [0.2, 0.1], speed=1.0)  # friction helps to lower the arm
+    tick = pc.ControlTick(Paced(pc.ComputedTorque(CICESE, down, 800.0, 60.0), torque_limits=[45.0, 15.0]), 2.5e-3)
+    tick.start([1.4, 0.3])
+    for _ in range(20):
+        tau = tick(np.array([1.4, 0.3]), np.zeros(2))
+    assert np.isfinite(tau).all()
+    assert tick.s > 0
+    tick.reverse()
+    with pytest.raises(pc.TaskError, match="weight and dry friction"):
+        tick(np.array([1.4, 0.3]), np.zeros(2))
+
+
+def test_a_tick_starts_again_from_its_state_with_the_same_torques():
+    """The observer goes on, as if the tick before had been a period ago."""
+    law = SpeedOverride(pc.ComputedTorque(CICESE, CIRCLE, 800.0, 60.0, friction="observed"))
+    tick, q, qd = pc.ControlTick(law, 2.5e-3), np.array([0.9, 0.1]), np.zeros(2)
+    tick.start(q, qd)
+    for _ in range(100):
+        tick(q, qd)
+    state = tick.state
+    expected = tick(q, qd).copy()
+    tick.start_from(state)
+    assert np.abs(tick(q, qd) - expected).max() < 1e-9
+    with pytest.raises(pc.InputError, match=r"state has the shape \(2,\), expected \(12,\)"):
+        tick.start_from([0.5, 0.3])

@@ -21,6 +21,7 @@ from pathcontrol import (
     Projection,
     Run,
     SampledLoop,
+    SpeedOverride,
     TaskError,
     UnknownNameError,
     VelocityProfile,
@@ -418,3 +419,12 @@ def test_bad_ends(arm, circle, options, error, words):
     with pytest.raises(error) as raised:
         simulate(Projection(arm, task, 100.0, 20.0), [0.0, 0.0], duration=1.0, **options)
     assert all(word in str(raised.value) for word in words), str(raised.value)
+
+
+@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
+def test_a_rest_at_the_end_that_is_too_short_does_not_count_when_the_arm_comes_back(arm, engine):
+    """The arm is at the end for less than 50 ms, goes back, and returns a second later."""
+    law = ComputedTorque(arm.with_friction(None), Line([0.9, 0.1], [0.5, 0.6], speed=1.0), 800.0, 60.0)
+    there_and_back = SpeedOverride(law, [[1.1125, -1.0], [1.3125, 1.0]], acceleration=10.0)
+    run = simulate(there_and_back, [0.9, 0.1], duration=5.0, engine=engine, progress=False)
+    assert run.finish_time[0] > 1.3125  # when it is let go forward again

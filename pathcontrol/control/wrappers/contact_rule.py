@@ -46,16 +46,16 @@ class ContactRule(SpeedRule):
     def __init__(self, robot: RobotModel, threshold: ArrayLike | None, acceleration: float, pause: float) -> None:
         self.threshold = _check_threshold(robot, threshold)
         self.pause = as_scalar("pause", pause, positive=True)
-        self._robot, self._ramp = robot, OverrideRule(1.0, acceleration)
+        self.robot, self.ramp = robot, OverrideRule(1.0, acceleration)
 
     @property
     def acceleration(self) -> float:
         """The largest |ẇ| [1/s]."""
-        return self._ramp.acceleration
+        return self.ramp.acceleration
 
     def contact_torque(self, moment: Moment) -> Array:
         """Return |r + b q̇| − F [N m], (*batch, n), negative where friction explains what is seen."""
-        observation, friction = moment.out.observation, self._robot.friction
+        observation, friction = moment.out.observation, self.robot.friction
         if observation is None:
             name = type(unwrap(moment.law)).__name__
             raise InputError(
@@ -70,10 +70,10 @@ class ContactRule(SpeedRule):
 
     def start(self, law: Controller, q: Array, qd: Array, s: Array) -> Array:
         check_rows("threshold", self.count_rows(), s.size)
-        return np.concatenate([self._ramp.start(law, q, qd, s), np.full((*s.shape, 1), -self.pause)], axis=-1)
+        return np.concatenate([self.ramp.start(law, q, qd, s), np.full((*s.shape, 1), -self.pause)], axis=-1)
 
     def rate(self, moment: Moment, asked: Speed, x: Array) -> Array:
-        return self._ramp.rate(moment, asked, x[..., :2])
+        return self.ramp.rate(moment, asked, x[..., :2])
 
     def memory_rate(self, moment: Moment, asked: Speed, tau: Array, x: Array) -> Array:
         left = x[..., 2]
@@ -81,12 +81,12 @@ class ContactRule(SpeedRule):
         wanted = Speed(np.where(contact | (left > 0), 0.0, asked.factor), asked.rate)
         unwinding = np.minimum(1.0, (left + self.pause) / _ALERT)
         winding = np.where(contact, (self.pause - left) / _ALERT, -unwinding)
-        ramp = self._ramp.memory_rate(moment, wanted, tau, x[..., :2])
+        ramp = self.ramp.memory_rate(moment, wanted, tau, x[..., :2])
         return np.concatenate([ramp, winding[..., None]], axis=-1)
 
     def advance(self, x: Array, xdot: Array, period: float) -> Array:
         left = np.minimum(np.maximum(x[..., 2:] + period * xdot[..., 2:], -self.pause), self.pause)
-        return np.concatenate([self._ramp.advance(x[..., :2], xdot[..., :2], period), left], axis=-1)
+        return np.concatenate([self.ramp.advance(x[..., :2], xdot[..., :2], period), left], axis=-1)
 
     def describe(self) -> dict[str, Any]:
         return {"threshold": self.threshold.tolist(), "pause": self.pause, "acceleration": self.acceleration}

@@ -64,9 +64,9 @@ class SpeedSteps:
             )
         self.times, self.factors = table.T
 
-    def __call__(self, t: float) -> Array:
-        i = int(np.searchsorted(self.times, t, side="right"))
-        return np.asarray(self.factors[i - 1] if i else 1.0)
+    def __call__(self, t: ArrayLike) -> Array:
+        i = np.searchsorted(self.times, t, side="right")
+        return np.where(i > 0, self.factors[i - 1], 1.0)
 
 
 class OverrideRule(SpeedRule):
@@ -128,12 +128,15 @@ class OverrideRule(SpeedRule):
         """
         if self._held or isinstance(self._value, FixedSpeed):
             return np.broadcast_to(self.value(0.0), (len(times), rollouts))
+        if isinstance(self._value, SpeedSteps):
+            steps = self._value(times)[:, None]
+            return np.broadcast_to(-steps if self._back else steps, (len(times), rollouts))
         u = np.empty((len(times), rollouts))
         for row, t in enumerate(times):
             try:
                 u[row] = self._value_of_rollouts(float(t), rollouts)
             except Exception:  # of the user's function, which the run may never come to
-                if row == 0 or row == len(times) - 1:
+                if row == 0:
                     raise
                 return u[:row]
         return u
@@ -144,6 +147,11 @@ class OverrideRule(SpeedRule):
         if u.ndim and u.size != rollouts:
             check_rows(f"override at t = {t:g} s", u.size, rollouts)
         return u
+
+    @property
+    def is_known(self) -> bool:
+        """True where u is known for all times, and is no function of the user's."""
+        return self._held or not isinstance(self._value, GivenSpeed)
 
     @property
     def factors(self) -> Array | None:

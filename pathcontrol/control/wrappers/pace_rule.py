@@ -31,21 +31,23 @@ class FastestPlan:
         margin: share of them that is left to feedback.
 
     Attributes:
+        robot: the arm, as given.
+        task: the path, as given.
         fastest: the task with its time-optimal profile, or a batch of them.
     """
 
     def __init__(self, robot: RobotModel, task: PathTask, torque: Array, margin: float) -> None:
-        self._robot, self._task, self._torque, self._margin = robot, task, torque, margin
+        self.robot, self.task, self._torque, self._margin = robot, task, torque, margin
         self.fastest = self._each(lambda one: one)
 
     def forward(self, s: Array) -> tuple[Array, Array]:
         """Return the largest w > 0 at s (*batch,) and its slope dw/ds, (*batch,) each."""
-        return _compare_rates(self.fastest, self._task, s, s)
+        return _compare_rates(self.fastest, self.task, s, s)
 
     def back(self, s: Array) -> tuple[Array, Array]:
         """Return the largest −w > 0 of a plan that goes back at s (*batch,), and its slope, (*batch,) each."""
-        mirror = 2 * self._task.s0 if self._task.closed else self._task.s0 + self._task.s_end
-        return _compare_rates(self.fastest_back, self._task, s, mirror - s)
+        mirror = 2 * self.task.s0 if self.task.closed else self.task.s0 + self.task.s_end
+        return _compare_rates(self.fastest_back, self.task, s, mirror - s)
 
     @cached_property
     def fastest_back(self) -> PathTask:
@@ -54,16 +56,16 @@ class FastestPlan:
 
     def _each(self, change: Callable[[PathTask], PathTask]) -> PathTask:
         """Return the changed task, or each of a batch, with its time-optimal profile."""
-        if not isinstance(self._task, TaskBatch):
-            return self._make_fastest(change(self._task))
-        made = {id(one): self._make_fastest(change(one)) for one, _ in self._task.groups()}
-        return TaskBatch([made[id(one)] for one in self._task])
+        if not isinstance(self.task, TaskBatch):
+            return self._make_fastest(change(self.task))
+        made = {id(one): self._make_fastest(change(one)) for one, _ in self.task.groups()}
+        return TaskBatch([made[id(one)] for one in self.task])
 
     def _make_fastest(self, task: PathTask) -> PathTask:
         """Return a task with its time-optimal profile."""
         end, torque = None if task.closed else END_TIME, self._torque
         return task.with_profile(
-            time_optimal(self._robot, task, velocity=None, torque=torque, margin=self._margin, end_time=end)
+            time_optimal(self.robot, task, velocity=None, torque=torque, margin=self._margin, end_time=end)
         )
 
 
@@ -104,7 +106,7 @@ class PaceRule(SpeedRule):
         # where nothing keeps all limits, slower is better; but no pace turns round, it only comes to rest
         rate = np.where(least <= most, np.minimum(np.maximum(wanted, least), most), np.minimum(most, 0.0))
         rest = -way * x[..., 0] / _APPROACH
-        return np.asarray(way * np.maximum(rate, np.minimum(rest, wanted)))
+        return np.asarray(way * np.maximum(rate, rest))
 
     def describe(self) -> dict[str, Any]:
         return self._settings

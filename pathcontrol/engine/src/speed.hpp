@@ -108,7 +108,7 @@ template <class V> static V pace_rate(const Setup &setup, const Rule &rule, cons
   const V wanted = way * (target.rate + (target.factor - w) / APPROACH), rest = -way * w / APPROACH;
   // where nothing keeps all limits, slower is better; but no pace turns round, it only comes to rest
   const V rate = select(less_equal(least, most), smaller(larger(wanted, least), most), smaller(most, V{}));
-  return way * larger(rate, smaller(rest, wanted));
+  return way * larger(rate, rest);
 }
 
 // --- the law ----------------------------------------------------------------------------------------------------------
