@@ -25,8 +25,8 @@ task = pc.ToolpathTask(robot, "tip", drawing, table, orientation="down", start=r
 known = pc.Viscous(np.full(6, 0.5)) + pc.Coulomb([6.0, 6.0, 4.0, 1.0, 1.0, 1.0])
 actual = pc.Viscous(np.full(6, 0.6)) + pc.Coulomb([7.0, 7.0, 4.5, 1.1, 1.1, 1.1])
 model, plant = robot.with_friction(known), robot.with_friction(actual)
-laws = [pc.ExtendedMotionPlan(model, path, K_p=1600.0, K_v=80.0, k=0.2, friction="full") for path in task]
-loop = pc.SampledLoop(period=8e-3, torque_limits=True)
+laws = [pc.ExtendedMotionPlan(model, path, K_p=1600.0, K_v=80.0, k=0.5, friction="full") for path in task]
+loop = pc.SampledLoop(period=4e-3, torque_limits=True)
 run = pc.simulate_sequence(laws, task.q_d(np.array(0.0)), task=task, duration=60.0, plant=plant, loop=loop)
 
 numbers = pc.toolpath_metrics(run)

@@ -1,4 +1,4 @@
-"""The paper's experiment with projection at twice its period, and with what the law learns along the path, lap by lap.
+"""The paper's experiment with projection, and with what the law learns along the path, lap by lap.
 
 Writes a film and a figure of the errors. Usage: python examples/learning.py [folder] [laps]
 """
@@ -16,7 +16,7 @@ laps = int(sys.argv[2]) if len(sys.argv) > 2 else 4
 robot = pc.load_robot("cicese_2dof")
 task = pc.Circle(np.deg2rad(57.3), np.deg2rad(114.59))
 law = pc.Projection(robot, task, 800.0, [45.0, 100.0])
-loop = pc.SampledLoop(5e-3, encoders=True, velocity="difference", torque_limits=True)
+loop = pc.SampledLoop(encoders=True, velocity="difference", torque_limits=True)
 
 runs = {
     name: pc.simulate(one, np.deg2rad([40.0, 70.0]), laps=laps, duration=4.0 * laps + 2.0, loop=loop)

@@ -25,8 +25,8 @@ task = pc.ToolpathTask(robot, "cutter", program, table, orientation="down", star
 friction = pc.Viscous(np.full(7, 0.5)) + pc.Coulomb([0.6, 0.6, 0.5, 0.5, 0.3, 0.3, 0.3])
 plant = robot.with_payload(0.2, frame="panda_link8", com=[0.0, 0.0, 0.08]).with_friction(friction)
 model = robot.with_friction(friction)
-laws = [pc.ExtendedMotionPlan(model, path, K_p=1600.0, K_v=80.0, k=0.2, friction="full") for path in task]
-loop = pc.SampledLoop(period=8e-3, torque_limits=True)
+laws = [pc.ExtendedMotionPlan(model, path, K_p=1600.0, K_v=80.0, k=0.5, friction="full") for path in task]
+loop = pc.SampledLoop(period=4e-3, torque_limits=True)
 run = pc.simulate_sequence(laws, task.q_d(np.array(0.0)), task=task, duration=60.0, plant=plant, loop=loop)
 
 numbers = pc.toolpath_metrics(run)
