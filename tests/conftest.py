@@ -10,6 +10,9 @@ from pathlib import Path
 
 # matrices here are small: threads of BLAS would wait for each other, busily, on cores that other tests need
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# what an array frees, the next one takes: glibc gives it back to the system otherwise, and asks for it page by page
+os.environ.setdefault("MALLOC_MMAP_THRESHOLD_", str(1 << 25))  # bytes, the largest that it takes
+os.environ.setdefault("MALLOC_TRIM_THRESHOLD_", str(1 << 30))
 
 import numpy as np
 import pytest
