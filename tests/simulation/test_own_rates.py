@@ -50,3 +50,26 @@ def test_intervals_shorter_than_the_period_are_told(ideal_arm):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         pc.simulate(law, [0.99, 0.0], loop=pc.SampledLoop(0.05, substeps=20), **start)
+
+
+def fastest_of_a_pace(arm, period):
+    """The largest factor of the speed of a paced law from rest, and its last difference to 1."""
+    law = pc.Paced(pc.Projection(arm, pc.Circle(0.5, 1.0), k_p=20.0, K_v=8.0))
+    loop, start = pc.SampledLoop(period, substeps=20), law.task.q_d(np.zeros(()))
+    w = pc.simulate(law, start, duration=40 * period, loop=loop, progress=False).array("sdot")[0] / 2.0
+    return w.max(), abs(w[-1] - 1)
+
+
+def test_a_pace_goes_beyond_what_is_asked_for_only_with_a_word(ideal_arm):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fastest, late = fastest_of_a_pace(ideal_arm, 0.02)
+    assert fastest < 1.001
+    assert late < 0.02
+    with pytest.warns(StepWarning, match="goes beyond the speed that is asked for; shorten the period"):
+        fastest, late = fastest_of_a_pace(ideal_arm, 0.03)
+    assert fastest > 1.4
+    assert late < 0.05
+    with pytest.warns(StepWarning, match="pace of Paced .* is likely to be unstable"):
+        fastest, late = fastest_of_a_pace(ideal_arm, 0.045)
+    assert late > 0.5

@@ -17,7 +17,7 @@ from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.profile import END_TIME
 from pathcontrol.tasks.task import PathTask
 
-_APPROACH = 0.02  # s, time constant with which w comes to the speed that is asked for, or possible
+APPROACH = 0.02  # s, time constant with which w comes to the speed that is asked for, or possible
 _FLAT = 1e-9  # share of the largest |∂τ/∂ẇ|/τ_max below which a joint does not depend on ẇ
 
 
@@ -101,11 +101,11 @@ class PaceRule(SpeedRule):
     def rate(self, moment: Moment, asked: Speed, x: Array) -> Array:
         """Return ẇ [1/s], (*batch,); a plan that is to go back does what one that goes forward does, mirrored."""
         target, way = self._within_reach(moment, asked), np.where(asked.factor < 0, -1.0, 1.0)
-        wanted = way * (target.rate + (target.factor - x[..., 0]) / _APPROACH)
+        wanted = way * (target.rate + (target.factor - x[..., 0]) / APPROACH)
         least, most = rate_bounds(moment.out.tau, way[..., None] * moment.gradient, self.torque)
         # where nothing keeps all limits, slower is better; but no pace turns round, it only comes to rest
         rate = np.where(least <= most, np.minimum(np.maximum(wanted, least), most), np.minimum(most, 0.0))
-        rest = -way * x[..., 0] / _APPROACH
+        rest = -way * x[..., 0] / APPROACH
         return np.asarray(way * np.maximum(rate, rest))
 
     def describe(self) -> dict[str, Any]:

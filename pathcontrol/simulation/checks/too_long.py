@@ -27,7 +27,7 @@ from pathcontrol.simulation.checks.fast_modes import (
     rates_of_disturbance,
 )
 from pathcontrol.simulation.checks.held_gains import linearize_law, longest_period
-from pathcontrol.simulation.checks.own_rates import check_own_rates
+from pathcontrol.simulation.checks.own_rates import check_own_rates, check_pace
 from pathcontrol.simulation.checks.plan_gain import check_plan_gain
 from pathcontrol.simulation.checks.too_fast import TooFast, gather_paths, select_worst
 from pathcontrol.simulation.loops import MOST_SUBSTEPS, Arm, ContinuousTime, SampledLoop
@@ -110,7 +110,7 @@ def _find_warnings(
     """Yield the warnings of all laws, of the arm and of the disturbance."""
     rows = find_extreme_arms(robot, q[:1])
     felt = {row: add_damping(arm_of(robot, row), loop.period / loop.substeps) for row in rows}
-    yield from gather_paths([list(_check_law(unwrap(law), loop, robot, felt, q, qd)) for law in controllers])
+    yield from gather_paths([list(_check_law(law, loop, robot, felt, q, qd)) for law in controllers])
     if disturbance is not None:
         found = (one for arm in felt.values() for one in _check_disturbance(disturbance, loop, arm, q, qd, duration))
         yield from (one.sentence for one in select_worst(found))
@@ -120,6 +120,8 @@ def _check_law(
     law: Controller, loop: SampledLoop, robot: Arm, felt: Mapping[int, DampedArm], q: Array, qd: Array
 ) -> Iterator[TooFast]:
     """Yield what is too fast of a law, and of the arms on its path."""
+    yield from check_pace(law, loop.period)
+    law = unwrap(law)
     postures, speeds = _sample_states(law.task, q, qd)
     yield from _check_gains(law, loop.period, robot, list(felt), postures)
     yield from _check_plan(law, loop)
