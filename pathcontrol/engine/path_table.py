@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pathcontrol._arrays import Array
+from pathcontrol._arrays import Array, norms
 from pathcontrol._identity import IdentityCache
 from pathcontrol.control.ending import Ending, arrival_parameter
 from pathcontrol.engine.library import load_library
@@ -18,8 +18,7 @@ from pathcontrol.errors import EngineError
 from pathcontrol.geometry import hermite
 from pathcontrol.geometry.hermite import horner
 from pathcontrol.geometry.periodic import wrap
-from pathcontrol.tasks.profile import ConstantRate
-from pathcontrol.tasks.recorded import RecordedPath
+from pathcontrol.tasks.recorded import sample_path
 from pathcontrol.tasks.task import PathTask
 
 _NODES = 0.5 - 0.5 * np.cos(np.pi * (2 * np.arange(6) + 1) / 12)  # places in a cell at which ϑ is interpolated
@@ -115,18 +114,16 @@ def make_table(task: PathTask) -> PathTable:
             f"{name} neither ends nor repeats, so it has no table; give it an s_end or a period", value=name
         )
     try:
-        recorded = RecordedPath.of(task, ConstantRate(1.0))
+        sampled, jets = sample_path(task)
     except Exception as error:  # code of the user, which need not answer everywhere
         raise EngineError(f"{name} cannot be tabulated: {error}", value=name) from error
-    samples = recorded.samples if task.knots is not None else _halve(recorded.samples)
-    knots = _refine(task, _add_corners(task, samples))
-    jets = recorded.jets if np.array_equal(knots, recorded.samples) else _jets(task, knots)
-    rate = _rate_pieces(task, knots[:-1], knots[1:])
+    knots, rate = _refine(task, _add_corners(task, sampled if task.knots is not None else _halve(sampled)))
+    if not np.array_equal(knots, sampled):
+        jets = _jets(task, knots)
     coefficients = np.concatenate([hermite.coefficients(knots, jets), rate[..., None]], axis=-1)
     ending = Ending.of(task)
     arrival = np.inf if task.closed else arrival_parameter(task)
-    width = float(np.median(np.diff(knots)))
-    table = PathTable(knots, np.moveaxis(coefficients, 0, 1), task.closed, ending, arrival, width)
+    table = PathTable(knots, np.moveaxis(coefficients, 0, 1), task.closed, ending, arrival, _median(np.diff(knots)))
     if not _agrees(table, task):
         raise EngineError(
             f"{name} is not smooth enough for a table of quintics: q_d must have two derivatives that fit", value=name
@@ -152,6 +149,12 @@ def _jets(task: PathTask, s: Array) -> Array:
     return np.stack([task.q_d(s), task.dq_d(s), task.ddq_d(s)])
 
 
+def _median(values: Array) -> float:
+    """Return the median; ``np.median`` takes many times as long."""
+    ordered, half = np.sort(values), len(values) // 2
+    return float(0.5 * (ordered[half] + ordered[-1 - half]))
+
+
 def _theta(task: PathTask, s: Array) -> tuple[Array, Array]:
     """Return ϑ and ϑ' at s, each of the shape of s."""
     zero = np.zeros_like(s)
@@ -162,7 +165,7 @@ def _rate_pieces(task: PathTask, left: Array, right: Array) -> Array:
     """Return quintics (6, K) that interpolate ϑ at the Chebyshev nodes of the cells [left, right], (K,) each."""
     width = right - left
     s = left + _NODES[:, None] * width
-    theta = _theta(task, s.reshape(-1))[0].reshape(s.shape)
+    theta = np.broadcast_to(task.theta(s.reshape(-1)), s.size).reshape(s.shape)
     powers = np.arange(_DEGREE, -1, -1)
     return np.linalg.solve(_NODES[:, None] ** powers, theta) / width ** powers[:, None]
 
@@ -185,36 +188,43 @@ def _halve(knots: Array) -> Array:
     return np.sort(np.concatenate([knots, 0.5 * (knots[1:] + knots[:-1])]))
 
 
-def _refine(task: PathTask, knots: Array) -> Array:
-    """Halve cells until quintics follow ϑ in them, within shares of the largest ϑ and |ϑ'|."""
+def _refine(task: PathTask, knots: Array) -> tuple[Array, Array]:
+    """Halve cells until quintics follow ϑ in them, within shares of the largest ϑ and |ϑ'|.
+
+    Return the knots and the quintics (6, K), each of which is made once.
+    """
     theta, slope = _theta(task, 0.5 * (knots[1:] + knots[:-1]))
     largest = np.abs(theta).max()
     scale = largest, max(np.abs(slope).max(), largest / (knots[-1] - knots[0]))
-    coarse, most = _find_coarse(task, knots, np.arange(len(knots) - 1), *scale), len(knots) + _MOST_CELLS
+    pieces, most = _rate_pieces(task, knots[:-1], knots[1:]), len(knots) + _MOST_CELLS
+    coarse = _find_coarse(task, knots[:-1], knots[1:], pieces, *scale)
     for _ in range(_HALVINGS):
         if not coarse.size or len(knots) + len(coarse) > most:
             break
         knots = np.insert(knots, coarse + 1, 0.5 * (knots[coarse] + knots[coarse + 1]))
         halves = coarse + np.arange(len(coarse))
-        coarse = _find_coarse(task, knots, np.sort(np.concatenate([halves, halves + 1])), *scale)
-    return knots
+        halves = np.sort(np.concatenate([halves, halves + 1]))
+        left, right = knots[halves], knots[halves + 1]
+        pieces = np.insert(pieces, coarse, 0.0, axis=1)
+        pieces[:, halves] = made = _rate_pieces(task, left, right)
+        coarse = halves[_find_coarse(task, left, right, made, *scale)]
+    return knots, pieces
 
 
 def _find_coarse(
-    task: PathTask, knots: Array, cells: NDArray[np.intp], largest: float, steepest: float
+    task: PathTask, left: Array, right: Array, pieces: Array, largest: float, steepest: float
 ) -> NDArray[np.intp]:
-    """Return those of the ``cells`` in which ϑ and its quintic differ too much."""
-    left, right = knots[cells], knots[cells + 1]
+    """Return the indices of the cells [left, right], (k,) each, in which ϑ and its quintic (6, k) differ too much."""
     x = _PROBES[:, None] * (right - left)
     theta, slope = (part.reshape(x.shape) for part in _theta(task, (left + x).reshape(-1)))
-    value, rise = horner(_rate_pieces(task, left, right)[:, None], x)
+    value, rise = horner(pieces[:, None], x)
     local = np.abs(slope).max(0, initial=0.0)
     # the tolerance cannot be less than the change of ϑ over the rounding of s
     rounding = _ROUNDING * (largest + local * np.abs(right))
     apart = np.abs(value - theta).max(0, initial=0.0) > _RATE * largest + rounding
     bent = np.abs(rise - slope).max(0, initial=0.0) > _RATE_SLOPE * (steepest + local) + 8 * rounding / (right - left)
     wide = right - left > _NARROWEST * np.maximum(np.abs(left), np.abs(right))  # s has no more digits to halve
-    return cells[(apart | bent) & wide]
+    return np.flatnonzero((apart | bent) & wide)
 
 
 def _agrees(table: PathTable, task: PathTask) -> bool:
@@ -247,12 +257,13 @@ def bezier_points(knots: Array, coefficients: Array) -> Array:
     width, degree = np.diff(knots), coefficients.shape[1] - 1
     powers = range(degree + 1)
     weights = np.array([[comb(j, i) / comb(degree, i) if i <= j else 0.0 for i in powers] for j in powers])
-    rising = coefficients[:, ::-1] * (width[:, None] ** np.arange(degree + 1))[..., None]
-    return np.einsum("ji,kin->kjn", weights, rising)
+    rising = np.moveaxis(coefficients, 1, 0)[::-1] * (width ** np.arange(degree + 1)[:, None])[..., None]
+    points = weights @ rising.reshape(degree + 1, -1)  # one product of matrices for all pieces
+    return np.moveaxis(points.reshape(rising.shape), 0, 1)
 
 
 def _balls(knots: Array, coefficients: Array) -> tuple[Array, Array]:
     """Return a ball around each piece of q_d, centres (K, n) and radii (K,)."""
     points = bezier_points(knots, coefficients)
     centre = 0.5 * (points.min(1) + points.max(1))
-    return centre, np.linalg.norm(points - centre[:, None], axis=-1).max(1) * (1 + 1e-12)
+    return centre, norms(points - centre[:, None]).max(1) * (1 + 1e-12)

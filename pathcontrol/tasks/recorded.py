@@ -136,15 +136,9 @@ class RecordedPath(PathTask):
             profile: its ϑ(s); by default samples of it.
             upto: the largest s that was used of an endless path; it is recorded a tenth further, or up to s0 + 2π.
         """
-
-        def jet(s: Array) -> Array:
-            return np.stack([task.q_d(s), task.dq_d(s), task.ddq_d(s)])
-
         endless = task.period is None and not np.isfinite(task.s_end)
-        s, jets = sample_adaptively(jet, _first_cells(task, upto, _CELLS if task.knots is None else 1))
         return cls(
-            s,
-            jets,
+            *sample_path(task, upto),
             recorded_profile(task, upto) if profile is None else profile,
             period=task.period,
             endless=endless,
@@ -219,6 +213,23 @@ class RecordedPath(PathTask):
                 s=float(s.max()),
             )
         return s if self.period is None else _wrap(s, self.samples, self.period)
+
+
+def sample_path(task: PathTask, upto: float | None = None) -> tuple[Array, Array]:
+    """Return the parameters, (m,), at which :meth:`RecordedPath.of` keeps a task, and its jets there, (3, m, n).
+
+    Raises:
+        InputError: they are not finite.
+    """
+
+    def jet(s: Array) -> Array:
+        return np.stack([task.q_d(s), task.dq_d(s), task.ddq_d(s)])
+
+    def compared(s: Array) -> Array:
+        return np.stack([task.q_d(s), task.dq_d(s)])
+
+    s, jets = sample_adaptively(jet, _first_cells(task, upto, _CELLS if task.knots is None else 1), compared)
+    return _check_samples(s, jets, 3)
 
 
 def _first_cells(task: PathTask, upto: float | None, cells: int) -> Array:
