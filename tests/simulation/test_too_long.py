@@ -12,7 +12,7 @@ from pathcontrol.control.projection import Projection
 from pathcontrol.errors import PathControlWarning, SimulationError
 from pathcontrol.robot.friction import Stribeck, Viscous
 from pathcontrol.robot.loading import load_robot
-from pathcontrol.simulation.arm.disturbance import Disturbance, Push
+from pathcontrol.simulation.arm.disturbance import Disturbance, FrameForce, Push
 from pathcontrol.simulation.checks.fast_modes import add_damping, rate_of_arm, rate_of_friction
 from pathcontrol.simulation.checks.too_long import warn_of_steps
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
@@ -176,6 +176,27 @@ def test_a_joint_held_for_a_while_needs_substeps_and_with_those_that_are_advised
             runs.append(simulate(LAW, start, duration=0.6, loop=loop, disturbance=held, progress=False).array("q")[0])
     # what holds it is held over a step, and so of first order
     assert np.abs(runs[0] - runs[1]).max() < 0.05 * np.ptp(runs[1])
+
+
+class Stuck(Push):
+    """A push of one's own class, with a spring."""
+
+    def torque(self, t, q, qd):
+        return super().torque(t, q, qd) - self.share(t) * 1e4 * q
+
+
+def test_what_depends_on_the_state_is_told_whatever_acts_beside_it():
+    push, spring = Push([1.0, 1.0], 0.1, 0.3), Held([0.0, 0.0], 1e4)
+    assert "the disturbance, a spring" in told(LAW, disturbance=push + spring)
+    assert advised(told(LAW, disturbance=push + spring)) == advised(told(LAW, disturbance=spring))
+    assert "Stuck, a spring" in told(LAW, disturbance=Stuck([1.0, 1.0]))
+
+
+def test_a_force_on_a_frame_is_told_however_short_it_is():
+    """The arm swings about a strong force as about gravity."""
+    force = FrameForce(ARM, ARM.frame_names[-1], [5e4, 0.0, 0.0], start=0.5032, duration=2.5e-3)
+    assert re.search("FrameForce, a spring that is held", told(LAW, disturbance=force))
+    assert told(LAW, disturbance=force, duration=0.5) == ""
 
 
 def test_a_sequence_of_paths_tells_it_too():

@@ -7,6 +7,8 @@ friction are taken by the midpoint rule, and a disturbance is held over a step.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import reduce
+from operator import add
 from typing import NamedTuple
 
 import numpy as np
@@ -14,12 +16,29 @@ import numpy as np
 from pathcontrol._arrays import Array, average_neighbours
 from pathcontrol.robot.friction import FrictionLaw, levels_of, levels_vary, viscous_of
 from pathcontrol.robot.model import RobotModel
-from pathcontrol.simulation.arm.disturbance import Disturbance, jump_times
+from pathcontrol.simulation.arm.disturbance import (
+    Disturbance,
+    FrameForce,
+    Harmonic,
+    Push,
+    TorqueLimitDrop,
+    jump_times,
+    list_terms,
+)
+from pathcontrol.simulation.arm.dropout import Dropout
+from pathcontrol.simulation.arm.friction_change import FrictionChange
+from pathcontrol.simulation.arm.jam import JammedJoint
+from pathcontrol.simulation.arm.pick_up import PickUp
+from pathcontrol.simulation.arm.wall import Wall
 
 _NUDGE = 1e-5  # rad and rad/s, the step of finite differences
 _TRIED_SPEED, _TRIED_ANGLE = 0.1, 1e-3  # rad/s and rad, the differences at which a disturbance is evaluated
 _TIMES = 65
 _SPEEDS = np.geomspace(1e-4, 10.0, 41)  # rad/s, between which the slope of friction is taken
+
+
+#: disturbances whose torque depends on time alone; a class of the user's own that extends one of them is none of these
+_OF_TIME = (Push, Harmonic, TorqueLimitDrop, Dropout, FrictionChange, JammedJoint, PickUp, Wall)
 
 
 class DampedArm(NamedTuple):
@@ -85,17 +104,25 @@ def rates_of_disturbance(
     """Return the fastest damping and the fastest oscillation [1/s] that a disturbance gives the arm.
 
     They are the largest |λ| of M̂⁻¹ ∂d/∂q̇, and the square root of that of M̂⁻¹ ∂d/∂q. The torques d are evaluated at
-    some times, at velocities and positions beside those of the start, (N, n).
+    some times, at velocities and positions beside those of the start, (N, n). Terms of the library that depend on time
+    alone have no slopes, and are not asked.
     """
+    terms = [term for term in list_terms(disturbance) if type(term) not in _OF_TIME]
+    if not terms:
+        return 0.0, 0.0
+    felt = reduce(add, terms)
     inverse = np.linalg.inv(damped.mass_matrix(q))
     known: set[bytes] = set()
     damping = stiffness = 0.0
-    for t in _sample_times(disturbance, duration):
-        tried = _try_states(disturbance, t, q, qd)
+    states = [(q + side * _TRIED_ANGLE, qd + side * _TRIED_SPEED) for side in (0.0, 1.0, -1.0)]
+    tried = np.empty((3, *q.shape))
+    for t in _sample_times(felt, duration):
+        for torque, state in zip(tried, states, strict=True):
+            torque[...] = felt.torque(t, *state)
         if (one := tried.tobytes()) in known:  # most change at their jumps only, and their slopes with them
             continue
         known.add(one)
-        slopes = _slopes(disturbance, t, q, qd, tried)
+        slopes = _slopes(felt, t, q, qd, tried)
         if slopes is None:
             continue
         by_speed, by_angle = slopes
@@ -105,17 +132,16 @@ def rates_of_disturbance(
 
 
 def _sample_times(disturbance: Disturbance, duration: float) -> Iterator[float]:
-    """Yield times [s] at which a disturbance is evaluated: evenly spread, and between its jumps."""
+    """Yield times [s] at which a disturbance is evaluated: between its jumps, and evenly spread.
+
+    Forces on frames are the same from one jump to the next.
+    """
     jumps = jump_times(disturbance)
-    ends = np.concatenate([[0.0], jumps[(jumps > 0) & (jumps < duration)], [duration]])
+    ends = np.concatenate([[0.0], np.unique(jumps[(jumps > 0) & (jumps < duration)]), [duration]])
     between = average_neighbours(ends)
-    yield from np.union1d(np.linspace(0.0, duration, _TIMES), between[:_TIMES]).tolist()
-
-
-def _try_states(disturbance: Disturbance, t: float, q: Array, qd: Array) -> Array:
-    """Return the torques at t [s] of the states (N, n) and of two beside them, (3, N, n)."""
-    beside = ((q + side * _TRIED_ANGLE, qd + side * _TRIED_SPEED) for side in (0.0, 1.0, -1.0))
-    return np.stack([_torque(disturbance, t, *state) for state in beside])
+    if len(between) > _TIMES or any(type(term) is not FrameForce for term in list_terms(disturbance)):
+        between = np.union1d(np.linspace(0.0, duration, _TIMES), between[:_TIMES])
+    yield from between.tolist()
 
 
 def _torque(disturbance: Disturbance, t: float, q: Array, qd: Array) -> Array:
