@@ -6,10 +6,12 @@ it, reports states that a test gives it, and keeps the input registers of every 
 ``direct_torque``.
 """
 
-import multiprocessing
 import os
+import pickle
 import socket
 import struct
+import subprocess
+import sys
 import threading
 import time
 from contextlib import suppress
@@ -173,37 +175,43 @@ class Peer:
             self.state |= POWERED | {"output_int_register_0": DONE}
 
 
-def _serve(motion, pipe):
-    """Serve until the pipe says so, in a process of its own: ur_rtde holds the interpreter while it waits.
-
-    It has real-time priority where that is allowed, as a controller has a computer of its own.
-    """
-    with suppress(PermissionError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(70))
-    peer = Peer(motion)
-    pipe.send("ready")
-    while (asked := pipe.recv()) is not None:
-        if isinstance(asked, dict):
-            peer.state |= asked
-        pipe.send((peer.log, peer.commands))
-
-
 class PeerProcess:
-    """A peer in a process of its own."""
+    """A peer in a process of its own: ur_rtde holds the interpreter while it waits."""
 
     def __init__(self, motion):
-        context = multiprocessing.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(motion, theirs), daemon=True)
-        self._process.start()
-        self._pipe.recv()
+        command = [sys.executable, "-S", __file__]  # it needs no packages, which would take longer to find than it runs
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self._ask(motion)
 
     def change(self, **state):
         """Change what the controller reports, and return its log and the commands that it took."""
-        self._pipe.send(state)
-        return self._pipe.recv()
+        return self._ask(state)
 
     def kill(self):
         """Let the controller vanish."""
         self._process.kill()
-        self._process.join()
+        self._process.communicate()
+
+    def _ask(self, what):
+        pickle.dump(what, self._process.stdin)
+        self._process.stdin.flush()
+        return pickle.load(self._process.stdout)
+
+
+def main():
+    """Serve along the motion that comes first, and take each state that comes after it, until no more can come.
+
+    The process has real-time priority where that is allowed, as a controller has a computer of its own.
+    """
+    with suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(70))
+    peer = Peer(pickle.load(sys.stdin.buffer))
+    with suppress(EOFError):
+        while True:
+            pickle.dump((peer.log, peer.commands), sys.stdout.buffer)
+            sys.stdout.buffer.flush()
+            peer.state |= pickle.load(sys.stdin.buffer)
+
+
+if __name__ == "__main__":
+    main()
