@@ -55,19 +55,7 @@ class MachineProcess:
         self.key = secrets.token_bytes(32) if key is None else key
         check_key(host, key)
         as_whole("port", port, 0, 65535)
-        steps = max(1, int(np.ceil(period / _STEP - 1e-9)))
-        effort = np.where(robot.limits.effort > 0, robot.limits.effort, np.inf)
-        settings = MachineSettings(
-            write_mjcf(robot, period / steps),
-            steps,
-            friction_bias(robot).tolist(),
-            np.minimum(effort, 1e9).tolist(),
-            np.asarray(q, dtype=np.float64).tolist(),
-            period,
-            host,
-            port,
-            self.key.hex(),
-        )
+        settings = choose_settings(robot, q, period, host, port, self.key)
         command = [sys.executable, "-m", "pathcontrol.hardware.sil.machine"]
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=_with_package()
@@ -107,6 +95,23 @@ class MachineProcess:
             said, _ = self._process.communicate()
         lines = said.strip().splitlines()
         return dict(json.loads(lines[-1])) if lines else {}
+
+
+def choose_settings(robot: RobotModel, q: Array, period: float, host: str, port: int, key: bytes) -> MachineSettings:
+    """Return the settings of a machine that is the ``robot`` at rest at q [rad], (n,)."""
+    steps = max(1, int(np.ceil(period / _STEP - 1e-9)))
+    effort = np.where(robot.limits.effort > 0, robot.limits.effort, np.inf)
+    return MachineSettings(
+        write_mjcf(robot, period / steps),
+        steps,
+        friction_bias(robot).tolist(),
+        np.minimum(effort, 1e9).tolist(),
+        np.asarray(q, dtype=np.float64).tolist(),
+        period,
+        host,
+        port,
+        key.hex(),
+    )
 
 
 def _with_package() -> dict[str, str]:
