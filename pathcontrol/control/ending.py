@@ -69,14 +69,14 @@ class Ending(NamedTuple):
 
     def brake(self, point: PathPoint, s: Array, factor: Array | float = 1.0) -> PathPoint:
         """Return ``point``, the task at s, with ϑ and ϑ' of the plan that goes at a ``factor`` and comes to rest."""
-        left, back, share = self._largest_factor_forward(s), self._largest_factor_back(s), self.share(s, factor)
+        left, back = self._largest_factor_forward(s), self._largest_factor_back(s)
+        share = _bound_factor(factor, left, back)
         slope = np.where(left < factor, -1.0 / self.braking, np.where(-back > factor, -1.0 / self.braking_back, 0.0))
         return point._replace(theta=point.theta * share, dtheta=point.dtheta * share + point.theta * slope)
 
     def share(self, s: Array, factor: Array | float = 1.0) -> Array:
         """Return the share of ϑ(s) at which a plan with a ``factor`` goes, as it comes to rest, (*batch,)."""
-        left, back = self._largest_factor_forward(s), self._largest_factor_back(s)
-        return np.minimum(np.maximum(factor, -np.maximum(back, 0.0)), np.maximum(left, 0.0))
+        return _bound_factor(factor, self._largest_factor_forward(s), self._largest_factor_back(s))
 
     def follows(self, s: Array, factor: Array) -> NDArray[np.bool_]:
         """Return where a plan goes at its ``factor``, and is not braked at an end, (*batch,)."""
@@ -93,6 +93,11 @@ class Ending(NamedTuple):
     def _largest_factor_back(self, s: Array) -> Array:
         """Return the largest factor at s with which the plan comes to rest on s0, negative before it."""
         return np.asarray((s - self.s0) / self.braking_back)
+
+
+def _bound_factor(factor: Array | float, forward: Array, back: Array) -> Array:
+    """Return the factor, or the largest one ``forward``, or ``back``, with which the plan comes to rest on an end."""
+    return np.minimum(np.maximum(factor, -np.maximum(back, 0.0)), np.maximum(forward, 0.0))
 
 
 def arrival_parameter(task: PathTask) -> float:

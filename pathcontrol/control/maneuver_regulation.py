@@ -12,6 +12,7 @@ from pathcontrol.control.base import ControlOutput
 from pathcontrol.control.reference_law import STEEPEST, Reference, TrackingReferenceLaw, differentiate_along
 from pathcontrol.geometry.closest_point.curve import Curve, Interval
 from pathcontrol.geometry.closest_point.local_search import descend_by_newton
+from pathcontrol.tasks.base import PathPoint
 
 
 class StateMetric(NamedTuple):
@@ -38,9 +39,24 @@ class StateMetric(NamedTuple):
 
     def lift(self, position: Array, velocity: Array) -> Array:
         """Return Lᵀ(position, velocity), (*batch, 2n), with P = LLᵀ, whose Euclidean norm is that of P."""
+        return self.factor().lift(position, velocity)
+
+    def factor(self) -> MetricFactor:
+        """Return L of P = LLᵀ."""
         root = np.sqrt(self.a)
-        first = root * position + self.b / root * velocity
-        return np.concatenate([first, np.sqrt(self.c - self.b**2 / self.a) * velocity], axis=-1)
+        return MetricFactor(root, self.b / root, np.sqrt(self.c - self.b**2 / self.a))
+
+
+class MetricFactor(NamedTuple):
+    """The factor L of a metric P = LLᵀ, a matrix [[d, 0], [e, f]] for each joint, (n,) or (N, n) each."""
+
+    d: Array
+    e: Array
+    f: Array
+
+    def lift(self, position: Array, velocity: Array) -> Array:
+        """Return Lᵀ(position, velocity), (*batch, 2n), whose Euclidean norm is that of P."""
+        return np.concatenate([self.d * position + self.e * velocity, self.f * velocity], axis=-1)
 
 
 class ManeuverRegulation(TrackingReferenceLaw):
@@ -77,7 +93,8 @@ class ManeuverRegulation(TrackingReferenceLaw):
     @property
     def metric(self) -> StateMetric:
         """The metric P."""
-        return StateMetric.of(*np.broadcast_arrays(self.K_p, self.K_v, np.ones(self.robot.n))[:2])
+        one = np.ones(np.broadcast_shapes(self.K_p.shape, self.K_v.shape, (self.robot.n,)))
+        return StateMetric.of(self.K_p * one, self.K_v * one)
 
     @property
     def decay_rate(self) -> Array:
@@ -101,7 +118,7 @@ class ManeuverRegulation(TrackingReferenceLaw):
         by_q, by_qd = metric.apply(point.dq_d, point.velocity_slope)
         squared = np.vecdot(by_q, point.dq_d) + np.vecdot(by_qd, point.velocity_slope)
         e_p, e_v = point.q_d - q, point.velocity - qd
-        bend_q, bend_qd = metric.apply(point.ddq_d, self._slope_rate(s))
+        bend_q, bend_qd = metric.apply(point.ddq_d, self.slope_rate(s))
         denominator = squared + np.vecdot(bend_q, e_p) + np.vecdot(bend_qd, e_v)
         regular = found & (denominator * STEEPEST > squared)
         moves = regular & ~self._held_by_end(s, np.vecdot(by_q, e_p) + np.vecdot(by_qd, e_v))
@@ -117,31 +134,17 @@ class ManeuverRegulation(TrackingReferenceLaw):
         if not near.ndim:
             s, found = self._descend(q[None], qd[None], near[None])
             return s[0], found[0]
-        metric, task = self.metric, self.task
+        task, maneuver = self.task, _Maneuver(self)
         upper = task.s_end if task.period is None else task.s0 + task.period
-        curve = Curve(self._maneuver, self._maneuver_slope, self._maneuver_bend)
-        interval, x = Interval(task.s0, upper, task.closed), metric.lift(q, qd)
+        curve = Curve(maneuver.state, maneuver.slope, maneuver.bend)
+        interval, x = Interval(task.s0, upper, task.closed), maneuver.factor.lift(q, qd)
         s, found = descend_by_newton(curve, interval, x, near)
         if found.all():
             return s, found
         again, refound = descend_by_newton(curve, interval, x, task.sigma_bar(q, near=near))
         return np.where(found, s, np.where(refound, again, near)), found | refound
 
-    def _maneuver(self, s: Array) -> Array:
-        """Return the lifted maneuver Lᵀx_d at s."""
-        point = self.point(s)
-        return self.metric.lift(point.q_d, point.velocity)
-
-    def _maneuver_slope(self, s: Array) -> Array:
-        """Return its first derivative."""
-        point = self.point(s)
-        return self.metric.lift(point.dq_d, point.velocity_slope)
-
-    def _maneuver_bend(self, s: Array) -> Array:
-        """Return its second derivative."""
-        return self.metric.lift(self.point(s).ddq_d, self._slope_rate(s))
-
-    def _slope_rate(self, s: Array) -> Array:
+    def slope_rate(self, s: Array) -> Array:
         """Return r'' [rad/s], (*batch, n), at s."""
         return differentiate_along(lambda one: self.point(one).velocity_slope, self.task, s)
 
@@ -150,3 +153,31 @@ class ManeuverRegulation(TrackingReferenceLaw):
         if self.task.closed:
             return np.zeros(s.shape, dtype=bool)
         return (s <= self.task.s0) & (slope > 0) | (s >= self.task.s_end) & (slope < 0)
+
+
+class _Maneuver:
+    """The lifted maneuver Lᵀx_d of a law at one moment, a curve that asks the law once at each s."""
+
+    def __init__(self, law: ManeuverRegulation) -> None:
+        self._law, self.factor = law, law.metric.factor()
+        self._asked: tuple[Array, PathPoint] | None = None
+
+    def state(self, s: Array) -> Array:
+        """Return Lᵀx_d at s (*batch,)."""
+        point = self._point(s)
+        return self.factor.lift(point.q_d, point.velocity)
+
+    def slope(self, s: Array) -> Array:
+        """Return its first derivative."""
+        point = self._point(s)
+        return self.factor.lift(point.dq_d, point.velocity_slope)
+
+    def bend(self, s: Array) -> Array:
+        """Return its second derivative."""
+        return self.factor.lift(self._point(s).ddq_d, self._law.slope_rate(s))
+
+    def _point(self, s: Array) -> PathPoint:
+        """Return the task at s."""
+        if self._asked is None or self._asked[0] is not s:
+            self._asked = s, self._law.point(s)
+        return self._asked[1]

@@ -217,6 +217,13 @@ class Lissajous(JointCurve):
     def ddq_d(self, s: Array) -> Array:
         return -self.amplitudes * self.frequencies**2 * np.sin(self._angle(s))
 
+    def at(self, s: Array) -> PathPoint:
+        angle = self._angle(s)
+        sin, dq_d = np.sin(angle), self.amplitudes * self.frequencies * np.cos(angle)
+        ddq_d = -self.amplitudes * self.frequencies**2 * sin
+        theta, dtheta = self._profile.at(dq_d, ddq_d, self, s)
+        return PathPoint(self.center + self.amplitudes * sin, dq_d, ddq_d, theta, dtheta)
+
     def _angle(self, s: Array) -> Array:
         return self.frequencies * np.asarray(s)[..., None] + self.phases
 

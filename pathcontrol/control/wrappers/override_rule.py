@@ -182,8 +182,10 @@ class OverrideRule(SpeedRule):
 
         Within 1e-9 of u at rest w is u, so that a plan that is held has a state that no longer changes.
         """
-        v = x[..., 1]
-        wanted = v + _SMOOTHING * xdot[..., 1]
+        v, change = x[..., 1], xdot[..., 1]
+        if not (v.any() or change.any()):  # w stays
+            return x + 0.0
+        wanted = v + _SMOOTHING * change
         bounded = np.abs(wanted) >= self.acceleration * (1 - 1e-12)
         gap = 4 * _SMOOTHING * wanted
         arrived = ~bounded & (np.maximum(np.abs(gap), _SMOOTHING * np.abs(v)) < _ARRIVED)
