@@ -211,6 +211,14 @@ def test_products_of_random_matrices_that_are_similar_to_blocks(seed):
     assert (np.abs(difference).min(0) < 1e-5).all()
 
 
+def test_eigenvalues_near_each_other_are_known_as_well_as_others():
+    """Orthogonal iteration takes dozens of laps to tell 1e-4 from 0.6e-4 and would stop with an error of its own."""
+    basis = np.random.default_rng(5).standard_normal((5, 5)) * np.geomspace(1.0, 100.0, 5)[:, None]
+    over_lap = np.log([1.0, 1e-4, 0.6e-4, 0.6e-8, 1e-30])
+    A = basis @ np.diag(np.exp(over_lap / 100)) @ np.linalg.inv(basis)
+    np.testing.assert_allclose(find_eigen([A] * 100).logarithms.real, over_lap, atol=1e-9)
+
+
 def test_an_adaptive_law_has_no_boundary_of_stability(ideal_arm):
     law = pc.AdaptiveSlotineLi(ideal_arm, pc.Circle(1.0, 2.0), 20.0, [100.0, 10.0], 0.001, k=20.0)
     for one in (law, pc.SpeedOverride(law, 0.5)):

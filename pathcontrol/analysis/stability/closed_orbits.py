@@ -25,6 +25,7 @@ _SLOWEST = 0.05  # of ϑ, of a plan that goes round in the mean
 _AWAY = 0.2  # of the extent of the path, beyond which a loop has left it
 _MORE = 1.1  # laps that are recorded, for the nearest tick to the end of one
 _ROUNDING = 1e-12  # of the state, which large gains magnify
+_AT_ONCE = 4096  # states for which a map is asked
 _CELLS, _MOST_CELLS = 1000, 8000  # of a lap in continuous time
 _LONGEST = 0.5  # cell over the time of the fastest mode
 
@@ -74,7 +75,7 @@ def follow_laps(
     orbits = [_cut_lap(tick, task, states) for states in _follow_ticks(laws, tick, loop, rows, task, settle)]
     counts = [count for _, count in orbits]
     states = np.concatenate([each[:count] for each, count in orbits])
-    steps = _differentiate(TickMap(laws(np.repeat(every, counts)), loop), states)
+    steps = _differentiate(lambda rows: TickMap(laws(rows), loop), np.repeat(every, counts), states)
     ways = [_count_laps(tick, task, each)[count] for each, count in orbits]
     durations = [tick.period * count for count in counts]
     each_lap = zip(np.split(steps, np.cumsum(counts)[:-1]), durations, ways, strict=True)
@@ -97,9 +98,9 @@ def _follow_path(laws: LawOfRows, row: int, task: PathTask) -> Lap:
 
 def _find_slopes(laws: LawOfRows, row: int, task: PathTask, s: Array) -> Array:
     """Return the matrices A/ϑ on the path at s (k,), (k, D, D)."""
-    field, point = ContinuousMap(laws(np.full(len(s), row))), task.at(s)
+    field, point = ContinuousMap(laws(np.array([row]))), task.at(s)
     x, theta = field.on_path(s), point.theta
-    slopes = _differentiate(field, x)
+    slopes = _differentiate(lambda rows: field, np.zeros(len(s), dtype=np.intp), x)
     wanted = np.column_stack([point.velocity, point.velocity_slope * theta[:, None], theta])
     _check_orbit(field(x), wanted, _ROUNDING * np.abs(slopes).max())
     return slopes / theta[:, None, None]
@@ -193,11 +194,17 @@ def _record_plan(task: PathTask, period: float) -> Array:
     return np.array(s)
 
 
-def _differentiate(field: ContinuousMap | TickMap, x: Array) -> Array:
-    """Return the Jacobians (k, D, D) of a map at x (k, D), by central differences."""
-    size = x.shape[1]
+def _differentiate(
+    field_of: Callable[[NDArray[np.intp]], ContinuousMap | TickMap], rows: NDArray[np.intp], x: Array
+) -> Array:
+    """Return the Jacobians (k, D, D) of a map by its ``rows`` of gains (k,) at x (k, D), by central differences."""
+    count, size = x.shape
     steps = _STEP * np.maximum(1.0, np.abs(x).max(0)) * np.eye(size)
-    columns = [(field(x + d) - field(x - d)) / (2 * d[i]) for i, d in enumerate(steps)]
+    columns = []
+    for some in np.array_split(steps, min(size, -(-2 * count * size // _AT_ONCE))):  # each call of a map takes a while
+        ends = np.concatenate([x + d for step in some for d in (step, -step)])
+        after = field_of(np.tile(rows, 2 * len(some)))(ends).reshape(-1, 2, count, size)
+        columns += [(high - low) / (2 * step.max()) for (high, low), step in zip(after, some, strict=True)]
     return np.stack(columns, axis=-1)
 
 

@@ -70,14 +70,22 @@ class GainGrowth:
         rates, multipliers = np.concatenate(parts, axis=1)
         return rates, multipliers
 
-    def find_roots(self, low: Array, high: Array) -> Array:
+    def find_roots(self, low: Array, high: Array, ends: tuple[Array, Array]) -> Array:
         """Return the gains (N, names) between ``low`` and ``high``, (N, names) each, at which nothing grows or decays.
 
         One of the ends is stable and the other is not; the root is found by Chandrupatla's method, to 1e-6 of it.
+
+        Args:
+            low: gains at one end.
+            high: gains at the other.
+            ends: growth rates at both, (N,) each.
         """
         from scipy.optimize.elementwise import find_root
 
         def rates(share: Array, row: Array) -> Array:
+            for end, known in enumerate(ends):  # which the method asks for first
+                if (share == end).all():
+                    return known[row]
             at = low[row] + share[:, None] * (high - low)[row]
             return self(at)[0]
 

@@ -42,28 +42,31 @@ def largest_gain(law: Controller, gain: str, loop: Loop = None, *, settle: int =
     own = largest_entry(law, gain) or 1.0
     grow = GainGrowth(law, [gain], loop, check_whole("settle", settle, 1))
     step, most = (_STEP, _MOST) if isinstance(loop, SampledLoop) else (_CONTINUOUS_STEP, _MOST_CONTINUOUS)
-    if grow(np.array([[own]]))[0][0] < 0:
-        found = _search(grow, own, step, most, stable=False)
-        if found is None:
-            return np.inf
-        low, high = found / step, found
-    else:
-        found = _search(grow, own, 1 / step, most, stable=True)
-        if found is None:
-            raise InputError(
-                f"{type(law).__name__} is unstable with any {gain} up to {own:g}; its other gains do not suit the loop",
-                argument=gain,
-                value=own,
-            )
-        low, high = found, found * step
-    return float(grow.find_roots(np.array([[low]]), np.array([[high]]))[0, 0])
+    tried = own * step ** np.arange(1.0 + most)
+    rates = _grow_while(grow, tried, stable=True)
+    if not rates[0] < 0:
+        tried = own / step ** np.arange(1.0 + most)
+        rates = _grow_while(grow, tried, stable=False)
+    stable = rates < 0
+    if stable.all():
+        return np.inf
+    if not stable.any():
+        raise InputError(
+            f"{type(law).__name__} is unstable with any {gain} up to {own:g}; its other gains do not suit the loop",
+            argument=gain,
+            value=own,
+        )
+    change = int((stable != stable[0]).argmax())
+    low, high = sorted([change - 1, change], key=lambda i: tried[i])
+    ends = rates[[low]], rates[[high]]
+    return float(grow.find_roots(tried[[low], None], tried[[high], None], ends)[0, 0])
 
 
-def _search(grow: GainGrowth, own: float, factor: float, most: int, stable: bool) -> float | None:
-    """Return the first of ``most`` gains own · factorⁱ that is ``stable`` or not, or ``None`` if there is none."""
-    for begin in range(1, most + 1, _TOGETHER):
-        tried: Array = own * factor ** np.arange(begin, begin + _TOGETHER)
-        is_wanted = (grow(tried[:, None])[0] < 0) == stable
-        if is_wanted.any():
-            return float(tried[int(is_wanted.argmax())])
-    return None
+def _grow_while(grow: GainGrowth, tried: Array, *, stable: bool) -> Array:
+    """Return the growth rates of the gains in ``tried``, some at once, until one is not ``stable`` or is."""
+    rates = np.zeros(0)
+    for begin in range(0, len(tried), _TOGETHER):
+        rates = np.append(rates, grow(tried[begin : begin + _TOGETHER, None])[0])
+        if ((rates < 0) != stable).any():
+            break
+    return rates

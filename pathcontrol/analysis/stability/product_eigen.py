@@ -20,9 +20,10 @@ from pathcontrol._arrays import Array
 _SWEEPS, _FEW_SWEEPS = 40, 8
 _TURNING = 0.1  # turn of a subspace in a sweep that goes on turning, as of a complex pair
 _ZERO = 1e-9  # of the largest singular value
-_SETTLED = 1e-8  # turn of a subspace in the last sweep below which it is invariant
+_ROUNDING = 1e-13  # of the largest size of one factor
+_SETTLED = 1e-11  # turn of a subspace in the last sweep below which it is invariant
 _FEW = 8  # products up to which each is orthogonalised on its own
-_APART = 1e4  # how far apart sizes may come in factors that are multiplied before they are orthogonalised
+_APART = 1e4  # how far apart sizes may come in what is solved, or multiplied, as one matrix
 
 
 class ProductEigen(NamedTuple):
@@ -40,17 +41,18 @@ def find_eigen(factors: Sequence[Array] | Array) -> ProductEigen:
 def find_eigen_of_many(factors: Array, leading: bool = False) -> list[ProductEigen]:
     """Return the eigenvalues of many products at once, of ``factors`` (N, K, D, D).
 
-    With ``leading`` only the largest ones are sought: fewer sweeps, and eigenvalues that are 0 may come out as rounding
-    beside the others.
+    With ``leading`` only the largest ones are sought: fewer sweeps, and eigenvalues below 1e-9 of the largest may come
+    out as rounding beside the others.
     """
     parts = _multiply(factors, _ZERO if leading else 0.0)
     # a basis in general position: one with an invariant subspace in it would never find what is outside
     size = factors.shape[-1]
     Q = np.tile(np.linalg.qr(np.random.default_rng(0).standard_normal((size, size)))[0], (len(factors), 1, 1))
+    least = np.log(_ZERO) if leading else len(parts) * np.log(_ROUNDING)
     for count in range(_FEW_SWEEPS if leading else _SWEEPS):
-        begin, Q = Q, _turn_round(parts, Q)
+        begin, (Q, sizes) = Q, _turn_round(parts, Q)
         turn = begin.swapaxes(-1, -2) @ Q
-        if all(_is_done(_measure_turns(one), count) for one in turn):
+        if count and all(_is_done(*one, least, count) for one in zip(turn, sizes, strict=True)):
             break
     return [_solve(*one) for one in zip(begin, turn, *_multiply_triangles(parts, begin), strict=True)]
 
@@ -76,12 +78,14 @@ def _multiply(factors: Array, zero: float) -> Array:
     return np.array(parts)
 
 
-def _turn_round(parts: Array, Q: Array) -> Array:
-    """Return the orthogonal matrices Q (N, D, D) after all parts."""
-    for part in parts:
+def _turn_round(parts: Array, Q: Array) -> tuple[Array, Array]:
+    """Return the orthogonal matrices Q (N, D, D) after all parts, and logarithms of sizes of their rows, (N, D)."""
+    diagonals = np.empty((len(parts), *Q.shape[:2]))
+    for diagonal, part in zip(diagonals, parts, strict=True):
         Q, R = _orthogonalise(part @ Q)
-        Q *= np.where(R.diagonal(axis1=-2, axis2=-1) < 0, -1.0, 1.0)[:, None]
-    return Q
+        diagonal[:] = R.diagonal(axis1=-2, axis2=-1)
+        Q *= np.where(diagonal < 0, -1.0, 1.0)[:, None]
+    return Q, np.log(np.maximum(np.abs(diagonals), np.finfo(float).tiny)).sum(0)
 
 
 def _orthogonalise(A: Array) -> tuple[Array, Array]:
@@ -137,10 +141,17 @@ def _measure_turns(turn: Array) -> Array:
     return np.array([np.abs(turn[p:, :p]).max() for p in range(1, len(turn))])
 
 
-def _is_done(turns: Array, count: int) -> bool:
-    """Return whether more sweeps change nothing: subspaces are invariant, or after some still turn round as fast."""
-    settled = turns < _SETTLED
-    return bool(settled.all() or (count >= _FEW_SWEEPS and (settled | (turns > _TURNING)).all()))
+def _is_done(turn: Array, sizes: Array, least: float, count: int) -> bool:
+    """Return whether more sweeps change nothing that counts: rows less than exp(``least``) of the largest do not.
+
+    Blocks between invariant subspaces, whose sizes are not far apart, have their eigenvalues however they lie in them;
+    after some sweeps it is enough that what is not settled still turns round as fast.
+    """
+    turns = _measure_turns(turn)
+    counted = sizes >= sizes.max() + least
+    apart = [np.ptp(sizes[rows][counted[rows]]) for rows in _find_blocks(turn) if counted[rows].any()]
+    turning = (turns < _SETTLED) | (turns > _TURNING)
+    return bool(max(apart) < np.log(_APART) or (count >= _FEW_SWEEPS and turning.all()))
 
 
 def _solve_block(turn: Array, sizes: Array, U: Array, rows: slice) -> tuple[Array, Array]:

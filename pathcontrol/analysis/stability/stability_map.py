@@ -94,8 +94,8 @@ def stability_map(
     with progress_bar("stability_map", points[..., 0].size, progress) as update:
         growth, multiplier = (each.reshape(shape) for each in grow(points.reshape(-1, len(names)), update))
     ends = _find_edges(growth < 0)
-    low, high = (points[tuple(end.T)] for end in ends)
-    boundary = grow.find_roots(low, high)
+    low, high = (tuple(end.T) for end in ends)
+    boundary = grow.find_roots(points[low], points[high], (growth[low], growth[high]))
     segments = _link(*ends)
     units, name = tuple(unit_of_gain(law, name) for name in names), type(law).__name__
     return StabilityMap(names, grids, growth, multiplier, boundary, segments, units, own, name, loop)
