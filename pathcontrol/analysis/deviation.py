@@ -16,6 +16,7 @@ from pathcontrol.analysis.progress import progress
 from pathcontrol.analysis.tool_following import PlannedToolCurve, orientation_error, require_tool, tool_motion
 from pathcontrol.analysis.window import Samples, Window, own_samples, samples_of
 from pathcontrol.cartesian.recognition import as_toolpath
+from pathcontrol.engine.frame_kinematics import frame_poses
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.run import Run
@@ -39,7 +40,9 @@ def tool_positions(run: Run, robot: RobotModel | None = None, frame: str | None 
     arm = run.robot if robot is None else robot
     expect("robot", arm, RobotModel)
     name, tip = _find_tool(resolve_task(run, None)) if frame is None else (frame, np.eye(4)[3])
-    return apply_where_finite(lambda q: (arm.frame_pose(q, name) @ tip)[..., :3], run.array("q"), shape=(3,))
+    return apply_where_finite(
+        lambda q: (frame_poses(arm, q, [name])[..., 0, :, :] @ tip)[..., :3], run.array("q"), shape=(3,)
+    )
 
 
 def tool_deviation(

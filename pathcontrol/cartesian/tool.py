@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_array, check_finite, freeze
+from pathcontrol.engine.frame_kinematics import frame_kinematics
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
 
@@ -47,11 +48,7 @@ class Tool:
 
     def kinematics(self, q: Array) -> ToolKinematics:
         """Return pose and Jacobian at q (N, n)."""
-        pose, jacobian = self.robot.frame_kinematics(q, self.frame)
-        if self.offset is not None:
-            lever = pose[..., :3, :3] @ self._offset[:3, 3]
-            pose = pose @ self._offset
-            jacobian[..., :3, :] += np.cross(jacobian[..., 3:, :], lever[..., :, None], axis=-2)
+        pose, jacobian = frame_kinematics(self.robot, q, self.frame, self.pose)
         return ToolKinematics(pose[..., :3, 3], pose[..., :3, :3], jacobian)
 
 

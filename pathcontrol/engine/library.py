@@ -77,6 +77,8 @@ def _declare(library: CDLL) -> None:
     array = c_void_p
     library.pathcontrol_run.restype = c_longlong
     library.pathcontrol_run.argtypes = [c_void_p] * 3 + [array, c_void_p, c_longlong, c_longlong]
+    library.pathcontrol_frames.restype = c_longlong
+    library.pathcontrol_frames.argtypes = [c_void_p, c_int, array, array, c_longlong, array, array, array]
     for name, arguments in {
         "advance": [c_void_p, c_double, array, array, array, array, c_longlong, c_longlong],
         "inverse_dynamics": [c_void_p, c_longlong, array, array, array, array],

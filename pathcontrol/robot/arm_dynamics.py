@@ -121,6 +121,21 @@ class ArmDynamics:
             )
         return self.joint_names.index(joint)
 
+    def frame_id(self, frame: str) -> int:
+        """Return the index of a frame in Pinocchio's model; of a link and a joint of one name, that of the link."""
+        # getFrameId answers nframes for a frame that does not exist, so ask first
+        model = self.pinocchio_model
+        if not isinstance(frame, str) or not model.existFrame(frame):
+            raise UnknownNameError(
+                f"{self.name} has no frame {frame!r}; it has {', '.join(self.frame_names)}"
+                f"{did_you_mean(frame, self.frame_names)}",
+                value=frame,
+                choices=self.frame_names,
+            )
+        if model.existFrame(frame, pin.FrameType.BODY):  # a link and a joint may share a name
+            return model.getFrameId(frame, pin.FrameType.BODY)
+        return model.getFrameId(frame)
+
     # --- dynamics -------------------------------------------------------------------------------------------
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, velocity: ArrayLike | None = None) -> Array:
@@ -223,7 +238,7 @@ class ArmDynamics:
 
     def frame_poses(self, q: ArrayLike, frames: Sequence[str]) -> Array:
         """Return the poses of several frames in the base frame [m], (*batch, len(frames), 4, 4) homogeneous."""
-        model, data, ids = self.pinocchio_model, self._data, [self._frame_id(frame) for frame in frames]
+        model, data, ids = self.pinocchio_model, self._data, [self.frame_id(frame) for frame in frames]
         array, solve, place = self._array("q", q), pin.forwardKinematics, pin.updateFramePlacement
         rows = array.reshape(-1, self.n)
         poses = np.empty((len(rows), len(ids), 4, 4))
@@ -235,14 +250,11 @@ class ArmDynamics:
 
     def frame_jacobian(self, q: ArrayLike, frame: str) -> Array:
         """Return the Jacobian of ``frame``, (*batch, 6, n): linear [m], then angular velocity, in the base's axes."""
-        i = self._frame_id(frame)
-        return self._each(
-            q, (6, self.n), lambda qi: pin.computeFrameJacobian(self.pinocchio_model, self._data, qi, i, _ALIGNED)
-        )
+        return self.frame_kinematics(q, frame)[1]
 
     def frame_kinematics(self, q: ArrayLike, frame: str) -> tuple[Array, Array]:
         """Return the pose of ``frame`` (*batch, 4, 4) and its Jacobian (*batch, 6, n), for the cost of one of them."""
-        i, data, array = self._frame_id(frame), self._data, self._array("q", q)
+        i, data, array = self.frame_id(frame), self._data, self._array("q", q)
         batch, rows = array.shape[:-1], array.reshape(-1, self.n)
         one = (6, self.n) if self.n > 1 else (6,)  # as the Jacobian of a single joint comes
         poses, jacobians, placement = np.empty((len(rows), 4, 4)), np.empty((len(rows), *one)), data.oMf[i]
@@ -258,15 +270,15 @@ class ArmDynamics:
         Linear [m/s, m/s²], then angular [rad/s, rad/s²], in axes parallel to the base's, without gravity. The linear
         parts are those of the frame's origin, differentiated in the base frame (the "classical" acceleration).
         """
-        model, data, i, axes = self.pinocchio_model, self._data, self._frame_id(frame), _ALIGNED
-
-        def motion(qi: Array, qdi: Array, qddi: Array) -> list[Array]:
+        model, data, i, axes = self.pinocchio_model, self._data, self.frame_id(frame), _ALIGNED
+        arrays = broadcast(self.n, {"q": q, "qd": qd, "qdd": qdd}, self.joint_names)
+        batch, rows = arrays[0].shape[:-1], [a.reshape(-1, self.n) for a in arrays]
+        velocities, accelerations = np.empty((2, len(rows[0]), 6))
+        for k, (qi, qdi, qddi) in enumerate(zip(*rows, strict=True)):
             pin.forwardKinematics(model, data, qi, qdi, qddi)
-            velocity = pin.getFrameVelocity(model, data, i, axes)
-            return [velocity.vector, pin.getFrameClassicalAcceleration(model, data, i, axes).vector]
-
-        moments = self._each(q, (2, 6), motion, qd=qd, qdd=qdd)
-        return moments[..., 0, :], moments[..., 1, :]
+            velocities[k] = pin.getFrameVelocity(model, data, i, axes).vector
+            accelerations[k] = pin.getFrameClassicalAcceleration(model, data, i, axes).vector
+        return velocities.reshape(*batch, 6), accelerations.reshape(*batch, 6)
 
     # --- inside ---------------------------------------------------------------------------------------------
 
@@ -302,8 +314,11 @@ class ArmDynamics:
     def _each(self, q: ArrayLike, shape: tuple[int, ...], function: Callable[..., Any], **more: ArrayLike) -> Array:
         """Apply a ``function`` without a batched call to each configuration, with a row of each of ``more``."""
         arrays = broadcast(self.n, {"q": q, **more}, self.joint_names)
-        values = [function(*rows) for rows in zip(*(a.reshape(-1, self.n) for a in arrays), strict=True)]
-        return np.array(values, dtype=np.float64).reshape(arrays[0].shape[:-1] + shape)
+        batch, rows = arrays[0].shape[:-1], [a.reshape(-1, self.n) for a in arrays]
+        values = np.empty((len(rows[0]), *shape))
+        for k, row in enumerate(zip(*rows, strict=True)):
+            values[k] = function(*row)
+        return values.reshape(batch + shape)
 
     def _array(self, name: str, value: ArrayLike) -> Array:
         """Convert values of the joints to (*batch, n), ordered by name if they are labelled."""
@@ -331,26 +346,12 @@ class ArmDynamics:
 
     def _support(self, frame: str) -> int:
         """Return the index of Pinocchio's joint that moves a frame; 0, the base, is refused."""
-        i = self.pinocchio_model.frames[self._frame_id(frame)].parentJoint
+        i = self.pinocchio_model.frames[self.frame_id(frame)].parentJoint
         if i == 0:
             raise InputError(
                 f"no joint of {self.name} moves the frame {frame!r}; give one farther out as tip", value=frame
             )
         return i
-
-    def _frame_id(self, frame: str) -> int:
-        # getFrameId answers nframes for a frame that does not exist, so ask first
-        model = self.pinocchio_model
-        if not isinstance(frame, str) or not model.existFrame(frame):
-            raise UnknownNameError(
-                f"{self.name} has no frame {frame!r}; it has {', '.join(self.frame_names)}"
-                f"{did_you_mean(frame, self.frame_names)}",
-                value=frame,
-                choices=self.frame_names,
-            )
-        if model.existFrame(frame, pin.FrameType.BODY):  # a link and a joint may share a name
-            return model.getFrameId(frame, pin.FrameType.BODY)
-        return model.getFrameId(frame)
 
 
 def build_model(text: str) -> Any:

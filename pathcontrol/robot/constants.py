@@ -67,13 +67,19 @@ def arm_constants(robot: RobotModel) -> ArmConstants:
     )
 
 
+def frame_placement(robot: RobotModel, frame: str) -> tuple[int, Array]:
+    """Return the index of the body that carries ``frame`` (−1: the base), and the frame's pose in it [m], (4, 4)."""
+    found = robot.pinocchio_model.frames[robot.frame_id(frame)]
+    body, pose = int(found.parentJoint) - 1, np.array(found.placement.homogeneous)
+    if body >= 0:
+        pose[:3] = arm_constants(robot).turn[body].T @ pose[:3]
+    return body, pose
+
+
 def frame_carrier(robot: RobotModel, frame: str) -> tuple[int, Array]:
     """Return the index of the body that carries ``frame`` (−1: the base), and the frame's origin in it [m], (3,)."""
-    model = robot.pinocchio_model
-    found = model.frames[model.getFrameId(frame)]
-    body = int(found.parentJoint) - 1
-    offset = np.array(found.placement.translation)
-    return body, offset if body < 0 else arm_constants(robot).turn[body].T @ offset
+    body, pose = frame_placement(robot, frame)
+    return body, pose[:3, 3]
 
 
 def _joint_axes(model: Any) -> tuple[list[Array], list[int]]:

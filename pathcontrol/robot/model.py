@@ -82,7 +82,7 @@ class RobotModel(ArmDynamics):
         self._check_mass()
         body = payload_of(mass, com, inertia)
         model = pin.Model(self.pinocchio_model)
-        support = model.frames[self._frame_id(frame)]
+        support = model.frames[self.frame_id(frame)]
         model.appendBodyToJoint(support.parentJoint, body, support.placement)
         check_spread(model, f"mass = {body.mass:g}, com = {body.lever.tolist()}")
         tensor = np.array(body.inertia)
@@ -107,7 +107,7 @@ class RobotModel(ArmDynamics):
                 f"pose has shape {given.shape}, expected (4, 4), or (3,) for a position", argument="pose", value=pose
             )
         placement = pin.SE3(np.eye(3), given) if given.shape == (3,) else pin.SE3(check_rigid("pose", given, 1e-6))
-        support = model.frames[self._frame_id(parent)]
+        support = model.frames[self.frame_id(parent)]
         frame = pin.Frame(name, support.parentJoint, support.placement * placement, pin.FrameType.OP_FRAME)
         model.addFrame(frame, False)
         return self._with_model(model, "with_frame", {"name": name, "parent": parent, "pose": given.tolist()})

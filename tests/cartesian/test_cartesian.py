@@ -69,7 +69,7 @@ def random_curve(kind: str, seed: int, plane: bool) -> ToolCurve:
 def pose(robot: RobotModel, frame: str, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Position and rotation by Pinocchio's forward kinematics of joints, not the calls the library makes."""
     model = robot.pinocchio_model
-    data, placement = model.createData(), model.frames[robot._frame_id(frame)]
+    data, placement = model.createData(), model.frames[robot.frame_id(frame)]
     poses = []
     for qi in q:
         pin.forwardKinematics(model, data, qi)

@@ -9,6 +9,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.ik.constraint import ToolConstraint
 from pathcontrol.cartesian.ik.continuation import Trail
+from pathcontrol.engine.frame_kinematics import frame_poses
 
 PLANE = 1e-3  # m below the base plane that is still on it
 _AS_COMFORTABLE = 0.5  # share of the best comfort from which on the higher elbow counts more
@@ -17,7 +18,7 @@ _SAMPLES = 32  # postures of a trail that are compared
 
 def heights(constraint: ToolConstraint, q: Array) -> Array:
     """Return the heights [m] above the base plane, z = 0, of the joints that move the tool, (N, joints)."""
-    return constraint.tool.robot.frame_poses(q, _movers(constraint))[..., 2, 3]
+    return frame_poses(constraint.tool.robot, q, _movers(constraint))[..., 2, 3]
 
 
 def find_lowest(constraint: ToolConstraint, q: Array) -> tuple[str, float]:

@@ -83,6 +83,31 @@ EXPORT void pathcontrol_nearest(const Path *path, integer rows, const double *q,
   for (integer r = 0; r < rows; r++) s[r] = near ? followed_point(*path, q + r * path->joints, near[r]) : nearest_point(*path, q + r * path->joints);
 }
 
+// Poses (rows, frames, 4, 4) of frames on bodies, each placed by R (row by row) and p in its body, and unless `jacobians` is null their
+// Jacobians (rows, frames, 6, joints). Rows with a position beyond the range of sine_cosine are left out; return how many there are.
+EXPORT integer pathcontrol_frames(const Arm<double> *arm, int frames, const int *carriers, const double *placements, integer rows, const double *q, double *poses, double *jacobians) {
+  const int n = arm->joints;
+  Body<double> bodies[MOST_JOINTS];
+  integer left = 0;
+  for (integer r = 0; r < rows; r++, q += n) {
+    bool near = true;
+    for (int i = 0; i < n; i++) near = near && fabs(q[i]) < FARTHEST_ANGLE;
+    if (near) place<0>(*arm, q, bodies);
+    for (int k = 0; k < frames; k++, poses += 16, jacobians += jacobians ? 6 * n : 0) {
+      if (!near) continue;
+      double R[9], p[3];
+      frame_kinematics(*arm, bodies, carriers[k], placements + 12 * k, R, p, jacobians);
+      for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) poses[4 * i + j] = R[3 * i + j];
+        poses[4 * i + 3] = p[i], poses[12 + i] = 0;
+      }
+      poses[15] = 1;
+    }
+    left += !near;
+  }
+  return left;
+}
+
 // Distances to Γ of several series of states, q and q̇ (series, rows, joints) each.
 EXPORT void pathcontrol_gamma(const Gamma *gamma, integer series, integer rows, const double *q, const double *qd, double *distance, double *parameter) {
   const int joints = gamma->path->joints;

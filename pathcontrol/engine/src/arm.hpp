@@ -270,3 +270,39 @@ static NOINLINE void point_force_torque(const Arm<C> &arm, Body<V> *bodies, int 
     for (int k = 0; k < 3; k++) f[k] = x[k], t[k] = y[k] + z[k];
   }
 }
+
+// The pose of a frame on a body in the base, after place(): R (row by row) and p, given the frame's own in the body, −1 for the base.
+// With columns it gets its Jacobian too, 6 rows of `joints`: of its origin, then angular, in axes of the base.
+static NOINLINE void frame_kinematics(const Arm<double> &arm, const Body<double> *bodies, int body, const double *placement, double *R, double *p, double *columns) {
+  int chain[MOST_JOINTS], length = 0;
+  for (int i = body; i >= 0; i = arm.parent[i]) chain[length++] = i;
+  double axes[MOST_JOINTS][3], origins[MOST_JOINTS][3], turn[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, at[3] = {0, 0, 0};
+  const auto move = [&](const double *by, const double *offset) {
+    double x[3], A[9];
+    rotate(turn, offset, x);
+    for (int r = 0; r < 3; r++)
+      for (int c = 0; c < 3; c++) A[3 * r + c] = turn[3 * r] * by[c] + turn[3 * r + 1] * by[3 + c] + turn[3 * r + 2] * by[6 + c];
+    for (int k = 0; k < 9; k++) turn[k] = A[k];
+    for (int k = 0; k < 3; k++) at[k] += x[k];
+  };
+  for (int k = length - 1; k >= 0; k--) {
+    move(bodies[chain[k]].R, bodies[chain[k]].p);
+    for (int r = 0; r < 3; r++) axes[k][r] = turn[3 * r + 2], origins[k][r] = at[r];
+  }
+  move(placement, placement + 9);
+  for (int k = 0; k < 9; k++) R[k] = turn[k];
+  for (int k = 0; k < 3; k++) p[k] = at[k];
+  if (!columns) return;
+  const int n = arm.joints;
+  for (int k = 0; k < 6 * n; k++) columns[k] = 0;
+  for (int k = 0; k < length; k++) {
+    const double lever[3] = {at[0] - origins[k][0], at[1] - origins[k][1], at[2] - origins[k][2]};
+    double linear[3];
+    cross(axes[k], lever, linear);
+    for (int r = 0; r < 3; r++) {
+      double *column = columns + r * n + chain[k];
+      if (arm.slides[chain[k]]) column[0] = axes[k][r];
+      else column[0] = linear[r], column[3 * n] = axes[k][r];
+    }
+  }
+}

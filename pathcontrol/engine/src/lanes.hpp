@@ -87,7 +87,8 @@ template <class T> struct Buffer {
   T &operator[](integer i) { return at[i]; }
 };
 
-// sin x and cos x within 1 unit in the last place for |x| < 10^6: Taylor series on ±π/4 after an exact reduction by π/2 in
+constexpr double FARTHEST_ANGLE = 1e6;
+// sin x and cos x within 1 unit in the last place for |x| < FARTHEST_ANGLE: Taylor series on ±π/4 after an exact reduction by π/2 in
 // three parts (Cody and Waite, Software Manual for the Elementary Functions, 1980).
 template <class V> ALWAYS_INLINE void sine_cosine(V x, V &sine, V &cosine) {
   V k = rounded(x * 0.63661977236758134308);

@@ -10,6 +10,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.cartesian.recognition import as_toolpath
+from pathcontrol.engine.frame_kinematics import frame_poses
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.view.bodies.body_shapes import Color
@@ -84,7 +85,7 @@ class Recording:
         """The poses of the visible links, and of the tool, at all samples [m], (k, 4, 4) each."""
         frames = list(dict.fromkeys([*(visual.link for visual in self.visuals), self.tool]))
         parts = np.array_split(self.q, -(-len(self.q) // _AT_ONCE))
-        stacked = np.concatenate([self.robot.frame_poses(part, frames) for part in parts])
+        stacked = np.concatenate([frame_poses(self.robot, part, frames) for part in parts])
         return {frame: stacked[:, i] for i, frame in enumerate(frames)}
 
     @property
@@ -99,7 +100,7 @@ class Recording:
 
     def tool_at(self, q: Array) -> Array:
         """Return positions of the tool [m], (k, 3), at joint positions (k, n)."""
-        return self.robot.frame_pose(q, self.tool)[..., :3, 3]
+        return frame_poses(self.robot, q, [self.tool])[..., 0, :3, 3]
 
     @staticmethod
     def _domain(task: PathTask) -> tuple[float, float]:

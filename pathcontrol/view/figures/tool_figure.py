@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
+from pathcontrol.engine.frame_kinematics import frame_poses
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.joined.path_sequence import PathSequence
 from pathcontrol.tasks.task import PathTask
@@ -178,7 +179,7 @@ def _tool_path(one: Shown, robot: RobotModel | None, tool: str | None) -> ToolPo
 def _positions(robot: RobotModel, q: Array, frame: str) -> Array:
     """Return the positions of a frame (k, 3) at q (k, n); NaN where q is not finite."""
     x, known = np.full((len(q), 3), np.nan), ~np.isnan(q).any(-1)
-    x[known] = robot.frame_pose(q[known], frame)[:, :3, 3]
+    x[known] = frame_poses(robot, q[known], [frame])[:, 0, :3, 3]
     return x
 
 
