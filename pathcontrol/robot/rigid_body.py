@@ -32,11 +32,11 @@ class RigidBody:
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """Return τ [N m] of (q, q̇, q̈), (*batch, n), by the recursive Newton–Euler algorithm."""
-        return self._of(pin.rnea, pin.rneaInParallel, {"q": q, "qd": qd, "qdd": qdd})
+        return self._of(pin.rnea, pin.rneaInParallel, ("q", "qd", "qdd"), q, qd, qdd)
 
     def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
         """Return q̈ [rad/s²] of (q, q̇, τ), (*batch, n), by the articulated-body algorithm."""
-        return self._of(_aba, pin.abaInParallel, {"q": q, "qd": qd, "tau": tau})
+        return self._of(_aba, pin.abaInParallel, ("q", "qd", "tau"), q, qd, tau)
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """Return M(q) [kg m²], (*batch, n, n), by the composite rigid body algorithm."""
@@ -46,19 +46,28 @@ class RigidBody:
             M[k] = pin.crba(self.model, self.data, qi)
         return M.reshape(*array.shape, self.n)
 
-    def _of(self, one: Callable[..., Any], many: Callable[..., Any], arguments: Mapping[str, ArrayLike]) -> Array:
+    def _of(self, one: Callable[..., Any], many: Callable[..., Any], names: Sequence[str], *values: Any) -> Array:
         """Apply an algorithm, given for one configuration and for many, to (*batch, n) arguments that broadcast."""
-        arrays = broadcast(self.n, arguments, self._joints)
-        out: Array = np.empty(arrays[0].shape)
+        if not _fit(self.n, *values):
+            values = tuple(broadcast(self.n, dict(zip(names, values, strict=True)), self._joints))
+        a, b, c = values
+        out: Array = np.empty(a.shape)
         if out.size == self.n:  # one configuration is not worth the threads' overhead
-            out[...] = one(self.model, self.data, *[a.ravel() for a in arrays])
+            out[...] = one(self.model, self.data, a.ravel(), b.ravel(), c.ravel())
         elif out.size:
-            many(self._threads, self._pool, *(a.reshape(-1, self.n).T for a in (*arrays, out)))
+            many(self._threads, self._pool, *(array.reshape(-1, self.n).T for array in (a, b, c, out)))
         return out
 
     @cached_property
     def _pool(self) -> Any:
         return pin.ModelPool(self.model, self._threads)
+
+
+def _fit(n: int, a: Any, b: Any, c: Any) -> bool:
+    """Return whether three arguments are arrays of doubles of one shape (*batch, n), as in each step of a run."""
+    if not (type(a) is type(b) is type(c) is np.ndarray and a.dtype == b.dtype == c.dtype == np.float64):
+        return False
+    return bool(a.shape == b.shape == c.shape and a.shape[-1:] == (n,))
 
 
 def broadcast(n: int, arguments: Mapping[str, ArrayLike], joints: Sequence[str] | None = None) -> list[Array]:

@@ -61,7 +61,7 @@ class Plant:
         expect("robot", robot, RobotModel, RobotBatch)
         self.robot, self.step = robot, step
         self._viscous = viscous_of(robot.friction)
-        self._levels = levels_of(robot.friction, np.zeros((1, robot.n))) if _is_constant(robot.friction) else None
+        self._levels = _signed_levels(robot.friction, np.zeros((1, robot.n))) if _is_constant(robot.friction) else None
         self._inertia = robot.with_armature(0.5 * step * self._viscous)
         self._strong = has_strong_friction(robot)
         self._damps = bool(self._strong.any())
@@ -100,8 +100,7 @@ class Plant:
 
         The first two broadcast against q̇ (N, n); where q̇ is 0 the third is either of them. Held joints have none.
         """
-        forward, minus = levels_of(self.robot.friction, qd) if self._levels is None else self._levels
-        backward = np.subtract(0.0, minus)
+        forward, backward = self._levels or _signed_levels(self.robot.friction, qd)
         if held is not None:
             forward, backward = np.where(held, 0.0, forward), np.where(held, 0.0, backward)
         return forward, backward, np.where(qd > 0, forward, backward)
@@ -237,6 +236,12 @@ def has_strong_friction(robot: RobotModel | RobotBatch) -> NDArray[np.bool_]:
 def _is_constant(law: FrictionLaw) -> bool:
     """Return whether a law is one of the library, or a sum of these, that has the same levels at all velocities."""
     return all(map(_is_constant, law.terms)) if type(law) is FrictionSum else type(law) in (Viscous, Coulomb)
+
+
+def _signed_levels(law: FrictionLaw, qd: Array) -> tuple[Array, Array]:
+    """Return the dry friction of forward and of backward motion at q̇, which broadcasts against q̇ (N, n)."""
+    forward, minus = levels_of(law, qd)
+    return forward, np.subtract(0.0, minus)
 
 
 def _hold(robot: RobotModel | RobotBatch, q: Array, x: Array, held: _Held) -> Array:
