@@ -7,6 +7,7 @@ import warnings
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from io import BytesIO
+from itertools import combinations, product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from matplotlib.axis import Axis, XAxis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
+from matplotlib.text import Text
 from test_pareto import table as front_table
 from test_sweep_figures import table as sweep_table
 from test_view_figures_layout import assert_readable, made, makers
@@ -32,9 +34,10 @@ from pathcontrol import (
     tool_figure,
     toolpath_figure,
 )
-from pathcontrol.view.figures import formula_memory
+from pathcontrol.view.figures import formula_memory, text_memory
 from pathcontrol.view.figures.formula_memory import remembered_formulas
 from pathcontrol.view.figures.style import apply_style, new_figure, style
+from pathcontrol.view.figures.text_memory import remembered_texts
 from pathcontrol.view.figures.tick_memory import METHODS, remembered_ticks
 
 FORMATS = ["png", "svg", "pdf"]
@@ -137,8 +140,8 @@ def test_a_figure_that_is_changed_is_laid_out_again(tmp_path):
     assert_readable(figure, "changed")
 
 
-def test_remembered_ticks_and_formulas_change_no_byte_and_leave_matplotlib_as_it_was(saved, tmp_path, monkeypatch):
-    for name in ("remembered_ticks", "remembered_formulas"):
+def test_what_is_remembered_changes_no_byte_and_leaves_matplotlib_as_it_was(saved, tmp_path, monkeypatch):
+    for name in ("remembered_ticks", "remembered_formulas", "remembered_texts"):
         monkeypatch.setattr(f"pathcontrol.view.figures.panel_layout.{name}", lambda *_: nullcontext())
     kind = saved.files[0].stem
     found = save_figure(makers(made(3, scale=1.3))[kind](), tmp_path / kind, FORMATS)
@@ -147,6 +150,33 @@ def test_remembered_ticks_and_formulas_change_no_byte_and_leave_matplotlib_as_it
     assert axes
     assert not any(name in vars(axis) for axis in axes for name in METHODS)
     assert MathTextParser._parse_cached is formula_memory._parse
+    assert Text._get_layout is text_memory._measure
+    assert text_memory._measured == {}
+
+
+def test_texts_are_measured_again_where_they_look_different(monkeypatch):
+    monkeypatch.setattr(text_memory, "_MOST", 12)
+    looks = [{}, {"fontsize": 20}, {"ha": "right"}, {"va": "top"}, {"ma": "right"}, {"linespacing": 3.0}]
+    looks += [{"rotation": 30}, {"rotation": 30, "rotation_mode": "anchor"}, {"parse_math": False}, {"wrap": True}]
+    figure = Figure(figsize=(2.0, 1.0))
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    texts = [figure.text(0.6, 0.5, "$x$ and\nmuch more of it", **look) for look in looks]
+
+    def measure(dpi, first):
+        figure.dpi = dpi
+        texts[0].set_text(first)
+        found = [text.get_window_extent(renderer) and text._get_layout(renderer) for text in texts]
+        return [(box.bounds, lines, corner) for box, lines, corner in found]
+
+    changes = list(product((100, 200), ("one", "another")))
+    with style():
+        own = [measure(*change) for change in changes]
+        with remembered_texts():
+            assert [measure(*change) for change in changes] == own
+            assert measure(*changes[-1]) == own[-1]
+            assert len(text_memory._measured) <= 12
+    for found in own:
+        assert all(one != other for one, other in combinations(found, 2))
 
 
 def test_a_formula_is_parsed_once_for_all_files_but_for_each_size_and_thread(monkeypatch):

@@ -10,11 +10,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from pathcontrol._arrays import Array
 from pathcontrol.view.figures.formula_memory import remembered_formulas
+from pathcontrol.view.figures.text_memory import remembered_texts
 from pathcontrol.view.figures.tick_memory import remembered_ticks
 
 _PAD = 0.03  # in, around panels
-_LAYOUTS, _SETTLED = 6, 5e-4  # at most so many, shares of the figure
+_LAYOUTS, _SETTLED = 8, 5e-4  # at most so many, shares of the figure
 
 
 class SettledLayout(ConstrainedLayoutEngine):
@@ -28,15 +30,19 @@ class SettledLayout(ConstrainedLayoutEngine):
 
     def execute(self, fig: Any) -> None:
         """Move and resize the panels of a figure."""
-        before = _places(fig)
+        before, ahead = _places(fig), np.zeros(())
         for _ in range(_LAYOUTS):
             with remembered_ticks(fig):
                 super().execute(fig)
             places = _places(fig)
             if not _has_equal_scales(fig) or np.allclose(places, before, rtol=0.0, atol=_SETTLED):
                 break
-            before = places
-        _round_places(fig)
+            # not twice in a row, as from beyond their end panels come back at once
+            ahead = 0.0 * places if ahead.any() else _still_to_go(places - before)
+            before = places + ahead
+            _set_places(fig, before)
+        # the solver differs in the last bit, and names inside SVG files come from these numbers
+        _set_places(fig, np.round(_places(fig), 9))
 
 
 @contextmanager
@@ -47,7 +53,7 @@ def laid_out(figure: Figure, dpi: float) -> Iterator[None]:
         yield
         return
     figure.dpi = dpi
-    with remembered_formulas():
+    with remembered_formulas(), remembered_texts():
         engine.execute(figure)
         figure.set_layout_engine(None)
         try:
@@ -63,12 +69,22 @@ def _has_equal_scales(figure: Figure) -> bool:
     return any(axes.get_aspect() != "auto" for axes in figure.axes)
 
 
-def _places(figure: Figure) -> list[tuple[float, ...]]:
-    """Return the places of all panels, as shares of the figure."""
-    return [axes.get_position(original=True).bounds for axes in figure.axes]
+def _places(figure: Figure) -> Array:
+    """Return the places of all panels (panel, 4), as shares of the figure."""
+    return np.array([axes.get_position(original=True).bounds for axes in figure.axes])
 
 
-def _round_places(figure: Figure) -> None:
-    """Round the places: the solver differs in the last bit, and names inside SVG files come from these numbers."""
-    for axes in figure.axes:
-        axes._set_position(np.round(axes.get_position(original=True).bounds, 9).tolist())  # type: ignore[attr-defined]
+def _still_to_go(moved: Array) -> Array:
+    """Return how far panels go on that have ``moved`` (panel, 4), their low edges and their sizes.
+
+    Where an edge moves alone it goes half of the rest with each of the two layouts that Matplotlib makes at once, so
+    that each move is a quarter of the last one; of places from which both edges move the next moves are others.
+    """
+    low, high = moved[:, :2], moved[:, :2] + moved[:, 2:]
+    return moved / 3 if np.allclose(low * high, 0.0, rtol=0.0, atol=_SETTLED**2) else 0.0 * moved
+
+
+def _set_places(figure: Figure, places: Array) -> None:
+    """Put the panels in their places."""
+    for axes, place in zip(figure.axes, places, strict=True):
+        axes._set_position(place.tolist())  # type: ignore[attr-defined]
