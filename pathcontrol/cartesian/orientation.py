@@ -60,6 +60,10 @@ class Orientation(ABC):
         """Return de/dω of :meth:`error` where the tool has the frames ``wanted`` (N, 3, 3)."""
         return np.broadcast_to(np.eye(3), wanted.shape) if self.rows == 3 else wanted[..., :, :2].swapaxes(-1, -2)
 
+    def turning(self, wanted: Array, angular: Array) -> Array:
+        """Return ∂e/∂q (N, rows, n) where the tool has the frames ``wanted``, given its angular Jacobian (N, 3, n)."""
+        return angular if self.rows == 3 else self.slope(wanted) @ angular
+
 
 class FreeOrientation(Orientation):
     """An orientation that is not prescribed: only the position of the tool is."""

@@ -48,9 +48,8 @@ def quaternions_of(rotations: Array) -> Array:
 
 def rotation_vectors_of(rotation: Array) -> Array:
     """Return the rotation vectors [rad], (*batch, 3), of rotation matrices (*batch, 3, 3)."""
-    skew = 0.5 * (rotation - rotation.swapaxes(-1, -2))
-    axis = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
-    cosine = 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1)
+    axis = 0.5 * (rotation[..., [2, 0, 1], [1, 2, 0]] - rotation[..., [1, 2, 0], [2, 0, 1]])
+    cosine = 0.5 * (rotation[..., 0, 0] + rotation[..., 1, 1] + rotation[..., 2, 2] - 1)
     turn = scale_axis(axis, cosine)
     wide = cosine < _WIDE
     if wide.any():
@@ -75,6 +74,6 @@ def _wide_turn(rotation: Array, axis: Array, cosine: Array) -> Array:
 
 def scale_axis(axis: Array, cosine: Array) -> Array:
     """Return the rotation vector of an axis (N, 3) whose length is the sine of the angle, given its ``cosine``."""
-    sine = np.linalg.norm(axis, axis=-1)
+    sine = np.sqrt((axis * axis).sum(-1))
     factor = np.divide(np.arctan2(sine, cosine), sine, out=np.ones_like(sine), where=sine > _NO_SINE)
     return factor[..., None] * axis

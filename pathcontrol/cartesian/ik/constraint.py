@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -86,6 +87,10 @@ class ToolConstraint:
         """The mask of the joints without room between their limits, (n,); they count as locked."""
         return self.tool.robot.limits.lower >= self.tool.robot.limits.upper
 
+    @cached_property
+    def _some_frozen(self) -> bool:
+        return bool(self.frozen.any())
+
     @property
     def freedom(self) -> int:
         """The number of independent motions that leave the tool at rest: n − rank."""
@@ -122,9 +127,9 @@ class ToolConstraint:
         return self._slope(self.tool.kinematics(q).jacobian, target)
 
     def _slope(self, jacobian: Array, target: Target) -> Array:
-        turning = self.orientation.slope(target.frames) @ jacobian[:, 3:]
+        turning = self.orientation.turning(target.frames, jacobian[:, 3:])
         rows = np.concatenate([jacobian[:, :3] / self.length, turning], axis=-2)
-        return np.where(self.frozen, 0.0, rows)
+        return np.where(self.frozen, 0.0, rows) if self._some_frozen else rows
 
     def deviation(self, f: Array) -> tuple[Array, Array]:
         """Return the distance [m] and the angle [rad] of the deviations f (N, m), each (N,)."""

@@ -99,7 +99,8 @@ def _null_step(
     multipliers = -(linear.inverse.swapaxes(1, 2) @ gradient[..., None])
     count, k, n = free.shape
     beside = q[:, None] + _PROBE * free
-    slopes = constraint.slope(beside.reshape(-1, n), target.rows(np.repeat(np.arange(count), k)))
+    there = target if k == 1 else target.rows(np.repeat(np.arange(count), k))
+    slopes = constraint.slope(beside.reshape(-1, n), there)
     turned = (slopes.reshape(count, k, -1, n) - linear.slope[:, None]).swapaxes(-1, -2) @ multipliers[:, None]
     bend = (turned[..., 0] + cost.beside(beside) - gradient[:, None]) / _PROBE
     hessian = bend @ free.swapaxes(1, 2)

@@ -48,6 +48,8 @@ class PostureCost:
 
     def beside(self, q: Array) -> Array:
         """Return ∇H at several postures for each row, (N, k, n)."""
+        if not self.weight.any():
+            return q - self.rest[:, None]
         pull = _ATTRACTION * (q - self.anchor[:, None])
         return q - self.rest[:, None] + self.weight[:, None, None] * (pull - self._push(q))
 
