@@ -14,6 +14,22 @@ from pathcontrol.errors import EngineError
 #: builds for x86-64, from the plainest instruction set on; other machines have the first only
 BUILDS = ("base", "avx2", "avx512")
 _FOLDER = Path(__file__).parent / "lib"
+_ARRAY = c_void_p
+#: the functions of the library with the types of their arguments
+FUNCTIONS = {
+    "run": [c_void_p] * 3 + [_ARRAY, c_void_p, c_longlong, c_longlong],
+    "advance": [c_void_p, c_double, _ARRAY, _ARRAY, _ARRAY, _ARRAY, c_longlong, c_longlong],
+    "frames": [c_void_p, c_int, _ARRAY, _ARRAY, c_longlong, _ARRAY, _ARRAY, _ARRAY],
+    "inverse_dynamics": [c_void_p, c_longlong, _ARRAY, _ARRAY, _ARRAY, _ARRAY],
+    "mass_matrix": [c_void_p, c_longlong, _ARRAY, _ARRAY],
+    "momentum": [c_void_p, c_longlong, _ARRAY, _ARRAY, _ARRAY, _ARRAY],
+    "stick_slip": [c_int, c_longlong, _ARRAY, _ARRAY, _ARRAY, _ARRAY, _ARRAY, _ARRAY],
+    "evaluate": [c_void_p, c_longlong, _ARRAY, _ARRAY],
+    "gamma": [c_void_p, c_longlong, c_longlong, _ARRAY, _ARRAY, _ARRAY, _ARRAY],
+    "nearest": [c_void_p, c_longlong, _ARRAY, _ARRAY, _ARRAY],
+    "control_tick": [c_void_p],
+}
+_RESULTS = {"run": c_longlong, "frames": c_longlong}
 
 
 @cache
@@ -68,27 +84,17 @@ def _open(build: str) -> CDLL:
             limit=expected,
             file=str(path),
         )
-    _declare(library)
+    try:
+        _declare(library)
+    except AttributeError as error:  # structs of the same sizes, and a function less
+        raise EngineError(
+            f"{path.name} was built from other sources: {error}; install pathcontrol again", file=str(path)
+        ) from error
     return library
 
 
 def _declare(library: CDLL) -> None:
-    """Set argument types, so that a wrong argument is an error in Python."""
-    array = c_void_p
-    library.pathcontrol_run.restype = c_longlong
-    library.pathcontrol_run.argtypes = [c_void_p] * 3 + [array, c_void_p, c_longlong, c_longlong]
-    library.pathcontrol_frames.restype = c_longlong
-    library.pathcontrol_frames.argtypes = [c_void_p, c_int, array, array, c_longlong, array, array, array]
-    for name, arguments in {
-        "advance": [c_void_p, c_double, array, array, array, array, c_longlong, c_longlong],
-        "inverse_dynamics": [c_void_p, c_longlong, array, array, array, array],
-        "mass_matrix": [c_void_p, c_longlong, array, array],
-        "momentum": [c_void_p, c_longlong, array, array, array, array],
-        "stick_slip": [c_int, c_longlong, array, array, array, array, array, array],
-        "evaluate": [c_void_p, c_longlong, array, array],
-        "gamma": [c_void_p, c_longlong, c_longlong, array, array, array, array],
-        "nearest": [c_void_p, c_longlong, array, array, array],
-        "control_tick": [c_void_p],
-    }.items():
+    """Set types of arguments and results, so that a wrong argument is an error in Python."""
+    for name, arguments in FUNCTIONS.items():
         function = getattr(library, f"pathcontrol_{name}")
-        function.restype, function.argtypes = None, arguments
+        function.restype, function.argtypes = _RESULTS.get(name), arguments

@@ -87,6 +87,11 @@ def test_a_file_that_is_no_library_or_another_one_is_refused(monkeypatch, tmp_pa
         monkeypatch.setattr(library, "MOST_JOINTS", 8)
         with pytest.raises(pc.EngineError, match="built from other sources"):
             _run(engine="compiled")
+        monkeypatch.undo()
+        load_library.cache_clear()
+        monkeypatch.setattr(library, "FUNCTIONS", library.FUNCTIONS | {"of_tomorrow": []})
+        with pytest.raises(pc.EngineError, match=r"built from other sources.*of_tomorrow"):
+            _run(engine="compiled")
     finally:
         monkeypatch.undo()
         load_library.cache_clear()
