@@ -121,7 +121,7 @@ def test_plans_tend_to_the_least_time_as_intervals_shrink():
 def test_a_simulated_arm_passes_a_free_end_within_its_torques():
     law = pc.PathMPC(TWO_LINK, FastLine(), intervals=9, **FAST)
     q, qd = law.task.q_d(0.0), law.task.dq_d(0.0) * START_RATE
-    loop = pc.SampledLoop(period=0.03, torque_limits=True, substeps=5)
+    loop = pc.SampledLoop(period=0.045, torque_limits=True, substeps=8)
     run = pc.simulate(law, q, qd=qd, duration=0.9, until="duration", loop=loop, progress=False)
     before = run.array("s")[0] < 1.0
     assert run.array("regular")[0, before].all()
@@ -133,7 +133,7 @@ def test_a_simulated_arm_passes_a_free_end_within_its_torques():
 def test_an_open_path_ends_at_rest():
     line = pc.Line([1.0, 0.8], [1.15, 0.7], 1.0)
     law = pc.PathMPC(TWO_LINK, line, 0.4, 8)
-    loop = pc.SampledLoop(period=0.03, torque_limits=True, substeps=5)
+    loop = pc.SampledLoop(period=law.step, torque_limits=True, substeps=8)
     run = pc.simulate(law, line.start, duration=2.0, loop=loop, progress=False)
     assert run.finish_time[0] < 1.2
     assert run.array("q")[0, -1] == pytest.approx([1.15, 0.7], abs=1e-3)
@@ -164,7 +164,7 @@ def test_each_rollout_has_its_own_problem():
         np.testing.assert_array_equal(both.zdot[i], one.zdot)
 
 
-@pytest.mark.parametrize("factor", [0.5, 0.0, -0.5])
+@pytest.mark.parametrize("factor", [0.0, -0.5])
 def test_the_speed_may_be_overridden(factor):
     law = pc.SpeedOverride(circling(), [[0.0, factor]], acceleration=50.0)
     loop = pc.SampledLoop(period=0.03, substeps=5)

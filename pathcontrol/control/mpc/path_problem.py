@@ -26,6 +26,7 @@ _OPTIONS = {
         "tol": 1e-9,
         "compl_inf_tol": 1e-9,
         "mu_init": 1e-3,
+        "mu_strategy": "adaptive",  # a guess is near the optimum: two thirds of the steps of a barrier that only falls
         "warm_start_init_point": "yes",
     },
 }
