@@ -122,10 +122,10 @@ def test_a_hold_is_a_ramp_within_its_bound_and_the_plan_its_integral(ideal_arm, 
 @pytest.mark.parametrize("which", [0, 1])
 def test_v_falls_as_the_theorem_says_while_an_operator_plays(ideal_arm, which):
     def u(t):
-        return 1.2 * np.cos(5.0 * t)
+        return 1.2 * np.cos(8.0 * t)
 
-    law = pc.SpeedOverride(path_laws(ideal_arm, pc.Ellipse([1.0, 0.6], 1.5))[which], u, acceleration=5.0)
-    played = run(law, duration=0.75, loop=pc.ContinuousTime(output_period=2e-3))
+    law = pc.SpeedOverride(path_laws(ideal_arm, pc.Ellipse([1.0, 0.6], 1.5))[which], u, acceleration=8.0)
+    played = run(law, duration=0.48, loop=pc.ContinuousTime(output_period=2e-3))
     V, Vdot = (part[0] for part in pc.lyapunov(law, played))
     change = cumulative_simpson(Vdot, dx=2e-3, initial=0)
     np.testing.assert_allclose(V, V[0] + change, rtol=0, atol=2e-4 * V[0])

@@ -1,5 +1,7 @@
 """Laws for arms that are stepped by hand, and bad measurements of them."""
 
+from functools import cache
+
 import numpy as np
 
 import pathcontrol as pc
@@ -29,9 +31,14 @@ def arm_of(n):
     return pc.load_robot("panda", lock=fingers), [0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.8], 0.2
 
 
-def law_of(n, kind=pc.Projection):
+@cache
+def arm_and_path(n):
     robot, center, size = arm_of(n)
-    task = pc.Lissajous(np.full(n, size), list(range(1, n + 1)), 0.5, center=center)
+    return robot, pc.Lissajous(np.full(n, size), list(range(1, n + 1)), 0.5, center=center)
+
+
+def law_of(n, kind=pc.Projection):
+    robot, task = arm_and_path(n)
     if kind is pc.Projection:
         return pc.Projection(robot, task, k_p=400.0, K_v=40.0)
     if kind is pc.ExtendedMotionPlan:

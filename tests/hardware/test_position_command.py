@@ -9,7 +9,7 @@ import pathcontrol as pc
 from pathcontrol.errors import InputError
 
 H = 2e-3
-JAM, END = (1.0, 1.6), 2.2  # s
+JAM, END = (0.4, 1.0), 1.6  # s
 
 
 def task_of(n):
@@ -76,8 +76,8 @@ def test_an_override_is_followed_as_in_the_simulation():
 @pytest.mark.parametrize(
     ("kind", "n", "jammed"),
     [
-        *((pc.ExtendedMotionPlan, 2, 0), (pc.ExtendedMotionPlan, 6, 2)),
-        *((pc.Projection, 2, 0), (pc.Projection, 6, 1), (pc.Projection, 6, 3)),
+        *((pc.ExtendedMotionPlan, 2, 0), (pc.ExtendedMotionPlan, 6, 0)),
+        *((pc.Projection, 2, 0), (pc.Projection, 6, 3)),
     ],
 )
 def test_an_arm_that_jams_waits_on_its_path(kind, n, jammed):
@@ -132,7 +132,7 @@ def test_holding_and_going_on_without_a_jump():
     command, q = pc.PositionCommand(law, H), start_of(law)
     command.start(q)
     went, q = [], q
-    for act, seconds in ((None, 0.3), (command.hold, 0.7), (command.resume, 0.3), (command.reverse, 0.9)):
+    for act, seconds in ((None, 0.2), (command.hold, 0.6), (command.resume, 0.3), (command.reverse, 0.6)):
         if act is not None:
             act()
         s = command.s
@@ -172,16 +172,16 @@ def test_bad_measurements_are_bridged_and_many_hold_the_plan():
     law = law_of(2)
     command, q = pc.PositionCommand(law, H), start_of(law)
     command.start(q)
-    for k in range(400):
+    for k in range(150):
         q = command.step(None if 100 <= k < 104 else q)
     assert command.faults == 4
     moved = np.abs(command.qd).max()
-    for _ in range(600):
+    for _ in range(300):
         command.step(np.full(2, np.nan))
     assert np.abs(command.qd).max() < 1e-3 < moved
     q = command.q
     command.resume()
-    for _ in range(400):
+    for _ in range(200):
         q = command.step(q)
     assert np.abs(command.qd).max() > 0.3
 
