@@ -2,64 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
 from typing import TYPE_CHECKING, Any
 
 import h5py  # type: ignore[import-untyped]
 import numpy as np
+from h5py import h5d
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.samples import Samples
+from pathcontrol.simulation.storage.hdf5_arrays import find_arrays
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 
 if TYPE_CHECKING:
     import xarray as xr
 
-NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 _DEEPEST = 50
 _DENSEST = 1100  # bytes that deflate may expand one byte to, 1032, with a margin
 _UNWRITTEN = 1 << 20  # bytes that a small variable may have without being in the file
 WORDS, COUNTS = ("status", "reason", "path_status"), ("laps", "path_index", "forgotten")
 
 
-def check_sizes(file: h5py.File, size: int) -> None:
-    """Check that no variable is larger than ``size`` bytes of a file can hold, before memory is taken for it.
+def find_sized_arrays(file: h5py.File, size: int) -> dict[str, h5py.Dataset]:
+    """Return the arrays in a file by their place, none larger than ``size`` bytes can hold: they take memory next.
 
     Raises:
         InputError: one is, or its numbers are not in this file.
     """
-    stored = 0
-    for name, variable in _variables(file):
-        if variable.external or variable.is_virtual:
+    stored, found = 0, {}
+    for name, variable in find_arrays(file):
+        place, creation = variable.id, variable.id.get_create_plist()
+        if creation.get_external_count() or creation.get_layout() == h5d.VIRTUAL:
             raise InputError(f"the numbers of {name} are said to be in another file", value=name)
-        stored += variable.id.get_storage_size()
+        stored += place.get_storage_size()
         most = _UNWRITTEN + _DENSEST * min(stored, size)
-        chunk = 1 if variable.chunks is None else int(np.prod([float(length) for length in variable.chunks]))
-        count = max(chunk, int(np.prod([float(length) for length in variable.shape])))
-        if count * variable.dtype.itemsize > most:
+        chunk = creation.get_chunk() if creation.get_layout() == h5d.CHUNKED else ()
+        count = max(math.prod(chunk), math.prod(place.shape))
+        if count * place.get_type().get_size() > most:
             raise InputError(
                 f"it says that {name} has the shape {variable.shape}, which cannot be in a file of {size} bytes",
                 value=variable.shape,
             )
-
-
-def _variables(group: h5py.Group) -> Iterator[tuple[str, h5py.Dataset]]:
-    """Yield all datasets but those that only hold the length of a dimension."""
-    for name in group:
-        link = group.get(name, getlink=True)
-        if not isinstance(link, h5py.HardLink):
-            raise InputError(f"{name} is a link to somewhere else", value=name)
-        item = group[name]
-        if isinstance(item, h5py.Group):
-            yield from ((f"{name}/{inner}", one) for inner, one in _variables(item))
-        elif isinstance(item, h5py.Dataset) and not is_length(item):
-            yield name, item
-
-
-def is_length(item: h5py.Dataset) -> bool:
-    """Return whether a dataset only holds the length of a dimension."""
-    return bytes(item.attrs.get("NAME", b"")).startswith(NO_VARIABLE.encode())
+        found[name] = variable
+    return found
 
 
 def check_form(data: xr.Dataset | Samples, config: Any) -> None:

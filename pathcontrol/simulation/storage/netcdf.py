@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +12,13 @@ import h5netcdf  # type: ignore[import-untyped]
 import h5py  # type: ignore[import-untyped]
 import numpy as np
 
-from pathcontrol._arrays import Array
 from pathcontrol._files import whole_file
 from pathcontrol.errors import InputError, warn
 from pathcontrol.simulation.context import StoredContext
-from pathcontrol.simulation.samples import Labelled, Samples
+from pathcontrol.simulation.samples import Samples
 from pathcontrol.simulation.storage.cf_encoding import decode_samples, encode_run
-from pathcontrol.simulation.storage.file_form import NO_VARIABLE, check_form, check_sizes, is_length
+from pathcontrol.simulation.storage.file_form import check_form, find_sized_arrays
+from pathcontrol.simulation.storage.hdf5_arrays import put_arrays, read_attributes, read_dimensions
 from pathcontrol.simulation.storage.seal import check_seal, digest_of, seal
 from pathcontrol.simulation.variables import OUTCOMES, VARIABLES
 
@@ -31,7 +31,6 @@ _DIGEST = "pathcontrol_sha256"
 _GROUP = "origin"
 _WRITER = np.bytes_(f"version=2,h5py={h5py.__version__},hdf5={h5py.version.hdf5_version}")  # netCDF-C wants to know
 _KNOWN = (*VARIABLES, *OUTCOMES, "time", "joint", "rollout")
-_OF_FORMAT = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties")
 _RECIPE = {"long_name": "robot and task of the run, JSON in UTF-8"}
 _NUMBERS = {"long_name": "arrays of the recipe, one after another"}
 
@@ -49,10 +48,10 @@ def write_run(path: Path, data: xr.Dataset | Samples, config: Mapping[str, Any],
     origin = {"recipe": (("byte",), recipe, _RECIPE), "numbers": (("number",), stored.numbers, _NUMBERS)}
     with h5py.File(memory, "w", track_order=True) as file:
         variables, about = encode_run(data)
-        _put(file, variables, data.arrays if isinstance(data, Samples) else data.data_vars, _LEVEL)
+        put_arrays(file, variables, data.arrays if isinstance(data, Samples) else data.data_vars, _LEVEL)
         file.attrs.update({**about, _CONFIG: text, _DIGEST: _digest_of_run(data, text), "_NCProperties": _WRITER})
         group = file.create_group(_GROUP, track_order=True)
-        _put(group, origin, origin, 4)
+        put_arrays(group, origin, origin, 4)
         group.attrs[_DIGEST] = _digest_of_origin(stored)
     content = memory.getbuffer()
     with whole_file(path) as temporary, temporary.open("wb") as written:
@@ -83,8 +82,9 @@ def read_run(path: Path) -> tuple[xr.Dataset | Samples, dict[str, Any], StoredCo
     try:
         check_seal(path)
         with h5py.File(path, "r") as file:
-            check_sizes(file, path.stat().st_size)
-            samples, about = _read_samples(file)
+            items = find_sized_arrays(file, path.stat().st_size)
+            about, stored = read_attributes(file), _read_origin(file, items)
+            samples = _read_samples({name: item for name, item in items.items() if "/" not in name}, about)
         data, about = _read_data(path) if samples is None else (samples, about)
         digest, text = about.pop(_DIGEST, None), about.pop(_CONFIG)
         config = json.loads(text)
@@ -92,7 +92,6 @@ def read_run(path: Path) -> tuple[xr.Dataset | Samples, dict[str, Any], StoredCo
         _check_digest(digest, lambda: _digest_of_run(data, text))
         if not isinstance(data, Samples) and "rollout" not in data.coords:
             data = data.assign_coords(rollout=data["rollout"])  # so that parts of the run keep their numbers
-        stored = _read_origin(path)
     except Exception as error:  # a broken file may fail anywhere in the readers
         reason = str(error) if "file signature not found" not in str(error) else f"it is no HDF5 file{_remedy(path)}"
         raise InputError(f"{str(path)!r} is not a run saved by Run.save: {reason}", file=str(path)) from error
@@ -104,26 +103,13 @@ def read_run(path: Path) -> tuple[xr.Dataset | Samples, dict[str, Any], StoredCo
     return data, config, stored
 
 
-def _read_samples(file: h5py.File) -> tuple[Samples | None, dict[str, Any]]:
+def _read_samples(items: Mapping[str, h5py.Dataset], about: Mapping[str, Any]) -> Samples | None:
     """Read a file that is as :func:`write_run` writes it, without xarray; ``None`` from another one."""
-    items = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset) and not is_length(item)}
-    dims, about = {name: _dimensions(name, item) for name, item in items.items()}, _read_attributes(file)
+    dims = {name: read_dimensions(name, item) for name, item in items.items()}
     if not isinstance(about.get(_CONFIG), str) or any(len(dims[name]) != item.ndim for name, item in items.items()):
-        return None, about
-    found = {name: (dims[name], _read_array(item), _read_attributes(item)) for name, item in items.items()}
-    own = {name: value for name, value in about.items() if name not in (_CONFIG, _DIGEST)}
-    return decode_samples(found, own), about
-
-
-def _dimensions(name: str, item: h5py.Dataset) -> tuple[str, ...]:
-    """Return the names of the scales of a variable, or its own if it is one."""
-    scales = [scale for dim in item.dims for scale in dim.values()]
-    return (name,) if item.is_scale else tuple(scale.name.removeprefix("/") for scale in scales)
-
-
-def _read_attributes(item: h5py.HLObject) -> dict[str, Any]:
-    """Read the attributes of a variable or a group, but those of the format."""
-    return {name: item.attrs[name] for name in item.attrs if name not in _OF_FORMAT}
+        return None
+    found = {name: (dims[name], _read_array(item), read_attributes(item)) for name, item in items.items()}
+    return decode_samples(found, {name: value for name, value in about.items() if name not in (_CONFIG, _DIGEST)})
 
 
 def _read_data(path: Path) -> tuple[xr.Dataset, dict[str, Any]]:
@@ -155,17 +141,15 @@ def _remedy(path: Path) -> str:
     return "; a toolpath is read by read_toolpath" if suffix in _TOOLPATHS else ""
 
 
-def _read_origin(path: Path) -> StoredContext | None:
+def _read_origin(file: h5py.File, items: Mapping[str, h5py.Dataset]) -> StoredContext | None:
     """Read robot and path, or ``None`` from a file without them."""
-    with h5py.File(path, "r") as file:
-        if _GROUP not in file:  # the file is older than runs that know their robot
-            return None
-        origin = file[_GROUP]
-        recipe, numbers, digest = origin["recipe"][...], origin["numbers"][...], origin.attrs.get(_DIGEST)
+    if _GROUP not in file:  # the file is older than runs that know their robot
+        return None
+    recipe, numbers = (items[f"{_GROUP}/{name}"][...] for name in ("recipe", "numbers"))
     if recipe.dtype != np.uint8 or numbers.dtype != np.float64 or recipe.ndim != 1 or numbers.ndim != 1:
         raise InputError("what it says of its robot and path is no text with numbers")
     stored = StoredContext(recipe.tobytes().decode(), numbers)
-    _check_digest(digest, lambda: _digest_of_origin(stored))
+    _check_digest(file[_GROUP].attrs.get(_DIGEST), lambda: _digest_of_origin(stored))
     return stored
 
 
@@ -186,32 +170,3 @@ def _digest_of_run(data: xr.Dataset | Samples, text: str) -> str:
 def _digest_of_origin(stored: StoredContext) -> str:
     """Return the checksum of robot and path."""
     return digest_of({"numbers": stored.numbers}, stored.text)
-
-
-def _put(group: h5py.Group, labelled: Mapping[str, Labelled], packed: Collection[Any], level: int) -> None:
-    """Write arrays over dimensions as netCDF-4 does, the ``packed`` ones compressed at a ``level``.
-
-    A dimension is a scale of HDF5, the array of its name or else an empty one.
-    """
-    sizes = {dim: n for dims, array, _ in labelled.values() for dim, n in zip(dims, np.shape(array), strict=True)}
-    for name, (_, array, attributes) in labelled.items():
-        variable = _put_array(group, name, array, attributes.get("_FillValue"), level if name in packed else None)
-        set_attribute = variable.attrs.create
-        for key, value in attributes.items():
-            set_attribute(key, value if isinstance(value, str) else np.atleast_1d(value))
-    for dim, size in sizes.items():
-        own = dim in labelled
-        scale = group[dim] if own else group.create_dataset(dim, (size,), ">f4", track_order=True)
-        scale.make_scale(dim if own else f"{NO_VARIABLE}{size:10}")
-        for name, (dims, *_) in labelled.items():
-            if dim in dims and name != dim:
-                variable = h5py.h5d.open(group.id, name.encode())  # an item of the group would take thrice the time
-                h5py.h5ds.attach_scale(variable, scale.id, dims.index(dim))
-
-
-def _put_array(group: h5py.Group, name: str, array: Array, missing: Any, level: int | None) -> h5py.Dataset:
-    """Write an array, words as text of any length, and return its place in the file."""
-    more = {"compression": "gzip", "compression_opts": level, "shuffle": True} if level and array.size > 1 else {}
-    if array.dtype.kind in "UO":
-        array, more["dtype"] = array.astype(object), h5py.string_dtype()
-    return group.create_dataset(name, data=array, fillvalue=missing, track_order=True, **more)
