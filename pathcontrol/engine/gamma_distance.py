@@ -55,6 +55,7 @@ def distances_to_gamma(task: PathTask, q: Array, qd: Array, weight: float, braki
     """
     library = load_library()
     table, path, kept = task_table(task)
+    braking = braking and table.ending is not None
     ready = _READY.get(task) or _READY.keep(task, {})
     known = ready.get((weight, braking))
     if known is None or known.table is not table:

@@ -219,8 +219,8 @@ def _find_coarse(
     theta, slope = (part.reshape(x.shape) for part in _theta(task, (left + x).reshape(-1)))
     value, rise = horner(pieces[:, None], x)
     local = np.abs(slope).max(0, initial=0.0)
-    # the tolerance cannot be less than the change of ϑ over the rounding of s
-    rounding = _ROUNDING * (largest + local * np.abs(right))
+    # the tolerance cannot be less than the change of ϑ over the rounding of s, nor than numbers have digits
+    rounding = _ROUNDING * (largest + local * np.abs(right)) + np.finfo(np.float64).tiny
     apart = np.abs(value - theta).max(0, initial=0.0) > _RATE * largest + rounding
     bent = np.abs(rise - slope).max(0, initial=0.0) > _RATE_SLOPE * (steepest + local) + 8 * rounding / (right - left)
     wide = right - left > _NARROWEST * np.maximum(np.abs(left), np.abs(right))  # s has no more digits to halve
