@@ -298,9 +298,10 @@ OF_ARGUMENTS = ("InputError", "TaskError", "UnknownNameError", "UrdfError")
 @functools.cache
 def raising():
     """All errors of arguments that the package makes: the place, the message and the names of the attributes."""
-    found = []
+    found, making = [], re.compile(rf"\b({'|'.join(OF_ARGUMENTS)})\(")
     for file in sorted(Path(pc.__file__).parent.rglob("*.py")):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        text = file.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)) if making.search(text) else ():
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") in OF_ARGUMENTS and node.args:
                 beside = {keyword.arg for keyword in node.keywords}
                 found.append((f"{file.name}:{node.lineno}", node.func.id, said(node.args[0]), beside))

@@ -12,6 +12,7 @@ import json
 import platform
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -117,6 +118,12 @@ class Manifest:
 
 def versions() -> dict[str, str]:
     """Return the versions of the packages that compute the numbers."""
+    return dict(_versions())
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Return the versions of the packages that compute the numbers; reading them takes milliseconds."""
     return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
 
 
