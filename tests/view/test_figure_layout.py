@@ -80,10 +80,8 @@ OF_TABLES = {
 
 
 @pytest.mark.parametrize("name", OF_TABLES)
-def test_words_of_sweeps_are_on_the_page_and_apart(name, tmp_path):
-    figure = OF_TABLES[name]()
-    save_figure(figure, tmp_path / "figure", ["svg"])
-    assert_readable(figure, name)
+def test_words_of_sweeps_are_on_the_page_and_apart(name):
+    assert_readable(OF_TABLES[name](), name)
 
 
 @pytest.mark.parametrize("size", [(200, 20), (20, 200), (70, 71), (0.02, 0.01), (900, 1000)])
@@ -106,12 +104,14 @@ class Saved(NamedTuple):
     files: list[Path]
 
 
-@pytest.fixture(scope="module", params=["path", "errors"])  # with equal scales, and free ones
+# with equal scales, and free ones, for which two formats are enough
+@pytest.fixture(scope="module", params=[("path", FORMATS), ("errors", FORMATS[:2])], ids=lambda param: param[0])
 def saved(request, tmp_path_factory) -> Saved:
-    figure, places = makers(made(3, scale=1.3))[request.param](), []
+    (kind, formats), places = request.param, []
+    figure = makers(made(3, scale=1.3))[kind]()
     before = figure.get_layout_engine(), figure.dpi
     figure.canvas.mpl_connect("draw_event", lambda _: places.append([a.get_position().bounds for a in figure.axes]))
-    files = save_figure(figure, tmp_path_factory.mktemp("saved") / request.param, FORMATS)
+    files = save_figure(figure, tmp_path_factory.mktemp("saved") / kind, formats)
     return Saved(figure, before, places, files)
 
 
@@ -144,7 +144,7 @@ def test_what_is_remembered_changes_no_byte_and_leaves_matplotlib_as_it_was(save
     for name in ("remembered_ticks", "remembered_formulas", "remembered_texts"):
         monkeypatch.setattr(f"pathcontrol.view.figures.panel_layout.{name}", lambda *_: nullcontext())
     kind = saved.files[0].stem
-    found = save_figure(makers(made(3, scale=1.3))[kind](), tmp_path / kind, FORMATS)
+    found = save_figure(makers(made(3, scale=1.3))[kind](), tmp_path / kind, [file.suffix[1:] for file in saved.files])
     assert [file.read_bytes() for file in saved.files] == [file.read_bytes() for file in found]
     axes = saved.figure.findobj(Axis)
     assert axes
@@ -244,8 +244,8 @@ def test_numbers_are_plain_text_and_are_what_they_stand_at(middle, half):
     figure, axes = panel(middle - half, middle + half)
     with style(), warnings.catch_warnings():
         warnings.simplefilter("error")
-        FigureCanvasAgg(figure).draw()
         for axis in (axes.xaxis, axes.yaxis):
+            axis.get_tightbbox(figure.canvas.get_renderer())  # writes its numbers as they are drawn
             found = [
                 (p, t.get_text()) for p, t in zip(axis.get_majorticklocs(), axis.get_majorticklabels(), strict=True)
             ]

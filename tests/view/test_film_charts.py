@@ -33,7 +33,7 @@ def runs(arm: RobotModel, circle: Circle) -> dict[str, Run]:
     """Runs of two controllers, of different durations and sample times."""
     plan, projection = ExtendedMotionPlan(arm, circle, 800.0, 45.0, 20.0), Projection(arm, circle, 800.0, 45.0)
     start = np.deg2rad([40.0, 70.0])
-    loop = ContinuousTime(output_period=0.004)
+    loop = ContinuousTime(output_period=0.01)
     return {
         "path": simulate(plan, start, duration=2.0, progress=False),
         "motion": simulate(projection, start, duration=1.5, loop=loop, progress=False),
@@ -242,7 +242,7 @@ def test_settings_say_what_each_run_was_made_with(both: Reel, runs: dict[str, Ru
     assert rows["loop"] == ["sampled", "continuous"]
     assert rows["control period [s]"] == ["0.0025", "–"]
     assert rows["friction of the plant"] == ["Viscous + Coulomb"] * 2
-    assert rows["duration"] == ["2 s, 801 samples", "1.5 s, 376 samples"]
+    assert rows["duration"] == ["2 s, 801 samples", "1.5 s, 151 samples"]
     assert "pathcontrol " in rows["versions"][0]
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lxml import html
 from numpy.testing import assert_allclose
 
 from pathcontrol import (
@@ -18,9 +17,9 @@ from pathcontrol import (
     load_robot,
     momentum_observer,
     observer_figure,
-    report,
     simulate,
 )
+from pathcontrol.view.report.pictures import pictures
 
 CAPTION = "Torques beside those of motors and friction"
 RAIL = load_robot(
@@ -70,16 +69,14 @@ def test_a_joint_that_slides_is_pushed_by_a_force():
     assert axes.lines[1].get_ydata()[-1] == pytest.approx(3.0, rel=1e-6)
 
 
-def test_reports_of_pushed_runs_have_it(runs, tmp_path, monkeypatch):
+def test_reports_of_pushed_runs_have_it(runs, monkeypatch):
     monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure: ("png", b""))  # captions are enough
 
-    def captions(some):
-        page = html.parse(report(some, tmp_path / "page.html")).getroot()
-        return [caption.text_content() for caption in page.iter("figcaption")]
+    def captions(*names):
+        return [one.caption for one in pictures({name: runs[name] for name in names})]
 
-    assert CAPTION in captions(runs)
-    assert CAPTION in captions(runs["pushed"])
-    assert CAPTION not in captions(runs["alone"])
+    assert CAPTION in captions("alone", "pushed")
+    assert CAPTION not in captions("alone")
 
 
 @pytest.mark.filterwarnings("ignore::pathcontrol.PathControlWarning")

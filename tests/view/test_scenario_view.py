@@ -22,6 +22,11 @@ def jam():
 
 
 @pytest.fixture(scope="module")
+def calm():
+    return pc.compare("projection", "undisturbed", rollouts=1, progress=False)
+
+
+@pytest.fixture(scope="module")
 def page(jam, tmp_path_factory) -> Path:
     return pc.save_comparison(jam, tmp_path_factory.mktemp("page") / "comparison.html")
 
@@ -45,8 +50,7 @@ def test_the_figure_draws_the_measures_of_each_law_around_the_event(jam):
         pc.scenario_figure(jam.runs["projection"])
 
 
-def test_without_an_event_all_of_the_run_is_drawn():
-    calm = pc.compare("projection", "undisturbed", rollouts=1, progress=False)
+def test_without_an_event_all_of_the_run_is_drawn(calm):
     axes = pc.scenario_figure(calm).axes[0]
     assert axes.get_xlim() == pytest.approx((0.0, 10.0))
     assert not axes.patches
@@ -72,8 +76,7 @@ def test_charts_of_the_page_mark_the_event(page):
         assert film.complaints == []
 
 
-def test_a_page_without_an_event_has_none_and_another_name_is_refused(tmp_path):
-    calm = pc.compare("projection", "undisturbed", rollouts=1, progress=False)
+def test_a_page_without_an_event_has_none_and_another_name_is_refused(calm, tmp_path):
     with pytest.raises(pc.InputError, match=r"\.html"):
         pc.save_comparison(calm, tmp_path / "page.pdf")
     with opened(pc.save_comparison(calm, tmp_path / "page.html"), (1000, 700), "#t=0") as film:
@@ -103,8 +106,10 @@ def test_rounding_is_nothing_and_what_all_laws_share_is_not_the_best(jam):
     assert apart.best("lag_peak") == ["projection"]
 
 
-def test_names_and_counts_are_as_a_reader_has_them(jam):
-    one = pc.compare(["pd_plus", "adaptive_slotine_li"], "undisturbed", rollouts=1, progress=False)
+def test_names_and_counts_are_as_a_reader_has_them(jam, calm):
+    held = {field: getattr(calm, field)["projection"] for field in ("laws", "runs", "undisturbed", "measures")}
+    names = ["pd_plus", "adaptive_slotine_li"]
+    one = dataclasses.replace(calm, **{field: dict.fromkeys(names, of) for field, of in held.items()})
     assert tabulate(one)[0] == ["", "PD+", "adaptive Slotine–Li"]
     assert [line for line in describe_comparison(one) if "one start" in line]
     assert not any("deviation" in line for line in describe_comparison(one))

@@ -144,9 +144,8 @@ def test_words_stand_apart_and_axes_have_units(n, count):
             assert_units(figure, name)
 
 
-@pytest.mark.parametrize("offset", [0.0, 123.456])
-@pytest.mark.parametrize("size", [1e-7, 30.0])
-def test_numbers_stand_apart(offset, size):
+@pytest.mark.parametrize(("size", "offset"), [(1e-7, 0.0), (1e-7, 123.456), (30.0, 123.456)])
+def test_numbers_stand_apart(size, offset):
     run = made(3, scale=size)
     run.data["q"] += offset
     for name, figure in {"phase": phase_figure(run), "path": path_figure(run)}.items():

@@ -177,9 +177,13 @@ def test_outlines_reach_as_far_as_their_shapes_in_every_direction(seed: int) -> 
 def away(points: np.ndarray, mesh: Mesh) -> np.ndarray:
     """Distance of points (k, 3) from the nearest triangle of a mesh, (k,)."""
     triangles = mesh.vertices[mesh.faces]
-    repeated = np.repeat(points, len(triangles), axis=0)
-    nearest = trimesh.triangles.closest_point(np.tile(triangles, (len(points), 1, 1)), repeated)
-    return np.linalg.norm(nearest - repeated, axis=-1).reshape(len(points), -1).min(axis=1)
+    centers = triangles.mean(axis=1)
+    off = np.linalg.norm(points[:, None] - centers, axis=-1)  # (point, triangle)
+    reach = np.linalg.norm(triangles - centers[:, None], axis=-1).max(axis=1)
+    i, k = np.nonzero(off - reach <= off.min(axis=1, keepdims=True))  # others are farther away than a center
+    nearest, found = trimesh.triangles.closest_point(triangles[k], points[i]), np.full(len(points), np.inf)
+    np.minimum.at(found, i, np.linalg.norm(nearest - points[i], axis=-1))
+    return found
 
 
 def bumpy(seed: int) -> Mesh:
