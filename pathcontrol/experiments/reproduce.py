@@ -221,13 +221,15 @@ def compare_engines(reference: Experiment, robot: RobotModel) -> dict[str, Any]:
 
 def _write(experiment: Experiment, robot: RobotModel, out: Path) -> None:
     """Write data, figures and animation of one experiment."""
+    run, task = experiment.run, experiment.controller.task
+    run.save(out / f"{experiment.name}.nc")
+
+    # what draws, which takes longer to load than to write the run
     from pathcontrol.view.animation.record import record
     from pathcontrol.view.figures.error_figures import error_figure
     from pathcontrol.view.figures.path_figures import path_figure
     from pathcontrol.view.figures.style import save_figure
 
-    run, task = experiment.run, experiment.controller.task
-    run.save(out / f"{experiment.name}.nc")
     path_name, error_name = FIGURES[experiment.name]
     save_figure(path_figure(run, task), out / path_name)
     save_figure(error_figure(run), out / error_name)

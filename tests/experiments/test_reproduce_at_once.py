@@ -26,9 +26,11 @@ from pathcontrol.experiments import reproduce
 {}
 main(["reproduce", "--out", *sys.argv[1:]])
 """
-SHORTLY = [sys.executable, "-c", PROGRAM.format("reproduce.DURATION = 0.2")]
+SHORT, NO_WRITERS = "reproduce.DURATION = 0.2", "reproduce.load_writers = lambda: None"
 #: what draws takes longer to load than all that comes before it
-UNDRAWN = [sys.executable, "-c", PROGRAM.format("reproduce.load_writers = lambda: None")]
+SHORTLY, UNDRAWN, SHORTLY_UNDRAWN = (
+    [sys.executable, "-c", PROGRAM.format(change)] for change in (SHORT, NO_WRITERS, f"{SHORT}; {NO_WRITERS}")
+)
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +103,7 @@ def test_files_are_the_same_to_the_last_bit_from_one_process_and_from_two(thread
 def test_errors_of_another_process_are_told_in_one_sentence(tmp_path):
     for name in ("extended_motion_plan", "projection"):  # the first file that each of the two processes writes
         (tmp_path / "out" / f"{name}.nc").mkdir(parents=True)
-    done = subprocess.run([*SHORTLY, tmp_path / "out"], capture_output=True, text=True)
+    done = subprocess.run([*SHORTLY_UNDRAWN, tmp_path / "out"], capture_output=True, text=True)
     assert done.returncode == 2
     assert "extended_motion_plan.nc" in done.stderr
     assert "Traceback" not in done.stderr

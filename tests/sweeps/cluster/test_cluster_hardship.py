@@ -161,7 +161,8 @@ def test_what_the_page_starts_listens_on_this_machine_only(here, tmp_path):
 @pytest.fixture(scope="module")
 def certificate(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tls")
-    line = "openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost -keyout key.pem -out cert.pem"
+    line = "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=localhost"
+    line += " -keyout key.pem -out cert.pem"
     try:
         subprocess.run(shlex.split(line), cwd=folder, check=True, capture_output=True)
     except FileNotFoundError:
