@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from pathcontrol._arrays import Array, as_array, check_finite, freeze
 from pathcontrol.arguments import Direction, Form, Unit
 from pathcontrol.errors import InputError
-from pathcontrol.robot.rotations import rotation_vectors_of, scale_axis
+from pathcontrol.robot.rotations import cross, rotation_vectors_of, scale_axis
 from pathcontrol.toolpaths.tool_curve import ToolCurve
 
 _PARALLEL = 1e-6  # sine of an angle that counts as zero
@@ -50,7 +50,7 @@ class Orientation(ABC):
         if self.rows == 3:
             return rotation_vectors_of(rotation @ wanted.swapaxes(-1, -2))
         z, towards = rotation[..., :, 2], wanted[..., :, 2]
-        axis, cosine = np.cross(towards, z), (towards * z).sum(-1)
+        axis, cosine = cross(towards, z), (towards * z).sum(-1)
         turn = scale_axis(axis, cosine)
         opposite = (np.linalg.norm(axis, axis=-1) <= _NO_SINE) & (cosine < 0)
         turn[opposite] = np.pi * wanted[opposite, :, 0]  # half a turn, about any axis across z

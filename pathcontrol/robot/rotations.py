@@ -46,6 +46,14 @@ def quaternions_of(rotations: Array) -> Array:
     return columns / np.linalg.norm(columns, axis=-1, keepdims=True)
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Return the products a × b of rows (*batch, 3), as NumPy does, which takes three times as long for a few."""
+    out = np.empty(a.shape)
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+    return out
+
+
 def rotation_vectors_of(rotation: Array) -> Array:
     """Return the rotation vectors [rad], (*batch, 3), of rotation matrices (*batch, 3, 3)."""
     axis = 0.5 * (rotation[..., [2, 0, 1], [1, 2, 0]] - rotation[..., [1, 2, 0], [2, 0, 1]])

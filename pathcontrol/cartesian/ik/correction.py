@@ -95,14 +95,16 @@ def _null_step(
     With the Lagrangian L = H + λᵀf and λ = −(∂f/∂q)⁺ᵀ∇H, Z∇L = 0 at the optimum, Z the rows ``linear.free``; ∇²L
     along them is a difference quotient of ∇L. Where it is not positive the step still goes downhill.
     """
-    free, gradient = linear.free, cost.gradient(q)
-    multipliers = -(linear.inverse.swapaxes(1, 2) @ gradient[..., None])
+    free = linear.free
     count, k, n = free.shape
     beside = q[:, None] + _PROBE * free
+    gradients = cost.gradients(np.concatenate([q[:, None], beside], axis=1))
+    gradient = gradients[:, 0]
+    multipliers = -(linear.inverse.swapaxes(1, 2) @ gradient[..., None])
     there = target if k == 1 else target.rows(np.repeat(np.arange(count), k))
     slopes = constraint.slope(beside.reshape(-1, n), there)
     turned = (slopes.reshape(count, k, -1, n) - linear.slope[:, None]).swapaxes(-1, -2) @ multipliers[:, None]
-    bend = (turned[..., 0] + cost.beside(beside) - gradient[:, None]) / _PROBE
+    bend = (turned[..., 0] + gradients[:, 1:] - gradient[:, None]) / _PROBE
     hessian = bend @ free.swapaxes(1, 2)
     curvature, axes = np.linalg.eigh(0.5 * (hessian + hessian.swapaxes(1, 2)))
     downhill = -(free @ gradient[..., None] + bend @ step[..., None])

@@ -42,11 +42,7 @@ class PostureCost:
         """Return the cost ½‖q − q_rest‖²."""
         return cls(rest, rest, np.zeros(len(rest)), limits)
 
-    def gradient(self, q: Array) -> Array:
-        """Return ∇H at q (N, n)."""
-        return self.beside(q[:, None])[:, 0]
-
-    def beside(self, q: Array) -> Array:
+    def gradients(self, q: Array) -> Array:
         """Return ∇H at several postures for each row, (N, k, n)."""
         if not self.weight.any():
             return q - self.rest[:, None]
