@@ -7,12 +7,17 @@ from pathlib import Path
 
 import ezdxf
 import numpy as np
+from hypothesis import Phase, settings
+from hypothesis import strategies as st
 
 from pathcontrol.toolpaths.contour import Contour
 from pathcontrol.toolpaths.dxf.reader import read_dxf
 from pathcontrol.toolpaths.segments.segment import Polyline
 
 U = np.linspace(0.0, 1.0, 9)
+TEN = st.lists(st.integers(0, 10**6), min_size=10, max_size=10, unique=True)  # seeds of what one file holds
+#: files of many drawings, which would take minutes to shrink
+TOGETHER = settings(max_examples=1, phases=[Phase.explicit, Phase.generate])
 MM_PAGE = 'width="100mm" height="50mm" viewBox="0 0 100 50"'
 
 
@@ -32,6 +37,19 @@ def dxf_reader(folder: Path):
         return read_dxf(folder / "drawing.dxf", **options)
 
     return read
+
+
+def apart(draws):
+    """Draws what several functions do, each on a layer of its own: one file for many drawings."""
+
+    def draw(modelspace):
+        for k, one in enumerate(draws):
+            before = len(modelspace)
+            one(modelspace)
+            for entity in modelspace[before:]:
+                entity.dxf.layer = f"drawing {k}"
+
+    return draw
 
 
 def write(folder: Path, text: str, name: str = "drawing.svg") -> Path:

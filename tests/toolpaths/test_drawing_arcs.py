@@ -5,7 +5,7 @@ from __future__ import annotations
 import ezdxf
 import numpy as np
 import pytest
-from drawings import dxf_reader
+from drawings import TOGETHER, apart, dxf_reader
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,24 +26,23 @@ def whole(contour) -> bool:
     return contour.closed and isinstance(segment, Arc) and abs(segment.sweep) == pytest.approx(TURN, abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("start", "end"),
-    [
+def test_an_arc_within_1e_4_of_a_whole_turn_is_one(read):
+    ends = [
         *[(0, 360), (0, 360.0001), (0, 359.9999), (90, 450.0001), (270, 270), (270.0001, 270), (-90, 269.9999)],
         *[(0, 720), (90, 90.00005), (360, 0), (1e-9, 0), (0, 359.9999999), (180, -180), (180, -180.0001)],
-    ],
-)
-def test_an_arc_within_1e_4_of_a_whole_turn_is_one(read, start, end):
-    (contour,) = read(lambda m: m.add_arc((1, 2), 0.01, start, end))
-    assert whole(contour)
-    assert contour.length == pytest.approx(TURN * 0.01, rel=1e-12)
+    ]
+    found = read(apart(lambda m, a=start, b=end: m.add_arc((1, 2), 0.01, a, b) for start, end in ends))
+    for contour, pair in zip(found, ends, strict=True):
+        assert whole(contour), pair
+        assert contour.length == pytest.approx(TURN * 0.01, rel=1e-12), pair
 
 
-@settings(max_examples=10)
-@given(st.floats(-TURN, 2 * TURN), st.floats(-1e-4, 1e-4), st.integers(1, 2))
-def test_an_ellipse_within_1e_4_of_a_whole_turn_is_one(read, start, off, turns):
-    (contour,) = read(lambda m: m.add_ellipse((1, 2), (0.02, 0.01), 0.4, start, start + turns * TURN + 0.99 * off))
-    assert whole(contour)
+@settings(TOGETHER, max_examples=2)
+@given(st.lists(st.tuples(st.floats(-TURN, 2 * TURN), st.floats(-1e-4, 1e-4), st.integers(1, 2)), min_size=10))
+def test_an_ellipse_within_1e_4_of_a_whole_turn_is_one(read, ellipses):
+    ends = [(start, start + turns * TURN + 0.99 * off) for start, off, turns in ellipses]
+    found = read(apart(lambda m, a=a, b=b: m.add_ellipse((1, 2), (0.02, 0.01), 0.4, a, b) for a, b in ends))
+    assert [whole(contour) for contour in found] == [True] * len(ends)
 
 
 @pytest.mark.parametrize("end", [6.28318530718, 6.2831855, 6.283185, 6.2832])
@@ -52,17 +51,17 @@ def test_ellipses_as_programs_write_them(read, end):
     assert whole(contour)
 
 
-@settings(max_examples=10)
-@given(st.floats(-400, 400), st.floats(-4.9, -2).map(lambda e: 10**e))
-def test_short_arcs_and_arcs_with_a_gap_stay_what_they_are(read, start, sweep):
+@settings(TOGETHER, max_examples=2)
+@given(st.lists(st.tuples(st.floats(-400, 400), st.floats(-4.9, -2).map(lambda e: 10**e)), min_size=10))
+def test_short_arcs_and_arcs_with_a_gap_stay_what_they_are(read, arcs):
     """Not near a whole turn by more than 1e-4 rad, or short without having been reduced by a turn."""
-    degrees = float(np.rad2deg(sweep))
-    (short,) = read(lambda m: m.add_arc((0, 0), 1, start, start + degrees))
-    assert short.length == pytest.approx(sweep, rel=1e-6)
-    if sweep > 1.01e-4:
-        (gap,) = read(lambda m: m.add_arc((0, 0), 1, start, start - degrees))
-        assert gap.length == pytest.approx(TURN - sweep)
-        assert not gap.closed
+    gaps = [(start, sweep) for start, sweep in arcs if sweep > 1.01e-4]
+    ends = [(start, start + float(np.rad2deg(sweep))) for start, sweep in arcs]
+    ends += [(start, start - float(np.rad2deg(sweep))) for start, sweep in gaps]
+    found = read(apart(lambda m, a=a, b=b: m.add_arc((0, 0), 1, a, b) for a, b in ends))
+    assert [c.length for c in found[: len(arcs)]] == pytest.approx([sweep for _, sweep in arcs], rel=1e-6)
+    assert [c.length for c in found[len(arcs) :]] == pytest.approx([TURN - sweep for _, sweep in gaps])
+    assert not any(c.closed for c in found[len(arcs) :])
 
 
 def test_a_bulge_of_nearly_a_whole_turn_is_drawn(read):

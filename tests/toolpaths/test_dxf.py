@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
+from functools import partial
+
 import numpy as np
 import pytest
-from drawings import U, dxf_reader, samples
+from drawings import TEN, TOGETHER, U, apart, dxf_reader, samples
 from ezdxf import path as ezpath
 from ezdxf.math import OCS, Matrix44, Vec3
 from ezdxf.render import R12Spline
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given
 
 from pathcontrol.errors import InputError, ToolpathError, UnknownNameError
 from pathcontrol.toolpaths.dxf.reader import UNITS
@@ -41,33 +43,42 @@ def test_lines_and_circles(read):
     assert np.allclose(samples(circle)[0], [1, 2, 3] + 0.5 * flat(np.exp(1j * TURN * U)), atol=1e-15)
 
 
-@settings(max_examples=10)
-@given(st.integers(0, 10**6))
-def test_arcs_run_counterclockwise(read, seed):
-    rng = np.random.default_rng(seed)
-    radius, (start, end) = rng.uniform(0.1, 3), np.sort(rng.uniform(0, 360, 2))
-    there, back = read(lambda m: (m.add_arc((1, 2), radius, start, end), m.add_arc((9, 2), radius, end, start)))
-    angle = np.radians(start + U * (end - start))
-    assert np.allclose(samples(there)[0], flat(1 + 2j + radius * np.exp(1j * angle)), atol=1e-14)
-    assert there.length + back.length == pytest.approx(TURN * radius)
-
-
-@settings(max_examples=10)
-@given(st.integers(0, 10**6))
-def test_ellipses(read, seed):
-    rng = np.random.default_rng(seed)
-    major, ratio = rng.normal(size=3) * [1, 1, 0], rng.uniform(0.1, 1)
-    start, sweep = rng.uniform(0, TURN), rng.uniform(0.1, 6)
-    arc, whole = read(
-        lambda m: (
-            m.add_ellipse((1, 2, 3), major, ratio, start, (start + sweep) % TURN),
-            m.add_ellipse((9, 2, 3), major, ratio),
+@TOGETHER
+@given(TEN)
+def test_arcs_run_counterclockwise(read, seeds):
+    rngs = [np.random.default_rng(seed) for seed in seeds]
+    arcs = [(rng.uniform(0.1, 3), *np.sort(rng.uniform(0, 360, 2))) for rng in rngs]
+    found = read(
+        apart(
+            lambda m, r=radius, a=start, b=end: (m.add_arc((1, 2), r, a, b), m.add_arc((9, 2), r, b, a))
+            for radius, start, end in arcs
         )
     )
-    phi = start + U[:, None] * sweep
-    minor = ratio * np.array([-major[1], major[0], 0])
-    assert np.allclose(samples(arc)[0], [1, 2, 3] + np.cos(phi) * major + np.sin(phi) * minor, atol=1e-13)
-    assert whole.closed
+    for (radius, start, end), there, back in zip(arcs, found[::2], found[1::2], strict=True):
+        angle = np.radians(start + U * (end - start))
+        assert np.allclose(samples(there)[0], flat(1 + 2j + radius * np.exp(1j * angle)), atol=1e-14)
+        assert there.length + back.length == pytest.approx(TURN * radius)
+
+
+@TOGETHER
+@given(TEN)
+def test_ellipses(read, seeds):
+    rngs = [np.random.default_rng(seed) for seed in seeds]
+    ellipses = [
+        (rng.normal(size=3) * [1, 1, 0], rng.uniform(0.1, 1), rng.uniform(0, TURN), rng.uniform(0.1, 6)) for rng in rngs
+    ]
+
+    def draw(m):
+        for major, ratio, start, sweep in ellipses:
+            m.add_ellipse((1, 2, 3), major, ratio, start, (start + sweep) % TURN)
+            m.add_ellipse((9, 2, 3), major, ratio)
+
+    found = read(draw)
+    for (major, ratio, start, sweep), arc, whole in zip(ellipses, found[::2], found[1::2], strict=True):
+        phi = start + U[:, None] * sweep
+        minor = ratio * np.array([-major[1], major[0], 0])
+        assert np.allclose(samples(arc)[0], [1, 2, 3] + np.cos(phi) * major + np.sin(phi) * minor, atol=1e-13)
+        assert whole.closed
 
 
 def bulge_arc(a: complex, b: complex, bulge: float) -> np.ndarray:
@@ -77,23 +88,31 @@ def bulge_arc(a: complex, b: complex, bulge: float) -> np.ndarray:
     return a + share * (b - a) * np.exp(1j * 2 * quarter * (U - 1))
 
 
-@settings(max_examples=10)
-@given(st.integers(0, 10**6), st.booleans(), st.sampled_from(["LWPOLYLINE", "POLYLINE"]))
-def test_bulges_are_arcs(read, seed, closed, kind):
-    rng = np.random.default_rng(seed)
-    corners = rng.uniform(-3, 3, 6) + 1j * rng.uniform(-3, 3, 6)
-    bulges = rng.uniform(-3, 3, 6) * (rng.random(6) < 0.7)
-    vertices = np.column_stack([corners.real, corners.imag, bulges]).tolist()
-    add = {"LWPOLYLINE": "add_lwpolyline", "POLYLINE": "add_polyline2d"}[kind]
-    (contour,) = read(lambda m: getattr(m, add)(vertices, format="xyb", close=closed))
-    ring = np.append(corners, corners[:1]) if closed else corners
-    expected = [
-        bulge_arc(a, b, k) if k else a + U * (b - a)
-        for a, b, k in zip(ring[:-1], ring[1:], bulges[: len(ring) - 1], strict=True)
+@TOGETHER
+@given(TEN)
+def test_bulges_are_arcs(read, seeds):
+    rngs = [np.random.default_rng(seed) for seed in seeds]
+    lines = [
+        (rng.uniform(-3, 3, 6) + 1j * rng.uniform(-3, 3, 6), rng.uniform(-3, 3, 6) * (rng.random(6) < 0.7))
+        for rng in rngs
     ]
-    assert contour.closed == closed
-    assert np.abs(samples(contour) - flat(np.array(expected))).max() < 1e-12
-    assert sum(isinstance(s, Arc) for s in contour.segments) == np.count_nonzero(bulges[: len(ring) - 1])
+    kinds = list(itertools.product(["add_lwpolyline", "add_polyline2d"], [True, False])) * 3
+
+    def drawn(line, kind):
+        (corners, bulges), (add, closed) = line, kind
+        vertices = np.column_stack([corners.real, corners.imag, bulges]).tolist()
+        return lambda m: getattr(m, add)(vertices, format="xyb", close=closed)
+
+    found = read(apart(map(drawn, lines, kinds)))
+    for contour, (corners, bulges), (_, closed) in zip(found, lines, kinds[:10], strict=True):
+        ring = np.append(corners, corners[:1]) if closed else corners
+        expected = [
+            bulge_arc(a, b, k) if k else a + U * (b - a)
+            for a, b, k in zip(ring[:-1], ring[1:], bulges[: len(ring) - 1], strict=True)
+        ]
+        assert contour.closed == closed
+        assert np.abs(samples(contour) - flat(np.array(expected))).max() < 1e-12
+        assert sum(isinstance(s, Arc) for s in contour.segments) == np.count_nonzero(bulges[: len(ring) - 1])
 
 
 @pytest.mark.parametrize("bulge", [0.9e-3, -1e-5, 1e-8])
@@ -124,26 +143,27 @@ def test_polylines_in_space_and_fitted_ones(read):
 # --- coordinate systems, blocks -------------------------------------------------------------------------------------
 
 
-@settings(max_examples=10)
-@given(st.integers(0, 10**6))
-def test_object_coordinates(read, seed):
+@TOGETHER
+@given(TEN)
+def test_object_coordinates(read, seeds):
     """Entities drawn in a plane of any normal, against ezdxf's own conversion."""
-    rng = np.random.default_rng(seed)
-    normal = rng.normal(size=3) if seed % 3 else np.array([0, 0, -1.0])
-    attributes = {"extrusion": normal}
+    normals = [np.random.default_rng(seed).normal(size=3) for seed in seeds] + [np.array([0, 0, -1.0])]
 
     def draw(m):
-        m.add_arc((1, 2, 3), 2, 20, 130, dxfattribs=attributes)
-        m.add_lwpolyline([(0, 0, 0.5), (1, 0, 0), (4, 5, 0)], format="xyb", dxfattribs={**attributes, "elevation": 7})
+        for normal in normals:
+            attributes = {"extrusion": normal}
+            m.add_arc((1, 2, 3), 2, 20, 130, dxfattribs=attributes)
+            corners = [(0, 0, 0.5), (1, 0, 0), (4, 5, 0)]
+            m.add_lwpolyline(corners, format="xyb", dxfattribs={**attributes, "elevation": 7})
 
-    arc, polyline = read(draw)
-    to_world = OCS(Vec3(normal)).to_wcs
-    angle = np.radians(20 + 110 * U)
-    expected = [to_world(Vec3(1 + 2 * np.cos(a), 2 + 2 * np.sin(a), 3)).xyz for a in angle]
-    assert np.allclose(samples(arc)[0], expected, atol=1e-12)
-    bulge, straight = bulge_arc(0j, 1 + 0j, 0.5), 1 + U * (3 + 5j)
-    expected = [[to_world(Vec3(z.real, z.imag, 7)).xyz for z in curve] for curve in (bulge, straight)]
-    assert np.allclose(samples(polyline), expected, atol=1e-12)
+    found = read(draw)
+    angle, (bulge, straight) = np.radians(20 + 110 * U), (bulge_arc(0j, 1 + 0j, 0.5), 1 + U * (3 + 5j))
+    for normal, arc, polyline in zip(normals, found[::2], found[1::2], strict=True):
+        to_world = OCS(Vec3(normal)).to_wcs
+        expected = [to_world(Vec3(1 + 2 * np.cos(a), 2 + 2 * np.sin(a), 3)).xyz for a in angle]
+        assert np.allclose(samples(arc)[0], expected, atol=1e-12)
+        expected = [[to_world(Vec3(z.real, z.imag, 7)).xyz for z in curve] for curve in (bulge, straight)]
+        assert np.allclose(samples(polyline), expected, atol=1e-12)
 
 
 def fill(block) -> None:
@@ -158,24 +178,25 @@ def random_insert(rng: np.random.Generator) -> dict:
     return {"rotation": rng.uniform(0, 360), "extrusion": (0, 0, rng.choice([-1, 1])), **scale}
 
 
-@settings(max_examples=10)
-@given(st.integers(0, 10**6), st.integers(1, 3))
-def test_nested_blocks_are_the_product_of_their_matrices(read, seed, depth):
-    rng = np.random.default_rng(seed)
-    matrices = []
+@TOGETHER
+@given(TEN)
+def test_nested_blocks_are_the_product_of_their_matrices(read, seeds):
+    wholes = []
 
-    def draw(m):
-        blocks = [m.doc.blocks.new(f"B{i}", base_point=rng.normal(size=3)) for i in range(depth)]
+    def draw(m, seed, depth):
+        rng, whole = np.random.default_rng(seed), Matrix44()
+        blocks = [m.doc.blocks.new(f"B{seed}.{i}", base_point=rng.normal(size=3)) for i in range(depth)]
         fill(blocks[-1])
-        for parent, i in zip([m, *blocks[:-1]], range(depth), strict=True):
-            insert = parent.add_blockref(f"B{i}", rng.normal(size=3), dxfattribs=random_insert(rng))
-            matrices.append(insert.matrix44())
+        for parent, block in zip([m, *blocks[:-1]], blocks, strict=True):
+            insert = parent.add_blockref(block.name, rng.normal(size=3), dxfattribs=random_insert(rng))
+            whole = insert.matrix44() * whole  # row vectors: the innermost comes first
+        wholes.append(whole)
 
-    mapped = read(draw)
-    whole = Matrix44()
-    for matrix in matrices:  # row vectors: the innermost comes first
-        whole = matrix * whole
-    for one, other in zip(read(fill), mapped, strict=True):
+    mapped = read(apart(partial(draw, seed=seed, depth=1 + k % 3) for k, seed in enumerate(seeds)))
+    plain = list(read(fill)) * len(seeds)
+    for one, other, whole in zip(
+        plain, mapped, [w for w in wholes for _ in range(len(plain) // len(seeds))], strict=True
+    ):
         points = samples(one)
         image = np.array([v.xyz for v in whole.transform_vertices(points.reshape(-1, 3))]).reshape(points.shape)
         assert np.abs(samples(other) - image).max() < 1e-11

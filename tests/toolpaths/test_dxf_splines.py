@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+
 import ezdxf
 import numpy as np
 import pytest
-from drawings import U, dxf_reader, samples
+from drawings import TEN, TOGETHER, U, apart, dxf_reader, samples
 from ezdxf.math import BSpline
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given
 
 from pathcontrol.toolpaths.segments.bezier import Bezier
 
@@ -20,9 +21,7 @@ def read(tmp_path_factory):
     return dxf_reader(tmp_path_factory.mktemp("dxf"))
 
 
-@settings(max_examples=10)
-@given(st.integers(0, 10**6), st.integers(2, 5), st.booleans())
-def test_splines_are_exact_bezier_curves(read, seed, degree, rational):
+def random_spline(seed, degree, rational):
     rng = np.random.default_rng(seed)
     count = degree + int(rng.integers(1, 7))
     inner = np.sort(rng.choice(np.arange(1, 9), count - degree - 1))
@@ -38,14 +37,22 @@ def test_splines_are_exact_bezier_curves(read, seed, degree, rational):
         if rational:
             spline.weights = weights
 
-    (contour,) = read(draw)
-    reference = BSpline(control, degree + 1, knots, None if weights is None else weights.tolist())
-    steps = np.unique(knots)
-    t = steps[:-1, None] + U * np.diff(steps)[:, None]
-    expected = np.array([[reference.point(x).xyz for x in row] for row in np.minimum(t, 9 - 1e-15)])
-    assert len(contour.segments) == len(expected)
-    assert np.abs(samples(contour) - expected).max() < 1e-11
-    assert all(isinstance(s, Bezier) for s in contour.segments)
+    return draw, BSpline(control, degree + 1, knots, None if weights is None else weights.tolist()), knots
+
+
+@TOGETHER
+@given(TEN)
+def test_splines_are_exact_bezier_curves(read, seeds):
+    kinds = itertools.product([2, 3, 4, 5], [False, True])
+    splines = [random_spline(seed, *kind) for seed, kind in zip(seeds, kinds, strict=False)]
+    found = read(apart(draw for draw, _, _ in splines))
+    for contour, (_, reference, knots) in zip(found, splines, strict=True):
+        steps = np.unique(knots)
+        t = steps[:-1, None] + U * np.diff(steps)[:, None]
+        expected = np.array([[reference.point(x).xyz for x in row] for row in np.minimum(t, 9 - 1e-15)])
+        assert len(contour.segments) == len(expected)
+        assert np.abs(samples(contour) - expected).max() < 1e-11
+        assert all(isinstance(s, Bezier) for s in contour.segments)
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e200, 1e-200])
@@ -80,17 +87,18 @@ def test_unclamped_closed_splines_begin_at_their_first_inner_knot(read):
     assert np.allclose(radii, (4 + 2 * np.cos(TURN / 8)) / 6, atol=1e-15)
 
 
-@settings(max_examples=10)
-@given(st.integers(0, 10**6), st.integers(3, 9))
-def test_fit_points_are_passed_as_cad_programs_do(read, seed, count):
-    points = np.random.default_rng(seed).normal(size=(count, 3))
-    (contour,) = read(lambda m: m.add_spline(fit_points=points))
-    through = np.concatenate([samples(contour)[:, 0], [contour.end]])
-    assert np.abs(through - points).max() < 1e-12
-    theirs = ezdxf.math.fit_points_to_cad_cv(points)
-    knots = np.unique(np.round(theirs.knots(), 12))
-    middle = [theirs.point(t).xyz for t in (knots[:-1] + knots[1:]) / 2]
-    assert np.abs(samples(contour)[:, 4] - middle).max() < 1e-9
+@TOGETHER
+@given(TEN)
+def test_fit_points_are_passed_as_cad_programs_do(read, seeds):
+    splines = [np.random.default_rng(seed).normal(size=(3 + k % 7, 3)) for k, seed in enumerate(seeds)]
+    found = read(lambda m: [m.add_spline(fit_points=points) for points in splines])
+    for contour, points in zip(found, splines, strict=True):
+        through = np.concatenate([samples(contour)[:, 0], [contour.end]])
+        assert np.abs(through - points).max() < 1e-12
+        theirs = ezdxf.math.fit_points_to_cad_cv(points)
+        knots = np.unique(np.round(theirs.knots(), 12))
+        middle = [theirs.point(t).xyz for t in (knots[:-1] + knots[1:]) / 2]
+        assert np.abs(samples(contour)[:, 4] - middle).max() < 1e-9
 
 
 def test_fit_points_with_tangents_and_closed_ones(read):
