@@ -20,7 +20,7 @@ def chain(degree: int, count: int, seed: int = 0) -> Contour:
     return Contour(tuple(Bezier.of_each(np.concatenate([joints[:-1, None], inner, joints[1:, None]], axis=1))))
 
 
-def flower(count: int = 60) -> Contour:
+def flower(count: int) -> Contour:
     """A smooth closed curve of cubics."""
     t = np.linspace(0.0, 2 * np.pi, count + 1)
     radius, slope = 0.1 + 0.02 * np.sin(7 * t), 0.14 * np.cos(7 * t)
@@ -55,13 +55,13 @@ def near(contour: Contour, count: int = 60) -> np.ndarray:
 
 
 CONTOURS = {
-    "lines": chain(1, 40),
-    "parabolas": chain(2, 40),
-    "cubics": chain(3, 40),
+    "lines": chain(1, 24),
+    "parabolas": chain(2, 24),
+    "cubics": chain(3, 24),
     "one": chain(3, 1),
     "one line": chain(1, 1),
     "quintics": chain(5, 5),
-    "smooth": flower(),
+    "smooth": flower(36),
     "mixed": mixed(),
     "a handle of no length": Contour((Bezier(np.array([[0, 0, 0], [0, 0, 0], [1, 1, 0], [2, 0, 0]])),) * 1),
 }

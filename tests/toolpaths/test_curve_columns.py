@@ -47,7 +47,7 @@ def test_segments_of_many_are_those_of_each(degree):
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4])
 def test_lengths_and_boxes_of_many_are_those_of_each(degree):
-    points = odd_and_random(max(degree, 2))[:, : degree + 1] if degree < 4 else odd_and_random(4)
+    points = odd_and_random(max(degree, 2), 5)[:, : degree + 1] if degree < 4 else odd_and_random(4, 5)
     points = points[np.ptp(points, axis=1).any(1)]
     many = [Bezier(row) for row in points]
     measure_lengths(many)
