@@ -51,7 +51,7 @@ class HeldPlan:
         self._held.resume()
         self._held.start(q, qd)
         if self._free is not None:
-            self._free.start(q, qd)
+            self._free.start_from(self._held.state[:-2])  # what is before the state of the speed input
         self._tick = self._free or self._held
 
     def tick(self, q: Array, qd: Array) -> Array:

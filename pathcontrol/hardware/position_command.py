@@ -115,7 +115,9 @@ class PositionCommand:
         self._lower = np.where(limited, robot.limits.lower, -np.inf)
         self._upper = np.where(limited, robot.limits.upper, np.inf)
         self._plant = Plant(robot.with_friction(_compensated_friction(law)), self.period)
-        self._start(np.asarray(law.task.q_d(np.array(law.task.s0)), dtype=np.float64).reshape(robot.n))
+        begin = np.asarray(law.task.q_d(np.array(law.task.s0)), dtype=np.float64).reshape(robot.n)
+        rest = np.zeros(robot.n)
+        self._start(begin, rest, np.atleast_2d(self.law.start(begin, rest)))
         self._started = False
 
     @property
@@ -138,16 +140,15 @@ class PositionCommand:
         """
         position = as_joint_vector("q", q, self.robot.n)
         velocity = np.zeros(self.robot.n) if qd is None else as_joint_vector("qd", qd, self.robot.n)
-        s = float(np.atleast_2d(self.law.start(position, velocity))[0, 0])
-        away = float(np.linalg.norm(np.asarray(self.law.task.q_d(np.array(s))).reshape(-1) - position))
+        z = np.atleast_2d(self.law.start(position, velocity))
+        away = float(np.linalg.norm(np.asarray(self.law.task.q_d(z[0, :1])).reshape(-1) - position))
         if fault := find_start_fault(self.robot, position, self._lower, self._upper, away, self._tube):
             raise InputError(fault, argument="q", value=position.tolist())
-        self._start(position, velocity)
+        self._start(position, velocity, z)
 
-    def _start(self, q: Array, qd: Array | None = None) -> None:
-        """Start at (q, q̇), (n,) each."""
-        self.q, self.qd = q.copy(), np.zeros_like(q) if qd is None else qd.copy()
-        self._z = np.atleast_2d(self.law.start(self.q, self.qd))
+    def _start(self, q: Array, qd: Array, z: Array) -> None:
+        """Start at (q, q̇), (n,) each, with the state z (1, m) of the law."""
+        self.q, self.qd, self._z = q.copy(), qd.copy(), z
         self._before = self._now = self.q.copy(), self.qd.copy()  # of the virtual arm, a period apart
         self._passed, self._pace, self._ticks = 1.0, 1.0, 0  # share of that period, λ, periods of the virtual arm
         self._servo.start(self.q)

@@ -33,9 +33,9 @@ def compared(*names, scenario="jammed-joint", **options):
 
 
 def shortened(name):
-    """A scenario of the library until half a second after its event, and of one without any the first second."""
+    """A scenario of the library until half a second after its event, and of one without any for 0.7 s."""
     whole = pc.make_scenario(name)
-    duration = 1.0 if whole.event is None else whole.event[1] + 0.5
+    duration = 0.7 if whole.event is None else whole.event[1] + 0.5
     calm = whole.undisturbed
     return replace(whole, duration=duration, undisturbed=None if calm is None else replace(calm, duration=duration))
 

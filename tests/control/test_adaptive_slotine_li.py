@@ -105,7 +105,7 @@ def test_an_unknown_payload_is_learnt_where_the_known_law_keeps_its_error(ideal_
     )
     laps = []
     for law in laws:
-        run = pc.simulate(law, [0.95, 0.0], duration=4.8, plant=heavy, progress=False)
+        run = pc.simulate(law, [0.95, 0.0], duration=4.8, loop=pc.SampledLoop(4e-3), plant=heavy, progress=False)
         error = run.norm("e_p")[0]
         laps.append([error[(run.time >= t) & (run.time < t + 1.4)].max() for t in (0.0, 1.6, 3.4)])
     known, learning = np.array(laps)

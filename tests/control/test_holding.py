@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import pathcontrol as pc
+from pathcontrol.simulation.compiled_plant import CompiledPlant
 
 START = np.deg2rad([40.0, 70.0])
 PERIOD = 2.5e-3
@@ -37,7 +38,7 @@ def test_a_hold_is_an_orbit_of_a_few_ticks_of_loop_and_arm(arm, name, wrapped):
     law = make(arm, name, friction="observed" if wrapped == "observed" else "viscous")
     law = pc.SpeedOverride(pc.EventPlan(law) if wrapped == "event plan" else law)
     law = pc.Paced(law) if wrapped == "paced" else law
-    tick, plant = pc.ControlTick(law, 2 * PERIOD), pc.Plant(arm, 2 * PERIOD)
+    tick, plant = pc.ControlTick(law, 2 * PERIOD), CompiledPlant(arm, 2 * PERIOD)
     q, qd = START[None], np.zeros((1, 2))
     tick.start(q[0], qd[0])
     limit, seen = arm.limits.effort, []

@@ -120,6 +120,13 @@ def learned():
     return controller, run(controller, 6)
 
 
+@pytest.fixture(scope="module")
+def last_state(learned):
+    """Return the state of that law at the end of its run."""
+    controller, one = learned
+    return pc.law_states(one, controller)[:, -1]
+
+
 def test_what_is_learned_is_the_dry_friction_of_the_motion(learned):
     """Away from where a joint turns round, τ̂ is its level in the direction of the desired motion."""
     controller, _ = learned
@@ -187,10 +194,10 @@ def test_the_table_of_a_run_is_found_again(learned):
 
 
 def test_a_hold_and_a_way_back_leave_the_table_as_it_is(learned):
-    """The plan is held for 0.6 s in the fifth lap, and goes back in the sixth."""
-    steps = [[4.3 * LAP, 0.0], [4.3 * LAP + 0.6, 1.0], [5.5 * LAP + 0.6, -1.0], [5.7 * LAP + 0.6, 1.0]]
+    """The plan is held for 0.4 s in the third lap, and goes back in the fourth."""
+    steps = [[2.3 * LAP, 0.0], [2.3 * LAP + 0.4, 1.0], [3.5 * LAP + 0.4, -1.0], [3.7 * LAP + 0.4, 1.0]]
     controller = Kept(pc.SpeedOverride(law(), steps, acceleration=10.0), nodes=32)
-    disturbed = run(controller, 7)
+    disturbed = run(controller, 5)
     assert pc.speed_factor(disturbed)[0].min() < 0
     away = np.abs(controller.last.torque - learned[0].last.torque)[0]
     assert (np.sqrt((away**2).mean(0)) < [0.35, 0.08]).all()  # a twentieth of 7.6 and 1.7 N m
@@ -199,10 +206,10 @@ def test_a_hold_and_a_way_back_leave_the_table_as_it_is(learned):
 
 
 @pytest.mark.parametrize(("factor", "share"), [(0.5, 1.0), (-0.05, 0.5), (-1.0, 0.0)])
-def test_a_plan_that_goes_back_has_none_of_what_was_learned(learned, factor, share):
+def test_a_plan_that_goes_back_has_none_of_what_was_learned(learned, last_state, factor, share):
     controller, one = learned
-    z, inner = pc.law_states(one, controller)[:, -1], controller.inner.at_speed(np.array([factor]))
-    own, _ = controller.split(z)
+    inner = controller.inner.at_speed(np.array([factor]))
+    own, _ = controller.split(last_state)
     state = one.time[-1], one.array("q")[:, -1], one.array("qd")[:, -1]
     added = inner.law(*state, own).tau - inner.base.law(*state, inner.split(own)[0]).tau
     whole = controller.inner.law(*state, own).tau - controller.inner.base.law(*state, inner.split(own)[0]).tau

@@ -210,9 +210,9 @@ def test_without_the_rule_for_rest_the_torque_would_grow(monkeypatch):
     controller = ComputedTorque(CICESE, line, 800.0, 60.0, friction="observed")
     observe = controller.observer.observe
     monkeypatch.setattr(controller.observer, "observe", lambda t, q, qd, memory, kept: observe(t, q, qd, memory))
-    options = {"duration": 2.0, "plant": STICKY, "until": "duration", "engine": "pinocchio"}
+    options = {"duration": 2.6, "plant": STICKY, "until": "duration", "engine": "pinocchio"}
     run = simulate(controller, [0.3, 0.2], loop=paper_loop(), progress=False, **options)
-    assert np.ptp(run.array("tau")[0, run.time > 1.4], axis=0).max() > 0.1
+    assert np.ptp(run.array("tau")[0, run.time > 2.2], axis=0).max() > 0.1
 
 
 def test_a_slow_path_is_followed_without_stick_and_slip():

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import pathcontrol as pc
 from pathcontrol.control.wrappers.pace_rule import rate_bounds
+from pathcontrol.simulation.compiled_plant import CompiledPlant
 
 LIMITS = np.array([150.0, 15.0])
 LOOPS = {
@@ -170,7 +171,7 @@ def test_a_plan_that_goes_back_from_beside_its_path_does_not_run_away(arm, start
     """Where no pace keeps all limits, slower is better, also for a plan that goes back: −1 ≤ w at all times."""
     law = pc.Paced(pc.ExtendedMotionPlan(arm, pc.Circle(1.0, 2.0), 800.0, [45.0, 100.0], 20.0))
     law.reverse()
-    tick, plant = pc.ControlTick(law, 2.5e-3), pc.Plant(arm, 2.5e-3)
+    tick, plant = pc.ControlTick(law, 2.5e-3), CompiledPlant(arm, 2.5e-3)
     q, qd = np.array([start]), np.array([[0.1, 0.2]])
     tick.start(q[0], qd[0])
     factors = [tick.state[-1]]
