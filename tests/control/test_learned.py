@@ -62,7 +62,7 @@ def test_a_lap_is_the_contraction_that_is_promised(gain, change):
 
     errors = []
     for lap in range(5):
-        memory = go_round(table, memory, lap, see, ticks=40)
+        memory = go_round(table, memory, lap, see, ticks=24)
         errors.append(table.read(memory, np.array([0.3]))[0, 0] - right)
     factor = 1 - gain + gain * change
     first = change * (0 - right)  # a node that knows nothing takes all

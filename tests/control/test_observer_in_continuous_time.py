@@ -24,7 +24,7 @@ def run_counted(law, monkeypatch, q=(1.0, 0.0), **options):
         return ask(self, *arguments)
 
     monkeypatch.setattr(type(law), "law", count)
-    run = pc.simulate(law, q, duration=0.5, loop=pc.ContinuousTime(**options), progress=False)
+    run = pc.simulate(law, q, duration=0.35, loop=pc.ContinuousTime(**options), progress=False)
     monkeypatch.undo()
     return run, asked[0]
 
@@ -45,8 +45,8 @@ def test_an_observer_that_sees_nothing_costs_little_and_changes_nothing(law, mon
 
 
 def test_the_tolerances_hold_the_estimate_too(monkeypatch):
-    push = pc.Push([3.0, 1.0], 0.2, 0.3)
-    options = {"duration": 0.6, "disturbance": push, "progress": False}
+    push = pc.Push([3.0, 1.0], 0.15, 0.15)
+    options = {"duration": 0.4, "disturbance": push, "progress": False}
     loose, tight = (
         pc.simulate(plan(friction="observed"), [[1.0, 0.0], [0.9, 0.1]], loop=loop, **options)
         for loop in (pc.ContinuousTime(), pc.ContinuousTime(rtol=1e-11, atol=1e-13))

@@ -8,8 +8,6 @@ import os
 import numpy as np
 import pytest
 from franka_server import ROTORS, install, serve, urdf_of
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import pathcontrol as pc
 from pathcontrol.errors import ArmError
@@ -124,16 +122,15 @@ def test_a_robot_that_is_not_there_is_an_error_and_priorities_stay_as_they_were(
     assert os.sched_getscheduler(0) == before
 
 
-joints = st.lists(st.floats(-5, 5), min_size=7, max_size=7).map(np.array)
-
-
-@settings(max_examples=200, deadline=None, derandomize=True)
-@given(joints, joints, st.lists(st.floats(-1.99, 1.99), min_size=7, max_size=7).map(np.array))
-def test_no_torque_is_a_step_away_from_what_the_robot_had_or_was_sent(tau, had, further):
+def test_no_torque_is_a_step_away_from_what_the_robot_had_or_was_sent():
+    """Each joint is limited by itself, so these are as many robots."""
+    rng = np.random.default_rng(0)
+    tau, had, further = rng.uniform(-1, 1, (3, 10_000, 7)) * np.reshape([5, 5, 1.99], (3, 1, 1))
+    further[:100] = np.clip(np.round(further[:100]), -1.99, 1.99)  # also no difference, and that of a whole step
     sent = had + further
     limited = franka._limit_step(tau, had, sent)
     for reference in (had, sent):
-        assert (np.abs(limited - reference) <= 0.999 + 1e-9).all() or (np.abs(further) > 1.998).any()
+        assert (np.abs(limited - reference) <= 0.999 + 1e-9).all()
     within = (np.abs(tau - had) < 0.99) & (np.abs(tau - sent) < 0.99)
     assert (limited[within] == tau[within]).all()
     np.testing.assert_array_equal(franka._limit_step(tau, had, None), franka._limit_step(tau, had, had))

@@ -35,7 +35,7 @@ def replay(loop, run, begin=5.0):
 
 def simulate(law):
     start = np.asarray(EIGHT.q_d(np.array(0.0))) + np.array([0.05, 0.0])
-    return pc.simulate(law, start, duration=1.0, progress=False)
+    return pc.simulate(law, start, duration=0.6, progress=False)
 
 
 @pytest.mark.parametrize("kind", ["plain", "overridden"])
@@ -44,7 +44,7 @@ def test_the_log_of_a_loop_is_the_run_that_it_replays(kind, where, tmp_path):
     if where == "file":
         pytest.importorskip("mcap")
     law = pc.ExtendedMotionPlan(ROBOT, EIGHT, 400.0, 40.0, k=20.0)
-    law = law if kind == "plain" else pc.SpeedOverride(law, [[0.3, 0.3], [0.7, 1.2]])
+    law = law if kind == "plain" else pc.SpeedOverride(law, [[0.2, 0.3], [0.4, 1.2]])
     run, loop = simulate(law), loop_of(law)
     with loop.record(tmp_path / "log.mcap" if where == "file" else None) as log:
         replay(loop, run)
