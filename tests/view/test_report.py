@@ -202,6 +202,13 @@ def test_long_runs_are_thinned_evenly(arm, circle, tmp_path):
     assert np.diff(time).max() <= 2 * np.diff(time).min() + 1e-9
 
 
+@pytest.mark.usefixtures("no_figures")
+def test_the_film_of_a_page_with_tables_of_its_own_measures_nothing(runs, tmp_path, monkeypatch):
+    monkeypatch.setattr("pathcontrol.view.animation.record.tables", None)
+    short = runs["plan"].with_data(runs["plan"].data.isel(time=slice(0, 20)))
+    assert table(parsed(report(short, tmp_path / "r.html")), "summary")["path"] == ["Circle"]
+
+
 def test_figures_are_images_that_parse(page):
     pictures = page.xpath("//figure/img")
     assert len(pictures) >= 5

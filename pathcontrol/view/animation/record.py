@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from pathcontrol.robot.model import RobotModel
     from pathcontrol.simulation.run import Run
     from pathcontrol.tasks.task import PathTask
+    from pathcontrol.view.animation.rollout import Recording
 
 MOST_GHOSTS = 6  # with a label each: those of more would hide the arm, and the legend names them anyway
 
@@ -63,6 +64,19 @@ def record(
     """
     expect_choice("layout", layout, get_args(Layout))
     recordings = make_recordings(run, robot, task, rollout, tool)
+    film = _make_film(recordings, rollout, layout)
+    film.header["tables"] = tables(recordings)
+    return Animation(film)
+
+
+def record_for_page(run: Run | Mapping[str, Run], *, rollout: int = 0, layout: Layout = "beside") -> Animation:
+    """Animate runs as :func:`record` does, for a page that has tables of its own: they are not measured for this."""
+    expect_choice("layout", layout, get_args(Layout))
+    return Animation(_make_film(make_recordings(run, None, None, rollout, None), rollout, layout))
+
+
+def _make_film(recordings: Sequence[Recording], rollout: int, layout: Layout) -> Film:
+    """Return the film of recordings, without tables."""
     drawn_rollouts, film = draw_rollouts(recordings), Film()
     ghosted = layout == "ghosted" and len(recordings) > 1
     film.header = {
@@ -74,9 +88,9 @@ def record(
         **_picture(film, drawn_rollouts, layout, ghosted),
         "charts": [chart.header(film) for chart in charts(drawn_rollouts)],
         "plane": plane(drawn_rollouts).header(film, drawn_rollouts),
-        "tables": tables(recordings),
+        "tables": [],
     }
-    return Animation(film)
+    return film
 
 
 def _picture(film: Film, drawn_rollouts: Sequence[DrawnRollout], layout: Layout, ghosted: bool) -> dict[str, Any]:

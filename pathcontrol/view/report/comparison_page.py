@@ -11,7 +11,7 @@ from pathcontrol._files import whole_file
 from pathcontrol._suffixes import check_suffix
 from pathcontrol.comparison.compare import Comparison
 from pathcontrol.comparison.comparison_table import describe_comparison, law_title, tabulate
-from pathcontrol.view.animation.record import record
+from pathcontrol.view.animation.record import record_for_page
 from pathcontrol.view.figures.scenario_figure import scenario_figure
 from pathcontrol.view.page.html import Section, page
 from pathcontrol.view.report.pictures import picture
@@ -34,9 +34,9 @@ def save_comparison(compared: Comparison, out: str | Path, rollout: int = 0) -> 
     out = check_suffix(out, "a comparison as a page", ".html", ".htm", name="out")
     scenario = compared.scenario
     runs = {law_title(law): run for law, run in compared.runs.items()}
-    film = record(runs, rollout=rollout).film
+    film = record_for_page(runs, rollout=rollout).film
     events = [] if scenario.event is None else [[scenario.event[0], min(scenario.event[1], scenario.duration)]]
-    film = dataclasses.replace(film, header=film.header | {"tables": [], "events": events})
+    film = dataclasses.replace(film, header=film.header | {"events": events})
     text = page(film, (scenario.name, scenario.sentence), [Section("Comparison", _body(compared, rollout))])
     with whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from pathcontrol.analysis.observing_laws import compensates_observed, halts_at_contacts
 from pathcontrol.analysis.power.power_balance_table import find_power_balance
 from pathcontrol.cartesian.toolpath_task import ToolpathTask
-from pathcontrol.errors import InputError
+from pathcontrol.errors import InputError, PathControlError
 from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
 
@@ -106,9 +106,11 @@ def _draw_power_balance(runs: Run | Mapping[str, Run]) -> Figure | None:
     """Return the figure of the power balance, of the runs that have one."""
     from pathcontrol.view.figures.power_balance_figure import power_balance_figure
 
-    if isinstance(runs, Run):
-        return None if find_power_balance(runs) is None else power_balance_figure(runs)
-    able = {name: run for name, run in runs.items() if find_power_balance(run) is not None}
+    try:
+        return power_balance_figure(runs)
+    except PathControlError:  # one has none
+        several = {} if isinstance(runs, Run) else runs
+    able = {name: run for name, run in several.items() if find_power_balance(run) is not None}
     return power_balance_figure(able) if able else None
 
 

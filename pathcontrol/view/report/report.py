@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -44,16 +43,14 @@ def report(
     Raises:
         InputError: there are no runs, one does not know its robot, or ``out`` does not end with ``.html``.
     """
-    from pathcontrol.view.animation.record import record
+    from pathcontrol.view.animation.record import record_for_page
     from pathcontrol.view.page.html import page
     from pathcontrol.view.report.sections import sections
 
     named, out = _name_runs(runs), check_suffix(out, "a report as a page", ".html", ".htm", name="out")
-    animation = record(runs, layout=layout)
-    # the sections have tables of their own
-    film = dataclasses.replace(animation.film, header=animation.film.header | {"tables": []})
+    animation = record_for_page(runs, layout=layout)
     words = animation.title if title is None else (title,)
-    text = page(film, words, sections(named, command or _call(named, out), sweep))
+    text = page(animation.film, words, sections(named, command or _call(named, out), sweep))
     with whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return out
