@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from pathcontrol import ExperimentError, Run
 from pathcontrol.cli import main
 from pathcontrol.cli.tables import toolpath_tables
 from pathcontrol.experiments.runner import load_setup, run_experiment
+from pathcontrol.view.figures.style import save_figure
 
 SQUARE = """G21 G90 G17
 G0 X0 Y0 Z0
@@ -156,7 +158,9 @@ def experiment(part) -> Path:
     return path
 
 
-def test_an_experiment_follows_the_program(experiment, tmp_path):
+def test_an_experiment_follows_the_program(experiment, tmp_path, monkeypatch):
+    # test_every_output has figures in all formats
+    monkeypatch.setattr("pathcontrol.view.figures.style.save_figure", partial(save_figure, formats=("svg",)))
     done = run_experiment(experiment, tmp_path / "out", progress=False)
     assert done.run.status[0] == "finished"
     assert done.metrics["tool_deviation_peak"][0] < 1e-3

@@ -78,9 +78,9 @@ SEVEN = pc.Space.sobol(
 @pytest.mark.parametrize("space", [SEVEN, WILD], ids=["sobol", "wild"])
 def test_chunks_of_any_size_give_the_same_table_and_the_same_histories(space, tmp_path):
     keep = pc.Keep(worst=2, by="e_p_peak", random=1, diverged=1)
-    whole = pc.sweep(circle, space, tmp_path / "whole", keep=keep, chunk=4, progress=False)
+    whole = pc.sweep(circle, space, tmp_path / "whole", keep=keep, chunk=7, progress=False)
     table, histories = whole.table(), {sample: whole.run(sample).data for sample in whole.kept}
-    for chunk in (1, 3, 7):
+    for chunk in (1, 3):
         other = pc.sweep(circle, space, tmp_path / str(chunk), keep=keep, chunk=chunk, progress=False)
         assert other.table().identical(table), chunk
         assert other.kept == whole.kept
