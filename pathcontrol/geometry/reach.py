@@ -12,6 +12,7 @@ least diameter of curvature, 2r, has its ends at least πr apart along the curve
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -173,13 +174,25 @@ def _refine(curve: Curve, interval: Interval, a: float, b: float, size: float) -
 
 def _touching_radius(interval: Interval, s: Array, point: Array, tangent: Array, other: Array) -> Array:
     """Return F, the radius of the circle that touches a curve in its ``point`` at s and goes through the ``other``."""
-    chord = other - point
-    along = (chord * tangent).sum(-1)
+    # one coordinate after another: sums over two or three of them take most of the time, and have the same bits
+    directions = [tangent[..., i] for i in range(tangent.shape[-1])]
+    chord = [np.ascontiguousarray(other[..., i]) - point[..., i] for i in range(other.shape[-1])]
+    along = _sum(c * t for c, t in zip(chord, directions, strict=True))
     along = np.where(interval.at_lower(s), np.maximum(along, 0.0), along)  # at an end the tangent is a half-line
     along = np.where(interval.at_upper(s), np.minimum(along, 0.0), along)
-    squared, away = (chord**2).sum(-1), np.linalg.norm(chord - along[..., None] * tangent, axis=-1)
+    squared = _sum(c * c for c in chord)
+    aside = (c - along * t for c, t in zip(chord, directions, strict=True))
+    away = np.sqrt(_sum(a * a for a in aside))
     infinite = np.where(squared > 0, np.inf, 0.0)
     return np.divide(squared, 2 * away, out=infinite, where=away > 0)
+
+
+def _sum(parts: Iterable[Array]) -> Array:
+    """Return the sum of some arrays of one shape, in their order."""
+    first, *others = parts
+    for part in others:
+        first = first + part
+    return first
 
 
 def _tangent(curve: Curve, s: Array) -> Array:

@@ -48,10 +48,11 @@ LOOPS = {
 every_arm = pytest.mark.parametrize("arm", [ARMS[2], ARMS[7]], ids=["2", "7"])
 
 
+TASKS = {n: Lissajous(np.full(n, 0.4), 1 + np.arange(n) % 3, 1.0, phases=0.3 * np.arange(n)) for n in ARMS}
+
+
 def law(arm, **options):
-    n = arm.n
-    task = Lissajous(np.full(n, 0.4), 1 + np.arange(n) % 3, 1.0, phases=0.3 * np.arange(n))
-    return ExtendedMotionPlan(arm, task, 200.0, 30.0, 5.0, **options)
+    return ExtendedMotionPlan(arm, TASKS[arm.n], 200.0, 30.0, 5.0, **options)
 
 
 def moved(

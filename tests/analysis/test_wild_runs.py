@@ -10,6 +10,7 @@ import pytest
 
 import pathcontrol as pc
 from pathcontrol.analysis.coverage import even_points
+from pathcontrol.analysis.deviation import tool_positions
 from pathcontrol.engine import gamma_distance as engine_gamma
 from pathcontrol.engine.library import load_library
 from pathcontrol.errors import EngineError, InputError, TaskError
@@ -172,7 +173,7 @@ def test_counts_are_whole_numbers(name, kind, sequence, closed, tmp_path):
 def test_a_run_none_of_whose_positions_is_known_has_no_place_of_the_tool(sequence):
     run = pc.Run.load(sequence)
     nothing = run.data.assign(q=(run.data["q"].dims, np.full(run.data["q"].shape, np.nan), run.data["q"].attrs))
-    positions = pc.analysis.deviation.tool_positions(run.with_data(nothing), frame="tool")
+    positions = tool_positions(run.with_data(nothing), frame="tool")
     assert positions.shape == (*run.array("q").shape[:2], 3)
     assert np.isnan(positions).all()
 

@@ -194,15 +194,15 @@ def accuracy(
     space, places = ComparedSpace.of(run, path, frame), (np.arange(sections) + 0.5) / sections
     if path.period is None:
         s = path.s0 + places * (path.s_end - path.s0)
-        parts = [(run.rollout(i), s) for i in range(run.rollouts)]
+        parts = [(one, count_along(one, path), s) for one in map(run.rollout, range(run.rollouts))]
     else:
         one = run.rollout(rollout)
         along = count_along(one, path)
         s = along[0] + places * path.period
         laps = int((along.max() - along[0]) / path.period + 1e-9)
-        parts = [(one, s + lap * path.period) for lap in range(skip, laps)]
+        parts = [(one, along, s + lap * path.period) for lap in range(skip, laps)]
     planes = _Planes.of(path, space, s)
-    found = [_measure(one, path, space, planes, at) for one, at in parts]
+    found = [_measure(one, along, path, space, planes, at) for one, along, at in parts]
     cycles, crossed = _select(found, path.period is None)
     if crossed.sum() < _FEWEST:
         what = "rollout" if path.period is None else f"lap after the first {skip}"
@@ -318,9 +318,8 @@ def count_along(one: Run, path: PathTask) -> Array:
     return s
 
 
-def _measure(one: Run, path: PathTask, space: ComparedSpace, planes: _Planes, s: Array) -> _Cycle:
-    """Return where a rollout crosses the planes, s counting laps."""
-    along = count_along(one, path)
+def _measure(one: Run, along: Array, path: PathTask, space: ComparedSpace, planes: _Planes, s: Array) -> _Cycle:
+    """Return where a rollout, at ``along`` of the path at its samples, crosses the planes at s, both counting laps."""
     known = slice(0, len(along))
     time, q, qd = one.time[known], one.array("q")[0, known], one.array("qd")[0, known]
     span = path.s_end - path.s0 if path.period is None else path.period
