@@ -102,17 +102,10 @@ def test_robots_are_read_alike(name):
     assert_read_alike(find_urdf(name).text)
 
 
-def test_an_arm_without_pictures_needs_no_library_of_meshes():
-    code = (
-        "import sys, pathcontrol as pc; pc.load_robot('cicese_2dof'); print({'trimesh', 'yourdfpy'} & {*sys.modules})"
-    )
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
-
-
-def test_an_arm_and_a_law_load_nothing_of_scipy():
+def test_an_arm_without_pictures_and_a_law_load_nothing_of_scipy_and_no_library_of_meshes():
     code = (
         "import sys, pathcontrol as pc; arm = pc.load_robot('cicese_2dof'); task = pc.Circle(radius=1.0, speed=2.0)\n"
         "pc.Projection(arm, task, k_p=800.0, K_v=[45.0, 100.0])\n"
-        "print({'scipy', 'xarray', 'matplotlib'} & {*sys.modules})"
+        "print({'scipy', 'xarray', 'matplotlib', 'trimesh', 'yourdfpy'} & {*sys.modules})"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
