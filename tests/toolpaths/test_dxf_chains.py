@@ -69,9 +69,10 @@ def test_shuffled_and_turned_pieces_become_the_outline_again(read, seed, count, 
     order = rng.permutation(len(pieces))
     # arcs of DXF always run counterclockwise: negative bulges cannot be written, so arcs are not turned
     loose = [turned(pieces[i]) if rng.random() < 0.5 and len(pieces[i]) != 3 else pieces[i] for i in order]
-    (contour,) = read(loose)
+    contour, *alone = read(loose + pieces, ["whole"] * len(loose) + list(range(len(pieces))))
     assert contour.closed == closed
-    assert contour.length == pytest.approx(sum(c.length for c in read(pieces, range(len(pieces)))), rel=1e-12)
+    assert len(alone) == len(pieces)
+    assert contour.length == pytest.approx(sum(c.length for c in alone), rel=1e-12)
     joints = np.array([complex(p[0]) for p in pieces])
     where = samples(contour)[:, 0]
     drawn = np.concatenate([where[:, 0] + 1j * where[:, 1], [complex(*contour.end[:2])]])
@@ -119,10 +120,10 @@ def test_small_gaps_are_closed_by_moving_both_ends(read, seed, count, gap):
         else tuple(p + 0.5 * gap * np.exp(1j * rng.uniform(0, 6)) for p in piece[:2]) + tuple(piece[2:])
         for piece in pieces
     ]
-    (contour,) = read(apart)
+    contour, *each = read(apart * 2, ["whole"] * count + list(range(count)))
     assert contour.closed  # which needs ends that meet to 1 nm
     assert len(samples(contour)) == count
-    for drawn, alone in zip(samples(contour), read(apart, range(count)), strict=True):
+    for drawn, alone in zip(samples(contour), each, strict=True):
         assert np.abs(drawn - samples(alone)[0]).max() <= 0.5 * gap + 1e-12
 
 
