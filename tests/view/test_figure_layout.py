@@ -134,9 +134,9 @@ def test_figures_of_others_are_laid_out_as_they_say(tmp_path):
 
 def test_a_figure_that_is_changed_is_laid_out_again(tmp_path):
     figure = makers(made(2))["errors"]()
-    save_figure(figure, tmp_path / "before")
+    save_figure(figure, tmp_path / "before", ["svg"])
     figure.axes[0].set_ylabel("much\ntaller\nthan\nit was")
-    save_figure(figure, tmp_path / "after")
+    save_figure(figure, tmp_path / "after", ["svg"])
     assert_readable(figure, "changed")
 
 
