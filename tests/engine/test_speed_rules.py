@@ -21,16 +21,16 @@ PLAN = pc.ExtendedMotionPlan(CICESE, CIRCLE, 800.0, [45.0, 100.0], k=20.0)
 NEAREST = pc.Projection(CICESE, CIRCLE, 800.0, [45.0, 100.0])
 PUSH = pc.Push([40.0, 8.0], start=0.15, duration=0.2)
 #: changes of pace that are still under way when the next one comes, backwards too
-STEPS = [[0.1, 1.7], [0.2, 0.0], [0.4, -1.0], [0.7, 0.6]]
+STEPS = [[0.05, 1.7], [0.1, 0.0], [0.2, -1.0], [0.35, 0.6]]
 WRAPPERS = {
-    "override": lambda law: SpeedOverride(law, STEPS, acceleration=6.0),
-    "function": lambda law: SpeedOverride(law, lambda t: np.cos(5 * t)),
+    "override": lambda law: SpeedOverride(law, STEPS, acceleration=12.0),
+    "function": lambda law: SpeedOverride(law, lambda t: np.cos(10 * t)),
     "paced": lambda law: Paced(law, torque_limits=0.6 * _effort(law)),
-    "event": lambda law: EventPlan(law, threshold=0.02 * _effort(law), pause=0.05),
+    "event": lambda law: EventPlan(law, threshold=0.02 * _effort(law), pause=0.03),
     "all": lambda law: Paced(
         EventPlan(SpeedOverride(law, STEPS), threshold=0.05 * _effort(law)), torque_limits=_effort(law)
     ),
-    "twice": lambda law: SpeedOverride(SpeedOverride(law, [[0.0, 0.5]]), STEPS, acceleration=3.0),
+    "twice": lambda law: SpeedOverride(SpeedOverride(law, [[0.0, 0.5]]), STEPS, acceleration=6.0),
 }
 
 
@@ -40,8 +40,13 @@ def _effort(law):
 
 @pytest.mark.parametrize(
     ("wrap", "kind", "name"),
-    # each wrapper around each law, and each arm, by turns
-    [(w, k, list(MIDDLE)[(i + j) % 3]) for i, w in enumerate(WRAPPERS) for j, k in enumerate(LAWS)],
+    # all wrappers around each law; each alone around every other law; and each arm, by turns
+    [
+        (w, k, list(MIDDLE)[(i + j) % 3])
+        for i, w in enumerate(WRAPPERS)
+        for j, k in enumerate(LAWS)
+        if w in ("all", "twice") or (i + j) % 2
+    ],
 )
 def test_wrapped_laws_move_the_arm_as_the_reference_does(wrap, kind, name):
     robot = _arm(name)
@@ -49,8 +54,8 @@ def test_wrapped_laws_move_the_arm_as_the_reference_does(wrap, kind, name):
     law = WRAPPERS[wrap](_law(kind, robot, task))
     start = task.q_d(np.array(task.s0)) + 0.02
     loop = SampledLoop(period=5e-3, torque_limits=True)
-    push = pc.Push(0.1 * _effort(law), start=0.15, duration=0.2)
-    runs = _pair(law, start, duration=0.8, loop=loop, disturbance=push, until="duration")
+    push = pc.Push(0.1 * _effort(law), start=0.075, duration=0.1)
+    runs = _pair(law, start, duration=0.4, loop=loop, disturbance=push, until="duration")
     assert _apart(runs) < 1e-10
     assert _apart(runs, "s") < 1e-10
     assert _apart(runs, "sdot") < 1e-8
@@ -62,9 +67,9 @@ def test_wrapped_laws_move_the_arm_as_the_reference_does(wrap, kind, name):
 def test_a_plan_that_goes_back_is_paced_as_by_the_reference(kind):
     gains = {"K_p": 800.0, "k": 20.0} if kind is pc.ExtendedMotionPlan else {"k_p": 800.0}
     law = Paced(SpeedOverride(kind(CICESE, pc.Circle(1.0, 10.0), K_v=[45.0, 100.0], **gains), [[0.0, -1.0]]))
-    runs = _pair(law, [1.0, 0.0], duration=1.0, loop=SampledLoop(torque_limits=True))
+    runs = _pair(law, [1.0, 0.0], duration=1.0, loop=SampledLoop(period=5e-3, torque_limits=True))
     assert _apart(runs) < 1e-10
-    assert pc.speed_factor(runs[1])[0, 200:].max() > -0.9  # the motors cannot do more everywhere
+    assert pc.speed_factor(runs[1])[0, 100:].max() > -0.9  # the motors cannot do more everywhere
 
 
 @pytest.mark.parametrize("kind", ["ExtendedMotionPlan", "Projection", "ComputedTorque"])
@@ -73,7 +78,8 @@ def test_a_plan_that_goes_back_to_its_begin_is_timed_there_as_by_the_reference(k
     line = pc.Line([0.1, 0.0], [1.0, 1.2], speed=1.0)
     law = SpeedOverride(_law(kind, CICESE, line), [[0.3, -1.0]])
     push = pc.Push([20.0, -4.0], start=0.5, duration=0.4)
-    runs = _pair(law, [0.1, 0.0], duration=1.2, disturbance=push, until="duration")
+    loop = SampledLoop(period=5e-3)
+    runs = _pair(law, [0.1, 0.0], duration=1.2, loop=loop, disturbance=push, until="duration")
     assert _apart(runs) < 1e-10
     assert runs[1].array("s")[0, -1] < 1e-2
 
@@ -93,7 +99,7 @@ def test_observed_friction_is_compensated_as_by_the_reference(kind, name):
     law = _law(kind, robot.with_friction(None), task, friction="observed", observer_hz=cutoff)
     loop = SampledLoop(delay=3.1e-3, torque_limits=True)
     start = task.q_d(np.array(task.s0)) + 0.02
-    runs = _pair(law, start, duration=0.6, loop=loop, plant=robot, until="duration")
+    runs = _pair(law, start, duration=0.3, loop=loop, plant=robot, until="duration")
     assert _apart(runs) < 1e-10
     assert _apart(runs, "tau_demand") < 1e-6
 
@@ -117,7 +123,7 @@ def test_rollouts_have_rows_of_their_own_with_the_bits_they_have_alone(monkeypat
         )
         return Paced(EventPlan(SpeedOverride(plan, speeds[rows]), threshold=threshold[rows]))
 
-    options = {"duration": 0.5, "disturbance": PUSH, "loop": SampledLoop(torque_limits=True)}
+    options = {"duration": 0.5, "disturbance": PUSH, "loop": SampledLoop(period=5e-3, torque_limits=True)}
     many = law(slice(None))
     runs = _pair(many, [0.9, 0.1], **options)
     assert _apart(runs) < 1e-10
@@ -133,7 +139,7 @@ def test_rollouts_have_rows_of_their_own_with_the_bits_they_have_alone(monkeypat
 
 def test_lost_ticks_and_noise_meet_wrapped_laws_alike_in_blocks_of_any_length(monkeypatch):
     noise = pc.SensorNoise(position=1e-5, seed=2)
-    loop = SampledLoop(noise=noise, velocity="difference", filter_hz=80.0)
+    loop = SampledLoop(period=5e-3, noise=noise, velocity="difference", filter_hz=80.0)
     lost = pc.Dropout(0.1, 0.6, probability=0.3, seed=1) + pc.Dropout(0.2, 0.3, "measurements", probability=0.3)
     law = EventPlan(SpeedOverride(NEAREST, lambda t: 1 - t), threshold=[6.0, 2.0])
     starts = [[0.9, 0.1], [1.0, 0.2]]
@@ -229,21 +235,21 @@ def test_a_pace_of_other_paths_or_of_one_s_own_runs_in_python():
     twice = Paced(Paced(PLAN, torque_limits=0.6 * effort))
     stranger = LawWrapper(EventPlan(PLAN), ContactRule(CICESE.with_friction(None), [6.0, 2.0], 10.0, 0.1))
     for law in (many, own, twice, stranger):
-        runs = [pc.simulate(law, [0.9, 0.1], duration=0.3, engine=e, progress=False) for e in ("pinocchio", "auto")]
+        runs = [pc.simulate(law, [0.9, 0.1], duration=0.1, engine=e, progress=False) for e in ("pinocchio", "auto")]
         assert "in Python" in runs[1].config["engine_reason"]
         assert _apart(runs) < 1e-10
 
 
-@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
-def test_no_pace_turns_round(engine):
+def test_no_pace_turns_round():
     """It comes to rest where it has to brake harder than that, as on winding paths that begin at rest."""
     rng = np.random.default_rng(6)
     for _ in range(6):
         path = pc.WaypointPath(rng.uniform([-0.5, 0.0], [0.5, 0.9], (4, 2)), speed=0.5)
         law = Paced(pc.ExtendedMotionPlan(CICESE, path, 400.0, 40.0, k=5.0), torque_limits=0.65 * _effort(PLAN))
         q, loop = path.q_d(np.array(0.0)) + np.array([0.02, -0.02]), SampledLoop(period=5e-3, torque_limits=True)
-        run = pc.simulate(law, q, duration=0.4, loop=loop, engine=engine, progress=False)
-        assert pc.speed_factor(run).min() > -1e-9
+        for engine in ("pinocchio", "compiled"):
+            run = pc.simulate(law, q, duration=0.4, loop=loop, engine=engine, progress=False)
+            assert pc.speed_factor(run).min() > -1e-9
 
 
 @pytest.mark.parametrize(
@@ -269,12 +275,12 @@ def test_more_rules_than_the_engine_takes_run_in_python():
 @pytest.mark.parametrize("law", [Paced(SpeedOverride(PLAN)), EventPlan(NEAREST, threshold=[6.0, 2.0])])
 def test_a_control_tick_that_is_operated_is_what_the_law_says(law):
     """Whatever the operator asks for, at a moment's notice, and with an observer in the law."""
-    period = 2.5e-3
+    period = 5e-3
     tick, plant = pc.ControlTick(law, period), pc.Plant(CICESE, period)
     q, qd, limits = np.array([[0.9, 0.1]]), np.zeros((1, 2)), CICESE.limits.effort
     tick.start(q[0], qd[0])
-    z, asked = law.start(q, qd), {60: tick.hold, 150: tick.reverse, 260: tick.resume, 330: lambda: tick.override(1.8)}
-    for k in range(450):
+    z, asked = law.start(q, qd), {30: tick.hold, 75: tick.reverse, 130: tick.resume, 165: lambda: tick.override(1.8)}
+    for k in range(225):
         asked.get(k, lambda: None)()
         out = law.law(k * period, q, qd, z)
         assert np.abs(tick(q[0], qd[0]) - out.tau).max() < 1e-7
