@@ -123,7 +123,7 @@ def test_the_engine_agrees_with_the_reference_on_random_dropouts(seed, name):
         start=pc.Push(np.ones(n)),
     )
     loop = pc.SampledLoop(
-        velocity="difference", delay=3e-3, noise=pc.SensorNoise(1e-5), torque_limits=np.full(n, 400.0)
+        period=5e-3, velocity="difference", delay=6e-3, noise=pc.SensorNoise(1e-5), torque_limits=np.full(n, 400.0)
     )
     runs = [simulated(lost, law, task.q_d(np.array(0.0)), 0.3, engine=e, loop=loop) for e in ENGINES]
     assert runs[0].config["engine"] == "compiled"

@@ -66,7 +66,8 @@ def test_the_engine_agrees_with_the_reference_on_random_changes(seed, name):
     law = pc.ExtendedMotionPlan(robot, task, 400.0, np.full(n, 40.0), 5.0)
     changes = pc.FrictionChange(rng.uniform(0, 20, n), rng.uniform(0, 0.2), rng.uniform(0.01, 0.2))
     changes = changes + pc.FrictionChange(rng.uniform(0, 3), 0.1, coulomb=rng.uniform(0, 2, n)) + pc.Push(np.ones(n))
-    runs = [simulated(changes, law, task.q_d(np.array(0.0)), 0.3, engine=e) for e in ("compiled", "pinocchio")]
+    start, loop = task.q_d(np.array(0.0)), pc.SampledLoop(period=5e-3)
+    runs = [simulated(changes, law, start, 0.3, engine=e, loop=loop) for e in ("compiled", "pinocchio")]
     assert runs[0].config["engine"] == "compiled"
     assert "engine_reason" not in runs[0].config
     assert_allclose(runs[0].array("q"), runs[1].array("q"), rtol=0, atol=1e-10)

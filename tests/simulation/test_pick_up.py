@@ -101,7 +101,8 @@ def test_the_engine_agrees_with_the_reference(seed, name):
     times = rng.uniform(0, 0.2, 2)
     pick = pc.PickUp(rng.uniform(0.1, 3.0, 2), TIPS[name], times, [0.1, np.inf], rng.normal(0, 0.1, (2, 3)))
     pick = pick + pc.PickUp(0.5, TIPS[name], 0.12, velocity=[0.3, 0.0, 0.0]) + pc.FrictionChange(2.0, 0.05, 0.1)
-    runs = [simulated(pick, law, task.q_d(np.array(0.0)), 0.3, engine=e) for e in ENGINES]
+    loop = pc.SampledLoop(period=5e-3)
+    runs = [simulated(pick, law, task.q_d(np.array(0.0)), 0.3, engine=e, loop=loop) for e in ENGINES]
     assert "engine_reason" not in runs[0].config
     assert_allclose(runs[0].array("q"), runs[1].array("q"), rtol=0, atol=1e-10)
 

@@ -117,12 +117,12 @@ def test_results_do_not_depend_on_threads_or_how_a_batch_is_cut(arm, circle):
     rng = np.random.default_rng(4)
     masses = rng.choice([0.0, 1.0, 2.0], 24)
     payloads = {mass: arm.with_payload(mass, "tool") for mass in np.unique(masses)}
-    plants = [payloads[mass] for mass in masses]
     q = START + 0.3 * rng.normal(size=(24, 2))
     gains = rng.uniform(400, 1200, (24, 2))
 
     def run(rows: slice, threads: int) -> Run:
-        some = [plant.with_threads(threads) for plant in plants[rows]]
+        parallel = {mass: plant.with_threads(threads) for mass, plant in payloads.items()}
+        some = [parallel[mass] for mass in masses[rows]]
         controller = Projection(arm.with_threads(threads), circle, gains[rows, :1], gains[rows] / 10)
         return simulate(controller, q[rows], duration=0.2, plant=some, loop=LOOP, progress=False)
 

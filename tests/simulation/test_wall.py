@@ -196,7 +196,8 @@ def test_the_engine_agrees_with_the_reference(seed, name, stiffness):
     normal = -ahead + 0.3 * np.linalg.norm(ahead) * rng.normal(size=3)
     kind = {"rigid": True} if stiffness is None else {"stiffness": stiffness}
     wall = pc.Wall(TIPS[name], at, normal, friction=rng.uniform(0, 0.5), duration=0.3, **kind)
-    runs = [simulated(wall + pc.Push(np.ones(n)), law, task.q_d(np.array(0.0)), 0.35, engine=e) for e in ENGINES]
+    push, loop = pc.Push(np.ones(n)), pc.SampledLoop(period=5e-3)
+    runs = [simulated(wall + push, law, task.q_d(np.array(0.0)), 0.35, engine=e, loop=loop) for e in ENGINES]
     assert "engine_reason" not in runs[0].config
     assert_allclose(runs[0].array("q"), runs[1].array("q"), rtol=0, atol=1e-8)
 
@@ -229,14 +230,13 @@ def test_each_rollout_has_its_wall_with_the_bits_it_has_alone(engine):
         "start": np.array([0.0, 0.05, 0.1]),
         "duration": [0.15, np.inf, 0.05],
     }
-    together = simulated(
-        pc.Wall("tool", points, [-1.0, 0.0, 0.1], stiffness, **options), q=(0.2, 0.3), duration=0.16, engine=engine
-    )
+    run = {"q": (0.2, 0.3), "duration": 0.16, "engine": engine, "loop": pc.SampledLoop(period=5e-3)}
+    together = simulated(pc.Wall("tool", points, [-1.0, 0.0, 0.1], stiffness, **options), **run)
     assert together.rollouts == 3
     for i in range(3):
         own = {name: values[i] for name, values in options.items()}
         wall = pc.Wall("tool", points[i], [-1.0, 0.0, 0.1], stiffness[i], **own)
-        alone = simulated(wall, q=(0.2, 0.3), duration=0.16, engine=engine)
+        alone = simulated(wall, **run)
         assert_array_equal(together.array("q")[i], alone.array("q")[0])
 
 
