@@ -42,7 +42,7 @@ def lap_time(one):
     return 2 * np.pi * (one.time[-1] - one.time[half]) / (s[-1] - s[half])
 
 
-@pytest.mark.parametrize(("name", "loop"), zip(LAWS, LOOPS, strict=True))
+@pytest.mark.parametrize(("name", "loop"), list(zip(LAWS, LOOPS, strict=True)))
 def test_the_circle_that_the_motors_cannot_do(arm, name, loop):
     """A lap asked in 0.571 s takes 0.673 s at least."""
     law = make_law(name, arm, pc.Circle(1.0, 11.0))
@@ -98,7 +98,7 @@ def test_a_paced_open_path_begins_and_ends_at_rest_within_the_limits(arm, name):
     assert np.rad2deg(pc.contour_error(there).max()) < 1.5
 
 
-@pytest.mark.parametrize(("name", "order"), zip(LAWS, ("outside", "inside"), strict=True))
+@pytest.mark.parametrize(("name", "order"), list(zip(LAWS, ("outside", "inside"), strict=True)))
 def test_an_operator_slows_holds_and_reverses_a_paced_law(arm, name, order):
     u = [[0.7, 0.0], [1.7, -1.0], [2.6, 0.5]]
     law = make_law(name, arm, pc.Circle(1.0, 11.0))

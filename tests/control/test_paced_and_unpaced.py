@@ -101,7 +101,7 @@ def arms():
     }
 
 
-@pytest.mark.parametrize(("which", "name"), zip(("ur5", "panda"), LAWS, strict=True))
+@pytest.mark.parametrize(("which", "name"), list(zip(("ur5", "panda"), LAWS, strict=True)))
 def test_arms_with_half_of_their_torque_stay_on_a_contour(which, name):
     """Peaks over a lap and more, from a start at rest, with dry friction, whose error a slow lap has too.
 
