@@ -92,6 +92,19 @@ def test_a_contact_is_forgotten_as_by_the_reference_at_long_periods_too():
     assert pc.speed_factor(runs[1]).min() < 0.5
 
 
+def test_a_pace_waits_where_no_rate_keeps_all_limits_as_by_the_reference():
+    """Far from the path one motor would need a plan that speeds up, another one a plan that slows down."""
+    law = Paced(pc.ExtendedMotionPlan(CICESE, pc.Circle(1.0, 8.0), 800.0, [45.0, 100.0], k=20.0))
+    loop = SampledLoop(period=2.5e-3, torque_limits=True)
+    runs = _pair(law, [1.54, 0.39], qd=[1.4, -4.8], duration=0.3, loop=loop)
+    assert _apart(runs) < 1e-10
+    for run in runs:
+        w, demand = pc.speed_factor(run)[0], np.abs(run.array("tau_demand")[0]) / _effort(law)
+        assert (demand[:10] > 1.1).any(-1).all()
+        assert (w[:10] == 0).all()
+        assert w[-1] > 0.9
+
+
 @pytest.mark.parametrize(("kind", "name"), [(kind, list(MIDDLE)[i % 3]) for i, kind in enumerate(LAWS)])
 def test_observed_friction_is_compensated_as_by_the_reference(kind, name):
     robot, task = _arm(name), _task(name, closed=True)
