@@ -22,9 +22,10 @@ def law() -> pc.Controller:
     return pc.ExtendedMotionPlan(robot, pc.Circle(1.0, 2.0), 800.0, [45.0, 100.0], 20.0)
 
 
-def run(law: pc.Controller, disturbance: pc.Disturbance | None, rollouts: int = 1) -> pc.Run:
+def run(law: pc.Controller, disturbance: pc.Disturbance | None, rollouts: int = 1, first: int = 0) -> pc.Run:
     q = np.tile(law.task.q_d(np.array(0.0)), (rollouts, 1))
-    return pc.simulate(law, q, duration=0.3, loop=LOOP, disturbance=disturbance, progress=False)
+    own = {"disturbance": disturbance, "first_rollout": first}
+    return pc.simulate(law, q, duration=0.3, loop=LOOP, progress=False, **own)
 
 
 def front(film: Reel, name: str = "walls/0 0") -> tuple[np.ndarray, np.ndarray]:
@@ -64,7 +65,7 @@ def test_a_plate_is_as_large_as_the_arm_and_opposite_to_it(law: pc.Controller) -
 def test_each_rollout_has_its_own_wall_even_alone_and_from_a_file(law: pc.Controller, tmp_path: Path) -> None:
     points = POINT + np.array([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0], [0.1, 0.0, 0.0]])
     walls = pc.Wall("tool", points, NORMAL, rigid=True, start=[0.0, 0.1, 0.2])
-    run(law, walls, 3).save(tmp_path / "run.nc")
+    run(law, walls, 3, first=5).save(tmp_path / "run.nc")  # as the piece of a sweep
     whole = pc.Run.load(tmp_path / "run.nc")
     for rollout, one in ((0, whole.rollout(0)), (1, whole), (2, whole.rollout(2)), (2, whole)):
         film = reel(pc.record(one, rollout=rollout if one is whole else 0))
