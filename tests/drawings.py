@@ -16,8 +16,8 @@ from pathcontrol.toolpaths.segments.segment import Polyline
 
 U = np.linspace(0.0, 1.0, 9)
 TEN = st.lists(st.integers(0, 10**6), min_size=10, max_size=10, unique=True)  # seeds of what one file holds
-#: files of many drawings, which would take minutes to shrink
-TOGETHER = settings(max_examples=1, phases=[Phase.explicit, Phase.generate])
+#: files of many drawings, which would take minutes to shrink: one for each 25 inputs that the profile asks for
+TOGETHER = settings(max_examples=max(1, settings.default.max_examples // 25), phases=[Phase.explicit, Phase.generate])
 MM_PAGE = 'width="100mm" height="50mm" viewBox="0 0 100 50"'
 
 

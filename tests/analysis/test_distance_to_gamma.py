@@ -69,7 +69,7 @@ KINDS = [(kind, closed) for kind in OPEN for closed in (True, False)]
 
 
 @pytest.mark.parametrize(("kind", "closed"), [*KINDS, ("jerk-limited", False), ("jerk-limited table", False)])
-@settings(max_examples=1, deadline=None, derandomize=True)
+@settings(max_examples=max(1, settings.default.max_examples // 25))
 @given(seed=st.integers(0, 10**6))
 def test_it_is_a_global_minimum_where_the_profile_has_corners(ideal_arm, kind, closed, seed):
     random = np.random.default_rng(seed)
