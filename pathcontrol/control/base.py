@@ -332,15 +332,13 @@ def check_controller(name: str, controller: Any) -> None:
 
 
 def _phi(x: Array) -> tuple[Array, Array]:
-    """Return φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x, by their series where x is small."""
+    """Return φ₁(x) = (eˣ − 1)/x and φ₂(x) = (φ₁(x) − 1)/x, the latter by its series where x is small."""
     if not x.any():  # laws whose rate does not depend on s
         return np.ones_like(x), np.full_like(x, 0.5)
-    small = np.abs(x) < 1e-3
+    from scipy.special import exprel  # runs of the engine do without SciPy
+
+    small, phi_1 = np.abs(x) < 1e-3, exprel(x)
     if not small.any():
-        phi_1 = np.expm1(x) / x
         return phi_1, (phi_1 - 1) / x
-    series = 1 + x / 2 * (1 + x / 3 * (1 + x / 4)), 0.5 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5)))
-    if small.all():
-        return series
-    large = _phi(np.where(small, 1.0, x))
-    return np.where(small, series[0], large[0]), np.where(small, series[1], large[1])
+    series = 0.5 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5)))
+    return phi_1, np.where(small, series, (phi_1 - 1) / np.where(small, 1.0, x))
