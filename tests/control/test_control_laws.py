@@ -277,6 +277,16 @@ def test_the_sampled_plan_is_second_order_along_a_moving_arm(ideal_arm, circle):
     assert 3.3 < errors[1] / errors[2] < 4.7
 
 
+@given(floats(-6, 4), floats(0.2, 0.8), floats(-0.1, 0.1), floats(-0.5, 0.5), floats(1e-4, 0.1))
+def test_a_step_of_the_plan_is_exact_where_its_rate_is_linear(ideal_arm, exponent, s, gap, rate, period):
+    """On a line at constant speed, from (22): ė = ϑ − v − ke for the plan's lead e, for any gain and period."""
+    task, k = Line([0.0, 0.0], [1.0, 0.0], 0.5), 10.0**exponent
+    law, z, theta = ExtendedMotionPlan(ideal_arm, task, 100.0, 20.0, k), np.array([s]), float(task.theta(0.5))
+    out = law.law(0.0, np.array([s - gap, 0.0]), np.array([rate, 0.0]), z)
+    lead = gap * np.exp(-k * period) - (theta - rate) * np.expm1(-k * period) / k
+    assert law.advance(z, out, period)[0] == pytest.approx(s - gap + rate * period + lead, rel=1e-12)
+
+
 def test_the_plan_waits_at_the_beginning_of_an_open_path(ideal_arm):
     """An arm behind the start that comes nearer leaves σ exactly where it is until the path begins."""
     task = Line([0.0, 0.0], [1.0, 0.0], 0.5)
