@@ -129,6 +129,13 @@ def test_every_finding_is_in_the_robots_page():
     assert {name for name in codes if f"`{name}`" not in source} == set()
 
 
+def test_every_source_of_the_engine_is_in_its_page():
+    listed = re.findall(r"^\| `(\w+\.[ch]pp)` \|", (DOCS / "engine.md").read_text(), re.MULTILINE)
+    assert sorted(listed) == sorted(
+        file.name for file in (Path(pathcontrol.__file__).parent / "engine" / "src").glob("*.?pp")
+    )
+
+
 def test_pages_load_nothing_from_the_network():
     """Formulas and the gallery are to be read offline; links may lead anywhere."""
     configuration = (DOCS / "conf.py").read_text(encoding="utf-8")
