@@ -70,7 +70,8 @@ def comparison_tables(compared: Comparison, width: int) -> list[Table]:
     from pathcontrol.comparison.comparison_table import tabulate
 
     title = Text(printable(f"{compared.scenario.name}: {compared.scenario.sentence}"))
-    return _deal_columns(tabulate(compared), 1, width, title)
+    rows = [[cell.replace("± ", "±") for cell in row] for row in tabulate(compared)]  # a narrow cell breaks before it
+    return _deal_columns(rows, 1, width, title)
 
 
 def _deal_columns(rows: Sequence[Sequence[str]], labels: int, width: int, title: Text | None = None) -> list[Table]:

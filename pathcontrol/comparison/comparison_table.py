@@ -79,4 +79,4 @@ def _cell(compared: Comparison, law: str, measure: str, factor: float, best: boo
     mean, spread = (0.0 if abs(value) < compared.rounding(measure) else factor * value for value in (mean, spread))
     decimals = max(0, _DIGITS - 1 - int(np.floor(np.log10(abs(mean))))) if mean else 0
     spread_text = f"{spread:.{decimals}f}"
-    return f"{mean:.{decimals}f}" + (f" ± {spread_text}" if float(spread_text) else "") + (" *" if best else "")
+    return f"{mean:.{decimals}f}" + ("*" if best else "") + (f" ± {spread_text}" if float(spread_text) else "")
