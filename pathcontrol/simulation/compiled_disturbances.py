@@ -50,27 +50,39 @@ def add_structs(setup: Setup, terms: Sequence[structs.Disturbance], memory: Memo
     kinds = [_DISTURBANCES[one.kind] for one in terms]
     setup.disturbances, setup.jams, setup.drops = len(terms), JammedJoint in kinds, TorqueLimitDrop in kinds
     setup.walls = kinds.count(Wall)
-    check_walls(setup.walls)
+    _check_number(setup.walls)
     if terms:
         setup.disturbance = addressof(memory.keep((structs.Disturbance * len(terms))(*terms)))
 
 
-def check_walls(count: int) -> None:
-    """Check that there are no more walls than the engine takes.
+def check_walls(walls: Sequence[Wall]) -> None:
+    """Check that walls, which are a part of the compiled plant, are the library's own and not too many.
 
     Raises:
-        EngineError: there are.
+        EngineError: they are not.
     """
+    _check_number(len(walls))
+    for wall in walls:
+        _check_known(wall)
+
+
+def _check_number(count: int) -> None:
+    """Raise if there are more walls than the engine takes."""
     if count > MOST_WALLS:
         raise EngineError(
             f"there are {count} walls, the engine takes {MOST_WALLS} at most", value=count, limit=MOST_WALLS
         )
 
 
-def disturbance_struct(term: Disturbance, n: int, memory: Memory) -> structs.Disturbance:
-    """Return a disturbance as struct of the engine."""
+def _check_known(term: Disturbance) -> None:
+    """Raise if a disturbance is not one that the engine knows."""
     if type(term) not in _DISTURBANCES:
         raise EngineError(f"the disturbance {type(term).__name__} is not one of the library", value=type(term).__name__)
+
+
+def disturbance_struct(term: Disturbance, n: int, memory: Memory) -> structs.Disturbance:
+    """Return a disturbance as struct of the engine."""
+    _check_known(term)
     struct = structs.Disturbance(kind=_DISTURBANCES.index(type(term)))
     if isinstance(term, TimedDisturbance):
         struct.start, struct.duration = memory.numbers(term.start), memory.numbers(term.duration)

@@ -110,7 +110,7 @@ def _compile(
     try:
         return Choice(CompiledArm(loop, robot, q, qd, outside, controllers), {"engine": "compiled"})
     except EngineError as error:
-        check_walls(sum(isinstance(term, Wall) for term in list_terms(outside.disturbance)))
+        check_walls([term for term in list_terms(outside.disturbance) if isinstance(term, Wall)])
         arm = SampledArm(loop, robot, q, qd, outside, CompiledPlant)
         return Choice(arm, {"engine": "compiled", "engine_reason": f"only the plant is compiled: {error}"})
 

@@ -10,6 +10,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
 from pathcontrol.simulation.checks.disturbance_loop import check_loop
+from pathcontrol.simulation.checks.frames import check_frames
 from pathcontrol.simulation.checks.friction_knowledge import warn_of_unknown_friction
 from pathcontrol.simulation.checks.idle_times import warn_of_idle_times
 from pathcontrol.simulation.checks.slips import warn_of_idle_changes, warn_of_slips, warn_of_walls
@@ -61,14 +62,15 @@ def prepare(
 
     Raises:
         EngineError: the engine is to be the compiled one, and something of the simulation is beyond it.
-        InputError: the disturbance fails at the initial states, or does what the loop cannot do.
-        UnknownNameError: it names a joint that the arm does not have.
+        InputError: the disturbance fails at the initial states, does what the loop cannot do, or names a frame that is
+            elsewhere on another arm.
+        UnknownNameError: it names a joint or a frame that an arm does not have.
     """
     disturbance, first = _find_names(outside.disturbance, robot), outside.first
     slip = warn_of_slips(robot, task, q, first)
     check_disturbance(disturbance, q, qd)
     check_loop(disturbance, loop, q)
-    warn_of_idle_changes(robot, disturbance)
+    warn_of_idle_changes(robot, loop, disturbance, first)
     warn_of_idle_times(disturbance, loop, duration, first)
     warn_of_walls(disturbance, q, first)
     warn_of_unknown_friction(controllers, robot, first)
@@ -79,5 +81,9 @@ def prepare(
 
 def _find_names(disturbance: Any, robot: Arm) -> Any:
     """Return the disturbance with the joints that it names found in the arm; what is none is left to the check."""
-    arm = robot.robots[0] if isinstance(robot, RobotBatch) else robot
-    return disturbance.find_names(arm) if isinstance(disturbance, Disturbance) else disturbance
+    if not isinstance(disturbance, Disturbance):
+        return disturbance
+    found = disturbance.find_names(robot.robots[0] if isinstance(robot, RobotBatch) else robot)
+    if isinstance(robot, RobotBatch):
+        check_frames(found, robot)
+    return found

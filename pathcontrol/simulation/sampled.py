@@ -51,7 +51,8 @@ class Actuator:
     def __init__(self, loop: SampledLoop, robot: Arm, shape: tuple[int, int]) -> None:
         limits = torque_limits(loop, robot)
         check_rows(limits, "torque_limits", shape[0])
-        self.limits = None if limits is None else np.atleast_2d(limits)
+        # no limit is the largest number, of which a disturbance may leave nothing; inf · 0 is none
+        self.limits = None if limits is None else np.atleast_2d(np.minimum(limits, np.finfo(np.float64).max))
         self._limits = None if self.limits is None else (-self.limits, self.limits)
         whole, late = split_delay(loop.delay, loop.period)
         self.waiting = whole + (late > 0)

@@ -58,6 +58,15 @@ def test_sum_adds_disturbances_and_friction_laws():
             pc.Push([1.0, 2.0]) + wrong
 
 
+def test_a_long_sum_is_as_good_as_a_short_one(tmp_path):
+    kicks = sum(pc.Push([1.0, 0.5], 1e-3 * i, 0.01) for i in range(1500))
+    assert kicks.torque(5e-3, np.zeros((1, 2)), np.zeros((1, 2))).tolist() == [6.0, 3.0]  # those from 0 to 5 ms
+    run = simulated(sum(pc.Push([1.0, 0.5], 1e-3 * i, 0.01) for i in range(30)))
+    run.save(tmp_path / "run.nc")
+    described = pc.Run.load(tmp_path / "run.nc").config["disturbance"]["terms"]
+    assert [one["disturbance"] for one in described] == ["Push"] * 30
+
+
 def test_disturbances_show_their_parameters():
     jam, push = pc.JammedJoint(1, 0.5, 0.1), pc.Push([1.0, 2.0], 0.25)
     assert repr(jam) == "JammedJoint(start=0.5, duration=0.1, joint=1)"

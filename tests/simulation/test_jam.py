@@ -90,10 +90,14 @@ def test_what_holds_a_joint_does_no_work():
 
 
 @pytest.mark.parametrize("engine", ["compiled", "pinocchio"])
-def test_each_rollout_has_a_jam_of_its_own_with_the_bits_it_has_alone(engine):
-    law = law_of(arm("cicese_2dof"))
-    joints, starts, spans = ["joint_1", "joint_2", "joint_1"], np.array([0.05, 0.1, 0.3]), np.array([0.1, 0.02, np.inf])
-    options = {"duration": 0.4, "engine": engine, "progress": False}
+@pytest.mark.parametrize("name", ["cicese_2dof", "ur5"])
+def test_each_rollout_has_a_jam_of_its_own_with_the_bits_it_has_alone(name, engine):
+    """One that jams while others are held, and their other joints stick, changes nothing of these."""
+    robot = arm(name)
+    law = law_of(robot.with_friction(pc.Viscous(np.full(robot.n, 1.0)) + pc.Coulomb(np.full(robot.n, 5.0))))
+    first, second = robot.joint_names[:2]
+    joints, starts, spans = [first, second, first], np.array([0.02, 0.05, 0.12]), np.array([0.06, 0.02, np.inf])
+    options = {"duration": 0.15, "engine": engine, "progress": False}
     together = pc.simulate(law, start_of(law), disturbance=pc.JammedJoint(joints, starts, spans), **options)
     assert together.rollouts == 3
     for i in range(3):
@@ -134,6 +138,12 @@ def test_attributes_of_a_disturbance_of_ones_own_may_be_called_anything():
 
     run = run_with(Kick() + pc.JammedJoint("joint_2"))
     assert np.ptp(run.array("q")[0, :, 1]) == 0
+
+
+def test_joints_of_rollouts_are_named_or_numbered_as_one_likes():
+    runs = [run_with(pc.JammedJoint(joints, 0.02)) for joints in (["joint_1", 1], ["joint_1", "joint_2"], [0, 1])]
+    for run in runs:
+        assert_array_equal(run.array("q"), runs[0].array("q"))
 
 
 def test_a_file_says_it(tmp_path):

@@ -130,6 +130,30 @@ class MyPlan(pc.ExtendedMotionPlan):
     """The same law, which the engine does not know."""
 
 
+class Bolt(pc.PickUp):
+    """A mass of one's own, with other arguments."""
+
+    def __init__(self, grams):
+        super().__init__(1e-3 * grams, "tool", 0.1)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_mass_of_ones_own_is_picked_up_as_one_of_the_library(engine):
+    runs = [simulated(pick, duration=0.2, engine=engine) for pick in (pc.PickUp(0.5, "tool", 0.1), Bolt(500.0))]
+    assert_allclose(runs[1].array("q"), runs[0].array("q"), rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: pc.PickUp(1.0, "tip", 0.0), lambda: pc.Wall("tip", [2, 0, 0], [-1, 0, 0], 1e4)]
+)
+def test_arms_of_other_lengths_are_refused_as_one_batch(make):
+    plants = [ARM.with_frame("tip", "tool", [0.0, 0.0, z]).with_payload(mass, "tool") for z, mass in ((0, 1), (0, 2))]
+    simulated(make(), duration=0.01, plant=plants)
+    plants[1] = ARM.with_frame("tip", "tool", [0.0, 0.0, -0.1])
+    with pytest.raises(pc.InputError, match=r"'tip' of (PickUp|Wall) is elsewhere on plant\[1\] than on plant\[0\]"):
+        simulated(make(), duration=0.01, plant=plants)
+
+
 def test_a_law_in_python_meets_the_same_mass():
     mine = MyPlan(ARM, pc.Circle(1.0, 2.0), 800.0, [45.0, 100.0], 20.0)
     pick, loop = pc.PickUp([1.0, 2.0], "tool", [0.1, 0.1512]), pc.SampledLoop(delay=1e-3, substeps=2)

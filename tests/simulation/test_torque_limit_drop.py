@@ -47,6 +47,20 @@ def test_motors_without_torque_let_the_arm_fall_as_one_without_motors(engine):
     assert_allclose(falling.array("q")[0, -1], q[0], rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize("engine", ["compiled", "pinocchio"])
+def test_a_dead_motor_has_no_torque_even_without_a_limit(engine):
+    loop = pc.SampledLoop(torque_limits=[np.inf, LIMITS[1]])
+    run = simulated(pc.TorqueLimitDrop([0.0, 1.0], 0.1, 0.1), loop=loop, engine=engine)
+    dead = (run.time >= 0.1 - 1e-9) & (run.time < 0.2 - 1e-9)
+    assert (run.array("tau")[0, dead, 0] == 0).all()
+    assert_array_equal(run.array("tau")[0, ~dead, 0], run.array("tau_demand")[0, ~dead, 0])
+
+
+def test_a_share_of_no_limit_is_told():
+    with pytest.warns(pc.PathControlWarning, match="joint_1 has no torque limit"):
+        simulated(pc.TorqueLimitDrop(0.5), loop=pc.SampledLoop(torque_limits=[np.inf, 10.0]))
+
+
 def test_drops_compose_and_each_rollout_has_its_own():
     factor, start = np.array([[0.5, 0.1], [0.2, 1.0]]), np.array([0.0, 0.2])
     drops = pc.TorqueLimitDrop(factor, start, 0.3) + pc.TorqueLimitDrop(0.5, 0.1, 0.3)

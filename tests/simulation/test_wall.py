@@ -287,6 +287,21 @@ def test_a_law_in_python_meets_the_same_walls():
     assert_allclose(runs[1].array("q"), runs[0].array("q"), rtol=0, atol=1e-9)
 
 
+class Edge(pc.Wall):
+    """A wall of one's own, with an argument of its own."""
+
+    def __init__(self, x):
+        super().__init__("tool", [x, 0.0, 0.0], [-1.0, 0.0, 0.0], 1e4)
+
+
+def test_a_wall_of_ones_own_is_met_as_one_of_the_library():
+    runs = [simulated(wall, duration=0.5, engine="pinocchio") for wall in (across(1e4), Edge(0.6))]
+    runs.append(simulated(Edge(0.6), duration=0.5))
+    assert "Edge is not one of the library" in runs[2].config["engine_reason"]
+    for run in runs[1:]:
+        assert_array_equal(run.array("q"), runs[0].array("q"))
+
+
 def test_more_walls_than_the_engine_takes_are_met_in_the_reference_and_the_run_says_so():
     mine = MyPlan(ARM, pc.Circle(1.0, 2.0), 800.0, [45.0, 100.0], 20.0)
     walls = sum((across(1e5, x=2.0 + i) for i in range(4)), start=across(1e5))
@@ -301,6 +316,10 @@ def test_more_walls_than_the_engine_takes_are_met_in_the_reference_and_the_run_s
 def test_what_is_likely_a_slip_is_told():
     with pytest.warns(pc.PathControlWarning, match=r"'tool' starts 0.0557 m beyond its wall"):
         simulated(across(1e3, x=0.66), duration=0.01)
+    with pytest.warns(
+        pc.PathControlWarning, match="'tool' starts 0.0557 m beyond its wall, which is rigid and lets it"
+    ):
+        simulated(across(x=0.66), duration=0.01)
     with pytest.warns(pc.PathControlWarning, match="points are in metres"):
         simulated(across(1e3, x=600.0), duration=0.01)
 
@@ -356,6 +375,10 @@ def test_a_file_says_it(tmp_path):
         (lambda: pc.Wall("tool", [0, 0, 0], [0, 0, 1], 1e4, -0.1), "friction = -0.1"),
         (lambda: pc.Wall("tool", [0, 0, 0], [0, 0, np.nan], 1e4), "normal"),
         (lambda: pc.Wall(3, [0, 0, 0], [0, 0, 1], 1e4), "frame = 3"),
+        (
+            lambda: pc.Wall("tool", [0, 0, 0], [0, 0, 1], rigid=[True, False]),
+            "rigid = .* a stiffness of inf is rigid for one",
+        ),
         (lambda: simulated(pc.Wall("hand", [0, 0, 0], [0, 0, 1], 1e4)), "hand"),
         (lambda: simulated(across(), loop=pc.ContinuousTime()), "continuous time cannot"),
         (lambda: simulated(across([1e3, 1e4]), q=[[0.7, 1.2]] * 3), "Wall"),

@@ -72,7 +72,9 @@ class Disturbance(ABC):
         return self
 
     def __add__(self, other: Any) -> Disturbance:
-        return _Sum((self, other)) if isinstance(other, Disturbance) else self.__radd__(other)
+        if not isinstance(other, Disturbance):
+            return self.__radd__(other)
+        return _Sum((*list_terms(self), *list_terms(other)))  # flat, however many are added one after another
 
     def __radd__(self, other: Any) -> Disturbance:  # sum(...) begins with 0
         return self if isinstance(other, int) and other == 0 else NotImplemented

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from typing import Annotated
 
 import numpy as np
@@ -25,7 +26,7 @@ class JammedJoint(TimedDisturbance):
     middle the time covers; its encoder and its motor go on as ever. Continuous time does not know it.
 
     Args:
-        joint: name or number of the joint, from 0, or one for each rollout, (N,).
+        joint: name or number of the joint, from 0, or one for each rollout, (N,). Joints that jam together are a sum.
         start: when it jams [s], or for each rollout, (N,).
         duration: how long it is held [s], or for each rollout, (N,).
 
@@ -35,16 +36,16 @@ class JammedJoint(TimedDisturbance):
 
     def __init__(self, joint: Joint, start: Begin = 0.0, duration: Span = np.inf) -> None:
         super().__init__(start, duration)
-        names = np.asarray(joint)
-        whole = names.dtype.kind in "iu" and bool((names >= 0).all())
-        if names.ndim > 1 or not names.size or not (whole or names.dtype.kind == "U"):
+        names = np.asarray(joint, dtype=object)
+        each = names.ravel().tolist()
+        if names.ndim > 1 or not each or not all(isinstance(one, str) or _is_number(one) for one in each):
             raise InputError(
                 f"joint = {joint!r}, expected the name of a joint or its number from 0, or one a rollout",
                 argument="joint",
                 value=joint,
             )
         self.joint = joint if isinstance(joint, str | int) else names.tolist()
-        self._index = names.astype(np.intp) if whole else None
+        self._index = names.astype(np.intp) if all(map(_is_number, each)) else None
         check_rollouts(start=self.start.shape, duration=self.duration.shape, joint=names.shape)
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
@@ -72,12 +73,11 @@ class JammedJoint(TimedDisturbance):
         return self._index[..., None]
 
     def find_names(self, robot: RobotModel) -> JammedJoint:
-        if self._index is not None:
-            self._check(robot.n)
-            return self
-        found = type(self)(self.joint, self.start, self.duration)
-        names = np.asarray(self.joint)
-        found._index = np.reshape([robot.joint_index(str(name)) for name in names.ravel()], names.shape)
+        names = np.asarray(self.joint, dtype=object)
+        each = [robot.joint_index(one) if isinstance(one, str) else one for one in names.ravel()]
+        found = copy(self)
+        found._index = np.reshape(each, names.shape).astype(np.intp)
+        found._check(robot.n)
         return found
 
     def _check(self, n: int) -> None:
@@ -89,3 +89,8 @@ class JammedJoint(TimedDisturbance):
                 value=self.joint,
                 limit=(0, n - 1),
             )
+
+
+def _is_number(joint: object) -> bool:
+    """Return whether it may be the number of a joint."""
+    return isinstance(joint, int | np.integer) and not isinstance(joint, bool) and bool(joint >= 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Annotated, Any
 
 import numpy as np
@@ -108,8 +109,8 @@ class PickUp(TimedDisturbance):
             UnknownNameError: the arm has no such frame.
         """
         robot.frame_pose(np.zeros(robot.n), self.frame)  # raises where there is no such frame
-        found = type(self)(self.mass, self.frame, self.time, self.duration, self.offset, self.velocity)
-        found._robot = robot
+        found = copy(self)
+        found._robot, found._carried = robot, {}
         return found
 
     def describe(self) -> dict[str, Any]:

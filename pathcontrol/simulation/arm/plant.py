@@ -74,8 +74,10 @@ class Plant:
         All arrays are (N, n); of walls each has the rollouts for which it is there, (N,).
         """
         held = None if held is None or not held.any() else np.broadcast_to(held, q.shape)
-        if held is not None and qd[held].any():
-            qd = _hold(self.robot, q, qd, held)
+        if held is not None and (moves := (held & (qd != 0)).any(-1)).any():
+            qd = _hold(
+                self.robot, q, qd, held & moves[:, None]
+            )  # the others keep their bits, and joints that stick stick
         met = _Met(walls, q, self.step, held) if walls else None
         if met is not None:
             qd = met.stop(self.robot, q, qd)

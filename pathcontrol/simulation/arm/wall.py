@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array, freeze
+from pathcontrol._expect import expect
 from pathcontrol.arguments import Direction, Form, Point, Unit
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
@@ -58,6 +60,7 @@ class Wall(TimedDisturbance):
             raise InputError(
                 f"frame = {frame!r}, expected the name of a frame, such as 'tool'", argument="frame", value=frame
             )
+        expect("rigid", rigid, bool, np.bool_, also=" for all rollouts; a stiffness of inf is rigid for one")
         self.frame, self.rigid = frame, bool(rigid)
         self._robot: RobotModel | None = None
         self.point, self.normal = check_vectors("point", point), check_vectors("normal", normal)
@@ -141,7 +144,7 @@ class Wall(TimedDisturbance):
             UnknownNameError: the arm has no such frame.
         """
         robot.frame_pose(np.zeros(robot.n), self.frame)  # raises where there is no such frame
-        found = type(self)(**{name: value for name, value in vars(self).items() if not name.startswith("_")})
+        found = copy(self)
         found._robot = robot
         return found
 

@@ -8,14 +8,15 @@ from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import warn
 from pathcontrol.robot.batch import RobotBatch
-from pathcontrol.simulation.arm.disturbance import Disturbance, list_terms
+from pathcontrol.simulation.arm.disturbance import Disturbance, TorqueLimitDrop, list_terms
 from pathcontrol.simulation.arm.friction_change import FrictionChange
 from pathcontrol.simulation.arm.wall import Wall
 from pathcontrol.simulation.checks.friction_knowledge import advise_on_dry_friction
 from pathcontrol.simulation.checks.position_range import describe_excess, describe_turns, find_excess
 from pathcontrol.simulation.checks.weight import PathPostures, check_weight
-from pathcontrol.simulation.loops import Arm
+from pathcontrol.simulation.loops import Arm, torque_limits
 from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.run_arguments import Loop
 from pathcontrol.tasks.task import PathTask
 
 _AWAY = 10.0  # m, beyond which a point of a wall is probably in millimetres
@@ -53,11 +54,23 @@ def warn_if_still(run: Run, robot: Arm, controller: Controller) -> None:
         warn(f"the arm did not move in {run.time[-1]:g} s: {advice}")
 
 
-def warn_of_idle_changes(robot: Arm, disturbance: Disturbance | None) -> None:
-    """Warn of a multiple of friction that the arm does not have."""
-    for term in list_terms(disturbance):
+def warn_of_idle_changes(robot: Arm, loop: Loop, disturbance: Disturbance | None, first: int = 0) -> None:
+    """Warn of a multiple of friction that the arm does not have, and of a share of limits that a loop does not have.
+
+    Of a larger batch only the part with the ``first`` rollout 0 is looked at.
+    """
+    for term in () if first else list_terms(disturbance):
         if isinstance(term, FrictionChange) and term.is_idle(robot.friction):
             warn(f"{robot.name} has no friction, so FrictionChange(factor=…) changes nothing; add some by coulomb=…")
+        if isinstance(term, TorqueLimitDrop) and (limits := torque_limits(loop, robot)) is not None:
+            idle = np.atleast_2d(np.isinf(limits) & (term.factor > 0) & (term.factor < 1))
+            names = [robot.joint_names[joint] for joint in np.flatnonzero(idle.any(0)).tolist()]
+            if names:
+                has = "have no torque limits" if len(names) > 1 else "has no torque limit"
+                warn(
+                    f"{', '.join(names)} {has}, and TorqueLimitDrop leaves a share of none as it is; give numbers "
+                    "[N m] by torque_limits=[…]"
+                )
 
 
 def warn_of_walls(disturbance: Disturbance | None, q: Array, first: int = 0) -> None:
@@ -69,7 +82,9 @@ def warn_of_walls(disturbance: Disturbance | None, q: Array, first: int = 0) -> 
         row = int(np.where(term.stands(0.0, len(q)), gap, np.inf).argmin())
         if term.stands(0.0, len(q))[row] and gap[row] < 0:
             whose = f" of rollout {row}" if len(q) > 1 else ""
-            warn(f"the frame {term.frame!r}{whose} starts {-gap[row]:.3g} m beyond its wall, which will push it out")
+            rigid = bool(np.isinf(np.broadcast_to(np.ravel(term.springs[0]), len(q))[row]))
+            what = "is rigid and lets it only go out" if rigid else "will push it out"
+            warn(f"the frame {term.frame!r}{whose} starts {-gap[row]:.3g} m beyond its wall, which {what}")
         elif (away := float(np.abs(gap).min())) > _AWAY:
             warn(f"the wall is {away:.3g} m from the frame {term.frame!r} at the start; points are in metres")
 
