@@ -12,14 +12,16 @@ from pathcontrol._arrays import Array, check_whole
 from pathcontrol._expect import expect
 from pathcontrol._json import to_json
 from pathcontrol.comparison.laws import Laws, make_laws
-from pathcontrol.comparison.measures import MEASURES, measure
+from pathcontrol.comparison.measures import MEASURES, acting_limits, measure
 from pathcontrol.comparison.scenarios import Scenario, make_scenario
 from pathcontrol.control.base import Controller
 from pathcontrol.control.wrappers.paced import Paced
 from pathcontrol.control.wrappers.speed_override import SpeedOverride
 from pathcontrol.errors import SimulationError
 from pathcontrol.simulation.engines import Engine, check_engine
+from pathcontrol.simulation.loops import torque_limits
 from pathcontrol.simulation.run import Run
+from pathcontrol.simulation.run_arguments import make_plant
 from pathcontrol.simulation.simulate import simulate
 
 _ROUNDING = 1e-7  # rad, m, N m, …
@@ -133,8 +135,9 @@ def compare(
       peak [s]; inf where it does not, NaN where no event ends.
     - ``time_lost_s``: path parameter behind that of the undisturbed run at the end, over ϑ [s]. It is 0 for motion
       control, whose s waits for nobody but for ticks that are missed; what that costs are contour error and lag.
-    - ``energy_j``: ∫|τ·q̇| dt [J].
-    - ``saturated_s``: time with any torque at its limit [s].
+    - ``energy_j``: ∫|τ·q̇| dt [J], with the torque that is held in each period.
+    - ``saturated_s``: time with any torque at its limit [s], as a :class:`TorqueLimitDrop` leaves it; 0 in a loop
+      without limits.
 
     Args:
         laws: names of known laws, laws for ``scenario.robot`` and ``scenario.task``, or functions (robot, task) that
@@ -162,8 +165,14 @@ def compare(
     runs = {name: _run(law, scenario, starts, engine, progress) for name, law in made.items()}
     others = runs if calm is scenario else {n: _run(law, calm, starts, engine, progress) for n, law in made.items()}
     end = None if scenario.event is None or scenario.event[1] >= scenario.duration else scenario.event[1]
-    measures = {name: measure(runs[name], others[name], scenario.window, end) for name in made}
+    measures = {name: _measure(law, runs[name], others[name], scenario, end) for name, law in made.items()}
     return Comparison(scenario, made, runs, others, measures)
+
+
+def _measure(law: Controller, run: Run, calm: Run, scenario: Scenario, event_end: float | None) -> dict[str, Array]:
+    """Return the measures of the run of one law."""
+    limits = torque_limits(scenario.loop, make_plant(scenario.plant, law))
+    return measure(run, calm, scenario.window, event_end, acting_limits(limits, scenario.disturbance, run))
 
 
 def _run(law: Controller, scenario: Scenario, starts: Array, engine: Engine | None, progress: bool) -> Run:

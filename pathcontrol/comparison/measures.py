@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.limit_shares import stack_torque_limits
+from pathcontrol.analysis.power.torque_account import acting_torque
 from pathcontrol.analysis.run_metrics import contour_error, lag_error, settling_time
+from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.task import PathTask
 
@@ -30,28 +32,37 @@ _SLACK = 1e-6  # share of a period, as times of samples are rounded
 _AT_LIMIT = 1 - 1e-9  # share of a limit
 
 
-def measure(run: Run, undisturbed: Run, window: tuple[float, float], event_end: float | None) -> dict[str, Array]:
+def measure(
+    run: Run, undisturbed: Run, window: tuple[float, float], event_end: float | None, limits: Array | None = None
+) -> dict[str, Array]:
     """Return all :data:`MEASURES` of a run beside the undisturbed one with the same samples, (rollout,) each.
 
-    All but the time lost are of the ``window``; those of a rollout that diverged are NaN. ``event_end`` is when the
-    event is over [s], or ``None`` where it never is, and no arm recovers, NaN.
+    All but the time lost are of the ``window``; those of a rollout that diverged are NaN, and those beside the
+    undisturbed one if that did. ``event_end`` is when the event is over [s], or ``None`` where it never is, and no arm
+    recovers, NaN. ``limits`` are of the torques from each sample on [N m], to be broadcast to (rollout, time, n).
     """
+    lost, unknown = (one.status == "diverged" for one in (run, undisturbed))
+    if lost.all():  # the run has ended, perhaps before the window
+        return {name: np.full(run.rollouts, np.nan) for name in MEASURES}
     first, stop = find_samples(run.time, window)
     time, task = run.time[first:stop], run.task
-    contour, normal = (contour_error(one)[:, first:stop] for one in (run, undisturbed))
+    contour, calm = (contour_error(one)[:, first:stop] for one in (run, undisturbed))
     torque, speed = run.array("tau")[:, first:stop], run.array("qd")[:, first:stop]
+    normal = np.where(unknown, np.nan, calm.max(-1, initial=0.0))
+    late = np.full(run.rollouts, np.nan) if task is None else time_lost(run, undisturbed, task)
+    at_limit = np.zeros(torque.shape[:2], dtype=bool) if limits is None else is_at_limit(run, limits)[:, first:stop]
     values = {
         "contour_peak": contour.max(-1),
         "contour_rms": np.sqrt((contour**2).mean(-1)),
         "lag_peak": np.abs(lag_error(run)[:, first:stop]).max(-1),
         "speed_peak": np.linalg.norm(speed, axis=-1).max(-1),
         "torque_peak": np.abs(torque).max((-1, -2)),
-        "recovery_s": recovery_time(contour, normal.max(-1), time, event_end),
-        "time_lost_s": np.full(run.rollouts, np.nan) if task is None else time_lost(run, undisturbed, task),
-        "energy_j": energy(torque, speed, time),
-        "saturated_s": saturated_time(torque, stack_torque_limits(run), time),
+        "recovery_s": recovery_time(contour, normal, time, event_end),
+        "time_lost_s": np.where(unknown, np.nan, late),
+        "energy_j": energy(run, first, stop),
+        "saturated_s": at_limit[:, :-1] @ np.diff(time),
     }
-    return {name: np.where(run.status == "diverged", np.nan, value) for name, value in values.items()}
+    return {name: np.where(lost, np.nan, value) for name, value in values.items()}
 
 
 def find_samples(time: Array, window: tuple[float, float]) -> tuple[int, int]:
@@ -104,16 +115,30 @@ def _planned_time(task: PathTask, begin: float, end: float) -> float:
     return time if error <= _ACCURACY * (1 + abs(time)) else float(np.copysign(np.inf, end - begin))
 
 
-def energy(torque: Array, speed: Array, time: Array) -> Array:
-    """Return ∫|τ·q̇| dt [J], (rollout,), by the trapezoidal rule, of (rollout, time, n)."""
-    return np.trapezoid(np.abs(np.vecdot(torque, speed)), time, axis=-1)
+def energy(run: Run, first: int, stop: int) -> Array:
+    """Return ∫|τ·q̇| dt [J], (rollout,), from sample ``first`` to the last before ``stop``, of torques as they acted.
 
-
-def saturated_time(torque: Array, limits: Array, time: Array) -> Array:
-    """Return the time [s] in which the torque of any joint is at its limit, (rollout,).
-
-    Torques are (rollout, time, n), each held for a period, and limits [N m], (rollout, n).
+    That is the trapezoidal rule in each period, with the torque that is held in it.
     """
-    at_limit = (np.abs(torque) >= _AT_LIMIT * limits[:, None]).any(-1)
-    period = time[1] - time[0] if len(time) > 1 else 0.0
-    return period * at_limit.sum(-1)
+    speed, step = run.array("qd").swapaxes(0, 1), np.diff(run.time)[:, None]
+    after, before = acting_torque(run)
+    power = 0.5 * (np.abs(np.vecdot(after, speed[:-1])) + np.abs(np.vecdot(before, speed[1:])))
+    return np.ascontiguousarray((power * step)[first : stop - 1].T).sum(-1)  # the same bits for a rollout alone
+
+
+def is_at_limit(run: Run, limits: Array) -> NDArray[np.bool_]:
+    """Return whether the torque of any joint is at its limit from each sample on, (rollout, time)."""
+    return np.asarray((np.abs(run.array("tau")) >= _AT_LIMIT * limits).any(-1))
+
+
+def acting_limits(limits: Array | None, disturbance: Disturbance | None, run: Run) -> Array | None:
+    """Return torque limits [N m], (n,) or (N, n), as a disturbance leaves them from each sample of a run on.
+
+    They are to be broadcast to (rollout, time, n); ``None`` where there are none.
+    """
+    if limits is None:
+        return None
+    limits, middle = limits[..., None, :], run.time + 0.5 * (run.time[1] - run.time[0] if len(run.time) > 1 else 0.0)
+    shares = [] if disturbance is None else [disturbance.torque_factor(t) for t in middle]
+    left = [np.broadcast_to(share, run.array("tau")[:, 0].shape) for share in shares if share is not None]
+    return limits * np.stack(left, axis=1) if left else limits

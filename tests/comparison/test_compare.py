@@ -129,6 +129,19 @@ def test_without_a_disturbance_motion_control_is_as_good(arm):
     assert np.isnan(calm.mean("pd_plus", "recovery_s"))
 
 
+def test_motors_that_lose_torque_are_at_the_limits_that_are_left(arm):
+    """A tenth of its limit does not carry the arm: some joint is at it for nearly all of the drop."""
+    calm = replace(pc.make_scenario("undisturbed"), duration=0.8)
+    drop = pc.TorqueLimitDrop(0.1, start=0.4, duration=0.3)
+    scenario = replace(calm, disturbance=drop, event=(0.4, 0.7), undisturbed=calm)
+    weak = compared("projection", scenario=scenario, rollouts=2)
+    tau, time = weak.runs["projection"].array("tau"), weak.runs["projection"].time
+    share = np.where((time >= 0.4 - 1e-9) & (time < 0.7 - 1e-9), 0.1, 1.0)[:, None]
+    counted = (np.abs(tau) >= (1 - 1e-9) * share * arm.limits.effort).any(-1)[:, time >= 0.4 - 1e-9]
+    assert_allclose(weak.measures["projection"]["saturated_s"], 2.5e-3 * counted[:, :-1].sum(-1), atol=1e-9)
+    assert weak.mean("projection", "saturated_s") > 0.2
+
+
 def test_motors_that_are_too_weak_saturate_and_the_same_ones_without_limits_do_not(arm):
     weak = compared("computed_torque", "projection", scenario="weak-motors", rollouts=1)
     assert weak.mean("computed_torque", "torque_peak") == pytest.approx(arm.limits.effort.max())
@@ -244,6 +257,16 @@ def test_what_does_not_fit_is_refused(arm, circle):
         replace(pc.make_scenario("jammed-joint"), loop=pc.SampledLoop(1e-3))
     with pytest.raises(pc.InputError, match="expected a Scenario"):
         pc.compare(None, 7)
+
+
+def test_a_law_that_diverges_before_the_event_has_no_numbers_beside_one_that_has():
+    unlimited = replace(pc.make_scenario("undisturbed"), duration=0.6, event=(0.5, 0.6), loop=pc.SampledLoop(0.01))
+    laws = {"wild": lambda arm, task: pc.Projection(arm, task, 1e6, 2e3), "mine": "projection"}
+    with pytest.warns(pc.PathControlWarning, match="unstable"):
+        numbers = pc.compare(laws, unlimited, rollouts=1, progress=False).to_dict()["controllers"]
+    assert numbers["wild"]["diverged"] == 1
+    assert all(numbers["wild"][name] is None for name in MEASURES)
+    assert numbers["mine"]["contour_peak"] > 0
 
 
 def test_json_has_the_keys_in_si_units_for_every_scenario():

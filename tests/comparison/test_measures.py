@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 import pathcontrol as pc
-from pathcontrol.comparison.measures import MEASURES, RECOVERED, measure, recovery_time
+from pathcontrol.comparison.measures import MEASURES, RECOVERED, acting_limits, measure, recovery_time
 from pathcontrol.simulation.variables import VARIABLES
 
 TIME = np.linspace(0.0, 4.0, 4001)
@@ -73,13 +73,38 @@ def test_energy_and_torque_of_a_constant_power(arm):
     assert_allclose(measure(turning, made(arm), (0.0, 4.0), None)["energy_j"], 16.0, rtol=1e-12)
 
 
+def test_energy_is_of_the_torque_that_is_held_in_each_period(arm):
+    """∫|τ q̇| dt of a torque that jumps at each tick and a speed that rises evenly is a sum over the periods."""
+    torque = np.random.default_rng(0).normal(0.0, 9.0, TIME.shape)
+    turning = made(arm, tau=np.stack([torque, 0 * torque], axis=-1))
+    turning.array("qd")[..., 0] = TIME
+    exact = (np.abs(torque[:-1]) * np.diff(TIME**2 / 2))[TIME[:-1] >= 1.0].sum()
+    assert_allclose(measure(turning, made(arm), (1.0, 4.0), None)["energy_j"], exact, rtol=1e-9)
+
+
 def test_saturated_is_the_time_at_the_limit_of_any_joint(arm):
     limits = arm.limits.effort
     torque = np.zeros((len(TIME), 2))
     torque[(TIME >= 1.0) & (TIME < 1.5), 0] = limits[0]
     torque[(TIME >= 1.25) & (TIME < 2.0), 1] = -limits[1]
     torque[TIME >= 3.0, 1] = 0.99 * limits[1]
-    assert_allclose(measure(made(arm, tau=torque), made(arm), (0.0, 4.0), None)["saturated_s"], 1.0, atol=2e-3)
+    run, whole = made(arm, tau=torque), made(arm, tau=limits)
+    assert_allclose(measure(run, made(arm), (0.0, 4.0), None, limits)["saturated_s"], 1.0, atol=2e-3)
+    assert measure(whole, made(arm), (1.0, 4.0), None, limits)["saturated_s"] == pytest.approx(3.0, rel=1e-12)
+    assert measure(whole, made(arm), (1.0, 4.0), None)["saturated_s"] == 0.0  # nothing limits it
+
+
+@pytest.mark.parametrize("factor", [0.25, [0.5, 0.25], [[0.25, 0.5]]])
+def test_saturated_is_at_the_limits_that_a_drop_leaves(arm, factor):
+    limits = arm.limits.effort
+    drop = pc.TorqueLimitDrop(factor, start=1.0, duration=2.0) + pc.TorqueLimitDrop(0.5, start=2.0, duration=1.0)
+    run = made(arm, tau=0.125 * limits)
+    left = acting_limits(limits, drop, run)
+    for time, share in ((0.5, 1.0), (1.5, np.asarray(factor)), (2.5, 0.5 * np.asarray(factor)), (3.5, 1.0)):
+        assert_allclose(left[0, TIME.searchsorted(time)], np.ravel(share * limits))
+    assert_allclose(measure(run, made(arm), (0.0, 4.0), None, left)["saturated_s"], 1.0, atol=1e-9)
+    assert acting_limits(None, drop, run) is None
+    assert_allclose(acting_limits(limits, None, run), limits[None])
 
 
 @given(st.floats(1e-3, 0.1), st.floats(0.5, 5.0))
@@ -133,6 +158,17 @@ def test_time_lost_to_an_end_at_rest_is_what_it_takes(arm, power, expected):
     assert_allclose(lost, expected * task.s_end**0.5, rtol=1e-6)
 
 
-def test_a_rollout_that_diverged_has_no_numbers(arm):
-    lost = made(arm, outcome={"diverged_time": np.array([2.0]), "reason": np.array(["too fast"])})
+LOST = {"diverged_time": np.array([2.0]), "reason": np.array(["too fast"])}
+
+
+@pytest.mark.parametrize("end", [len(TIME), 500])
+def test_a_rollout_that_diverged_has_no_numbers(arm, end):
+    """Also where all have, and the run ends before the time that counts."""
+    lost = made(arm, outcome=LOST, time=TIME[:end])
     assert all(np.isnan(value).all() for value in measure(lost, made(arm), (1.0, 4.0), 2.0).values())
+
+
+@pytest.mark.parametrize("end", [len(TIME), 500])
+def test_beside_an_undisturbed_run_that_diverged_nothing_is_recovered_or_lost(arm, end):
+    values = measure(made(arm, away=0.1), made(arm, outcome=LOST, time=TIME[:end]), (1.0, 4.0), 2.0)
+    assert {name for name, value in values.items() if np.isnan(value).all()} == {"recovery_s", "time_lost_s"}

@@ -61,7 +61,7 @@ class TorqueAccount(NamedTuple):
         arms = list(run.robots) if plant is None else [select_friction(plant, i) for i in range(run.rollouts)]
         for arm in {id(arm): arm for arm in arms}.values():
             _check_arm(arm, run)
-        acting, dt = _acting_torque(run), np.diff(run.time)[:, None]
+        acting, dt = acting_torque(run), np.diff(run.time)[:, None]
         mean = 0.5 * (acting[0] + acting[1])
         motion = zip(arms, *(part.swapaxes(0, 1) for part in (states.q, states.qd, mean)), strict=True)
         found = [split_unexplained(arm, dt, *rest) for arm, *rest in motion]
@@ -123,7 +123,7 @@ def _may_be_pushed(run: Run) -> bool:
     return table(run.config, "loop").get("loop") not in _SIMULATED or "disturbance" in run.config
 
 
-def _acting_torque(run: Run) -> tuple[Array, Array]:
+def acting_torque(run: Run) -> tuple[Array, Array]:
     """Return the torque that acts after each sample and before the next one, (k − 1, N, n) each; means where held."""
     tau, late = run.array("tau").swapaxes(0, 1), _split_delay(run)[1]
     if not is_sampled(run):
