@@ -288,7 +288,26 @@ def test_an_event_plan_is_compared_where_it_is_named():
     assert "event_plan" not in KNOWN_LAWS
 
 
+def test_a_law_for_an_equal_task_is_one_for_the_scenario(arm, circle):
+    """Two circles are the same where their paths, profiles and ends are."""
+    scenario = shortened("undisturbed")
+    equal = pc.Circle(scenario.task.radius, scenario.task.speed)
+    again = pc.compare([pc.Projection(arm, equal, 800.0, 45.0)], scenario, rollouts=1, progress=False)
+    assert again.laws["Projection"].task is not scenario.task
+    for other in (pc.Circle(1.0, 2.1), pc.Circle(1.1, 2.0), pc.Line([1.0, 0.0], [0.0, 1.0], 2.0)):
+        with pytest.raises(pc.InputError, match="another task"):
+            pc.compare([pc.Projection(arm, other, 800.0, 45.0)], scenario, rollouts=1, progress=False)
+
+
 # --- an operator, and weak motors -------------------------------------------------------------------------------
+
+
+def test_in_the_scenario_of_a_hold_the_plans_stand_still_in_it_and_go_on():
+    run = compared("extended_motion_plan", scenario="hold", rollouts=1).runs["extended_motion_plan"]
+    w, (begin, end) = pc.speed_factor(run)[0], pc.make_scenario("hold").event
+    assert np.abs(w[(run.time > begin + 1.0) & (run.time < end)]).max() < 1e-6
+    assert w[run.time < begin] == pytest.approx(1.0)
+    assert w[-1] == pytest.approx(1.0)
 
 
 def test_a_held_plan_loses_the_time_it_is_held_and_stays_on_the_path():

@@ -113,6 +113,22 @@ def test_an_operator_slows_holds_and_reverses_a_paced_law(arm, name, order):
     assert np.abs(np.diff(w)).max() < 0.25
 
 
+def test_plans_that_go_on_and_back_in_one_batch_are_what_they_are_alone(arm):
+    """At 11 rad/s both are bounded, each by the fastest motion in its own direction."""
+
+    def played(later):
+        override = lambda t: later if t > 0.05 else np.ones_like(later)  # noqa: E731
+        law = pc.Paced(pc.SpeedOverride(make_law("projection", arm, pc.Circle(1.0, 11.0)), override, 20.0))
+        q = np.tile([1.0, 0.0], (len(later), 1))
+        return pc.simulate(law, q, duration=0.6, loop=LOOPS["exact"], engine="pinocchio", progress=False)
+
+    together = played(np.array([1.0, -1.0]))
+    for row, later in enumerate((1.0, -1.0)):
+        alone = played(np.array([later]))
+        np.testing.assert_allclose(together.array("q")[row], alone.array("q")[0], rtol=0, atol=1e-12)
+    assert pc.speed_factor(alone)[0, -1] < -0.5
+
+
 def test_an_arm_that_is_moving_is_met_at_its_speed(arm):
     task = pc.Circle(1.0, 6.0)
     law = pc.Paced(make_law("extended_motion_plan", arm, task))
