@@ -251,6 +251,8 @@ def test_bad_overrides_are_told(arm):
         run(pc.SpeedOverride(law, lambda t: 1.0 if t < 0.5 else 3.0), duration=1.0)
     with pytest.raises(pc.InputError, match=r"reverse\(\)"):
         pc.SpeedOverride(law).override(-0.5)
+    with pytest.raises(pc.InputError, match="reverse"):
+        pc.SpeedOverride(law).override([0.5, -0.5])
     with pytest.raises(pc.InputError, match="2 values for 1 rollouts"):
         run(pc.SpeedOverride(law, lambda t: 1.0 if t < 0.5 else [1.0, 0.5]), duration=1.0)
     with pytest.raises(pc.InputError, match="expected a Controller"):
