@@ -28,6 +28,7 @@ _SOURCES = {
     "MotionLimit": "MotionLimit(ToolMotion(robot, frame), speed) makes one",
     "Space": "Space.grid(…) and Space.random(…) make one",
     "SweepResult": "sweep(…) gives one, and SweepResult(FOLDER)",
+    "Scenario": "make_scenario(NAME) gives one, and load_scenario(FILE)",
     "StabilityMap": "stability_map(law, gains) gives one",
 }
 #: what to write instead, by what was given and what was expected
@@ -35,6 +36,7 @@ _INSTEAD = {
     ("text", "RobotModel"): "load_robot({value!r}) gives one",
     ("text", "Run"): "Run.load({value!r}) gives one",
     ("text", "Toolpath"): "read_toolpath({value!r}) gives one",
+    ("text", "Scenario"): "load_scenario({value!r}) makes one of an experiment file",
     ("text", "SweepResult"): "SweepResult({value!r}) gives one",
     ("Controller", "RobotModel"): "a control law has one: controller.robot",
     ("Controller", "PathTask"): "a control law has one: controller.task",

@@ -63,6 +63,11 @@ def unit_of(metric: str, run: Run) -> str:
         return unit
     if unit == "N m/rad":
         return " or ".join(map("/".join, zip(*(_units(part, run) for part in ("N m", "rad")), strict=True)))
+    return unit_of_joints(unit, run)
+
+
+def unit_of_joints(unit: str, run: Run) -> str:
+    """Return a unit of turning joints as it is for the joints of the run: ``"m"`` or ``"rad or m"`` for ``"rad"``."""
     return " or ".join(_units(unit, run))
 
 

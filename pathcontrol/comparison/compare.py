@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from pathcontrol._arrays import Array, check_whole
-from pathcontrol._expect import expect
+from pathcontrol._expect import expect, expect_choice
 from pathcontrol._json import to_json
+from pathcontrol.analysis.readable import unit_of_joints
 from pathcontrol.comparison.laws import Laws, make_laws
 from pathcontrol.comparison.measures import MEASURES, acting_limits, measure
 from pathcontrol.comparison.scenarios import Scenario, make_scenario
@@ -46,13 +47,19 @@ class Comparison:
     undisturbed: Mapping[str, Run]
     measures: Mapping[str, Mapping[str, Array]]
 
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each measure for the joints of the arm: rad becomes m, and N m becomes N, where they slide."""
+        run = next(iter(self.runs.values()))
+        return {name: unit_of_joints(unit, run) for name, unit in MEASURES.items()}
+
     def mean(self, law: str, measure: str) -> float:
         """Return the mean of a measure over the rollouts; inf if one of them never recovers, NaN where none is one."""
-        return _reduce(np.mean, self.measures[law][measure])
+        return _reduce(np.mean, self._values(law, measure))
 
     def spread(self, law: str, measure: str) -> float:
         """Return the standard deviation of a measure over the rollouts; NaN where the mean is no number."""
-        return _reduce(np.std, self.measures[law][measure])
+        return _reduce(np.std, self._values(law, measure))
 
     def best(self, measure: str) -> list[str]:
         """Return the laws whose mean of a measure is the least, within a thousandth; none where no mean is finite."""
@@ -67,6 +74,12 @@ class Comparison:
         a path of some radians.
         """
         return max(_ROUNDING, _BESIDE_OTHERS * max(self._sizes(measure).values(), default=0.0))
+
+    def _values(self, law: str, measure: str) -> Array:
+        """Return the values of a measure, (rollouts,)."""
+        expect_choice("law", law, list(self.measures))
+        expect_choice("measure", measure, list(self.measures[law]))
+        return self.measures[law][measure]
 
     def _sizes(self, measure: str) -> dict[str, float]:
         """Return the sizes of those means of a measure that are finite, by law."""
@@ -85,7 +98,7 @@ class Comparison:
             "duration": scenario.duration,
             "event": to_json(scenario.event),
             "window": list(scenario.window),
-            "units": dict(MEASURES),
+            "units": self.units,
             "controllers": {law: self._law_to_dict(law) for law in self.measures},
         }
 
@@ -125,7 +138,7 @@ def compare(
     ``"maneuver_regulation"`` has K_p and K_v.
 
     The measures, of the event and the time after it (without one of the second half of a closed path, or of a whole
-    open one), in SI units:
+    open one), in SI units, with m for rad and N for N m where joints slide:
 
     - ``contour_peak``, ``contour_rms``: distance to the nearest point of the path [rad].
     - ``lag_peak``: largest component along the path of q_d(s) − q [rad], s of the law. It is 0 for projection.

@@ -20,8 +20,8 @@ def tabulate(compared: Comparison) -> list[list[str]]:
     Where the means of all laws are alike, there is none.
     """
     rows = [["", *map(law_title, compared.measures)]]
-    for name, unit in MEASURES.items():
-        factor, shown = reading(unit, np.zeros(0))
+    for name, unit in compared.units.items():
+        factor, shown = reading(unit, np.array([compared.mean(law, name) for law in compared.measures]))
         label = f"{_in_words(name)} [{shown}]"
         best = compared.best(name)
         best = [] if len(best) == len(compared.measures) else best
@@ -36,8 +36,11 @@ def describe_comparison(compared: Comparison) -> list[str]:
     numbers = f"Mean ± standard deviation of {count} starts" if count > 1 else "The numbers of one start"
     lines = [
         f"{numbers}, from {begin:g} to {end:g} s; * is the smallest in size.",
-        f"Recovered is an arm whose contour error stays below {RECOVERED:g} times its own undisturbed peak.",
     ]
+    if not all(np.isnan(compared.mean(law, "recovery_s")) for law in compared.measures):
+        lines.append(
+            f"Recovered is an arm whose contour error stays below {RECOVERED:g} times its own undisturbed peak."
+        )
     wins = [_in_words(name) for name in MEASURES if _is_won_by_motion(compared, name)]
     if wins:
         lines.append(f"Motion control is the best in: {', '.join(wins)}.")

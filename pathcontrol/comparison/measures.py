@@ -12,7 +12,7 @@ from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.task import PathTask
 
-#: the unit of each measure
+#: the unit of each measure of joints that turn
 MEASURES = {
     "contour_peak": "rad",
     "contour_rms": "rad",
@@ -26,7 +26,7 @@ MEASURES = {
 }
 #: an arm has recovered when its contour error stays within this many times its own undisturbed peak
 RECOVERED = 1.1
-_LEAST_BAND = 1e-4  # rad, of an arm that follows its path exactly
+_LEAST_BAND = 1e-4  # rad or m, of an arm that follows its path exactly
 _ACCURACY, _MOST_PIECES = 1e-6, 500  # of a quadrature: s and relative, and pieces in which it parts the path
 _SLACK = 1e-6  # share of a period, as times of samples are rounded
 _AT_LIMIT = 1 - 1e-9  # share of a limit

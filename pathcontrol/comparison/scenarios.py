@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array
-from pathcontrol._expect import did_you_mean
+from pathcontrol._arrays import Array, as_array, as_joint_vector, as_scalar
+from pathcontrol._expect import did_you_mean, expect
+from pathcontrol.comparison.event import find_event
 from pathcontrol.comparison.laws import PACED_LAWS, Law
 from pathcontrol.comparison.paper import DURATION, K_P, K_V, PERIOD, START_DEG, K, paper_task
-from pathcontrol.comparison.shared_gains import Gains
+from pathcontrol.comparison.shared_gains import Gains, make_gains
 from pathcontrol.control.base import Controller
 from pathcontrol.control.extended_motion_plan import ExtendedMotionPlan
 from pathcontrol.control.wrappers.override_rule import Override
@@ -23,8 +25,9 @@ from pathcontrol.simulation.arm.dropout import Dropout
 from pathcontrol.simulation.arm.jam import JammedJoint
 from pathcontrol.simulation.arm.noise import SensorNoise
 from pathcontrol.simulation.arm.wall import Wall
-from pathcontrol.simulation.engines import Engine
+from pathcontrol.simulation.engines import Engine, check_engine
 from pathcontrol.simulation.loops import ContinuousTime, SampledLoop
+from pathcontrol.simulation.run_arguments import check_loop
 from pathcontrol.tasks.curves import Circle
 from pathcontrol.tasks.task import PathTask
 
@@ -36,6 +39,16 @@ _LOST = (4.0, 4.1)  # s
 _HOLD = (4.0, 6.0)  # s
 _FAST = 11.0  # rad/s; a lap takes 0.571 s, of which the motors need 0.673 s at least
 _HEAVIER = 1.3
+
+
+#: the kinds of some arguments of a scenario
+_KINDS: dict[str, type] = {
+    "robot": RobotModel,
+    "task": PathTask,
+    "disturbance": Disturbance,
+    "laws": Mapping,
+    "pattern": Controller,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,19 +65,22 @@ class Scenario:
         loop: how the loop is closed.
         plant: the simulated arm, by default ``robot``.
         disturbance: what else acts on the arm, or ``None``.
-        event: from when to when something happens [s]; ``None`` where all of the run is as it is.
-        gains: what all laws share.
+        event: from when to when something happens [s], by default when the disturbances and the operator act that have
+            a time; ``None`` where none has.
+        gains: K_p [1/s²], K_v [1/s] and k [1/(rad² s)] of all laws, as a table by these names; k may be left out.
         override: an operator's input to the speed of all laws, as for :class:`SpeedOverride`, or ``None``.
         acceleration: largest rate of the factor of the speed that follows it [1/s], or ``None`` for what motors allow.
         engine: which engine runs it, see :func:`simulate`.
-        undisturbed: the scenario without what happens in it; ``None`` if nothing does. It is run for ``duration``, too.
+        undisturbed: the scenario without what happens in it, by default without its disturbance and its override. It is
+            run for ``duration``, too.
         laws: laws beside the known ones, by name: names of others, or functions of arm and task.
         pattern: a law whose ``friction`` and ``observer_hz``, and ``start`` on an open path, all known laws have; the
             one of its own kind is that law itself. By default they have those of their classes, and on a closed path
             they begin at the nearest point.
 
     Raises:
-        InputError: the event does not begin within the run, or the undisturbed one has samples at other times.
+        InputError: an argument is something else, the event does not begin within the run, or the undisturbed one has
+            samples at other times.
     """
 
     name: str
@@ -86,17 +102,26 @@ class Scenario:
     pattern: Controller | None = None
 
     def __post_init__(self) -> None:
-        if self.event is not None and not 0 <= self.event[0] < min(self.event[1], self.duration):
-            raise InputError(
-                f"event = {self.event}, expected begin and end [s] with a begin in the run of {self.duration:g} s",
-                argument="event",
-                value=self.event,
-                limit=(0.0, self.duration),
-            )
+        for name, kind in _KINDS.items():
+            if (value := getattr(self, name)) is not None or name in ("robot", "task"):
+                expect(name, value, kind)
+        made = {
+            "q": as_joint_vector("q", self.q, self.robot.n),
+            "duration": as_scalar("duration", self.duration, positive=True),
+            "loop": check_loop(self.loop),
+            "gains": make_gains(self.gains),
+        }
+        for name, value in made.items():
+            object.__setattr__(self, name, value)
+        check_engine(self.engine)
+        object.__setattr__(self, "event", self._find_event())
+        if self.undisturbed is not None:
+            self._check_undisturbed(self.undisturbed)
 
-        if self.undisturbed is not None and (own := _sampling(self.loop)) != (
-            other := _sampling(self.undisturbed.loop)
-        ):
+    def _check_undisturbed(self, undisturbed: Any) -> None:
+        """Check that the undisturbed scenario is one, and has samples at the same times."""
+        expect("undisturbed", undisturbed, Scenario)
+        if (own := _sampling(self.loop)) != (other := _sampling(undisturbed.loop)):
             raise InputError(
                 f"undisturbed.loop has samples each {other:g} s and loop each {own:g} s, expected the same times",
                 argument="undisturbed",
@@ -104,10 +129,31 @@ class Scenario:
                 limit=own,
             )
 
+    def _find_event(self) -> tuple[float, float] | None:
+        """Return the event that is given, or else that of disturbance and override."""
+        event = self.event
+        if event is None:
+            event = find_event(self.disturbance, self.duration, self.override)
+        if event is None:
+            return None
+        times = as_array("event", event)
+        if times.shape != (2,) or not 0 <= times[0] < min(times[1], self.duration):
+            raise InputError(
+                f"event = {event}, expected begin and end [s] with a begin in the run of {self.duration:g} s",
+                argument="event",
+                value=event,
+                limit=(0.0, self.duration),
+            )
+        return float(times[0]), float(times[1])
+
     @property
     def calm(self) -> Scenario:
         """The undisturbed scenario for the same time; itself where nothing happens."""
-        return self if self.undisturbed is None else replace(self.undisturbed, duration=self.duration)
+        if self.undisturbed is not None:
+            return replace(self.undisturbed, duration=self.duration)
+        if self.disturbance is None and self.override is None:
+            return self
+        return replace(self, disturbance=None, override=None)
 
     @property
     def window(self) -> tuple[float, float]:
@@ -149,7 +195,7 @@ def make_scenario(name: str) -> Scenario:
     Raises:
         UnknownNameError: there is none of this name.
     """
-    if name not in _SCENARIOS:
+    if not isinstance(name, str) or name not in _SCENARIOS:
         choices = tuple(_SCENARIOS)
         raise UnknownNameError(
             f"there is no scenario {name!r}, expected one of {', '.join(choices)}{_advise(name)}",
@@ -161,10 +207,10 @@ def make_scenario(name: str) -> Scenario:
     return change(_paper(name, sentence))
 
 
-def _advise(name: str) -> str:
+def _advise(name: Any) -> str:
     """Return what to try in place of an unknown name."""
-    if name.endswith(".toml"):
-        return f"; load_scenario({name!r}) makes one of an experiment file"
+    if str(name).endswith(".toml"):
+        return f"; load_scenario({str(name)!r}) makes one of an experiment file"
     return did_you_mean(name, _SCENARIOS)
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import TaskError
+from pathcontrol.errors import InputError, TaskError
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.task import PathTask
 
@@ -28,6 +29,23 @@ class Gains(NamedTuple):
     K_p: ArrayLike = 800.0
     K_v: ArrayLike = 57.0
     k: float | None = None
+
+
+def make_gains(gains: Any) -> Gains:
+    """Return gains that are given as :class:`Gains`, as a table by their names, or one after another.
+
+    Raises:
+        InputError: they are something else.
+    """
+    try:
+        return Gains(**gains) if isinstance(gains, Mapping) else Gains(*gains)
+    except TypeError as error:
+        raise InputError(
+            f"gains = {gains!r:.80}, expected K_p, K_v and, if the plan has one of its own, k: "
+            '{"K_p": 800.0, "K_v": [45.0, 100.0], "k": 20.0}',
+            argument="gains",
+            value=gains,
+        ) from error
 
 
 def sample_task(task: PathTask) -> Array:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pathcontrol._arrays import Array
 from pathcontrol.comparison.family import FAMILY
 from pathcontrol.comparison.laws import recover_gains
 from pathcontrol.comparison.scenarios import Scenario
@@ -20,7 +18,7 @@ from pathcontrol.experiments.builders.setup import Setup
 from pathcontrol.experiments.load import read_toml
 from pathcontrol.experiments.runner import load_setup
 from pathcontrol.registry import LAWS
-from pathcontrol.simulation.arm.disturbance import Disturbance, TimedDisturbance, list_terms
+from pathcontrol.simulation.arm.disturbance import list_terms
 from pathcontrol.tasks.joined.path_sequence import PathSequence
 
 
@@ -57,7 +55,6 @@ def load_scenario(path: str | Path) -> Scenario:
             loop=setup.loop,
             plant=setup.plant,
             disturbance=setup.disturbance,
-            event=find_event(setup.disturbance, float(setup.duration), operator.get("override")),
             gains=gains,
             engine=setup.engine,
             laws=_name_law(setup.controller),
@@ -70,35 +67,7 @@ def load_scenario(path: str | Path) -> Scenario:
         ) from error
     _warn_of_wrappers(setup.controller, path)
     _warn_of_start(setup, path)
-    calm = replace(scenario, disturbance=None, override=None)
-    return scenario if setup.disturbance is None and not operator else replace(scenario, undisturbed=calm)
-
-
-def find_event(disturbance: Disturbance | None, duration: float, override: Any = None) -> tuple[float, float] | None:
-    """Return from when to when some disturbances and an override act [s], ``None`` where none has a time.
-
-    An event lasts until the end of the run, ``duration`` [s], where one of them does, or another one has no time.
-    """
-    terms = list_terms(disturbance)
-    times = [
-        (float(np.min(term.start)), float(np.max(term.start + term.duration)))
-        for term in terms
-        if isinstance(term, TimedDisturbance)
-    ]
-    timeless = len(times) < len(terms) or (override is not None and np.ndim(override) < 2)
-    if override is not None and np.ndim(override) == 2:
-        times.append(_time_of_steps(np.asarray(override), duration))
-    if not times:
-        return None
-    begin, end = max(0.0, min(begin for begin, _ in times)), max(end for _, end in times)
-    return (begin, duration if timeless else min(end, duration))
-
-
-def _time_of_steps(steps: Array, duration: float) -> tuple[float, float]:
-    """Return from when the speed of the steps [[t, u], …] is another one than that of the profile, and until when."""
-    changed = np.flatnonzero(steps[:, 1] != 1.0)
-    last = changed[-1] + 1
-    return (float(steps[changed[0], 0]), float(steps[last, 0]) if last < len(steps) else duration)
+    return scenario
 
 
 def _find_override(law: Controller) -> dict[str, Any]:

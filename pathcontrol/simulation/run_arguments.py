@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from importlib.metadata import version
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_joint_array, check_finite
+from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller, ControlOutput
 from pathcontrol.control.law_gains import count_gain_rows
 from pathcontrol.control.wrappers.wrapper import LawWrapper, unwrap
@@ -90,6 +91,8 @@ def _memory() -> int:
 
 def make_plant(plant: RobotModel | Sequence[RobotModel] | None, controller: Controller) -> Arm:
     """Return the simulated arm: the given one, the controller's own, or a batch with one for each rollout."""
+    if plant is not None and not isinstance(plant, Iterable):
+        expect("plant", plant, RobotModel, also=", or one for each rollout")
     plants = [controller.robot] if plant is None else [plant] if isinstance(plant, RobotModel) else list(plant)
     for i, robot in enumerate(plants):
         if not isinstance(robot, RobotModel):

@@ -65,8 +65,8 @@ def test_all_laws_are_overridden_as_the_law_of_the_file(tmp_path):
 def test_an_event_lasts_as_long_as_override_and_disturbances_act(tmp_path, override, more, event):
     scenario = load(tmp_path, f'type = "speed_override"\noverride = {override}', more)
     assert scenario.event == (None if event is None else pytest.approx(event))
-    assert scenario.undisturbed.override is None
-    assert scenario.undisturbed.disturbance is None
+    assert scenario.calm.override is None
+    assert scenario.calm.disturbance is None
     assert scenario.override is not None
 
 
