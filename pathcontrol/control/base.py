@@ -315,6 +315,19 @@ class Controller(ABC):
         law.observer = MomentumObserver(self.robot, cutoff)
         return law
 
+    def observed_torque(self, z: ArrayLike) -> Array:
+        """Return what the law's observer saw at the tick before a state z, r [N m], (*batch, n); 0 at the start.
+
+        A :class:`ControlTick` has its state in ``state``, and those of a run are ``law_states(run, law)``.
+
+        Raises:
+            InputError: the law has no observer, or the state is not one of this law.
+        """
+        if self.observer is None:
+            name = type(self).__name__
+            raise InputError(f"{name} has no observer; give it friction='observed', or take law.watching()", value=self)
+        return self.observer.recall(np.asarray(z, dtype=np.float64)[..., 1 : 1 + self.observer.size])
+
 
 def check_controller(name: str, controller: Any) -> None:
     """Check that an argument is a control law, and that its class has made it whole.

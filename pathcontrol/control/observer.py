@@ -103,6 +103,10 @@ class MomentumObserver:
             new, both = np.where(kept, first, new), np.where(kept, torque, both)
         return Observation(t, p, c, new, both)
 
+    def recall(self, memory: Array) -> Array:
+        """Return r at the tick before [N m], (*batch, n), from the memory that it left."""
+        return self._split(memory)[1]
+
     def elapsed(self, t: float, memory: Array) -> Array:
         """Return the time from the tick before to t [s], (*batch,), 0 at the first tick."""
         last = memory[..., -1]

@@ -15,6 +15,7 @@ from pathcontrol import (
     ControlOutput,
     ControlTick,
     Dropout,
+    EventPlan,
     ExtendedMotionPlan,
     Harmonic,
     InputError,
@@ -31,6 +32,7 @@ from pathcontrol import (
     Stribeck,
     TorqueLimitDrop,
     Viscous,
+    law_states,
     load_robot,
     metrics,
     peak,
@@ -368,3 +370,32 @@ def test_a_law_of_a_user_compensates_with_one_call():
         moved(Plain(ARMS[2], task, friction="observed"))
     first, second = (np.abs(run.array("e_p")[0, -100:]).max() for run in (plain, observed))
     assert second < first
+
+
+def watching_laws():
+    plain = law(ARMS[2], friction="none")
+    yield "a law", plain.watching(CUTOFF)
+    yield "a law that compensates it", law(ARMS[2])
+    yield "a wrapper", SpeedOverride(plain).watching(CUTOFF)
+    yield "wrappers", EventPlan(SpeedOverride(plain), threshold=100.0, observer_hz=CUTOFF)
+
+
+@pytest.mark.parametrize("watching", [pytest.param(one, id=name) for name, one in watching_laws()])
+def test_a_state_says_what_the_observer_saw(watching):
+    """In a control tick and along a run: a push behind two low passes, of the tick before."""
+    h, A = 2e-3, np.array([2.0, 1.0])
+    run = moved(watching, 0.1, loop=SampledLoop(period=h), disturbance=Push(A, 0.02, 0.05))
+    seen = watching.observed_torque(law_states(run, watching))[0]
+    t = run.time - h
+    assert_allclose(seen, A * (step_response(t - 0.02) - step_response(t - 0.07)), rtol=0, atol=5e-3)
+    tick = ControlTick(watching, period=h)
+    tick.start(run.array("q")[0, 0])
+    for row, q, qd in zip(seen, run.array("q")[0], run.array("qd")[0], strict=True):
+        assert_allclose(watching.observed_torque(tick.state), row, rtol=0, atol=1e-9)
+        tick(q, qd)
+
+
+def test_a_law_without_observer_says_that_it_sees_nothing():
+    plain = law(ARMS[2], friction="none")
+    with pytest.raises(InputError, match=r"no observer; give it friction='observed', or take law\.watching\(\)"):
+        plain.observed_torque(plain.start(np.zeros(2), np.zeros(2)))

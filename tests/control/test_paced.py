@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import floats, tasks
 
 import pathcontrol as pc
 from pathcontrol.control.wrappers.pace_rule import rate_bounds
@@ -150,6 +151,25 @@ def test_bounds_of_the_rate_keep_the_limits_and_are_sharp(seed):
     if gradient.any() and (np.abs(tau) <= limits)[gradient == 0].all():
         for rate in (least, most):
             assert (np.abs(tau + rate * gradient) / limits).max() == pytest.approx(1.0, rel=1e-9)
+
+
+@given(tasks(), floats(-3, 3), floats(0, 1))
+def test_slower_by_one_factor_the_rest_of_a_path_asks_for_no_more(arm, task, s, factor):
+    """τ = λ²τ₁ + (1 − λ²)(τ₀ + λ/(1 + λ) B q_d'v) at λv: within a box that holds τ₁, τ₀ and τ₀ + ½B q_d'v."""
+    point, viscous = task.at(np.array(s)), arm.friction.viscous
+    plus, minus = arm.friction.levels(np.zeros(2))
+    dry = np.where(point.velocity > 0, plus, -minus)
+
+    def torque(share):
+        qd, qdd = share * point.velocity, share**2 * point.velocity_slope * point.theta
+        return arm.inverse_dynamics(point.q_d, qd, qdd) + viscous * qd + dry
+
+    most = torque(0.0) + 0.5 * viscous * point.velocity
+    between = torque(0.0) + factor / (1 + factor) * viscous * point.velocity
+    predicted = factor**2 * torque(1.0) + (1 - factor**2) * between
+    np.testing.assert_allclose(torque(factor), predicted, rtol=1e-9, atol=1e-9)
+    box = np.abs([torque(1.0), torque(0.0), most]).max(0)
+    assert (np.abs(torque(factor)) <= box + 1e-9 * box.max()).all()
 
 
 def test_the_tasks_of_a_batch_have_their_own_pace(arm):

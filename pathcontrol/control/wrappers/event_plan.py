@@ -23,7 +23,8 @@ class EventPlan(LawWrapper):
     ``pause``. Around :class:`Projection` the motion reference is estimated from the posture, as in that work the arc
     length is; around :class:`ExtendedMotionPlan` it is the plan, drawn to the arm by k ≥ 0.
 
-    The condition on the motion reference is that of :class:`LawWrapper`: for every law with the torque of (25) and (39)
+    The condition on the motion reference is that of :class:`LawWrapper`: for every law with the torque of (25) or (39)
+    and one k_p for all joints
 
         V̇ = −e_vᵀK_v e_v + k_p e_pᵀq_d'(σ̇ − wϑ),   V = ½e_vᵀe_v + ½k_p e_pᵀe_p,
 

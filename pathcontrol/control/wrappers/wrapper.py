@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, as_joint_array, join_columns
 from pathcontrol.control.base import Controller, ControlOutput, check_controller
 from pathcontrol.control.learning.learning_law import LearningLaw
+from pathcontrol.control.observer import CUTOFF
 from pathcontrol.control.wrappers.override_rule import Override, OverrideRule
 from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
 
@@ -61,6 +62,13 @@ class LawWrapper(Controller):
         """Return this wrapper, with its rule, around another ``law`` for the same arm and task."""
         wrapper = copy(self)
         LawWrapper.__init__(wrapper, law, self.rule)
+        return wrapper
+
+    def watching(self, observer_hz: ArrayLike = CUTOFF) -> Self:
+        """Return this wrapper around its law with a momentum observer; see :meth:`Controller.watching`."""
+        wrapper = copy(self)
+        wrapper.inner = self.inner.watching(observer_hz)
+        wrapper.observer = wrapper.inner.observer
         return wrapper
 
     # --- the operator ---------------------------------------------------------------------------------------
