@@ -28,6 +28,7 @@ _SOURCES = {
     "MotionLimit": "MotionLimit(ToolMotion(robot, frame), speed) makes one",
     "Space": "Space.grid(…) and Space.random(…) make one",
     "SweepResult": "sweep(…) gives one, and SweepResult(FOLDER)",
+    "Comparison": "compare(laws, scenario) gives one",
     "Scenario": "make_scenario(NAME) gives one, and load_scenario(FILE)",
     "StabilityMap": "stability_map(law, gains) gives one",
 }
@@ -44,6 +45,10 @@ _INSTEAD = {
     ("Run", "PathTask"): "a run has one: run.task",
     ("Run", "Animation"): "record(run) gives one",
     ("SweepResult", "Run"): "sweep.histories() gives those that a sweep has kept",
+    (
+        "Comparison",
+        "Run",
+    ): "it has one for each law: compared.runs; scenario_figure(compared) shows them",
     ("Toolpath", "PathTask"): "ToolpathTask(robot, frame, toolpath) makes one",
     ("Animation", "Figure"): "an animation is written by its own save(FILE)",
 }

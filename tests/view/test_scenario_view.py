@@ -67,12 +67,16 @@ def test_the_table_of_the_page_is_that_of_the_terminal(jam, page):
     assert any("±" in cell for cell in best)
 
 
-def test_charts_of_the_page_mark_the_event(page):
+def test_charts_and_slider_of_the_page_mark_the_event(page):
     with opened(page, (1440, 900), "#t=0") as film:
         over, band = (film.tab.locator(f".chart .u-over {more}").first.bounding_box() for more in ("", ".event"))
         assert (band["x"] - over["x"]) / over["width"] == pytest.approx(0.40, abs=0.01)
         assert band["width"] / over["width"] == pytest.approx(0.06, abs=0.01)
         assert band["height"] == pytest.approx(over["height"], abs=1)
+        slider, band = (film.tab.locator(f"#track {part}").bounding_box() for part in ("#scrubber", ".event"))
+        assert (band["x"] - slider["x"] - 8) / (slider["width"] - 16) == pytest.approx(0.40, abs=0.01)
+        assert band["width"] / (slider["width"] - 16) == pytest.approx(0.06, abs=0.01)
+        assert slider["y"] < band["y"] < band["y"] + band["height"] < slider["y"] + slider["height"]
         assert film.complaints == []
 
 

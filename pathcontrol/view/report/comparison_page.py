@@ -7,6 +7,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from pathcontrol._expect import expect
 from pathcontrol._files import whole_file
 from pathcontrol._suffixes import check_suffix
 from pathcontrol.comparison.compare import Comparison
@@ -21,7 +22,8 @@ from pathcontrol.view.report.sections import templates
 def save_comparison(compared: Comparison, out: str | Path, rollout: int = 0) -> Path:
     """Write one page of a comparison, whole or not at all: it plays in any browser and needs no network.
 
-    The arms of all laws move beside each other, charts mark the event, and below are the table and the figure.
+    The arms of all laws move beside each other, the slider and the charts mark the event, and below are the table and
+    the figure.
 
     Args:
         compared: what :func:`compare` gives.
@@ -29,8 +31,9 @@ def save_comparison(compared: Comparison, out: str | Path, rollout: int = 0) -> 
         rollout: which rollout is shown.
 
     Raises:
-        InputError: there is no such rollout, or ``out`` does not end with ``.html``.
+        InputError: ``compared`` is no comparison, there is no such rollout, or ``out`` does not end with ``.html``.
     """
+    expect("compared", compared, Comparison)
     out = check_suffix(out, "a comparison as a page", ".html", ".htm", name="out")
     scenario = compared.scenario
     runs = {law_title(law): run for law, run in compared.runs.items()}

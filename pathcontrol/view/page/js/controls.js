@@ -1,8 +1,8 @@
 // Buttons, the slider of time and the choice of speed.
 
 class Controls {
-  constructor(clock, picture) {
-    Object.assign(this, { clock, picture, said: -1 });
+  constructor(clock, picture, events = []) {
+    Object.assign(this, { clock, picture, events, said: -1 });
     for (const id of ["play", "scrubber", "time", "speed", "camera", "near", "theme", "help", "keys"]) {
       this[id] = document.getElementById(id);
     }
@@ -27,6 +27,7 @@ class Controls {
     const { clock, scrubber, speed } = this;
     document.getElementById("panel").hidden = false;
     scrubber.max = clock.duration;
+    scrubber.parentElement.append(...this.events.map((event) => this.band(...event.map((t) => t / clock.duration))));
     scrubber.addEventListener("input", () => clock.seek(Number(scrubber.value)));
     scrubber.addEventListener("pointerdown", () => clock.hold(true));
     for (const end of ["pointerup", "pointercancel"]) scrubber.addEventListener(end, () => clock.hold(false));
@@ -34,6 +35,15 @@ class Controls {
     for (const rate of SPEEDS) speed.add(new Option(`${rate}×`, rate));
     speed.addEventListener("change", () => (clock.speed = Number(speed.value)));
     this.time.append(textElement("span", ""), textElement("small", ` / ${this.seconds(clock.duration)} s`));
+  }
+
+  // what happens during the film, from a share of its time to another; the knob of the slider stays within its ends
+  band(from, to) {
+    const element = document.createElement("div");
+    element.className = "event";
+    element.style.left = `calc(8px + (100% - 16px) * ${from})`;
+    element.style.width = `calc((100% - 16px) * ${to - from})`;
+    return element;
   }
 
   approach() {

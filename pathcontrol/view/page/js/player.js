@@ -65,7 +65,7 @@ async function start() {
   loop = new Loop(clock);
   const planes = plane(film, clock);
   const picture = new Picture(film, () => loop.wake());
-  controls = new Controls(clock, picture);
+  controls = new Controls(clock, picture, film.header.events);
   loop.picture = picture;
   loop.followers = [picture, controls, ...planes, ...charts(film, clock)];
   showLegend(film);
