@@ -135,15 +135,17 @@ class RunContext:
 
     def rollout(self, number: int) -> RunContext:
         """Return the context of one rollout."""
-        arm = self.robot if self._robots is None else self._robots[number]
-        first = self._first() if self._robots is not None else 0
-        robot = None if arm is None else select_friction(arm, number - first)
-        if robot is arm and (
-            self._stored is not None or (self._robots is None and not isinstance(self.task, TaskBatch))
-        ):
+        arm, known, row = (
+            self.robot if self._robots is None else self._robots[number],
+            self._model(),
+            number - self._first(),
+        )
+        robot, model = (None if one is None else select_friction(one, row) for one in (arm, known))
+        same = robot is arm and model is known
+        if same and (self._stored is not None or (self._robots is None and not isinstance(self.task, TaskBatch))):
             return self
         task = self.task_of(np.array([number]))
-        return RunContext(lambda: robot, lambda: task, model=self._model)
+        return RunContext(lambda: robot, lambda: task, model=lambda: model)
 
     def with_robot(self, robot: RobotModel) -> RunContext:
         """Return the same context with another robot."""
@@ -164,8 +166,8 @@ class RunContext:
         if self.model is not None and self.model is not robot:
             recipes["model"] = recipe_of(self.model)
         recipes["task"] = _recipe(self.task, store, upto)
-        if isinstance(self.task, TaskBatch):
-            recipes["first_rollout"] = self._first()
+        if first := self._first():
+            recipes["first_rollout"] = first
         return StoredContext(json.dumps(recipes), store.numbers)
 
 
@@ -209,8 +211,8 @@ def _task(stored: StoredContext) -> PathTask | None:
 
 
 def _first(stored: StoredContext) -> int:
-    """Return the stored number of the first rollout."""
-    first = _part_of(stored, "first_rollout")
+    """Return the stored number of the first rollout; 0 is not stored."""
+    first = _part_of(stored, "first_rollout", missing=0)
     if not isinstance(first, int):
         raise InputError(
             f"the tasks of the run are said to begin with rollout {first!r}, expected a number", value=first

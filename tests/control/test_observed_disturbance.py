@@ -316,7 +316,7 @@ def test_a_file_a_saved_run_and_a_report_have_it(tmp_path, monkeypatch):
     monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure: ("png", b""))
     page = report({"again": saved}, tmp_path / "report.html").read_text(encoding="utf-8")
     assert "observer_hz=25.0" in page
-    assert "Torques beside those of motors, as the law compensates them" in page
+    assert "Torques beside those of motors, which the law compensates" in page
     assert "Torques beside those of motors and friction" not in page
 
 

@@ -245,3 +245,21 @@ def test_plants_that_do_not_fit(arm, circle):
         simulate(controller, START, plant=[arm, arm.reduced({"joint_1": 0.0})], **options)
     with pytest.raises(InputError, match="a sequence has a single rollout"):
         simulate_sequence([controller], START, plant=[arm, arm], **options)
+
+
+@pytest.mark.parametrize("first", [0, 4])
+def test_a_rollout_alone_has_its_own_row_of_friction(first, tmp_path):
+    """As arm and as model of the law, also of a part of a batch, and read from a file."""
+    from pathcontrol import Circle, momentum_observer
+
+    levels = np.array([[1.0, 0.5], [7.0, 1.7], [10.0, 2.0]])
+    arm = ARM.with_friction(Coulomb(levels))
+    run = simulate(law(arm, Circle(1.0, 2.0)), START, duration=0.05, first_rollout=first, progress=False)
+    run.save(tmp_path / "run.nc")
+    together = momentum_observer(run, friction="full")
+    for one in (run, Run.load(tmp_path / "run.nc")):
+        for i, row in enumerate(levels):
+            alone = one.rollout(i)
+            for known in (alone.robot, alone.model):
+                assert_array_equal(known.friction.levels(np.zeros(2))[0], row)
+            assert_array_equal(momentum_observer(alone, friction="full")[0], together[i])

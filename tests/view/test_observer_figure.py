@@ -31,14 +31,16 @@ RAIL = load_robot(
 )
 
 
-def pushed(arm, disturbance=None, rows=1) -> Run:
+def pushed(arm, disturbance=None, rows=1, plant=None) -> Run:
     law = Projection(arm, Circle(1.0, 2.0), 800.0, [45.0, 100.0])
-    return simulate(law, [[0.7, 1.2]] * rows, duration=0.4, disturbance=disturbance, progress=False)
+    start = [[0.7, 1.2]] * rows
+    return simulate(law, start, duration=0.4, plant=plant, disturbance=disturbance, progress=False)
 
 
 @pytest.fixture(scope="module")
 def runs(arm) -> dict[str, Run]:
-    return {"pushed": pushed(arm, Push([20.0, 5.0], 0.1, 0.1)), "alone": pushed(arm)}
+    loaded = pushed(arm, plant=arm.with_payload(2.0, "tool"))
+    return {"pushed": pushed(arm, Push([20.0, 5.0], 0.1, 0.1)), "alone": pushed(arm), "loaded": loaded}
 
 
 @pytest.mark.parametrize("friction", ["none", "full"])
@@ -77,6 +79,7 @@ def test_reports_of_pushed_runs_have_it(runs, monkeypatch):
 
     assert CAPTION in captions("alone", "pushed")
     assert CAPTION not in captions("alone")
+    assert CAPTION in captions("loaded")
 
 
 @pytest.mark.filterwarnings("ignore::pathcontrol.PathControlWarning")

@@ -77,8 +77,8 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
         yield "Torques", torque_figure(shown)
     if {"q", "qd", "tau"} <= recorded and all(run.model.has_mass for run in runs.values()):
         if any(map(compensates_observed, runs.values())):
-            yield "Torques beside those of motors, as the law compensates them", observer_figure(shown)
-        if any(table(run.config, "disturbance") or halts_at_contacts(run) for run in runs.values()):
+            yield "Torques beside those of motors, which the law compensates", observer_figure(shown)
+        if any(map(_has_more_to_see, runs.values())):
             yield "Torques beside those of motors and friction", observer_figure(shown, friction="full")
     if (balance := _draw_power_balance(shown)) is not None:
         yield "Lyapunov function, and the causes of its rate", balance
@@ -90,6 +90,11 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
         if isinstance(run.task, ToolpathTask) and "path_index" in run.data.coords:
             of = f" of {name}" if len(runs) > 1 else ""
             yield f"Distance of the tool from the drawing{of}", deviation_figure(run, run.robot, run.task)
+
+
+def _has_more_to_see(run: Run) -> bool:
+    """Return whether more acts on the arm than the friction that its law knows, or a law looks out for that."""
+    return bool(table(run.config, "disturbance")) or halts_at_contacts(run) or run.model is not run.robot
 
 
 def _draw_ballbar(runs: Run | Mapping[str, Run]) -> Figure | None:
