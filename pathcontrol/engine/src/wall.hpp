@@ -57,8 +57,7 @@ template <int N> static double mobility(const ContactProblem<N> &problem, const 
   return multiply_rows(n, row, x);
 }
 template <int N> ALWAYS_INLINE double push_of(int n, const Touch<N> &touch, const double *v) {
-  const double push = touch.beta - touch.a * multiply_rows(n, touch.row[0], v);
-  return push > 0 ? push : 0.0;
+  return touch.beta - touch.a * multiply_rows(n, touch.row[0], v);
 }
 template <int N> ALWAYS_INLINE double slip_of(int n, const Touch<N> &touch, const double *v) {
   const double x = multiply_rows(n, touch.row[1], v), y = multiply_rows(n, touch.row[2], v);
@@ -83,20 +82,24 @@ template <int N> static void solve_weighted(const ContactProblem<N> &problem, in
   for (int i = 0; i < n; i++) sign[i] = (double)((p[i] > 0) - (p[i] < 0));
   stick_slip<N>(n, M, p, problem.low, problem.high, sign, v);
 }
-// c with c |J_t v⁺| = μλ of each wall, through the pairs of c and |J_t v⁺| before and now where `known`.
-template <int N> static void weigh(int n, int count, const Touch<N> *touches, const double *v, bool known, double *c0, double *s0, double *c) {
+// c with c |J_t v⁺| = μλ of each wall, through c, |J_t v⁺| and λ before and now where `known`.
+template <int N> static void weigh(int n, int count, const Touch<N> *touches, const double *v, bool known, double *c0, double *s0, double *p0, double *c) {
   for (int w = 0; w < count; w++) {
-    const double slip = slip_of<N>(n, touches[w], v), bound = touches[w].friction * push_of<N>(n, touches[w], v), hold = touches[w].hold;
+    const double slip = slip_of<N>(n, touches[w], v), push = push_of<N>(n, touches[w], v), friction = touches[w].friction, hold = touches[w].hold;
     const double c1 = c[w];
+    double bound = friction * push;
     c[w] = slip > 0 ? bound / slip : hold;
     if (known) {
-      if (s0[w] > slip && c1 * slip > c0[w] * s0[w]) {
-        const double mobile = (s0[w] - slip) / (c1 * slip - c0[w] * s0[w]), rest = slip * (1.0 + c1 * mobile) - bound * mobile;
+      const double change = c1 * slip - c0[w] * s0[w];
+      if ((s0[w] - slip) * change > 0) {
+        const double mobile = (s0[w] - slip) / change, lift = friction * (p0[w] - push) / change;
+        if (lift > -1.0) bound = (bound + lift * c1 * slip) / (1.0 + lift);
+        const double rest = slip + (c1 * slip - bound) * mobile;
         c[w] = rest > 0 ? bound / rest : hold;
       }
-      c0[w] = c1, s0[w] = slip;
+      c0[w] = c1, s0[w] = slip, p0[w] = push;
     }
-    c[w] = hold < c[w] ? hold : c[w];
+    c[w] = hold < c[w] ? hold : c[w] > 0 ? c[w] : 0.0;
   }
 }
 template <int N>
@@ -104,20 +107,21 @@ static void iterate_contact(const ContactProblem<N> &problem, int count, const T
   constexpr double CLOSE = 1e-11;
   const int n = size<N>(problem.n);
   bool pushed[MOST_WALLS];
-  double c0[MOST_WALLS], s0[MOST_WALLS];
-  for (int w = 0; w < count; w++) pushed[w] = begin[w], c0[w] = 0.0, s0[w] = slip_of<N>(n, touches[w], v);
+  double c0[MOST_WALLS], s0[MOST_WALLS], p0[MOST_WALLS];
+  for (int w = 0; w < count; w++) pushed[w] = begin[w], c0[w] = 0.0, s0[w] = slip_of<N>(n, touches[w], v), p0[w] = push_of<N>(n, touches[w], v);
   for (int k = 0; k < most; k++) {
     double last[room<N>()], change = 0.0, largest = 0.0;
     for (int i = 0; i < n; i++) last[i] = v[i];
     solve_weighted<N>(problem, count, touches, c, pushed, v);
     bool same = true;
     for (int w = 0; w < count; w++) {
-      const bool now = push_of<N>(n, touches[w], v) > 0;
+      const bool now = push_of<N>(n, touches[w], v) > 0 || (pushed[w] && c[w] > 0);
       same &= now == pushed[w], pushed[w] = now;
     }
     for (int i = 0; i < n; i++) change = fmax(change, fabs(v[i] - last[i])), largest = fmax(largest, fabs(v[i]));
     if (same && (!slips || change <= CLOSE * largest)) return;
-    if (slips) weigh<N>(n, count, touches, v, true, c0, s0, c);
+    if (slips) weigh<N>(n, count, touches, v, true, c0, s0, p0, c);
+    for (int w = 0; slips && k >= most - 3 - 2 * count && w < count; w++) c[w] = p0[w] > 0 ? c0[w] : 0.0;  // at the end no wall pulls
   }
 }
 // v⁺ with walls, from the solution v without them.
@@ -141,7 +145,7 @@ template <int N> static NOINLINE void solve_contact(const ContactProblem<N> &pro
     for (int i = 0; i < n; i++) v[i] = stuck[i];
     return;
   }
-  weigh<N>(n, count, touches, v, false, nullptr, nullptr, c);
+  weigh<N>(n, count, touches, v, false, nullptr, nullptr, nullptr, c);
   iterate_contact<N>(problem, count, touches, v, c, pushed, MOST, true);
 }
 // A wall with what holds the point on it.

@@ -9,8 +9,9 @@ point's Jacobian along the normal, J_t its two rows along the wall, and p the mo
 F the dry friction of the joints (:mod:`~pathcontrol.simulation.arm.dry_friction`). For λ_t = 0 this is the optimality
 condition of a strictly convex problem, so that v⁺ is unique. Friction is found by weighting: λ_t = −c J_t v⁺, first
 with a large c, which is the solution where the point sticks. Where that asks for more than μλ, c = μλ/|J_t v⁺| is
-looked for from c = 0 on, with |J_t v⁺| = A/(1 + cw) through the last two solutions. For any c ≥ 0 friction takes energy
-out, whether this has converged or not.
+looked for from c = 0 on, with |J_t v⁺| and λ linear in the impulse c |J_t v⁺| through the last two solutions. Friction
+may press the point to the wall or off it: while c > 0 is looked for, λ < 0 says that c is too large, not that the wall
+is left. For any c ≥ 0 friction takes energy out, whether this has converged or not.
 """
 
 from __future__ import annotations
@@ -69,8 +70,8 @@ class Touch(NamedTuple):
     hold: float
 
     def push(self, v: Array) -> float:
-        """Return the impulse λ [N s] that the wall gives where the velocity is v, (n,)."""
-        return max(0.0, self.beta - self.a * float(self.normal @ v))
+        """Return the impulse λ [N s] that the wall gives where the velocity is v, (n,); below 0 if it had to pull."""
+        return self.beta - self.a * float(self.normal @ v)
 
     def slip(self, v: Array) -> float:
         """Return the speed along the wall [m/s]."""
@@ -157,39 +158,44 @@ def _iterate(
     problem: Problem, touches: Sequence[Touch], v: Array, c: list[float], pushed: list[bool], most: int, slips: bool
 ) -> Array:
     """Return v⁺ (n,) with the walls that push found, and, where the point ``slips``, with friction by weighting."""
-    before = [(0.0, touch.slip(v)) for touch in touches]
-    for _ in range(most):
+    before = [(0.0, touch.slip(v), touch.push(v)) for touch in touches]
+    for left in reversed(range(most)):
         weights = [(t.a, t.normal, t.beta) for t, on in zip(touches, pushed, strict=True) if on]
         for touch, weight, on in zip(touches, c, pushed, strict=True):
             if on and weight:
                 weights += [(weight, row, 0.0) for row in touch.along]
         last, v = v, problem.solve(weights, v)
-        now = [touch.push(v) > 0 for touch in touches]
+        now = [touch.push(v) > 0 or (on and w > 0) for touch, on, w in zip(touches, pushed, c, strict=True)]
         if now == pushed and (not slips or np.abs(v - last).max() <= _CLOSE * np.abs(v).max()):
             break
         pushed = now
         if slips:
-            known = [(weight, touch.slip(v)) for weight, touch in zip(c, touches, strict=True)]
+            known = [(weight, touch.slip(v), touch.push(v)) for weight, touch in zip(c, touches, strict=True)]
             c, before = _weigh(touches, v, before, known), known
+            if left <= 2 * len(touches) + 2:  # it does not converge: at the end no wall pulls
+                c = [0.0 if push <= 0 else weight for weight, _, push in known]
     return v
 
 
 def _weigh(
     touches: Sequence[Touch],
     v: Array,
-    before: Sequence[tuple[float, float]] = (),
-    known: Sequence[tuple[float, float]] = (),
+    before: Sequence[tuple[float, float, float]] = (),
+    known: Sequence[tuple[float, float, float]] = (),
 ) -> list[float]:
-    """Return c with c |J_t v⁺| = μλ of each wall, by the last two pairs of c and |J_t v⁺|, no more than what holds."""
+    """Return c with c |J_t v⁺| = μλ of each wall, by the last two c, |J_t v⁺| and λ, no more than what holds."""
     found = []
     for k, touch in enumerate(touches):
         bound, slip = touch.friction * touch.push(v), touch.slip(v)
         c = bound / slip if slip > 0 else touch.hold
         if known:
-            (c0, s0), (c1, s1) = before[k], known[k]
-            if s0 > s1 and c1 * s1 > c0 * s0:
-                w = (s0 - s1) / (c1 * s1 - c0 * s0)
-                rest = s1 * (1.0 + c1 * w) - bound * w
+            (c0, s0, p0), (c1, s1, p1) = before[k], known[k]
+            change = c1 * s1 - c0 * s0
+            if (s0 - s1) * change > 0:
+                w, lift = (s0 - s1) / change, touch.friction * (p0 - p1) / change
+                if lift > -1.0:
+                    bound = (bound + lift * c1 * s1) / (1.0 + lift)
+                rest = s1 + (c1 * s1 - bound) * w
                 c = bound / rest if rest > 0 else touch.hold
-        found.append(min(touch.hold, c))
+        found.append(max(0.0, min(touch.hold, c)))
     return found
