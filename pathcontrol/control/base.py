@@ -318,7 +318,7 @@ class Controller(ABC):
     def observed_torque(self, z: ArrayLike) -> Array:
         """Return what the law's observer saw at the tick before a state z, r [N m], (*batch, n); 0 at the start.
 
-        A :class:`ControlTick` has its state in ``state``, and those of a run are ``law_states(run, law)``.
+        A :class:`ControlTick` and a :class:`ControlLoop` have a ``state``, those of a run are ``law_states(run, law)``.
 
         Raises:
             InputError: the law has no observer, or the state is not one of this law.

@@ -107,6 +107,11 @@ class MomentumObserver:
         """Return r at the tick before [N m], (*batch, n), from the memory that it left."""
         return self._split(memory)[1]
 
+    def correct(self, memory: Array, change: Array) -> None:
+        """Add a ``change`` [N m], (*batch, n), to the torque that acts up to the next tick, in the memory itself."""
+        n = self.robot.n
+        memory[..., 3 * n : 4 * n] += change
+
     def elapsed(self, t: float, memory: Array) -> Array:
         """Return the time from the tick before to t [s], (*batch,), 0 at the first tick."""
         last = memory[..., -1]

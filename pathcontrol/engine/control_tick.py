@@ -36,8 +36,8 @@ class ControlTick:
     observers and wrappers; other laws are run in Python, with the same torques. A law that is wrapped, by
     :class:`SpeedOverride` or another :class:`LawWrapper`, has the methods of its speed input: :meth:`hold`,
     :meth:`resume`, :meth:`override` and :meth:`reverse` act at the next call. An observer takes the returned torques
-    to act up to the next call, within the effort limits of its robot. A compiled tick keeps the gains, the arm and the
-    task of the law as they are when it is made; speed inputs may change.
+    to act up to the next call, within the effort limits of its robot, unless :meth:`act` says which do. A compiled
+    tick keeps the gains, the arm and the task of the law as they are when it is made; speed inputs may change.
 
     Args:
         law: any law with one task, and gains for one arm.
@@ -51,6 +51,8 @@ class ControlTick:
             installed.
         InputError: the law is for several rollouts.
     """
+
+    _told: tuple[int, Array]  # the number of calls after which :meth:`act` was told of torques, and these
 
     def __init__(self, law: Controller, period: float) -> None:
         check_controller("law", law)
@@ -74,7 +76,7 @@ class ControlTick:
         n = self.law.robot.n
         position = as_joint_array("q", q, n)
         velocity = np.zeros(n) if qd is None else as_joint_array("qd", qd, n)
-        self._tick.start(self.law.start(position, velocity))
+        self._begin(self.law.start(position, velocity))
 
     @property
     def state(self) -> Array:
@@ -98,11 +100,23 @@ class ControlTick:
         observer = self.law.inner.observer if isinstance(self.law, LawWrapper) else self.law.observer
         if observer is not None and z[observer.size] >= 0:  # of a law that runs: its last tick is a period ago
             z[observer.size] = -self._period
-        self._tick.start(z)
+        self._begin(z)
 
     def __call__(self, q: Array, qd: Array) -> Array:
         """Return the torques [N m], (n,), for measured q [rad] and q̇ [rad/s]; advance the plan by a period."""
         return self._tick(q, qd)
+
+    def act(self, tau: ArrayLike) -> None:
+        """Tell the law's observer the torques that act up to the next call [N m], (n,), where others were returned.
+
+        So what a limit or a drive takes away is no disturbance. A law without an observer needs no telling.
+        """
+        if (observer := self.law.observer) is None:
+            return
+        acting, ticks = as_joint_array("tau", tau, self.law.robot.n).copy(), self._tick.ticks
+        assumed = self._told[1] if self._told[0] == ticks else self._tick.acting
+        observer.correct(self._tick.memory, acting - assumed)
+        self._told = ticks, acting
 
     def hold(self) -> None:
         """Let the plan come to rest on its path and stay there; see :meth:`LawWrapper.hold`."""
@@ -122,6 +136,11 @@ class ControlTick:
         """Let the plan go back along its path; see :meth:`LawWrapper.reverse`."""
         self._wrapper().reverse()
 
+    def _begin(self, z: Array) -> None:
+        """Start with a state z of the law."""
+        self._tick.start(z)
+        self._told = -1, np.zeros(0)
+
     def _wrapper(self) -> LawWrapper:
         """Return the law, which must have a speed input."""
         if not isinstance(self.law, LawWrapper):
@@ -136,7 +155,7 @@ class _CompiledTick:
     """A tick in the compiled engine."""
 
     def __init__(self, law: Controller, period: float) -> None:
-        self._memory, self._setup, self._period, self._ticks = Memory(), Setup(), period, 0
+        self._memory, self._setup, self._period, self.ticks = Memory(), Setup(), period, 0
         self._setup.period = period
         self._rules = add_law(self._setup, law, self._memory)
         with suppress(TaskError):  # of a path that can be passed in one direction only
@@ -158,16 +177,26 @@ class _CompiledTick:
     @property
     def time(self) -> float:
         """The time of the law at the next call [s]."""
-        return self._ticks * self._period
+        return self.ticks * self._period
 
     @property
     def state(self) -> Array:
         """The state z (m,)."""
         return np.append(self.s, self._state)
 
+    @property
+    def memory(self) -> Array:
+        """The part of z after s, itself."""
+        return self._state
+
+    @property
+    def acting(self) -> Array:
+        """The torques that the law takes to act up to the next call [N m], (n,)."""
+        return np.clip(self._tau, -self._most, self._most)
+
     def start(self, z: Array) -> None:
         """Start with the state z (m,)."""
-        self._io[len(self._q) * 2], self._state[:], self._ticks = z[..., 0].item(), z[..., 1:], 0
+        self._io[len(self._q) * 2], self._state[:], self.ticks = z[..., 0].item(), z[..., 1:], 0
 
     def __call__(self, q: Array, qd: Array) -> Array:
         """Return the torques, and advance."""
@@ -175,7 +204,7 @@ class _CompiledTick:
         if self._setup.memory:  # else nothing depends on time
             self._listen()
         self._function(self._address)
-        self._ticks += 1
+        self.ticks += 1
         return self._tau
 
     def _listen(self) -> None:
@@ -209,7 +238,7 @@ class _PythonTick:
     """A tick of a law in Python."""
 
     def __init__(self, law: Controller, period: float) -> None:
-        self._law, self._period, self._ticks = law, period, 0
+        self._law, self._period, self.ticks = law, period, 0
         self._z = np.zeros((1, 1))
         self._tau, self._most = np.zeros(law.robot.n), _effort_bounds(law)
 
@@ -221,22 +250,32 @@ class _PythonTick:
     @property
     def time(self) -> float:
         """The time of the law at the next call [s]."""
-        return self._ticks * self._period
+        return self.ticks * self._period
 
     @property
     def state(self) -> Array:
         """The state z (m,)."""
         return self._z[0].copy()
 
+    @property
+    def memory(self) -> Array:
+        """The part of z after s, itself."""
+        return self._z[0, 1:]
+
+    @property
+    def acting(self) -> Array:
+        """The torques that the law takes to act up to the next call [N m], (n,)."""
+        return np.clip(self._tau, -self._most, self._most)
+
     def start(self, z: Array) -> None:
         """Start with the state z (m,)."""
-        self._z, self._ticks = np.atleast_2d(z), 0
+        self._z, self.ticks = np.atleast_2d(z), 0
 
     def __call__(self, q: Array, qd: Array) -> Array:
         """Return the torques, and advance."""
         position, velocity = np.array(q, dtype=np.float64)[None], np.array(qd, dtype=np.float64)[None]
-        out = self._law.law(self._ticks * self._period, position, velocity, self._z)
+        out = self._law.law(self.ticks * self._period, position, velocity, self._z)
         acting = out._replace(tau=np.clip(out.tau, -self._most, self._most))
-        self._z, self._ticks = self._law.advance(self._z, acting, self._period), self._ticks + 1
+        self._z, self.ticks = self._law.advance(self._z, acting, self._period), self.ticks + 1
         self._tau[:] = out.tau[0]
         return self._tau

@@ -133,6 +133,11 @@ class ControlLoop:
         return Status(self._mode, self._reason, dict(self._faults), self._saturated, self._ticks, self._plan.s)
 
     @property
+    def state(self) -> Array:
+        """The state z of the law at the next step, (m,); ``law.observed_torque(loop.state)`` is what pushes the arm."""
+        return self._plan.state
+
+    @property
     def outcome(self) -> dict[str, Array]:
         """The outcome of the law up to now, (1,) each, see :meth:`Controller.outcome`."""
         return self._plan.outcome
@@ -158,6 +163,8 @@ class ControlLoop:
             wanted = self._brake()
         limited = self.envelope.clip(wanted, self._tau, self.period)
         self._saturated = bool((limited != wanted).any())
+        if self._saturated and self._mode < Mode.DAMP and not self._bad:
+            self._plan.act(limited)  # of a law that observes
         self._tau = limited
         if self._rings and self.recording:
             t = self._screen.t + self._bad * self.period

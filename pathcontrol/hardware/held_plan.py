@@ -42,6 +42,12 @@ class HeldPlan:
         return 1.0 if self._tick is self._free else float(self._wrapper.split(self._held.state)[-1][0])
 
     @property
+    def state(self) -> Array:
+        """The state z of the law, (m,), without that of a speed input which it does not have itself."""
+        state = self._tick.state
+        return state if self._tick is self._free or self._wrapper is self._law else state[:-2]
+
+    @property
     def outcome(self) -> dict[str, Array]:
         """The outcome of the law up to now, see :meth:`Controller.outcome`."""
         return {} if self._tick is self._free else self._wrapper.outcome(self._held.state[None])
@@ -60,6 +66,10 @@ class HeldPlan:
         if self._tick is not self._free and self._free is not None:
             self._leave_speed_input(self._free)
         return tau
+
+    def act(self, tau: Array) -> None:
+        """Say which torques act up to the next tick [N m], (n,), see :meth:`ControlTick.act`."""
+        self._tick.act(tau)
 
     def hold(self) -> None:
         """Let the plan come to rest on the path."""

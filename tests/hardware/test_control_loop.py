@@ -40,6 +40,69 @@ def test_measurements_of_a_run_give_its_torques_to_the_last_bit(n, kind):
     assert status.faults == {}
 
 
+def test_the_state_of_a_loop_is_that_of_the_law_held_or_not():
+    law = law_of(2)
+    for own in (law, pc.SpeedOverride(law), law.watching(), pc.EventPlan(law, threshold=50.0)):
+        arm, loop = Simulated(own), ControlLoop(own, H, Envelope(**WIDE))
+        for hold in (False, True):
+            arm.drive(loop, 3)
+            assert loop.state.shape == own.start(np.zeros(2), np.zeros(2)).shape
+            assert loop.state[0] == loop.status.s
+            if hold:
+                loop.hold()
+
+
+def test_what_pushes_the_arm_is_seen_in_the_loop():
+    plain = law_of(2)
+    law = pc.Projection(plain.robot.with_friction(None), plain.task, k_p=400.0, K_v=40.0).watching()
+    push = np.array([3.0, 1.0])
+    run = run_of(law, 0.1, pc.Push(push))
+    loop = ControlLoop(law, H, Envelope(**WIDE))
+    loop.start(run.array("q")[0, 0])
+    for q, qd, t in zip(run.array("q")[0], run.array("qd")[0], run.time, strict=True):
+        loop.step(q, qd, t)
+    np.testing.assert_allclose(law.observed_torque(loop.state), push, rtol=0, atol=0.01)
+
+
+class OwnProjection(pc.Projection):
+    """A law of a user, which is run in Python."""
+
+
+@pytest.mark.parametrize("kind", [pc.Projection, OwnProjection])
+def test_torques_that_the_envelope_takes_away_are_no_disturbance(kind):
+    arm, task = law_of(2).robot.with_friction(None), law_of(2).task
+    law = kind(arm, task, k_p=400.0, K_v=40.0, friction="observed")
+    loop = ControlLoop(law, H, Envelope(**WIDE | {"torque_rate": 500.0, "torque": [30.0, 4.0]}))
+    plant, seen, saturated = Simulated(law), [], []
+    loop.start(plant.q[0])
+    for _ in range(60):
+        plant.drive(loop, 1)
+        seen.append(law.observed_torque(loop.state))
+        saturated.append(loop.status.saturated)
+    assert np.mean(saturated) > 0.3
+    assert np.abs(seen).max() < 0.02
+
+
+def test_a_tick_is_told_which_torques_act():
+    law = law_of(2).watching()
+    told, not_told = (pc.ControlTick(law, H) for _ in range(2))
+    for tick in (told, not_told):
+        tick.start(law.task.q_d(np.array(0.0)))
+    q, qd = law.task.q_d(np.array(0.0)), np.array([0.3, -0.2])
+    for _ in range(2):
+        tau = np.clip(told(q, qd), -law.robot.limits.effort, law.robot.limits.effort)
+        not_told(q, qd)
+        told.act(tau + 9.0)
+        told.act(tau)  # the last word counts
+    np.testing.assert_allclose(told.state, not_told.state, rtol=0, atol=1e-12)
+    told.act(tau - [2.0, 1.0])
+    told(q, qd), not_told(q, qd)
+    share = (1 - np.exp(-2 * np.pi * 35.0 * H)) * np.array([2.0, 1.0])
+    np.testing.assert_allclose(told.state[1:3] - not_told.state[1:3], share, rtol=1e-9)  # behind the first low pass
+    with pytest.raises(InputError, match="tau"):
+        told.act([1.0, 2.0, 3.0])
+
+
 @pytest.mark.parametrize("kind", LAWS)
 def test_a_law_that_was_held_and_resumed_is_the_compiled_one_again(kind):
     law = law_of(2, kind)
