@@ -27,7 +27,17 @@ class Forgetful(pc.ExtendedMotionPlan):
     """A law that does not compensate what its observer sees."""
 
     def law(self, t, q, qd, z):
-        return make_plan().law(t, q, qd, z[..., :1])
+        return super().law(t, q, qd, z)._replace(observation=None)
+
+
+class Deaf(pc.ExtendedMotionPlan):
+    """A law that asks its task, and not ``self.point``, so that it goes at full speed whatever a wrapper asks for."""
+
+    def point(self, s):
+        return self.task.at(s)
+
+    def timed(self, s):
+        return np.zeros(s.shape, dtype=bool)
 
 
 class Unmade(pc.Projection):
@@ -109,6 +119,14 @@ def test_errors_of_a_law_inside_name_its_class():
             run(wrap(law))
     with pytest.raises(pc.InputError, match=r"^SpeedOverride\(ExtendedMotionPlan\) has K_p of shape"):
         run(pc.SpeedOverride(make_plan(ROWS)), [START] * 3)
+
+
+@pytest.mark.parametrize("drive", [run, lambda law: pc.ControlTick(law, 2.5e-3), lambda law: law.start(START, [0, 0])])
+def test_a_law_that_does_not_go_by_its_speed_is_not_wrapped_in_silence(drive):
+    law = Deaf(ARM, TASK, 800.0, [45.0, 100.0], 20.0)
+    for wrap in (pc.SpeedOverride, pc.EventPlan, lambda one: pc.SpeedOverride(pc.Learned(one), 0.5)):
+        with pytest.raises(pc.InputError, match=r"Deaf\.law gives the same torques .* self\.point"):
+            drive(wrap(law))
 
 
 def test_a_pace_without_limits_is_told_apart_from_an_arm_without():

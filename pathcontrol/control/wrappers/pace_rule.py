@@ -99,28 +99,34 @@ class PaceRule(SpeedRule):
         return np.minimum(np.maximum(along, 0.0), self.plan.forward(s)[0])[..., None]
 
     def rate(self, moment: Moment, asked: Speed, x: Array) -> Array:
-        """Return ẇ [1/s], (*batch,); a plan that is to go back does what one that goes forward does, mirrored."""
-        target, way = self._within_reach(moment, asked), np.where(asked.factor < 0, -1.0, 1.0)
-        wanted = way * (target.rate + (target.factor - x[..., 0]) / APPROACH)
+        """Return ẇ [1/s], (*batch,); a plan that goes back does what one that goes forward does, mirrored."""
+        w = x[..., 0]
+        way = np.where(w < 0, -1.0, 1.0)
+        wanted, rest = way * self._wanted_rate(moment, asked, w), -way * w / APPROACH
         least, most = rate_bounds(moment.out.tau, way[..., None] * moment.gradient, self.torque)
-        # where nothing keeps all limits, slower is better; but no pace turns round, it only comes to rest
-        rate = np.where(least <= most, np.minimum(np.maximum(wanted, least), most), np.minimum(most, 0.0))
-        rest = -way * x[..., 0] / APPROACH
-        return np.asarray(way * np.maximum(rate, rest))
+        kept, turns = least <= most, way * asked.factor < 0
+        # where nothing keeps all limits, slower is better; but no pace turns round unasked, it only comes to rest
+        rate = np.where(kept, np.minimum(np.maximum(wanted, least), most), most)
+        rate = np.where(kept & ~turns, rate, np.minimum(rate, 0.0))
+        return np.asarray(way * np.maximum(rate, np.where(kept, np.minimum(wanted, rest), rest)))
 
     def describe(self) -> dict[str, Any]:
         return self._settings
 
-    def _within_reach(self, moment: Moment, asked: Speed) -> Speed:
-        """Return the speed that is asked for, or the largest one possible in its direction."""
+    def _wanted_rate(self, moment: Moment, asked: Speed, w: Array) -> Array:
+        """Return the ẇ with which w comes to the speed that is asked for, or to the largest one if that takes less.
+
+        Along a largest one that falls, a plan below it has to brake too.
+        """
         s, sdot = moment.out.s, moment.out.sdot
+        wanted = asked.rate + (asked.factor - w) / APPROACH
         largest, slope = self.plan.forward(s)
-        target, rate = np.minimum(asked.factor, largest), np.where(asked.factor < largest, asked.rate, slope * sdot)
-        if (asked.factor < 0).any():
-            largest, slope = self.plan.back(s)
-            rate = np.where(-asked.factor < largest, rate, -slope * sdot)
-            target = np.maximum(target, -largest)
-        return Speed(target, rate)
+        forward = np.minimum(wanted, slope * np.maximum(sdot, 0.0) + (largest - w) / APPROACH)
+        if not (asked.factor < 0).any():
+            return forward
+        largest, slope = self.plan.back(s)
+        back = np.maximum(wanted, -slope * np.minimum(sdot, 0.0) - (largest + w) / APPROACH)
+        return np.where(asked.factor < 0, back, forward)
 
 
 def rate_bounds(tau: Array, gradient: Array, torque: Array) -> tuple[Array, Array]:

@@ -26,8 +26,9 @@ class Paced(LawWrapper):
     feedforward and feedback together, so that the limits are an interval of ẇ. In it w comes to the smaller of the
     speed that is asked for and w_max(σ), that of the time-optimal motion along the path within limits that are less by
     ``torque_margin``: a look ahead to the end of the path, or over its whole lap, which leads into no state from which
-    the rest could not be passed (a trap). Along w_max(σ) ẇ comes to the rate of that motion, w_max'σ̇. Where no ẇ keeps
-    all limits the plan brakes.
+    the rest could not be passed (a trap). Along w_max(σ) ẇ comes to the rate of that motion, w_max'σ̇, and where w_max
+    falls w brakes in time. Where no ẇ keeps all limits the plan brakes. Where ϑ falls faster than the motors can brake,
+    w is more than what is asked for until they have.
 
     The plan begins as fast as the arm is, with w = 0 at rest. Only the pace of the plan changes, so the theorem of the
     law inside holds while the torques are within their limits (:class:`LawWrapper`). That they always are is not

@@ -14,6 +14,7 @@ from pathcontrol.control.learning.learning_law import LearningLaw
 from pathcontrol.control.observer import CUTOFF
 from pathcontrol.control.wrappers.override_rule import Override, OverrideRule
 from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
+from pathcontrol.errors import InputError
 
 
 class LawWrapper(Controller):
@@ -103,9 +104,14 @@ class LawWrapper(Controller):
     # --- the law --------------------------------------------------------------------------------------------
 
     def start(self, q: ArrayLike, qd: ArrayLike) -> Array:
-        """Return the state z of the law inside and of all rules, (*batch, m), for an arm that starts at (q, q̇)."""
+        """Return the state z of the law inside and of all rules, (*batch, m), for an arm that starts at (q, q̇).
+
+        Raises:
+            InputError: the law inside does not go by the speed that it is given.
+        """
         position, velocity = self._repeat(*self._arm_state(q, qd))
         own = self.inner.start(position, velocity)
+        self._check_listens(position, velocity, own)
         position, velocity = (np.broadcast_to(one, (*own.shape[:-1], self.robot.n)) for one in (position, velocity))
         parts, asked = [own], np.ones(own.shape[:-1])
         for rule in self.rules:
@@ -132,6 +138,31 @@ class LawWrapper(Controller):
         if rows == 1 or q.shape[:-1] not in ((), (1,)):
             return q, qd
         return np.broadcast_to(q, (rows, self.robot.n)).copy(), np.broadcast_to(qd, (rows, self.robot.n)).copy()
+
+    def _check_listens(self, q: Array, qd: Array, own: Array) -> None:
+        """Check at the start (q, q̇) that the law inside, in its state ``own``, goes by the speed that it is given.
+
+        Raises:
+            InputError: it would go on at full speed when it is held.
+        """
+        z = own.reshape(-1, own.shape[-1])
+        q, qd = (np.broadcast_to(part, (*own.shape[:-1], self.robot.n)).reshape(len(z), -1) for part in (q, qd))
+        at_rest, at_full = (self.inner.at_speed(np.full(len(z), w)) for w in (0.0, 1.0))
+        held = at_rest.law(0.0, q, qd, z)
+        if at_rest._asked is not None:  # it asks self.point
+            return
+        free = at_full.law(0.0, q, qd, z)
+        moves = at_full.full_speed(free.s)[1] != 0
+        same = (held.sdot == free.sdot) & (held.tau == free.tau).all(-1)
+        if (same & moves).any():
+            kind = type(unwrap(self)).__name__
+            raise InputError(
+                f"{kind}.law gives the same torques and ṡ held and at full speed, expected one that goes by its speed; "
+                "take the task from self.point(s), in place of self.task, and let the plan wait for the arm only where "
+                "not self.timed(s)",
+                argument="law",
+                value=self.inner,
+            )
 
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         if q.shape[:-1] != z.shape[:-1]:  # one arm, and rules with a row for each rollout

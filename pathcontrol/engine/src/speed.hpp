@@ -73,17 +73,16 @@ template <class V> static Speed<V> largest_factor(const Setup &setup, const Path
   }
   return found;
 }
-// The speed that is asked for, or the largest one possible in its direction.
-template <class V> static Speed<V> within_reach(const Setup &setup, const Rule &rule, const Path *const *paths, const Moment<V> &moment, const Speed<V> &asked) {
+// The ẇ with which w comes to the speed that is asked for, or to the largest one in its direction if that takes less.
+template <class V> static V wanted_rate(const Setup &setup, const Rule &rule, const Path *const *paths, const Moment<V> &moment, const Speed<V> &asked, V w) {
   const Output<V> &out = moment.out;
-  Speed<V> largest = largest_factor(setup, rule.fastest, paths, moment.at, out.s, 1.0), target;
-  target.factor = smaller(asked.factor, largest.factor);
-  target.rate = select(less(asked.factor, largest.factor), asked.rate, largest.rate * out.sdot);
-  if (!rule.fastest_back || !any(less(asked.factor, V{}))) return target;
+  const V wanted = asked.rate + (asked.factor - w) / APPROACH;
+  Speed<V> largest = largest_factor(setup, rule.fastest, paths, moment.at, out.s, 1.0);
+  const V forward = smaller(wanted, V(largest.rate * larger(out.sdot, V{}) + (largest.factor - w) / APPROACH));
+  const Mask<V> goes_back = less(asked.factor, V{});
+  if (!rule.fastest_back || !any(goes_back)) return forward;
   largest = largest_factor(setup, rule.fastest_back, paths, moment.at, out.s, -1.0);
-  target.rate = select(less(V(-asked.factor), largest.factor), target.rate, -largest.rate * out.sdot);
-  target.factor = larger(target.factor, V(-largest.factor));
-  return target;
+  return select(goes_back, larger(wanted, V(-largest.rate * smaller(out.sdot, V{}) - (largest.factor + w) / APPROACH)), forward);
 }
 // The least and the largest rate x for which |τ + x ∂τ/∂x| is within torque limits; joints that hardly depend on it are left out.
 template <class V> static void rate_bounds(int n, const V *tau, const V *gradient, const double *torque, V &least, V &most) {
@@ -98,17 +97,18 @@ template <class V> static void rate_bounds(int n, const V *tau, const V *gradien
     most = smaller(most, select(flat, number<V>(INFINITY), larger(one, other)));
   }
 }
-// ẇ of a pace at w: a plan that is to go back does what one that goes forward does, mirrored.
+// ẇ of a pace at w: a plan that goes back does what one that goes forward does, mirrored.
 template <class V> static V pace_rate(const Setup &setup, const Rule &rule, const Path *const *paths, const Moment<V> &moment, const Speed<V> &asked, V w) {
-  const Speed<V> target = within_reach(setup, rule, paths, moment, asked);
-  const V way = select(less(asked.factor, V{}), number<V>(-1.0), number<V>(1.0));
+  const V way = select(less(w, V{}), number<V>(-1.0), number<V>(1.0));
+  const V wanted = way * wanted_rate(setup, rule, paths, moment, asked, w), rest = -way * w / APPROACH;
   V mirrored[MOST_JOINTS], least, most;
   for (int i = 0; i < setup.joints; i++) mirrored[i] = way * moment.gradient[i];
   rate_bounds(setup.joints, moment.out.tau, mirrored, rule.torque, least, most);
-  const V wanted = way * (target.rate + (target.factor - w) / APPROACH), rest = -way * w / APPROACH;
-  // where nothing keeps all limits, slower is better; but no pace turns round, it only comes to rest
-  const V rate = select(less_equal(least, most), smaller(larger(wanted, least), most), smaller(most, V{}));
-  return way * larger(rate, rest);
+  const Mask<V> kept = less_equal(least, most), turns = less(V(way * asked.factor), V{});
+  // where nothing keeps all limits, slower is better; but no pace turns round unasked, it only comes to rest
+  V rate = select(kept, smaller(larger(wanted, least), most), most);
+  rate = select(kept & ~turns, rate, smaller(rate, V{}));
+  return way * larger(rate, select(kept, smaller(wanted, rest), rest));
 }
 
 // --- the law ----------------------------------------------------------------------------------------------------------
