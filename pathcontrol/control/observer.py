@@ -112,6 +112,10 @@ class MomentumObserver:
         n = self.robot.n
         memory[..., 3 * n : 4 * n] += change
 
+    def wait(self, memory: Array, time: float) -> None:
+        """Let ``time`` [s] pass beside that of the ticks, in which the last torque goes on, in the memory itself."""
+        memory[..., 4 * self.robot.n] -= time
+
     def elapsed(self, t: float, memory: Array) -> Array:
         """Return the time from the tick before to t [s], (*batch,), 0 at the first tick."""
         last = memory[..., -1]

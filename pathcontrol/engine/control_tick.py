@@ -9,7 +9,7 @@ from ctypes import addressof
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_joint_array
+from pathcontrol._arrays import Array, as_joint_array, as_scalar
 from pathcontrol._milliseconds import as_period
 from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.control.law_gains import refuse_several_gains
@@ -117,6 +117,14 @@ class ControlTick:
         assumed = self._told[1] if self._told[0] == ticks else self._tick.acting
         observer.correct(self._tick.memory, acting - assumed)
         self._told = ticks, acting
+
+    def wait(self, time: float) -> None:
+        """Tell the law's observer that more than a period passes up to the next call, by ``time`` [s].
+
+        The torques act on meanwhile. The plan waits, as it goes on by a period at each call.
+        """
+        if self.law.observer is not None:
+            self.law.observer.wait(self._tick.memory, as_scalar("time", time, least=0.0))
 
     def hold(self) -> None:
         """Let the plan come to rest on its path and stay there; see :meth:`LawWrapper.hold`."""

@@ -278,9 +278,10 @@ class ControlLoop:
         return self.gravity if self._mode >= Mode.DAMP else self._tau
 
     def _check_time(self, gap: float) -> None:
-        """Count a late step, and hold the plan after a long gap [s]."""
+        """Count a late step, of which observers are told, and hold the plan after a long gap [s]."""
         if gap > self.envelope.late * self.period:
             self._faults["deadline"] += 1
+            self._plan.wait(gap - self.period)  # while the last torque went on
         if gap > self.envelope.lost * self.period:
             self._react(Mode.HOLD, "deadline", f"no step for {gap:.3g} s")
 

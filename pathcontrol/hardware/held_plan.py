@@ -71,6 +71,10 @@ class HeldPlan:
         """Say which torques act up to the next tick [N m], (n,), see :meth:`ControlTick.act`."""
         self._tick.act(tau)
 
+    def wait(self, time: float) -> None:
+        """Say that ``time`` [s] has passed beside that of the ticks, see :meth:`ControlTick.wait`."""
+        self._tick.wait(time)
+
     def hold(self) -> None:
         """Let the plan come to rest on the path."""
         if self._tick is self._free and self._free is not None:

@@ -83,6 +83,28 @@ def test_torques_that_the_envelope_takes_away_are_no_disturbance(kind):
     assert np.abs(seen).max() < 0.02
 
 
+@pytest.mark.parametrize("lost", ["measurements", "steps"])
+@pytest.mark.parametrize("kind", [pc.Projection, OwnProjection])
+def test_time_that_passes_without_a_tick_is_no_disturbance(kind, lost):
+    """After three periods in which the last torque acts, the error is that of a period four times as long."""
+    arm, task = law_of(2).robot.with_friction(None), law_of(2).task
+    loop = ControlLoop(kind(arm, task, k_p=400.0, K_v=40.0, friction="observed"), H, Envelope(**WIDE))
+    plant, seen = Simulated(loop.law), []
+    loop.start(plant.q[0])
+    plant.drive(loop, 40)
+    for _ in range(5):
+        if lost == "measurements":
+            plant.drive(loop, 3, lambda k, *measured: BAD["not a number"](*measured))
+        else:
+            for _ in range(3):
+                plant.q, plant.qd = plant.plant.advance(plant.q, plant.qd, loop._tau[None])
+            plant.t += 3 * H
+        plant.drive(loop, 1)
+        seen.append(loop.law.observed_torque(loop.state))
+    assert loop.status.faults["deadline"] == 5
+    assert np.abs(seen).max() < 0.02
+
+
 def test_a_tick_is_told_which_torques_act():
     law = law_of(2).watching()
     told, not_told = (pc.ControlTick(law, H) for _ in range(2))
