@@ -128,13 +128,13 @@ from .simulation.arm.disturbance import Disturbance as Disturbance
 from .simulation.arm.disturbance import FrameForce as FrameForce
 from .simulation.arm.disturbance import Harmonic as Harmonic
 from .simulation.arm.disturbance import Push as Push
-from .simulation.arm.disturbance import TorqueLimitDrop as TorqueLimitDrop
 from .simulation.arm.dropout import Dropout as Dropout
 from .simulation.arm.friction_change import FrictionChange as FrictionChange
 from .simulation.arm.jam import JammedJoint as JammedJoint
 from .simulation.arm.noise import SensorNoise as SensorNoise
 from .simulation.arm.pick_up import PickUp as PickUp
 from .simulation.arm.plant import Plant as Plant
+from .simulation.arm.torque_limit_drop import TorqueLimitDrop as TorqueLimitDrop
 from .simulation.arm.wall import Wall as Wall
 from .simulation.loops import ContinuousTime as ContinuousTime
 from .simulation.loops import SampledLoop as SampledLoop

@@ -130,7 +130,7 @@ DISTURBANCES = Kind(
         "wall": "simulation.arm.wall:Wall",
         "dropout": "simulation.arm.dropout:Dropout",
         "friction_change": "simulation.arm.friction_change:FrictionChange",
-        "torque_limit_drop": "simulation.arm.disturbance:TorqueLimitDrop",
+        "torque_limit_drop": "simulation.arm.torque_limit_drop:TorqueLimitDrop",
     },
     ("robot",),
 )

@@ -18,13 +18,13 @@ from pathcontrol.simulation.arm.disturbance import (
     Harmonic,
     Push,
     TimedDisturbance,
-    TorqueLimitDrop,
     list_terms,
 )
 from pathcontrol.simulation.arm.dropout import Dropout
 from pathcontrol.simulation.arm.friction_change import FrictionChange
 from pathcontrol.simulation.arm.jam import JammedJoint
 from pathcontrol.simulation.arm.pick_up import PickUp
+from pathcontrol.simulation.arm.torque_limit_drop import TorqueLimitDrop
 from pathcontrol.simulation.arm.wall import Wall
 
 _DISTURBANCES = (Push, Harmonic, FrameForce, JammedJoint, TorqueLimitDrop, Wall)  # in the order of the engine's numbers

@@ -10,7 +10,7 @@ from pathcontrol.control.base import Controller
 from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
 from pathcontrol.simulation.checks.disturbance_loop import check_loop
-from pathcontrol.simulation.checks.frames import check_frames
+from pathcontrol.simulation.checks.frames import check_frames, warn_of_fixed_frames
 from pathcontrol.simulation.checks.friction_knowledge import warn_of_unknown_friction
 from pathcontrol.simulation.checks.idle_times import warn_of_idle_times
 from pathcontrol.simulation.checks.slips import warn_of_idle_changes, warn_of_slips, warn_of_walls
@@ -71,6 +71,7 @@ def prepare(
     check_disturbance(disturbance, q, qd)
     check_loop(disturbance, loop, q)
     warn_of_idle_changes(robot, loop, disturbance, first)
+    warn_of_fixed_frames(disturbance, robot, first)
     warn_of_idle_times(disturbance, loop, duration, first)
     warn_of_walls(disturbance, q, first)
     warn_of_unknown_friction(controllers, robot, first)

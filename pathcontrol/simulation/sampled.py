@@ -190,6 +190,7 @@ class SampledArm:
                 if self._disturbance is not None:
                     pushed = acting + self._disturbance.torque(middle, self.q, self.qd)
                     held = self._disturbance.held_joints(middle, self.q)
+                    held = None if held is None else np.asarray(held, dtype=bool)
                 self.q, self.qd = plant.advance(self.q, self.qd, pushed, held, walls)
                 t += plant.step
         self._ticks += 1

@@ -258,6 +258,7 @@ def test_a_task_in_a_file_is_part_of_the_definition(experiment, tmp_path):
         (GRID.replace("[sweep]", '[sweep]\nmetrics = ["e_p_peek"]'), "sweep.metrics = .*; did you mean 'e_p_peak'"),
         (GRID.replace("grid =", "list ="), "of 'start.q.list' a table of 'grid' or 'uniform'"),
         (GRID.replace("start.q", "start.p"), "in sample 0: start.p: unknown key; valid keys: q, qd"),
+        (GRID.replace("start.q", "start.q.0"), r"no entry '0' on the way there; an entry of a list is written \[0\]"),
         (GRID.replace("start.q", "start.q[5]"), "no entry 5 on the way there|list of finite numbers"),
         (GRID.replace(", -20.0", ""), "expected values of one kind and length"),
         (GRID.replace("70.0", "-20.0, 1.0"), "expected values of one kind and length"),

@@ -195,6 +195,15 @@ def test_a_disturbance_of_ones_own_that_cannot_say_what_it_holds_is_named():
         slide(Grip([1.0]))
 
 
+def test_what_is_held_may_be_said_by_a_list():
+    class Grip(Push):
+        def held_joints(self, t, q):
+            return [t > 0.1]
+
+    run = slide(Grip([5.0]))
+    assert np.ptp(run.array("q")[0, run.time > 0.1, 0]) == 0
+
+
 def test_disturbances_that_cannot_be(arm, circle):
     for make, words in (
         (lambda: Push([np.nan]), "magnitude"),
@@ -203,6 +212,14 @@ def test_disturbances_that_cannot_be(arm, circle):
         (lambda: FrameForce(arm, "tool", [1.0, 0.0]), r"force has shape \(2,\), expected \(3,\)"),
         (lambda: slide(3.0), r"disturbance = 3\.0, expected a Disturbance"),
         (lambda: slide(Push([1.0, 2.0])), r"Push\.torque has shape \(2,\), expected \(1, 1\)"),
+        (
+            lambda: slide(FrictionChange([1.0, 2.0])),
+            r"has shape \(2,\), expected .*; give a value for each of 1 joints",
+        ),
+        (
+            lambda: slide(Push([[1.0]] * 2) + Push([1.0], [0.0] * 3)),
+            r"Push \(term 0\) is for 2 .* Push \(term 1\) for 3",
+        ),
         (lambda: slide(Push([[1.0]] * 3), q=[[0.0]] * 2), r"Push\.torque has shape \(3, 1\), expected \(2, 1\)"),
         (lambda: slide(Push([1.0], [0.0] * 3), q=[[0.0]] * 2), r"has shape \(3, 1\), expected \(2, 1\)"),
     ):

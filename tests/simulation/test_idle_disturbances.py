@@ -58,6 +58,20 @@ def test_sum_adds_disturbances_and_friction_laws():
             pc.Push([1.0, 2.0]) + wrong
 
 
+@pytest.mark.parametrize("name", ["Wall", "PickUp", "FrameForce"])
+def test_a_frame_that_no_joint_moves_is_told(name):
+    made = {
+        "Wall": lambda frame: pc.Wall(**WALL | {"frame": frame}),
+        "PickUp": lambda frame: pc.PickUp(1.0, frame, 0.0),
+        "FrameForce": lambda frame: pc.FrameForce(ARM, frame, [1.0, 0.0, 0.0]),
+    }[name]
+    with pytest.warns(pc.PathControlWarning, match=f"no joint moves the frame 'base', so {name} does nothing"):
+        simulated(made("base"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulated(made("tool"))
+
+
 def test_a_long_sum_is_as_good_as_a_short_one(tmp_path):
     kicks = sum(pc.Push([1.0, 0.5], 1e-3 * i, 0.01) for i in range(1500))
     assert kicks.torque(5e-3, np.zeros((1, 2)), np.zeros((1, 2))).tolist() == [6.0, 3.0]  # those from 0 to 5 ms

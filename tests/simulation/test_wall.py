@@ -288,8 +288,12 @@ def test_joints_that_stick_or_are_held_do_so_at_a_wall():
 
 
 def test_the_length_of_a_normal_says_nothing():
-    runs = [simulated(pc.Wall("tool", [0.6, 0.0, 0.0], [-x, 0.0, 0.0], 1e5), q=(0.2, 0.3)) for x in (1.0, 7e3)]
-    assert_array_equal(runs[0].array("q"), runs[1].array("q"))
+    runs = [
+        simulated(pc.Wall("tool", [0.6, 0.0, 0.0], [-x, 0.0, 0.0], 1e5), q=(0.2, 0.3))
+        for x in (1.0, 7e3, 1e-200, 1e200)
+    ]
+    for run in runs[1:]:
+        assert_array_equal(run.array("q"), runs[0].array("q"))
 
 
 class MyPlan(pc.ExtendedMotionPlan):

@@ -63,8 +63,10 @@ def _entry(inside: Any, step: str | int, key: str) -> Any:
     try:
         return inside[step]
     except (KeyError, IndexError, TypeError) as error:
+        listed = isinstance(inside, list) and isinstance(step, str) and step.isdigit()
+        remedy = f"an entry of a list is written [{step}]" if listed else "give a value for it, or vary the whole list"
         raise ExperimentError(
-            f"{key}: the file has no entry {step!r} on the way there; give a value for it, or vary the whole list",
+            f"{key}: the file has no entry {step!r} on the way there; {remedy}",
             argument=key,
             value=step,
         ) from error

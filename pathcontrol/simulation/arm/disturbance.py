@@ -179,42 +179,6 @@ class Push(TimedDisturbance):
         return self.share(t) * self.magnitude
 
 
-class TorqueLimitDrop(TimedDisturbance):
-    """Motors that have only a share of their torque limits for a while: hot, or at a sagging supply.
-
-    What acts is limited anew in the periods of the loop whose middle the time covers, whenever it was asked for. It
-    needs torque limits, ``SampledLoop(torque_limits=…)``; the law knows nothing of it.
-
-    Args:
-        factor: what each motor still has of its limit, from 0 to 1: one number, (n,), or for each rollout, (N, n) or
-            (N, 1).
-        start: when it begins [s], or for each rollout, (N,).
-        duration: how long it lasts [s], or for each rollout, (N,).
-
-    Raises:
-        InputError: a factor is not from 0 to 1, or a time is no number.
-    """
-
-    def __init__(self, factor: Annotated[ArrayLike, Form.GAIN], start: Begin = 0.0, duration: Span = np.inf) -> None:
-        super().__init__(start, duration)
-        self.factor = freeze(check_finite("factor", as_array("factor", factor)))
-        if not ((self.factor >= 0) & (self.factor <= 1)).all():
-            raise InputError(
-                f"factor = {self.factor.tolist()}, expected numbers from 0 to 1",
-                argument="factor",
-                value=self.factor,
-                limit=(0.0, 1.0),
-            )
-        check_rollouts(start=self.start.shape, duration=self.duration.shape, factor=self.factor.shape[:-1])
-
-    def torque(self, t: float, q: Array, qd: Array) -> Array:
-        """Return zeros: it takes torque away and adds none."""
-        return np.zeros(np.broadcast_shapes(np.shape(self.share(t)), np.shape(self.factor), (q.shape[-1],)))
-
-    def torque_factor(self, t: float) -> Array:
-        return np.where(self.share(t) > 0, self.factor, 1.0)
-
-
 class Harmonic(Disturbance):
     """A sinusoidal torque on the joints, A sin(2πft + φ).
 
@@ -303,17 +267,36 @@ def check_disturbance(disturbance: Any, q: Array, qd: Array) -> None:
             argument="disturbance",
             value=disturbance,
         )
-    for term in list_terms(disturbance):
-        _check_term(term, q, qd)
+    terms = list_terms(disturbance)
+    torques = [_first_torque(term, q, qd) for term in terms]
+    counts = {
+        f"{type(term).__name__} (term {i})": one.shape[:-1]
+        for i, (term, one) in enumerate(zip(terms, torques, strict=True))
+    }
+    check_rollouts(**counts)
+    for term, torque in zip(terms, torques, strict=True):
+        _check_term(term, torque, q)
 
 
-def _check_term(disturbance: Disturbance, q: Array, qd: Array) -> None:
-    """Check the torques and the jumps of one disturbance."""
+def _first_torque(disturbance: Disturbance, q: Array, qd: Array) -> Array:
+    """Return the torque of one disturbance at the start, of whatever shape."""
     name = type(disturbance).__name__
-    torque = np.asarray(_try(name, "torque", q, lambda: np.array(disturbance.torque(0.0, q, qd), dtype=np.float64)))
+    return np.asarray(_try(name, "torque", q, lambda: np.array(disturbance.torque(0.0, q, qd), dtype=np.float64)))
+
+
+def _check_term(disturbance: Disturbance, torque: Array, q: Array) -> None:
+    """Check the first torque of one disturbance, what it holds, and its jumps."""
+    name = type(disturbance).__name__
     if torque.shape not in ((), q.shape[1:], (1, q.shape[1]), q.shape):
+        fits = torque.shape[-1] == q.shape[1]
+        what = (
+            f"one value for all rollouts, or one for each of {len(q)}"
+            if fits
+            else f"a value for each of {q.shape[1]} joints"
+        )
         raise InputError(
-            f"{name}.torque has shape {torque.shape}, expected {q.shape}: rollouts and joints", value=torque.shape
+            f"{name}.torque has shape {torque.shape}, expected {q.shape}: rollouts and joints; give {what}",
+            value=torque.shape,
         )
     held = _try(name, "held_joints", q, lambda: disturbance.held_joints(0.0, q))
     if held is not None and np.shape(held) not in (q.shape[1:], (1, q.shape[1]), q.shape):
@@ -376,6 +359,12 @@ def check_rollouts(**axes: tuple[int, ...]) -> None:
                 value=count,
                 limit=several[first],
             )
+
+
+def no_torques(q: Array, *parts: ArrayLike) -> Array:
+    """Return zeros for the rollouts and joints of parts that broadcast to (N, n), with the joints of q (N, n)."""
+    shape = np.broadcast_shapes(*map(np.shape, parts))
+    return np.zeros((*shape[:-1], q.shape[-1] if shape[-1:] in ((), (1,)) else shape[-1]))
 
 
 def check_vectors(name: str, value: ArrayLike) -> Array:

@@ -14,7 +14,7 @@ from pathcontrol.robot.batch import RobotBatch
 from pathcontrol.robot.friction import Coulomb, FrictionLaw, levels_of, viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.robot.scaled_friction import ScaledFriction
-from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance, check_rollouts
+from pathcontrol.simulation.arm.disturbance import Begin, Span, TimedDisturbance, check_rollouts, no_torques
 
 
 class FrictionChange(TimedDisturbance):
@@ -54,8 +54,7 @@ class FrictionChange(TimedDisturbance):
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
         """Return zeros: it changes friction and pushes nothing."""
-        shapes = (np.shape(part) for part in (self.share(t), self.factor, self.coulomb))
-        return np.zeros(np.broadcast_shapes(*shapes, (q.shape[-1],)))
+        return no_torques(q, self.share(t), self.factor, self.coulomb)
 
     @property
     def arm_change_times(self) -> Array:

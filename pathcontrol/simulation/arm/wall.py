@@ -64,8 +64,8 @@ class Wall(TimedDisturbance):
         self.frame, self.rigid = frame, bool(rigid)
         self._robot: RobotModel | None = None
         self.point, self.normal = check_vectors("point", point), check_vectors("normal", normal)
-        length = np.linalg.norm(self.normal, axis=-1, keepdims=True)
-        if (length == 0).any():
+        largest = np.abs(self.normal).max(-1, keepdims=True)  # whose square may be no number
+        if (largest == 0).any():
             raise InputError(
                 "normal = [0, 0, 0], expected the direction out of the wall, of any other length",
                 argument="normal",
@@ -101,7 +101,8 @@ class Wall(TimedDisturbance):
             normal=self.normal.shape[:-1],
             **counts,
         )
-        self._axes = _axes_of(self.normal / length)
+        direction = self.normal / largest
+        self._axes = _axes_of(direction / np.linalg.norm(direction, axis=-1, keepdims=True))
 
     def torque(self, t: float, q: Array, qd: Array) -> Array:
         """Return zeros: what a wall pushes with is not known before."""

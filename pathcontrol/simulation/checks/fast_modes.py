@@ -21,7 +21,6 @@ from pathcontrol.simulation.arm.disturbance import (
     FrameForce,
     Harmonic,
     Push,
-    TorqueLimitDrop,
     jump_times,
     list_terms,
 )
@@ -29,6 +28,7 @@ from pathcontrol.simulation.arm.dropout import Dropout
 from pathcontrol.simulation.arm.friction_change import FrictionChange
 from pathcontrol.simulation.arm.jam import JammedJoint
 from pathcontrol.simulation.arm.pick_up import PickUp
+from pathcontrol.simulation.arm.torque_limit_drop import TorqueLimitDrop
 from pathcontrol.simulation.arm.wall import Wall
 
 _NUDGE = 1e-5  # rad and rad/s, the step of finite differences

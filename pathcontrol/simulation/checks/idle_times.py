@@ -6,8 +6,9 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import warn
-from pathcontrol.simulation.arm.disturbance import Disturbance, TimedDisturbance, TorqueLimitDrop, list_terms
+from pathcontrol.simulation.arm.disturbance import Disturbance, TimedDisturbance, list_terms
 from pathcontrol.simulation.arm.dropout import Dropout
+from pathcontrol.simulation.arm.torque_limit_drop import TorqueLimitDrop
 from pathcontrol.simulation.loops import SampledLoop
 from pathcontrol.simulation.run_arguments import Loop
 

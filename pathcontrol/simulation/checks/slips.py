@@ -8,8 +8,9 @@ from pathcontrol._arrays import Array
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import warn
 from pathcontrol.robot.batch import RobotBatch
-from pathcontrol.simulation.arm.disturbance import Disturbance, TorqueLimitDrop, list_terms
+from pathcontrol.simulation.arm.disturbance import Disturbance, list_terms
 from pathcontrol.simulation.arm.friction_change import FrictionChange
+from pathcontrol.simulation.arm.torque_limit_drop import TorqueLimitDrop
 from pathcontrol.simulation.arm.wall import Wall
 from pathcontrol.simulation.checks.friction_knowledge import advise_on_dry_friction
 from pathcontrol.simulation.checks.position_range import describe_excess, describe_turns, find_excess
