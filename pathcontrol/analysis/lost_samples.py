@@ -16,12 +16,15 @@ _Marks = NDArray[np.bool_]  # (rollout, time)
 
 
 def find_lost(run: Run, filtered: bool) -> _Marks:
-    """Return the samples with the measurement of the sample before, as none came in a ``Dropout``, (rollout, time).
+    """Return the samples with the measurement of the sample before, as no new one came, (rollout, time).
 
-    An arm that rests may have the same measurement twice, too: only the times of the run's dropouts count. Of a
-    velocity that the loop has ``filtered`` the first measurement after a gap is lost, too: the filter went on unseen.
+    An arm that rests may have the same measurement twice, too: only the times of a run's ``Dropout`` count, and in the
+    log of a control loop those of an arm that moves. Of a velocity that the loop has ``filtered`` the first measurement
+    after a gap is lost, too: the filter went on unseen.
     """
     lost: _Marks = np.zeros((run.rollouts, len(run.time)), dtype=bool)
+    if table(run.config, "loop").get("loop") == "hardware" and "qd_measured" in run:
+        lost |= (run.array("qd_measured") != 0).any(-1)
     for dropout in _dropouts(table(run.config, "disturbance")):
         lost |= _covered(dropout, run)
     if not lost.any():

@@ -80,6 +80,21 @@ def test_faults_are_in_the_log(tmp_path):
     assert (found.array("q")[0, 100:120] == run.array("q")[0, 99]).all()  # the last good one
 
 
+def test_lost_measurements_in_a_log_are_no_disturbance():
+    """The log has the last good one in their place, which is no motion; the rest is the error of the cubic."""
+    law = pc.ExtendedMotionPlan(ROBOT, EIGHT, 400.0, 40.0, k=20.0)
+    loop, arm = loop_of(law), pc.Plant(ROBOT, H)
+    q, qd = EIGHT.q_d(np.zeros(1)), np.zeros((1, 2))
+    loop.start(q[0], qd[0])
+    with loop.record() as log:
+        for k in range(120):
+            tau = loop.step(q[0] * (np.nan if k % 40 in (30, 31, 32) else 1.0), qd[0], k * H)
+            q, qd = arm.advance(q, qd, tau[None])
+    run = log.run()
+    assert (np.diff(run.array("q")[0], axis=0) == 0).all(-1).sum() == 9
+    assert np.abs(pc.momentum_observer(run)).max() < 0.05
+
+
 def test_the_ring_loses_the_newest_and_never_waits_nor_grows():
     ring = SampleRing(2, 8)
     rows = ring._rows
