@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     "laws",
     multiple=True,
     metavar="NAME",
-    help="Compare this law; repeat for more. Default: the five that are compiled; 'all' for the whole family.",
+    help="Compare this law; repeat for more. Default: the five known ones and the scenario's own; 'all' for the whole "
+    "family.",
 )
 @click.option(
     "--rollouts", type=click.IntRange(1), default=16, show_default=True, metavar="N", help="How many initial postures."

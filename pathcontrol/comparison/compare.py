@@ -16,9 +16,11 @@ from pathcontrol.comparison.laws import Laws, make_laws
 from pathcontrol.comparison.measures import MEASURES, acting_limits, measure
 from pathcontrol.comparison.scenarios import Scenario, make_scenario
 from pathcontrol.control.base import Controller
+from pathcontrol.control.reference_law import ReferenceLaw
 from pathcontrol.control.wrappers.paced import Paced
 from pathcontrol.control.wrappers.speed_override import SpeedOverride
-from pathcontrol.errors import SimulationError
+from pathcontrol.control.wrappers.wrapper import unwrap
+from pathcontrol.errors import SimulationError, warn
 from pathcontrol.simulation.engines import Engine, check_engine
 from pathcontrol.simulation.loops import torque_limits
 from pathcontrol.simulation.run import Run
@@ -141,7 +143,8 @@ def compare(
     open one), in SI units, with m for rad and N for N m where joints slide:
 
     - ``contour_peak``, ``contour_rms``: distance to the nearest point of the path [rad].
-    - ``lag_peak``: largest component along the path of q_d(s) − q [rad], s of the law. It is 0 for projection.
+    - ``lag_peak``: largest component along the path of q_d(s) − q [rad], s of the law. It is nearly 0 for projection
+      that sees where the arm is.
     - ``speed_peak``: largest ‖q̇‖ [rad/s].
     - ``torque_peak``: largest torque that acted, of all joints [N m].
     - ``recovery_s``: time after the end of the event until the contour error stays below 1.1 times its own undisturbed
@@ -154,8 +157,9 @@ def compare(
 
     Args:
         laws: names of known laws, laws for ``scenario.robot`` and ``scenario.task``, or functions (robot, task) that
-            make one; one, several, or by names of your own. By default the five known ones and those of the scenario,
-            ``"all"`` for those of other sources too, also beside other laws.
+            make one; one, several, or by names of your own. A warning tells which begin elsewhere than the known ones.
+            By default the five known ones and those of the scenario, ``"all"`` for those of other sources too, also
+            beside other laws.
         scenario: a name of :func:`known_scenarios`, or a :class:`Scenario`.
         rollouts: how many starts: that of the scenario, and others near the path, see :meth:`Scenario.starts`.
         seed: of these starts.
@@ -171,6 +175,7 @@ def compare(
         scenario = make_scenario(scenario)
     expect("scenario", scenario, Scenario)
     made = make_laws(laws, scenario.robot, scenario.task, scenario.gains, scenario.laws, scenario.pattern)
+    _warn_of_starts(made, scenario)
     if engine is not None:
         check_engine(engine)
     starts = scenario.starts(rollouts, seed)
@@ -180,6 +185,23 @@ def compare(
     end = None if scenario.event is None or scenario.event[1] >= scenario.duration else scenario.event[1]
     measures = {name: _measure(law, runs[name], others[name], scenario, end) for name, law in made.items()}
     return Comparison(scenario, made, runs, others, measures)
+
+
+def _warn_of_starts(laws: Mapping[str, Controller], scenario: Scenario) -> None:
+    """Warn of laws that begin elsewhere than the known ones, so that an event catches them at another place."""
+    if not scenario.task.closed:
+        return
+    behind = [
+        repr(name)
+        for name, law in laws.items()
+        if law.start_at == "s0" and not isinstance(unwrap(law), ReferenceLaw)  # whose s is where the arm is
+    ]
+    if behind:
+        warn(
+            f"{', '.join(behind)} of this comparison begins at s0 of the closed path, wherever the arm is, and the "
+            "known laws at the nearest point, so that an event catches them at other places; make it with "
+            "start='nearest'"
+        )
 
 
 def _measure(law: Controller, run: Run, calm: Run, scenario: Scenario, event_end: float | None) -> dict[str, Array]:

@@ -195,11 +195,26 @@ def test_all_laws_may_be_named_beside_others(arm, circle):
 def test_laws_of_ones_own_are_objects_or_functions():
     scenario = shortened("undisturbed")
     law = Mine(scenario.robot, scenario.task, 800.0, [45.0, 100.0], start="nearest")
-    both = pc.compare({"a": law, "b": lambda arm, task: Mine(arm, task, 800.0, 50.0)}, scenario, rollouts=1)
+    both = pc.compare({"a": law, "b": lambda *of: Mine(*of, 800.0, 50.0, start="nearest")}, scenario, rollouts=1)
     theirs = compared("computed_torque", scenario=scenario, rollouts=1)
     assert both.mean("a", "contour_peak") == pytest.approx(theirs.mean("computed_torque", "contour_peak"))
     assert list(pc.compare(law, scenario, rollouts=1).measures) == ["Mine"]
     assert both.mean("b", "contour_peak") != both.mean("a", "contour_peak")
+
+
+def test_a_law_that_begins_elsewhere_than_the_known_ones_is_told(arm, recwarn):
+    scenario = replace(shortened("undisturbed"), duration=0.05)
+    there, here = (
+        Mine(scenario.robot, scenario.task, 800.0, [45.0, 100.0], start=start) for start in ("s0", "nearest")
+    )
+    follows = pc.Projection(scenario.robot, scenario.task, 800.0, [45.0, 100.0])
+    line = pc.Line([0.2, 0.1], [1.0, 1.2], 0.8)
+    opened = pc.Scenario("line", "A line.", arm, line, [0.2, 0.1], 0.05)
+    pc.compare({"here": here, "mine": follows, "known": "pd_plus"}, scenario, rollouts=1, progress=False)
+    pc.compare({"open": Mine(arm, line, 800.0, 50.0)}, opened, rollouts=1, progress=False)
+    assert not recwarn.list
+    with pytest.warns(pc.PathControlWarning, match=r"'there', 'paced' of .* start='nearest'"):
+        pc.compare({"there": there, "paced": pc.Paced(there), "here": here}, scenario, rollouts=1, progress=False)
 
 
 def test_the_undisturbed_run_lasts_as_long_whatever_its_scenario_says():

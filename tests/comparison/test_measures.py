@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from sliding_arm import sliding_arm
 
 import pathcontrol as pc
-from pathcontrol.comparison.measures import MEASURES, RECOVERED, acting_limits, measure, recovery_time
+from pathcontrol.comparison.measures import MEASURES, RECOVERED, acting_limits, energy, measure, recovery_time
 from pathcontrol.simulation.variables import VARIABLES
 
 TIME = np.linspace(0.0, 4.0, 4001)
@@ -80,6 +81,17 @@ def test_energy_is_of_the_torque_that_is_held_in_each_period(arm):
     turning.array("qd")[..., 0] = TIME
     exact = (np.abs(torque[:-1]) * np.diff(TIME**2 / 2))[TIME[:-1] >= 1.0].sum()
     assert_allclose(measure(turning, made(arm), (1.0, 4.0), None)["energy_j"], exact, rtol=1e-9)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.001])
+def test_energy_of_an_arm_without_friction_is_the_change_of_its_kinetic_energy(delay):
+    """Slides in a plane, T = ½Σmq̇², with noise so that torques jump at each tick."""
+    slides, mass = sliding_arm(), np.array([5.0, 3.0])
+    law = pc.ComputedTorque(slides, pc.Circle(0.3, 0.6), 400.0, 40.0)
+    loop = pc.SampledLoop(0.005, delay=delay, noise=pc.SensorNoise(position=1e-3, seed=1))
+    run = pc.simulate(law, [0.35, 0.0], duration=1.0, loop=loop, progress=False)
+    kinetic = 0.5 * (mass * run.array("qd") ** 2).sum(-1)
+    assert_allclose(energy(run, 0, len(run.time)), np.abs(np.diff(kinetic)).sum(-1), rtol=1e-3)  # turns within a period
 
 
 def test_saturated_is_the_time_at_the_limit_of_any_joint(arm):

@@ -69,7 +69,7 @@ def test_what_is_no_part_of_a_scenario_is_refused_by_its_name(name, value, said)
     assert name in str(raised.value)
 
 
-def test_what_is_no_scenario_no_plant_no_measure_and_no_comparison_is_told(tmp_path):
+def test_what_is_no_scenario_no_plant_and_no_measure_is_told(tmp_path):
     with pytest.raises(pc.InputError, match=r"load_scenario\('.*mine.toml'\)"):
         pc.compare(None, tmp_path / "mine.toml")
     with pytest.raises(pc.UnknownNameError, match="expected one of undisturbed"):
@@ -77,10 +77,6 @@ def test_what_is_no_scenario_no_plant_no_measure_and_no_comparison_is_told(tmp_p
     with pytest.raises(pc.InputError, match="plant = 3"):
         pc.compare("projection", scenario(plant=3))
     compared = pc.compare("projection", scenario(duration=0.05), rollouts=1, progress=False)
-    with pytest.raises(pc.InputError, match="expected a Comparison"):
-        pc.save_comparison(compared.runs["projection"], tmp_path / "page.html")
-    with pytest.raises(pc.InputError, match=r"is a Comparison.*scenario_figure"):
-        pc.comparison_figure(compared)
     for law, measure in (("plan", "contour_peak"), ("projection", "contour")):
         for ask in (compared.mean, compared.spread):
             with pytest.raises(pc.UnknownNameError, match="expected one of"):

@@ -50,6 +50,13 @@ def test_the_figure_draws_the_measures_of_each_law_around_the_event(jam):
         pc.scenario_figure(jam.runs["projection"])
 
 
+def test_what_is_no_comparison_or_is_one_is_told(calm, tmp_path):
+    with pytest.raises(pc.InputError, match="expected a Comparison"):
+        pc.save_comparison(calm.runs["projection"], tmp_path / "page.html")
+    with pytest.raises(pc.InputError, match=r"is a Comparison.*scenario_figure"):
+        pc.comparison_figure(calm)
+
+
 def test_without_an_event_all_of_the_run_is_drawn(calm):
     axes = pc.scenario_figure(calm).axes[0]
     assert axes.get_xlim() == pytest.approx((0.0, 10.0))
@@ -73,6 +80,7 @@ def test_charts_and_slider_of_the_page_mark_the_event(page):
         assert (band["x"] - over["x"]) / over["width"] == pytest.approx(0.40, abs=0.01)
         assert band["width"] / over["width"] == pytest.approx(0.06, abs=0.01)
         assert band["height"] == pytest.approx(over["height"], abs=1)
+        assert film.tab.locator("#track .event").count() == 1
         slider, band = (film.tab.locator(f"#track {part}").bounding_box() for part in ("#scrubber", ".event"))
         assert (band["x"] - slider["x"] - 8) / (slider["width"] - 16) == pytest.approx(0.40, abs=0.01)
         assert band["width"] / (slider["width"] - 16) == pytest.approx(0.06, abs=0.01)
