@@ -148,10 +148,7 @@ class LawWrapper(Controller):
         z = own.reshape(-1, own.shape[-1])
         q, qd = (np.broadcast_to(part, (*own.shape[:-1], self.robot.n)).reshape(len(z), -1) for part in (q, qd))
         at_rest, at_full = (self.inner.at_speed(np.full(len(z), w)) for w in (0.0, 1.0))
-        held = at_rest.law(0.0, q, qd, z)
-        if at_rest._asked is not None:  # it asks self.point
-            return
-        free = at_full.law(0.0, q, qd, z)
+        held, free = (law.law(0.0, q, qd, z) for law in (at_rest, at_full))
         moves = at_full.full_speed(free.s)[1] != 0
         same = (held.sdot == free.sdot) & (held.tau == free.tau).all(-1)
         if (same & moves).any():
