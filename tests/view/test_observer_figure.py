@@ -8,6 +8,8 @@ from numpy.testing import assert_allclose
 
 from pathcontrol import (
     Circle,
+    ControlLoop,
+    Envelope,
     InputError,
     Line,
     Projection,
@@ -71,15 +73,27 @@ def test_a_joint_that_slides_is_pushed_by_a_force():
     assert axes.lines[1].get_ydata()[-1] == pytest.approx(3.0, rel=1e-6)
 
 
-def test_reports_of_pushed_runs_have_it(runs, monkeypatch):
+def logged(arm) -> Run:
+    loop = ControlLoop(
+        Projection(arm, Circle(1.0, 2.0), 800.0, 45.0), 2.5e-3, Envelope(velocity=9.0, lower=-9.0, upper=9.0)
+    )
+    with loop.record() as log:
+        for k in range(5):
+            loop.step([1.0, 0.0], [0.0, 0.0], 2.5e-3 * k)
+    return log.run()
+
+
+def test_reports_of_pushed_runs_have_it(arm, runs, monkeypatch):
+    shown = runs | {"log": logged(arm)}
     monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure: ("png", b""))  # captions are enough
 
     def captions(*names):
-        return [one.caption for one in pictures({name: runs[name] for name in names})]
+        return [one.caption for one in pictures({name: shown[name] for name in names})]
 
     assert CAPTION in captions("alone", "pushed")
     assert CAPTION not in captions("alone")
     assert CAPTION in captions("loaded")
+    assert CAPTION in captions("log")
 
 
 @pytest.mark.filterwarnings("ignore::pathcontrol.PathControlWarning")

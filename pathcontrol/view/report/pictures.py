@@ -93,8 +93,9 @@ def _figures(runs: Mapping[str, Run]) -> Iterator[tuple[str, Figure]]:
 
 
 def _has_more_to_see(run: Run) -> bool:
-    """Return whether more acts on the arm than the friction that its law knows, or a law looks out for that."""
-    return bool(table(run.config, "disturbance")) or halts_at_contacts(run) or run.model is not run.robot
+    """Return whether more may act on the arm than the friction that its law knows, or a law looks out for that."""
+    real = table(run.config, "loop").get("loop") in ("log", "hardware")
+    return real or bool(table(run.config, "disturbance")) or halts_at_contacts(run) or run.model is not run.robot
 
 
 def _draw_ballbar(runs: Run | Mapping[str, Run]) -> Figure | None:
