@@ -21,7 +21,7 @@ from pathcontrol import (
     observer_figure,
     simulate,
 )
-from pathcontrol.view.report.pictures import pictures
+from pathcontrol.view.report.pictures import _has_more_to_see, pictures
 
 CAPTION = "Torques beside those of motors and friction"
 RAIL = load_robot(
@@ -83,17 +83,19 @@ def logged(arm) -> Run:
     return log.run()
 
 
-def test_reports_of_pushed_runs_have_it(arm, runs, monkeypatch):
-    shown = runs | {"log": logged(arm)}
+def test_reports_of_pushed_runs_have_it(runs, monkeypatch):
     monkeypatch.setattr("pathcontrol.view.report.pictures._draw", lambda figure: ("png", b""))  # captions are enough
 
     def captions(*names):
-        return [one.caption for one in pictures({name: shown[name] for name in names})]
+        return [one.caption for one in pictures({name: runs[name] for name in names})]
 
     assert CAPTION in captions("alone", "pushed")
     assert CAPTION not in captions("alone")
-    assert CAPTION in captions("loaded")
-    assert CAPTION in captions("log")
+
+
+def test_so_have_those_of_other_arms_and_of_logs(arm, runs):
+    assert all(map(_has_more_to_see, (runs["loaded"], logged(arm))))
+    assert not _has_more_to_see(runs["alone"])
 
 
 @pytest.mark.filterwarnings("ignore::pathcontrol.PathControlWarning")
