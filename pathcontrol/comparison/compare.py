@@ -16,19 +16,19 @@ from pathcontrol.comparison.laws import Laws, make_laws
 from pathcontrol.comparison.measures import MEASURES, acting_limits, measure
 from pathcontrol.comparison.scenarios import Scenario, make_scenario
 from pathcontrol.control.base import Controller
-from pathcontrol.control.reference_law import ReferenceLaw
 from pathcontrol.control.wrappers.paced import Paced
 from pathcontrol.control.wrappers.speed_override import SpeedOverride
-from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.errors import SimulationError, warn
 from pathcontrol.simulation.engines import Engine, check_engine
 from pathcontrol.simulation.loops import torque_limits
 from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.run_arguments import make_plant
 from pathcontrol.simulation.simulate import simulate
+from pathcontrol.tasks.task import PathTask
 
 _ROUNDING = 1e-7  # rad, m, N m, …
 _BESIDE_OTHERS = 1e-6  # share of the largest mean
+_ELSEWHERE = 1e-3  # rad, m: points of the path that are no other place for an event
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,31 +175,28 @@ def compare(
         scenario = make_scenario(scenario)
     expect("scenario", scenario, Scenario)
     made = make_laws(laws, scenario.robot, scenario.task, scenario.gains, scenario.laws, scenario.pattern)
-    _warn_of_starts(made, scenario)
     if engine is not None:
         check_engine(engine)
     starts = scenario.starts(rollouts, seed)
     calm = scenario.calm
     runs = {name: _run(law, scenario, starts, engine, progress) for name, law in made.items()}
+    _warn_of_starts(runs, scenario.task, starts)
     others = runs if calm is scenario else {n: _run(law, calm, starts, engine, progress) for n, law in made.items()}
     end = None if scenario.event is None or scenario.event[1] >= scenario.duration else scenario.event[1]
     measures = {name: _measure(law, runs[name], others[name], scenario, end) for name, law in made.items()}
     return Comparison(scenario, made, runs, others, measures)
 
 
-def _warn_of_starts(laws: Mapping[str, Controller], scenario: Scenario) -> None:
-    """Warn of laws that begin elsewhere than the known ones, so that an event catches them at another place."""
-    if not scenario.task.closed:
+def _warn_of_starts(runs: Mapping[str, Run], task: PathTask, starts: Array) -> None:
+    """Warn of laws that began at s0 where another point is nearer, so that an event caught them at another place."""
+    if not task.closed:
         return
-    behind = [
-        repr(name)
-        for name, law in laws.items()
-        if law.start_at == "s0" and not isinstance(unwrap(law), ReferenceLaw)  # whose s is where the arm is
-    ]
-    if behind:
+    away = np.abs(task.q_d(np.array(task.s0)) - task.q_d(task.sigma_bar(starts))).max()
+    elsewhere = [repr(name) for name, run in runs.items() if (run.array("s")[:, 0] == task.s0).all()]
+    if elsewhere and away > _ELSEWHERE:
         warn(
-            f"{', '.join(behind)} of this comparison begins at s0 of the closed path, wherever the arm is, and the "
-            "known laws at the nearest point, so that an event catches them at other places; make it with "
+            f"{', '.join(elsewhere)} of this comparison began at s0 of the closed path, wherever the arm was, and the "
+            "known laws at the nearest point, so that an event caught them at other places; make it with "
             "start='nearest'"
         )
 

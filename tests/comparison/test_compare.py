@@ -23,6 +23,13 @@ class Mine(pc.ComputedTorque):
     """Computed torque under another name."""
 
 
+class Near(pc.ComputedTorque):
+    """Computed torque that begins near the arm by itself."""
+
+    def start(self, q, qd):
+        return self.task.sigma_bar(q)[..., None]
+
+
 @pytest.fixture(scope="module")
 def jam():
     return pc.compare(None, "jammed-joint", progress=False)
@@ -210,8 +217,10 @@ def test_a_law_that_begins_elsewhere_than_the_known_ones_is_told(arm, recwarn):
     follows = pc.Projection(scenario.robot, scenario.task, 800.0, [45.0, 100.0])
     line = pc.Line([0.2, 0.1], [1.0, 1.2], 0.8)
     opened = pc.Scenario("line", "A line.", arm, line, [0.2, 0.1], 0.05)
-    pc.compare({"here": here, "mine": follows, "known": "pd_plus"}, scenario, rollouts=1, progress=False)
+    near = Near(scenario.robot, scenario.task, 800.0, [45.0, 100.0])
+    pc.compare({"here": here, "mine": follows, "known": "pd_plus", "near": near}, scenario, rollouts=1, progress=False)
     pc.compare({"open": Mine(arm, line, 800.0, 50.0)}, opened, rollouts=1, progress=False)
+    pc.compare(there, replace(scenario, q=scenario.task.q_d(np.array(0.0))), rollouts=1, progress=False)
     assert not recwarn.list
     with pytest.warns(pc.PathControlWarning, match=r"'there', 'paced' of .* start='nearest'"):
         pc.compare({"there": there, "paced": pc.Paced(there), "here": here}, scenario, rollouts=1, progress=False)
