@@ -77,6 +77,8 @@ class Own(pc.Disturbance):
     [
         ({"torque": lambda self, t, q, qd: None}, r"Own.torque .*"),
         ({"torque": lambda self, q, qd: q}, r"Own.torque fails for 1 rollouts of 2 joints: .*argument"),
+        ({"torque_factor": lambda self, t: np.ones(3)}, r"Own.torque_factor fails for 1 rollouts of 2 joints: .*shape"),
+        ({"torque_factor": lambda self, t: -0.5}, r"Own.torque_factor gives -0.5 at the start, expected shares from 0"),
         ({"torque": lambda self, t, q, qd: q[:, 5]}, r"Own.torque fails for 1 rollouts of 2 joints: index 5"),
         ({"torque": lambda self, t, q, qd: np.full(2, np.nan)}, r"Own.torque gives \[nan, nan\] at the start"),
         ({"jumps": "now"}, "Own.jumps cannot be used: jumps = 'now', expected numbers"),

@@ -304,6 +304,15 @@ def _check_term(disturbance: Disturbance, torque: Array, q: Array) -> None:
             f"{name}.held_joints has shape {np.shape(held)}, expected {q.shape}: rollouts and joints",
             value=np.shape(held),
         )
+    factor = _try(name, "torque_factor", q, lambda: disturbance.torque_factor(0.0))
+    share = 1.0 if factor is None else _try(name, "torque_factor", q, lambda: np.broadcast_to(factor, q.shape))
+    if not np.all((np.asarray(share) >= 0) & (np.asarray(share) <= 1)):
+        raise InputError(
+            f"{name}.torque_factor gives {np.asarray(factor).tolist()} at the start, expected shares from 0 to 1",
+            argument=name,
+            value=factor,
+            limit=(0.0, 1.0),
+        )
     if not np.isfinite(torque).all():
         raise InputError(
             f"{name}.torque gives {torque.tolist()} at the start, expected numbers", argument=name, value=torque
