@@ -31,6 +31,7 @@ class Form(Enum):
     NUMBER = "a finite number"
     NUMBERS = "a list of finite numbers"
     POSITIVE = "a number greater than 0"
+    POSITIVE_OR_INF = "a number greater than 0, or inf"
     POSITIVES = "a list of numbers greater than 0"
     NOT_NEGATIVE = "a number not below 0"
     DEVIATIONS = "a number not below 0, or a list with one for each joint"

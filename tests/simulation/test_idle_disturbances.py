@@ -6,8 +6,10 @@ import warnings
 
 import numpy as np
 import pytest
+from circle_file import CIRCLE_FILE
 
 import pathcontrol as pc
+from pathcontrol.experiments.runner import load_setup
 
 ARM = pc.load_robot("cicese_2dof")
 LAW = pc.Projection(ARM, pc.Circle(1.0, 2.0), 800.0, [45.0, 100.0])
@@ -79,6 +81,13 @@ def test_a_long_sum_is_as_good_as_a_short_one(tmp_path):
     run.save(tmp_path / "run.nc")
     described = pc.Run.load(tmp_path / "run.nc").config["disturbance"]["terms"]
     assert [one["disturbance"] for one in described] == ["Push"] * 30
+
+
+def test_a_file_says_for_ever_and_rigid_by_inf(tmp_path):
+    text = CIRCLE_FILE + '[disturbance]\ntype = "wall"\nframe = "tool"\npoint = [0.6, 0, 0]\nnormal = [-1, 0, 0]\n'
+    (tmp_path / "wall.toml").write_text(text + "stiffness = inf\nduration = inf\n")
+    wall = load_setup(tmp_path / "wall.toml").disturbance
+    assert (wall.springs[0], wall.duration) == (np.inf, np.inf)
 
 
 def test_disturbances_show_their_parameters():

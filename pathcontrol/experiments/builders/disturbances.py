@@ -21,7 +21,7 @@ from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.arm.disturbance import Disturbance, check_disturbance
 
 _ARGUMENT = re.compile(r"disturbance(?:\[(\d+)\])?\.(\w+)(?:\[\d+\])*")
-_NUMBERS = (Form.NUMBER, Form.NUMBERS, Form.POSITIVE, Form.GAIN)
+_NUMBERS = (Form.NUMBER, Form.NUMBERS, Form.POSITIVE, Form.POSITIVE_OR_INF, Form.GAIN)
 
 
 def build_disturbance(

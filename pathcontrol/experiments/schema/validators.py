@@ -94,6 +94,7 @@ _TESTS: dict[Form, Callable[[Any], bool]] = {
     Form.NUMBER: _is_number,
     Form.NUMBERS: _list_of(_is_number),
     Form.POSITIVE: _is_positive,
+    Form.POSITIVE_OR_INF: _is_limit,
     Form.POSITIVES: _list_of(_is_positive),
     Form.NOT_NEGATIVE: _is_not_negative,
     Form.DEVIATIONS: _either(_is_not_negative, _list_of(_is_not_negative)),

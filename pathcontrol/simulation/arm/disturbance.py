@@ -20,7 +20,7 @@ from pathcontrol.simulation.summaries import summarize
 from pathcontrol.tasks.profile import plain_attributes
 
 Begin = Annotated[ArrayLike, Form.NUMBER, Unit("s")]
-Span = Annotated[ArrayLike, Form.POSITIVE, Unit("s")]
+Span = Annotated[ArrayLike, Form.POSITIVE_OR_INF, Unit("s")]
 Frequency = Annotated[ArrayLike, Form.NUMBER, Unit("Hz")]
 Phase = Annotated[ArrayLike, Form.NUMBER, Unit("rad")]
 

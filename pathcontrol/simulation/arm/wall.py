@@ -48,7 +48,7 @@ class Wall(TimedDisturbance):
         frame: str,
         point: Point,
         normal: Direction,
-        stiffness: Annotated[ArrayLike, Form.POSITIVE, Unit("N/m")] | None = None,
+        stiffness: Annotated[ArrayLike, Form.POSITIVE_OR_INF, Unit("N/m")] | None = None,
         friction: Annotated[ArrayLike, Form.NUMBER] = 0.0,
         rigid: bool = False,
         damping: Annotated[ArrayLike, Form.NUMBER, Unit("N s/m")] | None = None,
