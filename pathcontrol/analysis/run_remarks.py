@@ -9,6 +9,7 @@ from pathcontrol._expect import expect
 from pathcontrol.analysis.limit_shares import RATIOS, find_worst_shares, is_passed
 from pathcontrol.analysis.progress import ENOUGH, progress
 from pathcontrol.analysis.run_metrics import end_error, metrics
+from pathcontrol.analysis.speed_factor import speed_factor
 from pathcontrol.analysis.window import samples_of
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.checks.friction_knowledge import advise_on_dry_friction
@@ -18,6 +19,7 @@ from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.task import PathTask
 
 _STILL = 1e-6  # rad or m, the largest motion of an arm that stands still
+_HELD = 1e-6  # of the speed of a profile, at which a plan stands still
 _TIMES = 2.0  # limits, from which a share is not said in percent
 _NEAR = float(np.deg2rad(2.0))  # rad, within which an arm is at a point of its path: the band of the metrics
 _LARGE = 0.05  # of the size of a path, which is near on large ones: no fault of a law that follows roughly
@@ -53,7 +55,15 @@ def stands_still(run: Run) -> bool:
 
 def remedy(run: Run) -> str:
     """Return advice for an arm that stands still."""
+    if _is_held(run):
+        return "an operator's input or a contact holds its plan, or sends it back"
     return _advise_on_friction(run) or "give the controller larger gains, or torque limits that hold and move the arm"
+
+
+def _is_held(run: Run) -> bool:
+    """Return whether the plan of the first rollout was held at the end by what wraps its law, or went back."""
+    wrapped = bool(laws(run.config)[-1].get("wrappers"))
+    return wrapped and bool(speed_factor(run)[0, -1] <= _HELD)
 
 
 def _find_faults(run: Run) -> dict[str, str]:

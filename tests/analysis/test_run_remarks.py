@@ -78,3 +78,13 @@ def test_shares_far_beyond_a_limit_are_told_as_multiples():
     ratio = pc.metrics(run)["torque_limit_ratio"][0]
     assert ratio > 2
     assert f"reached {ratio:.3g} times its limit" in said
+
+
+@pytest.mark.parametrize(("u", "held"), [([[0.1, 0.0]], True), (-0.5, True), (1.0, False)])
+def test_an_arm_that_an_operator_holds_is_not_given_larger_gains(u, held):
+    law = pc.SpeedOverride(pc.ExtendedMotionPlan(arm(), LINE, 400.0, 40.0, 20.0), u)
+    jam = None if held else pc.JammedJoint(0, 0.0, 9.0) + pc.JammedJoint(1, 0.0, 9.0)
+    run = pc.simulate(law, LINE.start, duration=2.0, disturbance=jam, progress=False)
+    said = pc.remarks(run)[-1]
+    assert ("holds its plan" in said) is held
+    assert ("larger gains" in said) is not held

@@ -29,7 +29,8 @@ class SpeedOverride(LawWrapper):
             one step is [[t, u]].
         acceleration: largest |ẇ| [1/s]. At 10 the plan comes from full speed to rest in a tenth of a second; the
             acceleration along the path is ẇ‖q_d'ϑ‖ [rad/s²], the torque for it M(q)q_d'ϑẇ [N m]. By default it is what
-            the torque limits of the law's model leave beside the motion everywhere on the path, from 2 to 10.
+            the torque limits of the law's model leave beside the motion everywhere on the path, from 2 to 10; of a
+            batch of tasks, on all of their paths.
 
     Raises:
         InputError: u is not from −2 to 2, also while the law runs, or an argument has the wrong shape.
