@@ -112,6 +112,13 @@ def loop_number(run: Run, name: str) -> float:
     return number if 0.0 <= number < np.inf else 0.0
 
 
+def split_loop_delay(run: Run) -> tuple[int, float]:
+    """Return the whole periods of the delay of a loop, and the share of a period that is left."""
+    period = loop_number(run, "period")
+    whole, late = split_delay(loop_number(run, "delay"), period) if period else (0, 0.0)
+    return whole, late / period if late else 0.0
+
+
 def _velocity_age(run: Run) -> float:
     """Return how long ago [s] the arm had the velocity of a sample: half a period for a difference of positions."""
     by_difference = table(run.config, "loop").get("velocity") == "difference"

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.torque_limits import torque_limits
+from pathcontrol.analysis.torque_limits import recorded_limits, torque_limits, torque_shares
 from pathcontrol.analysis.window import Samples
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
@@ -50,7 +50,7 @@ def limit_shares(run: Run) -> dict[str, Array]:
         if "tau" in run:
             limits = stack_torque_limits(run)
             limits = np.where(np.isfinite(limits), limits, np.nan)
-            shares["torque_limit_ratio"] = np.abs(run.array("tau")) / limits[:, None]
+            shares["torque_limit_ratio"] = torque_shares(run.array("tau"), limits)
     return shares
 
 
@@ -81,7 +81,12 @@ def list_robots(run: Run) -> Sequence[RobotModel | None]:
 
 
 def stack_torque_limits(run: Run) -> Array:
-    """Return torque limits [N m], (rollout, n); inf without one, or where the run does not know its robot."""
+    """Return torque limits [N m], (rollout, 1 or time, n); inf without one, or where the run does not know its robot.
+
+    Where a disturbance lowers them they are what is left from each sample on.
+    """
+    if "tau_limit" in run:
+        return recorded_limits(run)
     robots = list_robots(run)
     each = {id(robot): torque_limits(run, robot) for robot in robots}
     return np.array([each[id(robot)] for robot in robots])

@@ -158,7 +158,8 @@ def metrics(
     All of a rollout's time counts for: settling time [s] of ‖e_p‖ into ``band`` [rad]; largest torque demand and
     largest torque that acted [N m], over all joints; the largest share that a demand has of its limit; the largest
     shares that position, velocity and torque have of their limits, ``position_limit_ratio``, ``velocity_limit_ratio``
-    and ``torque_limit_ratio``, above 1 where a limit is passed; shares are left out where nothing is limited.
+    and ``torque_limit_ratio``, above 1 where a limit is passed; shares are left out where nothing is limited. Limits
+    of torques are those that act, as a :class:`TorqueLimitDrop` leaves them, for a demand while it acts.
 
     What says whether the arm went along the path at all: ``progress``, the share of what was to be passed that s has
     passed, see :func:`~pathcontrol.analysis.progress.progress`; ``coverage``, the share of the path's length to which

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
+from pathcontrol.analysis.disturbance_estimate import split_loop_delay
 from pathcontrol.analysis.limit_shares import stack_torque_limits
 from pathcontrol.analysis.lost_samples import find_lost
+from pathcontrol.analysis.torque_limits import torque_shares
 from pathcontrol.analysis.window import Samples
 from pathcontrol.simulation.config import laws
 from pathcontrol.simulation.run import Run
@@ -26,7 +28,8 @@ def torque_metrics(run: Run, own: Samples, counted: Samples) -> dict[str, Array]
     values = {f"{name}_peak": own.reduce(_peak, run.array(name)).max(-1) for name in (_DEMAND, "tau") if name in run}
     limits = stack_torque_limits(run)
     if np.isfinite(limits).any():
-        values["tau_demand_ratio"] = (own.reduce(_peak, run.array(_DEMAND)) / limits).max(-1)
+        shares = torque_shares(run.array(_DEMAND), _when_acting(limits, run))
+        values["tau_demand_ratio"] = own.reduce(_peak, shares).max(-1)
     lost = find_lost(run, filtered=False)
     noise = _expand_joints(counted.reduce(_noise, run.array(_DEMAND), _compensated_direction(run), lost), run)
     values["tau_noise"] = noise.max(-1)
@@ -36,6 +39,14 @@ def torque_metrics(run: Run, own: Samples, counted: Samples) -> dict[str, Array]
             gains = np.divide(noise, heard, out=0.0 * heard, where=heard > 0)
             values["noise_amplification"] = gains.max(-1)
     return values
+
+
+def _when_acting(limits: Array, run: Run) -> Array:
+    """Return the least of the limits (rollout, 1 or time, n) while a demand acts, which a delay makes later."""
+    whole, late = split_loop_delay(run)
+    last = limits.shape[1] - 1
+    begin = np.minimum(np.arange(last + 1) + whole, last)
+    return np.minimum(limits[:, begin], limits[:, np.minimum(begin + (late > 0), last)])
 
 
 def noise_deviation(values: Array, left_out: NDArray[np.bool_] | None = None) -> Array:

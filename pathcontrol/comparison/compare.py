@@ -13,12 +13,13 @@ from pathcontrol._expect import expect, expect_choice
 from pathcontrol._json import to_json
 from pathcontrol.analysis.readable import unit_of_joints
 from pathcontrol.comparison.laws import Laws, make_laws
-from pathcontrol.comparison.measures import MEASURES, acting_limits, measure
+from pathcontrol.comparison.measures import MEASURES, measure
 from pathcontrol.comparison.scenarios import Scenario, make_scenario
 from pathcontrol.control.base import Controller
 from pathcontrol.control.wrappers.paced import Paced
 from pathcontrol.control.wrappers.speed_override import SpeedOverride
 from pathcontrol.errors import SimulationError, warn
+from pathcontrol.simulation.acting_limits import acting_limits
 from pathcontrol.simulation.engines import Engine, check_engine
 from pathcontrol.simulation.loops import torque_limits
 from pathcontrol.simulation.run import Run
@@ -204,7 +205,7 @@ def _warn_of_starts(runs: Mapping[str, Run], task: PathTask, starts: Array) -> N
 def _measure(law: Controller, run: Run, calm: Run, scenario: Scenario, event_end: float | None) -> dict[str, Array]:
     """Return the measures of the run of one law."""
     limits = torque_limits(scenario.loop, make_plant(scenario.plant, law))
-    return measure(run, calm, scenario.window, event_end, acting_limits(limits, scenario.disturbance, run))
+    return measure(run, calm, scenario.window, event_end, acting_limits(limits, scenario.disturbance, run.time))
 
 
 def _run(law: Controller, scenario: Scenario, starts: Array, engine: Engine | None, progress: bool) -> Run:

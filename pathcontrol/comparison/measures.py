@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.analysis.power.torque_account import acting_torque
 from pathcontrol.analysis.run_metrics import contour_error, lag_error, settling_time
-from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.task import PathTask
 
@@ -129,16 +128,3 @@ def energy(run: Run, first: int, stop: int) -> Array:
 def is_at_limit(run: Run, limits: Array) -> NDArray[np.bool_]:
     """Return whether the torque of any joint is at its limit from each sample on, (rollout, time)."""
     return np.asarray((np.abs(run.array("tau")) >= _AT_LIMIT * limits).any(-1))
-
-
-def acting_limits(limits: Array | None, disturbance: Disturbance | None, run: Run) -> Array | None:
-    """Return torque limits [N m], (n,) or (N, n), as a disturbance leaves them from each sample of a run on.
-
-    They are to be broadcast to (rollout, time, n); ``None`` where there are none.
-    """
-    if limits is None:
-        return None
-    limits, middle = limits[..., None, :], run.time + 0.5 * (run.time[1] - run.time[0] if len(run.time) > 1 else 0.0)
-    shares = [] if disturbance is None else [disturbance.torque_factor(t) for t in middle]
-    left = [np.broadcast_to(share, run.array("tau")[:, 0].shape) for share in shares if share is not None]
-    return limits * np.stack(left, axis=1) if left else limits

@@ -11,7 +11,7 @@ from pathcontrol.control.base import ControlOutput
 from pathcontrol.errors import InputError
 from pathcontrol.simulation.arm.sensors import Reading
 from pathcontrol.simulation.record_memory import new_block
-from pathcontrol.simulation.variables import VARIABLES
+from pathcontrol.simulation.variables import RECORDED
 
 _LARGEST = 2**31 - 1  # bytes of a sample, which NumPy's types of records allow
 _ROOM = 1 << 30  # bytes reserved at first; pages that are not written take no memory
@@ -35,7 +35,7 @@ class Recorder:
     def __init__(self, rollouts: int, joints: int, samples: int) -> None:
         self._most, self._samples = samples, 0
         whole = {"rollout": rollouts, "joint": joints}
-        shapes = {name: tuple(whole[dim] for dim in dims if dim in whole) for name, (dims, _, _) in VARIABLES.items()}
+        shapes = {name: tuple(whole[dim] for dim in dims if dim in whole) for name, (dims, _, _) in RECORDED.items()}
         fields = [(name, bool if name == "regular" else np.float64, shape) for name, shape in shapes.items()]
         if sum(8 * prod(shape) for shape in shapes.values()) > _LARGEST:
             raise InputError(
@@ -50,7 +50,7 @@ class Recorder:
         """Store one more sample: true state, measurement, output of the law and the torque that acts."""
         if self._samples >= len(self._block):
             self._reserve_block(1)
-        values = (q, qd, *reading, out.tau, tau, out.s, out.sdot, out.e_p, out.e_v, out.regular)  # as in VARIABLES
+        values = (q, qd, *reading, out.tau, tau, out.s, out.sdot, out.e_p, out.e_v, out.regular)  # as in RECORDED
         for column, value in zip(self._columns, values, strict=True):
             column[self._samples] = value
         self._samples += 1
@@ -63,7 +63,7 @@ class Recorder:
     def reserve(self, samples: int) -> dict[str, Array]:
         """Return views of the room for the next ``samples``, (samples, rollout, …), to be written and then added."""
         block = self._reserve_block(samples)
-        return {name: block[name] for name in VARIABLES}
+        return {name: block[name] for name in RECORDED}
 
     def add(self, samples: int) -> None:
         """Count ``samples`` that have been written into the room for them."""
@@ -75,7 +75,7 @@ class Recorder:
 
     def arrays(self) -> dict[str, Array]:
         """Return all samples, rollouts first; room that was not written takes no memory."""
-        return {name: self._block[name][: self._samples].swapaxes(0, 1) for name in VARIABLES}
+        return {name: self._block[name][: self._samples].swapaxes(0, 1) for name in RECORDED}
 
     def _reserve_block(self, samples: int) -> Array:
         """Return the room for the next ``samples``; it doubles, as a run may end long before its duration."""
@@ -91,4 +91,4 @@ class Recorder:
     def _use_block(self, block: Array) -> None:
         """Store samples in ``block``, a variable in each of its columns."""
         self._block = block
-        self._columns = [block[name] for name in VARIABLES]
+        self._columns = [block[name] for name in RECORDED]

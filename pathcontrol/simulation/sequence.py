@@ -13,6 +13,7 @@ from pathcontrol._expect import describe
 from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.errors import InputError
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.acting_limits import record_limits
 from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.divergence import Divergence
 from pathcontrol.simulation.engines import Engine, check_engine
@@ -135,6 +136,7 @@ def simulate_sequence(
     described = {"controller": f"{paths} with {names}", "sequence": [law.describe() for law in laws]}
     config = make_config(described, robot, loop, disturbance, duration=durations.tolist(), laps=laps, **ready.engine)
     time = period * np.arange(arrays["s"].shape[1])
+    arrays = arrays | record_limits(arrays, time, loop, robot, disturbance)
     run = Run.from_arrays(
         time, map_position_units(robot), arrays, config, outcome, robot=robot, task=whole, model=laws[0].robot
     )

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import as_scalar, check_whole
 from pathcontrol.control.base import Controller, check_controller
 from pathcontrol.robot.model import RobotModel
+from pathcontrol.simulation.acting_limits import record_limits
 from pathcontrol.simulation.arm.disturbance import Disturbance
 from pathcontrol.simulation.checks.slips import warn_if_still
 from pathcontrol.simulation.engines import Engine, check_engine
@@ -104,6 +105,7 @@ def simulate(
     if controller.task.closed:
         outcome["laps"] = count_laps(controller.task, *first_and_last(arrays["s"]))
     time = period * np.arange(arrays["s"].shape[1])
+    arrays = arrays | record_limits(arrays, time, loop, robot, disturbance)
     run = Run.from_arrays(
         time,
         map_position_units(robot),

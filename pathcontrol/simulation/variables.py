@@ -10,6 +10,11 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "qd_measured": (("rollout", "time", "joint"), "rad/s", "joint velocity as the controller sees it"),
     "tau_demand": (("rollout", "time", "joint"), "N m", "torque the control law asks for"),
     "tau": (("rollout", "time", "joint"), "N m", "torque that acts from this moment on"),
+    "tau_limit": (
+        ("rollout", "time", "joint"),
+        "N m",
+        "its limit, in runs where rollouts differ in it or a disturbance lowers it",
+    ),
     "s": (("rollout", "time"), "1", "path parameter"),
     "sdot": (("rollout", "time"), "1/s", "rate of the path parameter"),
     "e_p": (("rollout", "time", "joint"), "rad", "position error q_d(s) - q as the controller sees it"),
@@ -24,11 +29,13 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
         "0 where the path parameter was undefined, or the law missed its tick, and the last one kept",
     ),
 }
+#: the variables that are recorded tick by tick, in this order
+RECORDED = {name: variable for name, variable in VARIABLES.items() if name != "tau_limit"}
 
 
 def bytes_of_sample(joints: int) -> int:
     """Return the memory of one sample of one rollout of an arm with ``joints``."""
-    return sum(8 * (joints if "joint" in dims else 1) for dims, _, _ in VARIABLES.values())
+    return sum(8 * (joints if "joint" in dims else 1) for dims, _, _ in RECORDED.values())
 
 
 #: every outcome of a run: (dimensions, unit, meaning); coordinates of its data

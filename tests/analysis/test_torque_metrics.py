@@ -137,6 +137,41 @@ def test_each_rollout_has_the_limits_of_its_own_arm(arm, circle):
         assert pc.metrics(run)["tau_demand_ratio"][i] == pc.metrics(run.rollout(i))["tau_demand_ratio"][0]
 
 
+@pytest.mark.parametrize("delay", [0.0, 2.5e-3, 4e-3])
+@pytest.mark.parametrize("rollouts", [3, 40])  # of 40 the configuration keeps a summary only
+def test_shares_are_of_the_limits_that_act(arm, circle, tmp_path, rollouts, delay):
+    limits = np.array([60.0, 12.0]) * np.linspace(0.5, 1.0, rollouts)[:, None]
+    left, begin = np.linspace(0.1, 0.9, rollouts), np.linspace(0.0, 0.1, rollouts)
+    drop = pc.TorqueLimitDrop(left[:, None], begin, 0.1)
+    law = pc.ExtendedMotionPlan(arm, circle, 800.0, [45.0, 100.0], 20.0)
+    loop = pc.SampledLoop(torque_limits=limits, delay=delay)
+    run = pc.simulate(law, START, duration=0.25, loop=loop, disturbance=drop, progress=False)
+    middle = run.time + 0.5 * loop.period - begin[:, None]
+    share = np.where((middle >= 0) & (middle < 0.1), left[:, None], 1.0)[..., None]
+    acting, demand = share * limits[:, None], np.abs(run.array("tau_demand"))
+    periods = {0.0: [0], 2.5e-3: [1], 4e-3: [1, 2]}[delay]  # in which a demand acts
+    asked = [(demand[:, : len(run.time) - later] / acting[:, later:]).max((1, 2)) for later in periods]
+    acted = (np.abs(run.array("tau")) / acting).max((1, 2))
+    run.save(tmp_path / "run.nc")
+    for one in (run, pc.Run.load(tmp_path / "run.nc")):
+        numbers = pc.metrics(one, only=("torque_limit_ratio", "tau_demand_ratio"))
+        np.testing.assert_allclose(numbers["torque_limit_ratio"], acted, rtol=1e-12)
+        np.testing.assert_allclose(numbers["tau_demand_ratio"], np.max(asked, axis=0), rtol=1e-12)
+        for name, value in numbers.items():
+            assert pc.metrics(one.rollout(1))[name] == [value[1]]
+
+
+def test_a_motor_without_any_torque_is_asked_for_infinitely_more(arm, circle):
+    law = pc.ExtendedMotionPlan(arm, circle, 800.0, [45.0, 100.0], 20.0)
+    dead = pc.TorqueLimitDrop([1.0, 0.0], 0.05)
+    free = pc.SampledLoop(torque_limits=[np.inf, 15.0])  # and of no limit no drop leaves one
+    for loop in (pc.SampledLoop(torque_limits=True), free):
+        run = pc.simulate(law, START, duration=0.1, loop=loop, disturbance=dead, progress=False)
+        numbers = pc.metrics(run)
+        assert numbers["tau_demand_ratio"] == [np.inf]
+        assert 0 < numbers["torque_limit_ratio"][0] <= 1
+
+
 def test_the_unit_of_the_amplification_follows_the_joints(arm, circle):
     law = pc.ExtendedMotionPlan(arm, circle, 800.0, [45.0, 100.0], 20.0)
     run = pc.simulate(law, START, duration=0.1, progress=False)

@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 from sliding_arm import sliding_arm
 
 import pathcontrol as pc
-from pathcontrol.comparison.measures import MEASURES, RECOVERED, acting_limits, energy, measure, recovery_time
+from pathcontrol.comparison.measures import MEASURES, RECOVERED, energy, measure, recovery_time
+from pathcontrol.simulation.acting_limits import acting_limits
 from pathcontrol.simulation.variables import VARIABLES
 
 TIME = np.linspace(0.0, 4.0, 4001)
@@ -111,12 +112,12 @@ def test_saturated_is_at_the_limits_that_a_drop_leaves(arm, factor):
     limits = arm.limits.effort
     drop = pc.TorqueLimitDrop(factor, start=1.0, duration=2.0) + pc.TorqueLimitDrop(0.5, start=2.0, duration=1.0)
     run = made(arm, tau=0.125 * limits)
-    left = acting_limits(limits, drop, run)
+    left = acting_limits(limits, drop, run.time)
     for time, share in ((0.5, 1.0), (1.5, np.asarray(factor)), (2.5, 0.5 * np.asarray(factor)), (3.5, 1.0)):
         assert_allclose(left[0, TIME.searchsorted(time)], np.ravel(share * limits))
     assert_allclose(measure(run, made(arm), (0.0, 4.0), None, left)["saturated_s"], 1.0, atol=1e-9)
-    assert acting_limits(None, drop, run) is None
-    assert_allclose(acting_limits(limits, None, run), limits[None])
+    assert acting_limits(None, drop, run.time) is None
+    assert_allclose(acting_limits(limits, None, run.time), limits[None, None])
 
 
 @given(st.floats(1e-3, 0.1), st.floats(0.5, 5.0))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pathcontrol._arrays import Array, average_neighbours
-from pathcontrol.analysis.disturbance_estimate import loop_number, split_unexplained
+from pathcontrol.analysis.disturbance_estimate import split_loop_delay, split_unexplained
 from pathcontrol.analysis.power.closed_loop_theorems import Energy, LoopState, Theorem
 from pathcontrol.analysis.power.law_of_run import LawRecord, has_demand
 from pathcontrol.analysis.torque_limits import torque_limits
@@ -19,7 +19,6 @@ from pathcontrol.robot.friction import viscous_of
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.simulation.config import table
 from pathcontrol.simulation.run import Run
-from pathcontrol.simulation.sampled import split_delay
 
 _SIMULATED = ("sampled", "continuous")
 _AT_LIMIT = 1 - 1e-9
@@ -125,7 +124,7 @@ def _may_be_pushed(run: Run) -> bool:
 
 def acting_torque(run: Run) -> tuple[Array, Array]:
     """Return the torque that acts after each sample and before the next one, (k − 1, N, n) each; means where held."""
-    tau, late = run.array("tau").swapaxes(0, 1), _split_delay(run)[1]
+    tau, late = run.array("tau").swapaxes(0, 1), split_loop_delay(run)[1]
     if not is_sampled(run):
         return tau[:-1], tau[1:]
     held = late * tau[:-1] + (1 - late) * tau[1:] if late else tau[:-1]
@@ -137,7 +136,7 @@ def _demand(run: Run, record: LawRecord, acting: tuple[Array, Array]) -> tuple[A
 
     Of a log that has no demands it is what acted, unless that is at a limit and the law asks for more.
     """
-    demand, (whole, late) = record.demand, _split_delay(run)
+    demand, (whole, late) = record.demand, split_loop_delay(run)
     if not has_demand(run):
         limits, tau = _AT_LIMIT * torque_limits(run, run.robot), acting[0]
         beyond = (np.abs(tau) >= limits) & (demand[:-1] * np.sign(tau) > np.abs(tau))
@@ -153,13 +152,6 @@ def _demand(run: Run, record: LawRecord, acting: tuple[Array, Array]) -> tuple[A
 def is_sampled(run: Run) -> bool:
     """Return whether torques were held from one sample to the next, as in every loop but that of continuous time."""
     return table(run.config, "loop").get("loop") != "continuous"
-
-
-def _split_delay(run: Run) -> tuple[int, float]:
-    """Return the whole periods of the delay of a loop, and the share of a period that is left."""
-    period = loop_number(run, "period")
-    whole, late = split_delay(loop_number(run, "delay"), period) if period else (0, 0.0)
-    return whole, late / period if late else 0.0
 
 
 def _delay(values: Array, ticks: int) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from pathcontrol.analysis.limit_shares import RATIOS, limit_shares
 from pathcontrol.analysis.readable import in_degrees
 from pathcontrol.analysis.tool_following import feed_along, find_tool, tool_speed
-from pathcontrol.analysis.torque_limits import torque_limits
+from pathcontrol.analysis.torque_limits import torque_limits, torque_shares
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.view.animation.charts.chart import Chart, Curve, Entry
 from pathcontrol.view.animation.charts.joint_curves import joint_curves
@@ -98,11 +98,11 @@ def _torques(drawn_rollout: DrawnRollout, index: int, several: bool) -> list[Ent
         return []
     tau, joints = recording.run.array("tau")[0], recording.robot.joint_names
     limits = torque_limits(recording.run, recording.robot)
-    limited = np.flatnonzero(np.isfinite(limits))
+    limited = np.flatnonzero(np.isfinite(limits).any(0))
     if not len(limited):
         lines = np.abs(tau).max(-1)[:, None] if several else tau
         return [("torque", recording.run.unit("tau"), joint_curves(recording, index, several, lines, joints))]
-    share = 100 * tau[:, limited] / limits[limited]
+    share = np.sign(tau[:, limited]) * 100 * torque_shares(tau[:, limited], limits[:, limited])
     share = np.abs(share).max(-1)[:, None] if several else share
     curves = joint_curves(recording, index, several, share, [joints[j] for j in limited])
     ends, signs = recording.time[[0, -1]], (1.0,) if several else (1.0, -1.0)

@@ -1,0 +1,46 @@
+"""The torque limits that act in a run, where they are not the same all the time and for all rollouts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pathcontrol._arrays import Array
+from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.loops import Arm, ContinuousTime, SampledLoop, torque_limits
+
+
+def record_limits(
+    arrays: Mapping[str, Array],
+    time: Array,
+    loop: SampledLoop | ContinuousTime,
+    robot: Arm,
+    disturbance: Disturbance | None,
+) -> dict[str, Array]:
+    """Return the variable ``tau_limit`` of a run with these ``arrays``, or none where its configuration says enough."""
+    limits = acting_limits(torque_limits(loop, robot), disturbance, time)
+    if limits is None or (limits == limits[:1, :1]).all():
+        return {}
+    tau = arrays["tau"]
+    left, gone = np.broadcast_to(limits, tau.shape), np.isnan(tau)
+    return {"tau_limit": np.where(gone, np.nan, left) if gone.any() else left}
+
+
+def acting_limits(limits: Array | None, disturbance: Disturbance | None, time: Array) -> Array | None:
+    """Return torque limits [N m], (n,) or (N, n), as a disturbance leaves them from each time of a run on.
+
+    They are (1 or N, 1 or time, n); ``None`` where there are none.
+    """
+    if limits is None:
+        return None
+    limits, middle = np.atleast_2d(limits), time + 0.5 * (time[1] - time[0] if len(time) > 1 else 0.0)
+    shares = [] if disturbance is None else [disturbance.torque_factor(t) for t in middle]
+    left = [limits if share is None else _lower(limits, share) for share in shares]
+    return np.stack(np.broadcast_arrays(*left), axis=1) if left else limits[:, None]
+
+
+def _lower(limits: Array, share: Array) -> Array:
+    """Return a share of limits; of no limit, inf, nothing is 0."""
+    with np.errstate(invalid="ignore"):
+        return np.where(share == 0, 0.0, limits * share)
