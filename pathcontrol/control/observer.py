@@ -113,8 +113,12 @@ class MomentumObserver:
         memory[..., 3 * n : 4 * n] += change
 
     def wait(self, memory: Array, time: float) -> None:
-        """Let ``time`` [s] pass beside that of the ticks, in which the last torque goes on, in the memory itself."""
+        """Let ``time`` [s] more than a period pass, in which the last torque goes on, in the memory itself."""
         memory[..., 4 * self.robot.n] -= time
+
+    def has_seen(self, memory: Array) -> bool:
+        """Return whether the memory (4n + 1,) is that of a tick, and not of the start."""
+        return bool(memory[-1] > 0.5 * _NEVER)
 
     def elapsed(self, t: float, memory: Array) -> Array:
         """Return the time from the tick before to t [s], (*batch,), 0 at the first tick."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pathcontrol._arrays import Array, as_joint_array, as_scalar
 from pathcontrol._milliseconds import as_period
-from pathcontrol.control.base import Controller, check_controller
+from pathcontrol.control.base import Controller, ControlOutput, check_controller
 from pathcontrol.control.law_gains import refuse_several_gains
 from pathcontrol.control.wrappers.override_rule import Override, check_one_speed
 from pathcontrol.control.wrappers.wrapper import LawWrapper
@@ -36,8 +36,9 @@ class ControlTick:
     observers and wrappers; other laws are run in Python, with the same torques. A law that is wrapped, by
     :class:`SpeedOverride` or another :class:`LawWrapper`, has the methods of its speed input: :meth:`hold`,
     :meth:`resume`, :meth:`override` and :meth:`reverse` act at the next call. An observer takes the returned torques
-    to act up to the next call, within the effort limits of its robot, unless :meth:`act` says which do. A compiled
-    tick keeps the gains, the arm and the task of the law as they are when it is made; speed inputs may change.
+    to act up to the next call, within the effort limits of its robot, unless :meth:`act` says which do; so does a law
+    of one's own that remembers its torque. A compiled tick keeps the gains, the arm and the task of the law as they are
+    when it is made; speed inputs may change.
 
     Args:
         law: any law with one task, and gains for one arm.
@@ -51,8 +52,6 @@ class ControlTick:
             installed.
         InputError: the law is for several rollouts.
     """
-
-    _told: tuple[int, Array]  # the number of calls after which :meth:`act` was told of torques, and these
 
     def __init__(self, law: Controller, period: float) -> None:
         check_controller("law", law)
@@ -76,18 +75,27 @@ class ControlTick:
         n = self.law.robot.n
         position = as_joint_array("q", q, n)
         velocity = np.zeros(n) if qd is None else as_joint_array("qd", qd, n)
-        self._begin(self.law.start(position, velocity))
+        self._tick.start(self.law.start(position, velocity))
 
     @property
     def state(self) -> Array:
         """The state z of the law at the next call, (m,)."""
         return self._tick.state
 
-    def start_from(self, state: ArrayLike) -> None:
+    @property
+    def ticks(self) -> int:
+        """The number of periods for which the law has run at the next call, which is its time."""
+        return self._tick.ticks
+
+    def start_from(self, state: ArrayLike, ticks: int = 0) -> None:
         """Start again from a ``state`` of the law, (m,), as :attr:`state` gives it.
 
+        Args:
+            state: z.
+            ticks: number of periods for which the law has run, where its time goes on.
+
         Raises:
-            InputError: it has another length than the state of this law.
+            InputError: the state has another length than that of this law.
         """
         z, expected = np.array(state, dtype=np.float64), self.state.shape
         if z.shape != expected:
@@ -98,33 +106,31 @@ class ControlTick:
                 limit=expected,
             )
         observer = self.law.inner.observer if isinstance(self.law, LawWrapper) else self.law.observer
-        if observer is not None and z[observer.size] >= 0:  # of a law that runs: its last tick is a period ago
-            z[observer.size] = -self._period
-        self._begin(z)
+        if observer is not None and observer.has_seen(z[1 : 1 + observer.size]):  # its last tick is a period ago
+            z[observer.size] = (ticks - 1) * self._period
+        self._tick.start(z, ticks)
 
     def __call__(self, q: Array, qd: Array) -> Array:
         """Return the torques [N m], (n,), for measured q [rad] and q̇ [rad/s]; advance the plan by a period."""
         return self._tick(q, qd)
 
     def act(self, tau: ArrayLike) -> None:
-        """Tell the law's observer the torques that act up to the next call [N m], (n,), where others were returned.
+        """Tell the law the torques that act up to the next call [N m], (n,), where others were returned.
 
-        So what a limit or a drive takes away is no disturbance. A law without an observer needs no telling.
+        So what a limit or a drive takes away is no disturbance to its observer, and a law of one's own advances with
+        the torque that acts. Others need no telling.
         """
-        if (observer := self.law.observer) is None:
-            return
-        acting, ticks = as_joint_array("tau", tau, self.law.robot.n).copy(), self._tick.ticks
-        assumed = self._told[1] if self._told[0] == ticks else self._tick.acting
-        observer.correct(self._tick.memory, acting - assumed)
-        self._told = ticks, acting
+        if self._tick.listens:
+            self._tick.act(as_joint_array("tau", tau, self.law.robot.n).copy())
 
     def wait(self, time: float) -> None:
-        """Tell the law's observer that more than a period passes up to the next call, by ``time`` [s].
+        """Tell the law's observer that another time than a period passes up to the next call: by ``time`` [s] more.
 
-        The torques act on meanwhile. The plan waits, as it goes on by a period at each call.
+        It is less than 0 where less passes. The torques act on meanwhile. The plan waits, as it goes on by a period at
+        each call.
         """
         if self.law.observer is not None:
-            self.law.observer.wait(self._tick.memory, as_scalar("time", time, least=0.0))
+            self._tick.wait(as_scalar("time", time, least=-self._period))
 
     def hold(self) -> None:
         """Let the plan come to rest on its path and stay there; see :meth:`LawWrapper.hold`."""
@@ -144,11 +150,6 @@ class ControlTick:
         """Let the plan go back along its path; see :meth:`LawWrapper.reverse`."""
         self._wrapper().reverse()
 
-    def _begin(self, z: Array) -> None:
-        """Start with a state z of the law."""
-        self._tick.start(z)
-        self._told = -1, np.zeros(0)
-
     def _wrapper(self) -> LawWrapper:
         """Return the law, which must have a speed input."""
         if not isinstance(self.law, LawWrapper):
@@ -164,7 +165,7 @@ class _CompiledTick:
 
     def __init__(self, law: Controller, period: float) -> None:
         self._memory, self._setup, self._period, self.ticks = Memory(), Setup(), period, 0
-        self._setup.period = period
+        self._setup.period, self._observer = period, law.observer
         self._rules = add_law(self._setup, law, self._memory)
         with suppress(TaskError):  # of a path that can be passed in one direction only
             self._rules.prepare_to_go_back()  # now: an operator may ask for it between two ticks
@@ -176,6 +177,7 @@ class _CompiledTick:
         places = {"io": self._io, "memory": self._state, "most": self._most}
         self._call = Tick(setup=addressof(self._setup), **{name: address_of(array) for name, array in places.items()})
         self._address = addressof(self._call)
+        self._told: Array | None = None  # the torques that act since the last call, where it was told
 
     @property
     def s(self) -> float:
@@ -193,18 +195,26 @@ class _CompiledTick:
         return np.append(self.s, self._state)
 
     @property
-    def memory(self) -> Array:
-        """The part of z after s, itself."""
-        return self._state
+    def listens(self) -> bool:
+        """True where the law asks which torques act."""
+        return self._observer is not None
 
-    @property
-    def acting(self) -> Array:
-        """The torques that the law takes to act up to the next call [N m], (n,)."""
-        return np.clip(self._tau, -self._most, self._most)
+    def act(self, tau: Array) -> None:
+        """Let the torques (n,) act up to the next call."""
+        assumed = np.clip(self._tau, -self._most, self._most) if self._told is None else self._told
+        if self._observer is not None:
+            self._observer.correct(self._state, tau - assumed)
+        self._told = tau
 
-    def start(self, z: Array) -> None:
-        """Start with the state z (m,)."""
-        self._io[len(self._q) * 2], self._state[:], self.ticks = z[..., 0].item(), z[..., 1:], 0
+    def wait(self, time: float) -> None:
+        """Let ``time`` [s] more than a period pass up to the next call."""
+        if self._observer is not None:
+            self._observer.wait(self._state, time)
+
+    def start(self, z: Array, ticks: int = 0) -> None:
+        """Start with the state z (m,) after a number of periods."""
+        self._io[len(self._q) * 2], self._state[:], self.ticks = z[..., 0].item(), z[..., 1:], ticks
+        self._told = None
 
     def __call__(self, q: Array, qd: Array) -> Array:
         """Return the torques, and advance."""
@@ -212,7 +222,7 @@ class _CompiledTick:
         if self._setup.memory:  # else nothing depends on time
             self._listen()
         self._function(self._address)
-        self.ticks += 1
+        self.ticks, self._told = self.ticks + 1, None
         return self._tau
 
     def _listen(self) -> None:
@@ -245,9 +255,12 @@ def _effort_bounds(law: Controller) -> Array:
 class _PythonTick:
     """A tick of a law in Python."""
 
+    listens = True  # whatever it remembers of its torque
+
     def __init__(self, law: Controller, period: float) -> None:
         self._law, self._period, self.ticks = law, period, 0
-        self._z = np.zeros((1, 1))
+        self._z, self._waited = np.zeros((1, 1)), 0.0
+        self._last: tuple[Array, ControlOutput] | None = None  # state and output of the last call
         self._tau, self._most = np.zeros(law.robot.n), _effort_bounds(law)
 
     @property
@@ -265,25 +278,38 @@ class _PythonTick:
         """The state z (m,)."""
         return self._z[0].copy()
 
-    @property
-    def memory(self) -> Array:
-        """The part of z after s, itself."""
-        return self._z[0, 1:]
+    def act(self, tau: Array) -> None:
+        """Let the torques (n,) act up to the next call: the law advances with them."""
+        if self._last is None or (tau == self._last[1].tau[0]).all():
+            return
+        z, out = self._last
+        self._advance(z, out._replace(tau=tau[None]))
+        self._delay(self._waited)
 
-    @property
-    def acting(self) -> Array:
-        """The torques that the law takes to act up to the next call [N m], (n,)."""
-        return np.clip(self._tau, -self._most, self._most)
+    def wait(self, time: float) -> None:
+        """Let ``time`` [s] more than a period pass up to the next call."""
+        self._waited += time
+        self._delay(time)
 
-    def start(self, z: Array) -> None:
-        """Start with the state z (m,)."""
-        self._z, self.ticks = np.atleast_2d(z), 0
+    def start(self, z: Array, ticks: int = 0) -> None:
+        """Start with the state z (m,) after a number of periods."""
+        self._z, self.ticks, self._last = np.atleast_2d(z), ticks, None
 
     def __call__(self, q: Array, qd: Array) -> Array:
         """Return the torques, and advance."""
         position, velocity = np.array(q, dtype=np.float64)[None], np.array(qd, dtype=np.float64)[None]
         out = self._law.law(self.ticks * self._period, position, velocity, self._z)
-        acting = out._replace(tau=np.clip(out.tau, -self._most, self._most))
-        self._z, self.ticks = self._law.advance(self._z, acting, self._period), self.ticks + 1
+        self._waited, self.ticks = 0.0, self.ticks + 1
+        self._advance(self._z, out._replace(tau=np.clip(out.tau, -self._most, self._most)))
         self._tau[:] = out.tau[0]
         return self._tau
+
+    def _advance(self, z: Array, out: ControlOutput) -> None:
+        """Take the state z (1, m) of the last call over a period, in which ``out.tau`` acts."""
+        self._z, self._last = self._law.advance(z, out, self._period), (z, out)
+
+    def _delay(self, time: float) -> None:
+        """Let the law's observer know of ``time`` [s] more."""
+        if self._law.observer is not None and time:
+            self._z = self._z.copy()
+            self._law.observer.wait(self._z[0, 1:], time)

@@ -21,6 +21,7 @@ from pathcontrol.hardware.measurements import Screen
 from pathcontrol.hardware.sample_ring import SampleRing
 from pathcontrol.hardware.start_check import find_start_fault
 
+_CLOCK = 1e-3  # share of a period up to which a step is in time: clocks are rounded
 _FAR = 2.0  # tubes from the path, from which holding on it is no help
 
 
@@ -161,11 +162,10 @@ class ControlLoop:
         except Exception as error:  # whatever a law of one's own raises, the arm must not fall
             self._react(Mode.DAMP, "law", f"the law raised {type(error).__name__}: {error}")
             wanted = self._brake()
-        limited = self.envelope.clip(wanted, self._tau, self.period)
+        self._tau = limited = self.envelope.clip(wanted, self._tau, self.period)
         self._saturated = bool((limited != wanted).any())
-        if self._saturated and self._mode < Mode.DAMP and not self._bad:
-            self._plan.act(limited)  # of a law that observes
-        self._tau = limited
+        if self._mode < Mode.DAMP and not self._bad:
+            self._tell(limited)
         if self._rings and self.recording:
             t = self._screen.t + self._bad * self.period
             for ring in self._rings:
@@ -278,10 +278,11 @@ class ControlLoop:
         return self.gravity if self._mode >= Mode.DAMP else self._tau
 
     def _check_time(self, gap: float) -> None:
-        """Count a late step, of which observers are told, and hold the plan after a long gap [s]."""
+        """Tell observers how long the last torque acted, count a late step, and hold the plan after a long gap [s]."""
+        if abs(gap - self.period) > _CLOCK * self.period:
+            self._plan.wait(gap - self.period)
         if gap > self.envelope.late * self.period:
             self._faults["deadline"] += 1
-            self._plan.wait(gap - self.period)  # while the last torque went on
         if gap > self.envelope.lost * self.period:
             self._react(Mode.HOLD, "deadline", f"no step for {gap:.3g} s")
 
@@ -292,6 +293,13 @@ class ControlLoop:
         if not np.isfinite(tau).all():
             self._react(Mode.DAMP, "law", "the law gave torques that are no numbers")
         return self._brake() if self._mode >= Mode.DAMP else tau
+
+    def _tell(self, tau: Array) -> None:
+        """Tell the law which torques act up to the next step [N m], (n,)."""
+        try:
+            self._plan.act(tau)
+        except Exception as error:  # a law of one's own advances with them
+            self._react(Mode.DAMP, "law", f"the law raised {type(error).__name__}: {error}")
 
     def _check_tube(self) -> None:
         """React to an arm that leaves the tube around its path."""

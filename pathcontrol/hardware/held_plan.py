@@ -72,13 +72,13 @@ class HeldPlan:
         self._tick.act(tau)
 
     def wait(self, time: float) -> None:
-        """Say that ``time`` [s] has passed beside that of the ticks, see :meth:`ControlTick.wait`."""
+        """Say that a period took ``time`` [s] more, see :meth:`ControlTick.wait`."""
         self._tick.wait(time)
 
     def hold(self) -> None:
         """Let the plan come to rest on the path."""
         if self._tick is self._free and self._free is not None:
-            self._held.start_from(np.concatenate([self._free.state, [1.0, 0.0]]))
+            self._held.start_from(np.concatenate([self._free.state, [1.0, 0.0]]), self._free.ticks)
             self._tick = self._held
         self._held.hold()
 
@@ -100,7 +100,7 @@ class HeldPlan:
             )
         for speed in speeds:
             speed[0] = 0.0
-        self._held.start_from(np.concatenate([own, *speeds]))
+        self._held.start_from(np.concatenate([own, *speeds]), self._tick.ticks)
         self._tick = self._held
 
     def distance(self, q: Array) -> float:
@@ -112,7 +112,7 @@ class HeldPlan:
         """Go on without the speed input where the plan has its full speed again."""
         state = self._held.state
         if abs(state[-2] - 1.0) < _FULL and abs(state[-1]) < _FULL:
-            free.start_from(state[:-2])
+            free.start_from(state[:-2], self._held.ticks)
             self._tick = free
 
 
