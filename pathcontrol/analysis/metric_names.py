@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from pathcontrol._expect import did_you_mean
+from pathcontrol.errors import UnknownNameError
+
 #: the unit of each metric
 UNITS = {
     **{f"{name}_{kind}": "rad" for name in ("e_p", "lag_error", "contour_error") for kind in ("peak", "rms")},
@@ -69,3 +74,21 @@ LABELS = {
     "tau_noise": "noise of the torque demand",
     "noise_amplification": "noise of the torque over that of the position",
 }
+
+
+def check_metric_names(argument: str, wanted: Any, also: str = "") -> None:
+    """Check that an ``argument`` names metrics; ``also`` says what else it may be.
+
+    Raises:
+        UnknownNameError: one of the names is no metric, or the argument is a text.
+    """
+    unknown = [wanted] if isinstance(wanted, str) else [name for name in wanted if name not in UNITS]
+    if not unknown:
+        return
+    meant = "; put it in brackets" if isinstance(wanted, str) and wanted in UNITS else did_you_mean(unknown[0], UNITS)
+    raise UnknownNameError(
+        f"{argument} = {wanted!r}, expected a list of {', '.join(UNITS)}{also}{meant}",
+        argument=argument,
+        value=wanted,
+        choices=tuple(UNITS),
+    )

@@ -7,8 +7,9 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_scalar, norms
+from pathcontrol._arrays import Array, as_array, as_scalar, norms
 from pathcontrol._expect import expect
 from pathcontrol.analysis.coverage import measure_coverage, path_points
 from pathcontrol.analysis.gamma import distance_to_gamma, planned_rate
@@ -21,20 +22,21 @@ from pathcontrol.analysis.metric_helpers import (
     root_mean_square,
     split_by_task,
 )
-from pathcontrol.analysis.metric_names import LABELS, UNITS
+from pathcontrol.analysis.metric_names import LABELS, UNITS, check_metric_names
 from pathcontrol.analysis.progress import progress
 from pathcontrol.analysis.tool_metrics import NAMES as TOOL_METRICS
 from pathcontrol.analysis.tool_metrics import tool_metrics
 from pathcontrol.analysis.torque import NAMES as TORQUE_METRICS
 from pathcontrol.analysis.torque import torque_metrics
 from pathcontrol.analysis.window import Samples, Window, samples_of
-from pathcontrol.errors import TaskError
+from pathcontrol.errors import InputError, TaskError, warn
 from pathcontrol.simulation.run import Run
 from pathcontrol.tasks.task import PathTask
 
 __all__ = ["LABELS", "UNITS"]
 
 _ERRORS = ("e_p", "e_v", "lag_error", "contour_error", "gamma_distance")
+_WIDEST_BAND = 1.0  # rad, beyond which a band is probably in degrees
 _OF_ERRORS = [f"{name}_{kind}" for name in _ERRORS for kind in ("peak", "rms")]
 
 
@@ -51,14 +53,14 @@ def steady_state(run: Run, fraction: float = 0.5) -> Run:
     return run.excerpt(np.arange(run.rollouts), int(stop) + 1, int(start))
 
 
-def peak(values: Array) -> Array:
+def peak(values: ArrayLike) -> Array:
     """Return the largest value over time, (rollout,) from (rollout, time)."""
-    return values.max(-1)
+    return np.asarray(as_array("values", values).max(-1))
 
 
-def rms(values: Array) -> Array:
+def rms(values: ArrayLike) -> Array:
     """Return the root mean square over time, (rollout,) from (rollout, time)."""
-    return np.sqrt(np.ascontiguousarray(values**2).mean(-1))
+    return np.asarray(np.sqrt(np.ascontiguousarray(as_array("values", values) ** 2).mean(-1)))
 
 
 def contour_error(run: Run, task: PathTask | None = None) -> Array:
@@ -102,13 +104,23 @@ def _lag(task: PathTask, s: Array, q: Array) -> Array:
     return apply_where_finite(lag, s, q)
 
 
-def settling_time(values: Array, time: Array, band: float) -> Array:
+def settling_time(values: ArrayLike, time: ArrayLike, band: float) -> Array:
     """Return the time [s] from which ``values`` (rollout, time) stay within ``band``, (rollout,).
 
     It is inf where they never do, and NaN where some are NaN.
+
+    Raises:
+        InputError: there is not one value for each time, or the band is not positive.
     """
+    values, time = as_array("values", values), as_array("time", time)
+    if time.ndim != 1 or not time.size or values.shape[-1:] != time.shape:
+        raise InputError(
+            f"values have shape {values.shape} and time {time.shape}, expected (rollout, time) and (time,)",
+            argument="values",
+            value=values,
+        )
     outside = np.abs(values) > as_scalar("band", band, positive=True)
-    last = values.shape[-1] - 1 - np.argmax(outside[:, ::-1], axis=-1)
+    last = values.shape[-1] - 1 - np.argmax(outside[..., ::-1], axis=-1)
     after = np.append(time, np.inf)[last + 1]
     return np.where(np.isnan(values).any(-1), np.nan, np.where(outside.any(-1), after, time[0]))
 
@@ -190,10 +202,14 @@ def metrics(
 
     Raises:
         InputError: no task is known, it has other joints, or a setting is something else.
-        UnknownNameError: a variable is missing in the run.
+        UnknownNameError: there is no such metric, or a variable is missing in the run.
         TaskError: the task returns something it must not.
     """
     band = as_scalar("band", band, positive=True)
+    check_metric_names("only", only)
+    if band > _WIDEST_BAND and "q" in run and run.unit("q") == "rad":
+        said = f"band = {band:g} rad is {np.rad2deg(band):.3g} deg"
+        warn(f"{said}; did you mean {band:g} deg? Then give np.deg2rad({band:g})")
     values: dict[str, Array] = {}
     for part, own, rows in split_by_task(run, resolve_task(run, task)):
         counted = samples_of(part, window, fraction)

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pathcontrol._arrays import Array, as_array
-from pathcontrol._expect import did_you_mean
+from pathcontrol.analysis.metric_names import check_metric_names
 from pathcontrol.analysis.progress import is_unfinished
-from pathcontrol.analysis.run_metrics import UNITS, metrics
+from pathcontrol.analysis.run_metrics import metrics
 from pathcontrol.analysis.window import own_samples
 from pathcontrol.errors import InputError, SimulationError, UnknownNameError
 from pathcontrol.simulation.checks.too_long import StepWarning
@@ -88,15 +88,7 @@ def make_measure(wanted: Sequence[str] | Measure | None) -> Measure:
         return metrics
     if callable(wanted):
         return wanted
-    unknown = [name for name in wanted if name not in UNITS]
-    if unknown or isinstance(wanted, str):
-        meant = did_you_mean(unknown[0], UNITS) if unknown and not isinstance(wanted, str) else ""
-        raise UnknownNameError(
-            f"metrics = {wanted!r}, expected a list of {', '.join(UNITS)}, or a function of a Run{meant}",
-            argument="metrics",
-            value=wanted,
-            choices=tuple(UNITS),
-        )
+    check_metric_names("metrics", wanted, also=", or a function of a Run")
     return lambda run: _select_metrics(metrics(run, only=wanted), wanted)
 
 

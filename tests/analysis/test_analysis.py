@@ -26,7 +26,8 @@ from pathcontrol import (
     simulate,
     steady_state,
 )
-from pathcontrol.analysis.run_metrics import UNITS
+from pathcontrol.analysis.run_metrics import UNITS, peak, rms
+from pathcontrol.errors import PathControlWarning, UnknownNameError
 
 START = np.deg2rad([40.0, 70.0])
 
@@ -118,6 +119,25 @@ def test_settling_time(ticks, band):
     assert settling_time(values, time, band)[0] == pytest.approx(time[ticks])
     values[0, -1] = 3 * band
     assert settling_time(values, time, band)[0] == np.inf
+
+
+def test_series_of_one_rollout_and_lists_are_reduced_too():
+    assert settling_time([3.0, 2.0, 1.0, 0.5], [0.0, 0.1, 0.2, 0.3], 1.5) == pytest.approx(0.2)
+    assert settling_time([[3.0, 1.0], [1.0, 1.0]], [0.0, 0.1], 1.5).tolist() == [0.1, 0.0]
+    assert peak([[1.0, 3.0]]).tolist() == [3.0]
+    assert rms([3.0, 3.0]) == 3.0
+    with pytest.raises(InputError, match=r"\(2,\) and time \(3,\)"):
+        settling_time([1.0, 2.0], [0.0, 0.1, 0.2], 1.5)
+
+
+def test_names_of_metrics_and_bands_in_degrees_are_told(arm, circle):
+    run = simulate(ExtendedMotionPlan(arm, circle, 800.0, [45.0, 100.0], 20.0), START, duration=0.1, progress=False)
+    with pytest.raises(UnknownNameError, match=r"did you mean 'e_p_peak'\?"):
+        metrics(run, only=["e_v_peak", "e_p_peek"])
+    with pytest.raises(UnknownNameError, match="brackets"):
+        metrics(run, only="e_p_peak")
+    with pytest.warns(PathControlWarning, match="did you mean 2 deg"):
+        metrics(run, band=2.0, only=["settling_time"])
 
 
 def test_metrics_of_a_run(arm, circle):
