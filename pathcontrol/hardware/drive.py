@@ -8,7 +8,6 @@ import numpy as np
 
 from pathcontrol._arrays import Array, as_scalar
 from pathcontrol._expect import expect
-from pathcontrol.control.wrappers.wrapper import LawWrapper
 from pathcontrol.errors import ArmError, InputError
 from pathcontrol.hardware.arm import Arm, Measurement
 from pathcontrol.hardware.control_loop import ControlLoop, Status
@@ -92,8 +91,6 @@ def drive(loop: ControlLoop, arm: Arm, duration: float, settle: float = 0.7) -> 
     finally:
         arm.finish()
         driver.close()
-        if isinstance(loop.law, LawWrapper):
-            loop.law.resume()  # it is the caller's law that was held
     return driver.record(stopped, allowed)
 
 

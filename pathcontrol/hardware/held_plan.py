@@ -26,7 +26,7 @@ class HeldPlan:
 
     def __init__(self, law: Controller, period: float) -> None:
         self._law = law
-        self._wrapper = law if isinstance(law, LawWrapper) else SpeedOverride(law)
+        self._wrapper = law.apart() if isinstance(law, LawWrapper) else SpeedOverride(law)
         self._held = ControlTick(self._wrapper, period)
         self._free = None if isinstance(law, LawWrapper) or law.observer is not None else _compiled(law, period)
         self._tick = self._free or self._held
@@ -45,7 +45,7 @@ class HeldPlan:
     def state(self) -> Array:
         """The state z of the law, (m,), without that of a speed input which it does not have itself."""
         state = self._tick.state
-        return state if self._tick is self._free or self._wrapper is self._law else state[:-2]
+        return state if self._tick is self._free or isinstance(self._law, LawWrapper) else state[:-2]
 
     @property
     def outcome(self) -> dict[str, Array]:
@@ -53,8 +53,8 @@ class HeldPlan:
         return {} if self._tick is self._free else self._wrapper.outcome(self._held.state[None])
 
     def start(self, q: Array, qd: Array) -> None:
-        """Start with an arm at (q, q̇), (n,), at full speed."""
-        self._held.resume()
+        """Start with an arm at (q, q̇), (n,), at the speed that the operator asks for."""
+        self._wrapper.go()
         self._held.start(q, qd)
         if self._free is not None:
             self._free.start_from(self._held.state[:-2])  # what is before the state of the speed input
@@ -80,11 +80,11 @@ class HeldPlan:
         if self._tick is self._free and self._free is not None:
             self._held.start_from(np.concatenate([self._free.state, [1.0, 0.0]]), self._free.ticks)
             self._tick = self._held
-        self._held.hold()
+        self._wrapper.stop()
 
     def resume(self) -> None:
-        """Let the plan go on."""
-        self._held.resume()
+        """Let the plan go on, as the operator asks for."""
+        self._wrapper.go()
 
     def restart(self, q: Array, qd: Array) -> None:
         """Begin at the point of the path that is nearest to the arm, at rest.

@@ -99,7 +99,7 @@ class PositionCommand:
             )
         refuse_several_gains(law)
         self._wait = WaitRule(as_scalar("tolerance", tolerance, positive=True))
-        self.law = LawWrapper(law, self._wait)
+        self.law = LawWrapper(law, self._wait).apart()  # bad measurements stop it beside its buttons
         self.period, robot = as_period("period", period), law.robot
         self._omega = as_scalar("bandwidth", bandwidth, positive=True)
         self._tube = read_tube(tube)
@@ -140,6 +140,7 @@ class PositionCommand:
         """
         position = as_joint_vector("q", q, self.robot.n)
         velocity = np.zeros(self.robot.n) if qd is None else as_joint_vector("qd", qd, self.robot.n)
+        self.law.go()
         z = np.atleast_2d(self.law.start(position, velocity))
         away = float(np.linalg.norm(np.asarray(self.law.task.q_d(z[0, :1])).reshape(-1) - position))
         if fault := find_start_fault(self.robot, position, self._lower, self._upper, away, self._tube):
@@ -184,6 +185,7 @@ class PositionCommand:
     def resume(self) -> None:
         """Let the plan go forward again; see :meth:`LawWrapper.resume`."""
         self._bad = 0
+        self.law.go()
         self.law.resume()
 
     def override(self, value: Override) -> None:
@@ -202,7 +204,7 @@ class PositionCommand:
         self._bad = 0 if good else self._bad + 1
         self.faults += not good
         if self._bad > _PATIENCE:
-            self.law.hold()
+            self.law.stop()
 
     def _advance(self, q: Array, qd: Array) -> tuple[Array, Array]:
         """Return position and velocity of the virtual arm a period later, (n,) each, and advance the plan."""

@@ -26,6 +26,8 @@ class WaitRule(SpeedRule):
         deviation: ‖d‖ [rad] at present.
     """
 
+    relative = True
+
     def __init__(self, tolerance: float) -> None:
         self.tolerance, self.deviation = tolerance, 0.0
 

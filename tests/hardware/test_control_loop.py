@@ -231,6 +231,33 @@ def test_a_law_that_was_held_and_resumed_is_the_compiled_one_again(kind):
     assert steps < 20.0  # no jump, neither on resuming nor when the compiled law takes over
 
 
+def test_a_loop_and_the_buttons_of_its_law_hold_the_plan_beside_each_other():
+    law = pc.SpeedOverride(law_of(2))
+    arm, loop = Simulated(law), ControlLoop(law, H, Envelope(**WIDE))
+
+    def passed():
+        s = loop.status.s
+        arm.drive(loop, 100)
+        return loop.status.s - s
+
+    law.hold()
+    loop.start(arm.q[0])
+    assert passed() == 0  # a start is no resume
+    law.reverse()
+    assert passed() < 0
+    loop.hold()
+    arm.drive(loop, 400)
+    for press in (law.hold, law.resume, law.reverse):
+        press()
+        assert abs(passed()) < 1e-9  # a reaction lasts until the loop goes on
+    loop.resume()
+    assert passed() < 0  # as the operator asked last
+    law.resume()
+    loop.hold()
+    assert "held" not in law.describe()
+    assert run_of(law).array("s")[0, -1] > 0  # the loop's hold is not that of others
+
+
 # --- one fault each ------------------------------------------------------------------------------------------------
 
 

@@ -73,6 +73,18 @@ def test_an_override_is_followed_as_in_the_simulation():
     assert np.abs(commands - run.array("q")[0, 1:]).max() < 2e-4  # the factor passes one more rule
 
 
+@pytest.mark.parametrize("u", [0.0, 0.2, 1.5])
+def test_commands_begin_at_the_speed_that_is_asked_for(u):
+    inner = law_of(2)
+    start, command = start_of(inner), pc.PositionCommand(pc.SpeedOverride(inner, u), H)
+    ideal = inner.robot.with_friction(pc.Viscous(inner.compensated))
+    law = pc.SpeedOverride(inner, u)
+    run = pc.simulate(law, start, duration=0.3, plant=ideal, loop=pc.SampledLoop(period=H), progress=False)
+    command.start(start)
+    commands, _ = serve(command.step, start, 0.3)
+    assert np.abs(commands - run.array("q")[0, 1:]).max() < 1e-8
+
+
 @pytest.mark.parametrize(
     ("kind", "n", "jammed"),
     [
@@ -168,7 +180,8 @@ def test_no_command_is_beyond_a_limit_whatever_is_measured(n):
         last = now
 
 
-def test_bad_measurements_are_bridged_and_many_hold_the_plan():
+@pytest.mark.parametrize("again", ["resume", "start"])
+def test_bad_measurements_are_bridged_and_many_hold_the_plan(again):
     law = law_of(2)
     command, q = pc.PositionCommand(law, H), start_of(law)
     command.start(q)
@@ -179,8 +192,12 @@ def test_bad_measurements_are_bridged_and_many_hold_the_plan():
     for _ in range(300):
         command.step(np.full(2, np.nan))
     assert np.abs(command.qd).max() < 1e-3 < moved
-    q = command.q
-    command.resume()
+    if again == "resume":
+        q = command.q
+        command.resume()
+    else:
+        q = start_of(law)
+        command.start(q)
     for _ in range(200):
         q = command.step(q)
     assert np.abs(command.qd).max() > 0.3

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from copy import copy
+from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,6 +71,16 @@ class SpeedSteps:
         return np.where(i > 0, self.factors[i - 1], 1.0)
 
 
+@dataclass
+class _Buttons:
+    """The state of an operator's buttons, and the override u as it was given and as a function of time."""
+
+    value: Callable[[float], Array]
+    given: Any
+    held: bool = False
+    back: bool = False
+
+
 class OverrideRule(SpeedRule):
     """The factor w follows u(t) within a bound of its rate, which has no jumps either.
 
@@ -85,21 +97,32 @@ class OverrideRule(SpeedRule):
 
     def __init__(self, override: Override = 1.0, acceleration: float = 10.0) -> None:
         self.acceleration = as_scalar("acceleration", acceleration, positive=True)
-        self._value = _make_function(override)
-        self._given: Any = override if callable(override) else np.asarray(override).tolist()
-        self._held, self._back = False, False
+        self._buttons = _Buttons(_make_function(override), _as_given(override))
+        self._stopped = False
+
+    def apart(self) -> Self:
+        """Return this rule with the same buttons, which can be stopped beside them."""
+        return copy(self)
+
+    def stop(self) -> None:
+        """Let the plan come to rest, whatever the buttons say, until :meth:`go`."""
+        self._stopped = True
+
+    def go(self) -> None:
+        """Let the plan do what the buttons say."""
+        self._stopped = False
 
     def hold(self) -> None:
         """Let the plan come to rest, whatever :meth:`override` says."""
-        self._held = True
+        self._buttons.held = True
 
     def resume(self) -> None:
         """Let the plan go forward at the override."""
-        self._held, self._back = False, False
+        self._buttons.held, self._buttons.back = False, False
 
     def reverse(self) -> None:
         """Let the plan go back at the override."""
-        self._held, self._back = False, True
+        self._buttons.held, self._buttons.back = False, True
 
     def override(self, value: Override) -> None:
         """Set how fast the plan goes when it is not held; a number is not below 0, as :meth:`reverse` goes back."""
@@ -110,15 +133,19 @@ class OverrideRule(SpeedRule):
                 value=value,
                 limit=(0.0, MOST),
             )
-        self._value = _make_function(value)
-        self._given = value if callable(value) else np.asarray(value).tolist()
+        self._buttons.value, self._buttons.given = _make_function(value), _as_given(value)
 
     def value(self, t: float) -> Array:
         """Return u at time t [s], a number or (N,)."""
-        if self._held:
+        if self._rests:
             return np.zeros(())
-        u = self._value(t)
-        return -u if self._back else u
+        u = self._buttons.value(t)
+        return -u if self._buttons.back else u
+
+    @property
+    def _rests(self) -> bool:
+        """True where the plan is to rest whatever the override is."""
+        return self._stopped or self._buttons.held
 
     def values(self, times: Array, rollouts: int) -> Array:
         """Return u at ``times`` [s], (m, N); fewer rows where u is out of range at one of them but the first.
@@ -126,11 +153,12 @@ class OverrideRule(SpeedRule):
         Raises:
             InputError: it is out of range at the first, or has as many values as there are neither rollouts nor one.
         """
-        if self._held or isinstance(self._value, FixedSpeed):
+        given = self._buttons.value
+        if self._rests or isinstance(given, FixedSpeed):
             return np.broadcast_to(self.value(0.0), (len(times), rollouts))
-        if isinstance(self._value, SpeedSteps):
-            steps = self._value(times)[:, None]
-            return np.broadcast_to(-steps if self._back else steps, (len(times), rollouts))
+        if isinstance(given, SpeedSteps):
+            steps = given(times)[:, None]
+            return np.broadcast_to(-steps if self._buttons.back else steps, (len(times), rollouts))
         u = np.empty((len(times), rollouts))
         for row, t in enumerate(times):
             try:
@@ -151,16 +179,17 @@ class OverrideRule(SpeedRule):
     @property
     def is_known(self) -> bool:
         """True where u is known for all times, and is no function of the user's."""
-        return self._held or not isinstance(self._value, GivenSpeed)
+        return self._rests or not isinstance(self._buttons.value, GivenSpeed)
 
     @property
     def factors(self) -> Array | None:
         """The factors of several rollouts that do not change, (N,); None where u is something else."""
-        fixed = self._value.factor if isinstance(self._value, FixedSpeed) else np.ones(())
+        given = self._buttons.value
+        fixed = given.factor if isinstance(given, FixedSpeed) else np.ones(())
         return fixed if fixed.ndim else None
 
     def count_rows(self) -> int:
-        return self._value(0.0).size
+        return self._buttons.value(0.0).size
 
     def start(self, law: Controller, q: Array, qd: Array, s: Array) -> Array:
         u = self.value(0.0)
@@ -199,9 +228,10 @@ class OverrideRule(SpeedRule):
         return new
 
     def describe(self) -> dict[str, Any]:
-        given = getattr(self._given, "__name__", repr(self._given)) if callable(self._given) else self._given
+        buttons = self._buttons
+        given = getattr(buttons.given, "__name__", repr(buttons.given)) if callable(buttons.given) else buttons.given
         said = {"override": given, "acceleration": self.acceleration}
-        return said | ({"held": True} if self._held else {"reversed": True} if self._back else {})
+        return said | ({"held": True} if buttons.held else {"reversed": True} if buttons.back else {})
 
 
 def _advance_ramp(v: Array, wanted: Array, period: float) -> tuple[Array, Array]:
@@ -216,6 +246,11 @@ def _advance_approach(v: Array, wanted: Array, period: float) -> tuple[Array, Ar
     decay, gap = np.exp(-pole * period), -4 * _SMOOTHING * wanted
     slope = v + pole * gap
     return decay * (gap + slope * period) - gap, decay * (v - pole * period * slope)
+
+
+def _as_given(override: Override) -> Any:
+    """Return an override as it is described: a function, or numbers."""
+    return override if callable(override) else np.asarray(override).tolist()
 
 
 def _make_function(override: Override) -> Callable[[float], Array]:

@@ -96,6 +96,20 @@ class LawWrapper(Controller):
         """Let the plan go back along its path at the override; an open path ends at its begin."""
         self._operator.reverse()
 
+    def apart(self) -> Self:
+        """Return this wrapper for a loop, which has the same buttons and can be stopped beside them."""
+        wrapper, operator = copy(self), self._operator
+        wrapper.rules = tuple(operator.apart() if rule is operator else rule for rule in self.rules)
+        return wrapper
+
+    def stop(self) -> None:
+        """Let the plan come to rest whatever the operator asks for, until :meth:`go`, see :meth:`apart`."""
+        self._operator.stop()
+
+    def go(self) -> None:
+        """Let the plan do what the operator asks for."""
+        self._operator.go()
+
     @property
     def _operator(self) -> OverrideRule:
         """The outermost speed input."""
