@@ -135,6 +135,10 @@ class Controller(ABC):
         memory[..., -1:] -= t  # its time, as this law's begins with 0
         return np.concatenate([z[..., :1], memory, z[..., 1 + size :]], axis=-1)
 
+    def recollect(self, z: Array, before: Array) -> Array:
+        """Return the first state z, with what the law has learned in a state ``before`` and the arm still is like."""
+        return z
+
     def rate(self, out: ControlOutput) -> Array:
         """Return ż in continuous time, (*batch, m), where the torque that acts is ``out.tau``."""
         if self.observer is None or out.observation is None:

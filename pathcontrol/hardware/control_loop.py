@@ -19,7 +19,7 @@ from pathcontrol.hardware.held_plan import HeldPlan
 from pathcontrol.hardware.loop_log import LoopLog
 from pathcontrol.hardware.measurements import Screen
 from pathcontrol.hardware.sample_ring import SampleRing
-from pathcontrol.hardware.start_check import find_start_fault
+from pathcontrol.hardware.start_check import find_start_fault, name_units
 
 _CLOCK = 1e-3  # share of a period up to which a step is in time: clocks are rounded
 _FAR = 2.0  # tubes from the path, from which holding on it is no help
@@ -305,10 +305,10 @@ class ControlLoop:
         """React to an arm that leaves the tube around its path."""
         if self.envelope.tube == np.inf:
             return
-        away = self._plan.distance(self._screen.q)
-        if away > self.envelope.tube:
-            mode = Mode.DAMP if away > _FAR * self.envelope.tube else Mode.HOLD
-            self._react(mode, "tube", f"the arm is {away:.3g} rad from its path, its tube is {self.envelope.tube:g}")
+        away, tube = self._plan.distance(self._screen.q), self.envelope.tube
+        if away > tube:
+            mode, unit = Mode.DAMP if away > _FAR * tube else Mode.HOLD, name_units(self.envelope.units)
+            self._react(mode, "tube", f"the arm is {away:.3g} {unit} from its path, its tube is {tube:g}")
 
     def _react(self, mode: Mode, kind: str, reason: str) -> None:
         """Take a reaction, unless a worse one is taken already."""

@@ -98,7 +98,8 @@ class Envelope:
                 limit=upper,
             )
         patient = (self.tube, self.jump, self.patience, self.frozen, self.late, self.lost)
-        return CompleteEnvelope(torque, rate, velocity, lower, upper, braking, *patient)
+        joints = tuple(robot.joint_names), tuple(robot.position_units)
+        return CompleteEnvelope(torque, rate, velocity, lower, upper, braking, *patient, *joints)
 
     def _as_number(self, name: str) -> float:
         """Return an argument that is one number or inf."""
@@ -122,7 +123,7 @@ class Envelope:
 
 @dataclass(frozen=True, eq=False)
 class CompleteEnvelope:
-    """An :class:`Envelope` with all limits as arrays (n,)."""
+    """An :class:`Envelope` with all limits as arrays (n,), and the names and units of the joints for its sentences."""
 
     torque: Array
     torque_rate: Array
@@ -136,18 +137,21 @@ class CompleteEnvelope:
     frozen: int
     late: float
     lost: float
+    joints: tuple[str, ...]
+    units: tuple[str, ...]
 
     def find_motion_fault(self, q: Array, qd: Array) -> str:
         """Return the sentence on a joint that is too fast, or too near to a position limit to be braked, or ""."""
         speed = np.abs(qd)
         if (speed > self.velocity).any():
             i = int((speed - self.velocity).argmax())
-            return f"joint {i + 1} moves at {qd[i]:.3g} rad/s, its limit is {self.velocity[i]:.3g}"
+            return f"{self.joints[i]} moves at {qd[i]:.4g} {self.units[i]}/s, its limit is {self.velocity[i]:.4g}"
         ahead = q + qd * speed / (2 * self.deceleration)
         over = np.maximum(np.maximum(q, ahead) - self.upper, self.lower - np.minimum(q, ahead))
         if (over > 0).any():
             i = int(over.argmax())
-            return f"joint {i + 1} at {q[i]:.3g} rad and {qd[i]:.3g} rad/s cannot be braked before its limit"
+            here, unit = f"{self.joints[i]} at {q[i]:.3g}", self.units[i]
+            return f"{here} {unit} and {qd[i]:.3g} {unit}/s cannot be braked before its limit"
         return ""
 
     def clip(self, tau: Array, last: Array, dt: float) -> Array:

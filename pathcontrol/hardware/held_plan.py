@@ -87,12 +87,15 @@ class HeldPlan:
         self._wrapper.go()
 
     def restart(self, q: Array, qd: Array) -> None:
-        """Begin at the point of the path that is nearest to the arm, at rest.
+        """Begin at the point of the path that is nearest to the arm, at rest, with what the law has learned.
 
         Raises:
             TaskError: the path does not say which point is nearest.
         """
         own, *speeds = self._wrapper.split(self._wrapper.start(q, qd))
+        before = self._held.state
+        if self._tick is self._held and np.isfinite(before).all():
+            own = self._wrapper.inner.recollect(own, self._wrapper.split(before)[0])
         own[0] = self._law.task.sigma_bar(q)
         if not np.isfinite(own[0]):
             raise TaskError(

@@ -60,7 +60,8 @@ class Screen:
         if not (over > 0).any():
             return ""
         i = int(over.argmax())
-        return f"the position of joint {i + 1} jumps by {q[i] - self.q[i]:.3g} rad in {gap:.3g} s"
+        limits, jump = self._envelope, q[i] - self.q[i]
+        return f"the position of {limits.joints[i]} jumps by {jump:.3g} {limits.units[i]} in {gap:.3g} s"
 
     def _is_frozen(self, q: Array, qd: Array) -> bool:
         """Return whether the same numbers have come for too long from an arm that moves."""

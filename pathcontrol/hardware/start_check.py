@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from pathcontrol._arrays import Array, as_array
@@ -23,11 +24,18 @@ def find_start_fault(robot: RobotModel, q: Array, lower: Array, upper: Array, aw
     """
     outside = describe_posture("the arm has", robot, q, lower, upper)
     if not away <= tube:
+        unit = name_units(robot.position_units)
         turned = f"; {outside}" if outside else ""
         return (
-            f"the arm is {away:.3g} rad from the path, the tube is {tube:g} rad; bring it there, or widen tube{turned}"
+            f"the arm is {away:.3g} {unit} from the path, the tube is {tube:g} {unit}; bring it there, or widen "
+            f"tube{turned}"
         )
     return outside if ((q < lower) | (q > upper)).any() else ""  # some joints may turn as often as they like
+
+
+def name_units(units: Sequence[str]) -> str:
+    """Return the unit of a distance of postures, ``"rad"``, ``"m"``, or ``"rad and m"`` of joints of both kinds."""
+    return " and ".join(unit for unit in ("rad", "m") if unit in units)
 
 
 def read_tube(value: Any) -> float:

@@ -14,6 +14,16 @@ from pathcontrol.simulation.compiled_plant import CompiledPlant
 WIDE = {"torque": 1e6, "torque_rate": 1e12, "velocity": 1e3, "lower": -1e3, "upper": 1e3, "tube": np.inf}
 
 
+GANTRY = """<robot name="gantry"><link name="base"/>
+<link name="slide"><inertial><mass value="8"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="arm"><inertial><origin xyz="0.1 0 0"/><mass value="3"/>
+<inertia ixx="0.02" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="lift" type="prismatic"><parent link="base"/><child link="slide"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" velocity="1" effort="300"/></joint>
+<joint name="turn" type="revolute"><parent link="slide"/><child link="arm"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" velocity="5" effort="30"/></joint></robot>"""
+
 LAWS = [pc.ComputedTorque, pc.ExtendedMotionPlan, pc.Projection]
 
 
@@ -500,6 +510,29 @@ def test_after_damping_the_plan_begins_at_rest_and_speeds_up_within_its_bound(ki
     assert loop._plan.factor == 1.0
 
 
+@pytest.mark.parametrize("broken", [False, True])
+def test_after_damping_what_was_learned_goes_on_unless_it_is_no_number(broken):
+    inner = pc.Projection(law_of(2).robot, pc.Circle(0.1, 12.0), k_p=800.0, K_v=40.0)
+    law = pc.Learned(inner, nodes=32)
+    arm, loop = Simulated(law), ControlLoop(law, H, Envelope(**WIDE))
+    loop.start(arm.q[0])
+    z = loop.state
+    learned = law.recall(z)  # views of z
+    learned.torque[:], learned.known[:], learned.fits[...], learned.weight[:] = 2.0, 1.0, 1.0, 0.1
+    loop._plan._held.start_from(z)
+    arm.drive(loop, 1)
+    loop._react(Mode.DAMP, "law", "")
+    if broken:
+        loop._plan._held._tick._z[:, 1:] = np.nan
+    loop.resume()
+    after = law.recall(loop.state)
+    for name in ("torque", "known", "fits"):
+        assert (getattr(after, name) == (0.0 if broken else getattr(learned, name))).all()
+    assert not after.weight.any()
+    assert np.abs(arm.drive(loop, 10)["tau"]).max() < 100.0
+    assert loop.status.mode == Mode.RUN
+
+
 class Lost(pc.Lissajous):
     """A path that cannot say any more which point is nearest."""
 
@@ -533,6 +566,23 @@ def test_a_law_that_cannot_go_on_leaves_the_arm_damped_and_resume_does_not_raise
 
 
 # --- arguments -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("joint", "unit"), [("lift", "m"), ("turn", "rad")])
+def test_reasons_name_the_joint_and_its_unit(joint, unit):
+    task = pc.Ellipse(semi_axes=[0.2, 0.5], speed=1.0)
+    loop = ControlLoop(pc.Projection(pc.load_robot(GANTRY), task, k_p=200.0, K_v=28.0), H)
+    q, move = task.q_d(np.array(0.0)), np.array([joint == "lift", joint == "turn"], dtype=float)
+    for position, velocity, said in (
+        (q, 8.0 * move, f"{joint} moves at 8 {unit}/s, its limit is"),
+        (q + 1.9 * move, 0.0 * move, f"the position of {joint} jumps by 1.9 {unit}"),
+    ):
+        loop.start(q)
+        for k in range(7):
+            loop.step(position, velocity, k * H)
+        assert said in loop.status.reason
+    loop.start(q + 2.0 * move)
+    assert " rad and m from the path, the tube is 0.5 rad and m" in loop.status.reason
 
 
 def test_limits_that_are_missing_or_wrong_are_told():

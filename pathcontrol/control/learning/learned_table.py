@@ -74,6 +74,14 @@ class LearnedTable:
         memory[..., -5], memory[..., -4] = laps, np.floor(laps)
         return memory
 
+    def recollect(self, memory: Array, before: Array) -> Array:
+        """Return a memory at the start, with the table of the one ``before``; a lap that has not ended is dropped."""
+        kept, first = before.copy(), self.split(memory)
+        parts = self.split(kept)
+        parts.seen[:], parts.weight[:] = 0.0, 0.0
+        parts.begin[...], parts.lap[...] = first.begin, first.lap
+        return kept
+
     def split(self, memory: Array) -> LapMemory:
         """Return the parts of a memory."""
         nodes, table = self.nodes, self.nodes * self.joints

@@ -49,6 +49,10 @@ class LearningLaw(Controller):
         z = self.base.start(q, qd)
         return join_columns([z, self.table.start(self._count_laps(z[..., 0]))])
 
+    def recollect(self, z: Array, before: Array) -> Array:
+        own, memory = self.split(z)
+        return np.concatenate([own, self.table.recollect(memory, self.split(before)[1])], axis=-1)
+
     def law(self, t: float, q: Array, qd: Array, z: Array) -> ControlOutput:
         """Return the output of the law inside with τ̂(s) added, at the s of the middle of the period to come."""
         own, memory = self.split(z)
