@@ -16,6 +16,7 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
+from pathcontrol.analysis.fitting_law import refuse_other_path, refuse_other_rows
 from pathcontrol.analysis.metric_helpers import resolve_task
 from pathcontrol.analysis.speed_factor import speed_factor
 from pathcontrol.control.base import Controller
@@ -92,9 +93,15 @@ def lyapunov(controller: Controller, run: Run) -> Lyapunov:
 
     V is evaluated at the errors of the run; V̇ is that of the theorem, not a difference of V. For
     :class:`ManeuverRegulation` V = eᵀPe, and for :class:`TransverseLinearization` that of the motion beside the path.
+
+    Raises:
+        InputError: no such function is known for the law, it goes along another path than the run, or its gains have
+            rows for another number of rollouts.
     """
     expect("controller", controller, Controller)
     resolve_task(run, controller.task)
+    refuse_other_rows(run, controller)
+    refuse_other_path(run, controller)
     e_p, e_v = run.array("e_p"), run.array("e_v")
     if isinstance(controller, LawWrapper):  # whose plan waits for nothing where it is held
         controller = unwrap(controller).at_speed(speed_factor(run, controller.task).T)

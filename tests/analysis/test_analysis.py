@@ -92,6 +92,15 @@ def test_v_of_rollouts_with_gains_of_their_own(ideal_arm, circle, loop):
         assert np.allclose(together.Vdot[i], alone.Vdot[0], rtol=1e-5, atol=1e-7)
 
 
+def test_no_lyapunov_function_of_a_law_for_other_rollouts_or_along_another_path(ideal_arm, circle):
+    several = ExtendedMotionPlan(ideal_arm, circle, [[50.0], [400.0]], 20.0, 1.0)
+    run = simulate(several, [START, START], duration=0.1, progress=False)
+    with pytest.raises(InputError, match="K_p of the law has 2 rows, the run 1"):
+        lyapunov(several, run.rollout(1))
+    with pytest.raises(InputError, match="another path"):
+        lyapunov(ExtendedMotionPlan(ideal_arm, Circle(0.5, 2.0), 50.0, 20.0, 1.0), run)
+
+
 def test_no_lyapunov_function_for_other_laws(ideal_arm, circle):
     law = ComputedTorque(ideal_arm, circle, 100.0, 20.0)
     run = simulate(law, START, duration=0.1, progress=False)

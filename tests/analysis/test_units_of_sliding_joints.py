@@ -27,3 +27,23 @@ def test_a_gantry_is_measured_in_metres(tmp_path, make, unit, rate_unit):
     assert pc.accuracy(run).unit == pc.ballbar(run).unit == "m"
     balance = pc.power_balance(run)
     assert (balance.unit, balance.rate_unit) == (unit, rate_unit)
+
+
+@pytest.mark.parametrize(
+    ("law", "unit", "rate_unit"),
+    [
+        (pc.Projection, "rad^2/s^2 or m^2/s^2", "rad^2/s^3 or m^2/s^3"),
+        (pc.ComputedTorque, "rad^2 or m^2", "rad^2/s or m^2/s"),
+        (pc.ManeuverRegulation, "rad^2 s or m^2 s", "rad^2 or m^2"),
+        (pc.PDPlus, "J", "W"),
+    ],
+)
+def test_v_of_an_arm_that_turns_and_slides_has_both_units(law, unit, rate_unit):
+    joints = JOINT.format("x", "base", "one", "1 0 0") + JOINT.format("turn", "one", "two", "0 0 1").replace(
+        "prismatic", "revolute"
+    )
+    text = "".join(map(LINK.format, ("base", "one", "two")))
+    arm = pc.load_robot(f'<robot name="crane">{text}{joints}</robot>')
+    run = pc.simulate(law(arm, pc.Circle(0.2, 0.8), 100.0, 20.0), [0.2, 0.0], duration=0.1, progress=False)
+    balance = pc.power_balance(run)
+    assert (balance.unit, balance.rate_unit) == (unit, rate_unit)

@@ -10,10 +10,9 @@ import numpy as np
 
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
+from pathcontrol.analysis.fitting_law import refuse_other_rows
 from pathcontrol.analysis.metric_helpers import resolve_task
 from pathcontrol.control.base import Controller, ControlOutput
-from pathcontrol.control.law_gains import count_gain_rows
-from pathcontrol.control.wrappers.wrapper import unwrap
 from pathcontrol.errors import InputError
 from pathcontrol.registry import LAWS
 from pathcontrol.simulation.config import table
@@ -52,7 +51,7 @@ def find_law(run: Run, controller: Controller | None) -> Controller:
     if controller is not None:
         expect("controller", controller, Controller)
         resolve_task(run, controller.task)
-        _refuse_other_rows(run, controller)
+        refuse_other_rows(run, controller)
         return controller
     described = table(run.config, "controller")
     name = str(described.get("controller", "")).rstrip(")").rpartition("(")[2]
@@ -67,20 +66,6 @@ def find_law(run: Run, controller: Controller | None) -> Controller:
         raise InputError(f"the law of the run, {name}, cannot be made again: {error}; {_GIVE}", value=name) from error
     expect("controller", law, Controller)
     return law
-
-
-def _refuse_other_rows(run: Run, controller: Controller) -> None:
-    """Check that the gains of a law of the library are those of one rollout, or of as many as the run has."""
-    known = LAWS.has(type(unwrap(controller)).__name__)
-    for name, rows in count_gain_rows(controller).items() if known else ():
-        if rows != run.rollouts:
-            raise InputError(
-                f"{name} of the law has {rows} rows, the run {run.rollouts} rollouts; expected as many, or one value "
-                "for all",
-                argument=name,
-                value=rows,
-                limit=run.rollouts,
-            )
 
 
 def record_of(run: Run, controller: Controller) -> LawRecord:

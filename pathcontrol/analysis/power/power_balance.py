@@ -10,7 +10,7 @@ import numpy as np
 from pathcontrol._arrays import Array, as_scalar, average_neighbours
 from pathcontrol._expect import expect
 from pathcontrol._json import to_json
-from pathcontrol.analysis.metric_helpers import is_along
+from pathcontrol.analysis.fitting_law import refuse_other_path
 from pathcontrol.analysis.power.closed_loop_theorems import Energy, LoopState, Theorem, theorem_of
 from pathcontrol.analysis.power.law_of_run import LawRecord, find_law, has_demand, record_of
 from pathcontrol.analysis.power.loop_states import states_of
@@ -64,11 +64,7 @@ class PowerBalance:
     @property
     def rate_unit(self) -> str:
         """The unit of all rates."""
-        if self.unit == "J":
-            return "W"
-        if self.unit.endswith(" s"):
-            return self.unit.removesuffix(" s")
-        return self.unit.replace("/s^2", "/s^3") if "/s" in self.unit else f"{self.unit}/s"
+        return " or ".join(map(_unit_of_rate, self.unit.split(" or ")))
 
     @property
     def shares(self) -> dict[str, Array]:
@@ -156,6 +152,15 @@ def power_balance(run: Run, controller: Controller | None = None, *, plant: Robo
     return balance
 
 
+def _unit_of_rate(unit: str) -> str:
+    """Return the unit of the rate of a quantity in a ``unit``."""
+    if unit == "J":
+        return "W"
+    if unit.endswith(" s"):
+        return unit.removesuffix(" s")
+    return unit.replace("/s^2", "/s^3") if "/s" in unit else f"{unit}/s"
+
+
 def _find_checked_law(run: Run, controller: Controller | None) -> tuple[Controller, Theorem]:
     """Return the law of a run with its theorem, after a check that the run has what the balance needs."""
     if missing := [name for name in _NEEDED if name not in run or np.isnan(run.array(name)).all()]:
@@ -171,13 +176,8 @@ def _find_checked_law(run: Run, controller: Controller | None) -> tuple[Controll
             limit=2,
         )
     law = find_law(run, controller)
-    s = run.array("s")
-    if has_demand(run) and not is_along(run.task, law.task, s[np.isfinite(s)]):
-        raise InputError(
-            f"{law!r} goes along another path than the run, {run.task!r}; give a law of that path",
-            argument="controller",
-            value=law,
-        )
+    if has_demand(run):
+        refuse_other_path(run, law)
     return law, theorem_of(law)
 
 
@@ -196,7 +196,7 @@ def _balance(
     rows = {name: np.ascontiguousarray(value.T) for name, value in supply.items()}
     middle = average_neighbours(run.time)
     rates = {"predicted": predicted.T.copy(), "measured": measured.T.copy(), "residual": residual.T.copy()}
-    unit = theorem.unit.replace("rad", "m") if run.unit("q") == "m" else theorem.unit
+    unit = " or ".join(dict.fromkeys(theorem.unit.replace("rad", kind) for kind in run.unit("q").split(" or ")))
     return PowerBalance(run.time, energy.V.T.copy(), middle, **rates, **rows, unit=unit)
 
 
