@@ -9,7 +9,7 @@ from ctypes import addressof
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pathcontrol._arrays import Array, as_joint_array, as_scalar
+from pathcontrol._arrays import Array, as_joint_array, as_scalar, check_whole
 from pathcontrol._milliseconds import as_period
 from pathcontrol.control.base import Controller, ControlOutput, check_controller
 from pathcontrol.control.law_gains import refuse_several_gains
@@ -95,8 +95,9 @@ class ControlTick:
             ticks: number of periods for which the law has run, where its time goes on.
 
         Raises:
-            InputError: the state has another length than that of this law.
+            InputError: the state has another length than that of this law, or ``ticks`` is no whole number.
         """
+        check_whole("ticks", ticks, 0)
         z, expected = np.array(state, dtype=np.float64), self.state.shape
         if z.shape != expected:
             raise InputError(

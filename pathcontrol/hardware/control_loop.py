@@ -184,7 +184,7 @@ class ControlLoop:
             MissingExtraError: a file is to be written, and the extra ``mcap`` is not installed.
             StorageError: the file cannot be written.
         """
-        log = LoopLog(self.law, self.period, path)
+        log = LoopLog(self.law, self.period, path, lambda: self.outcome)
         self.fill(log.ring)
         return log
 

@@ -35,7 +35,7 @@ class LoopContext:
     """
 
     def __init__(self, law: Controller, period: float, outcome: Mapping[str, Array] | None = None) -> None:
-        self._law, self._period, self._outcome = law, period, dict(outcome or {})
+        self._law, self._period, self.outcome = law, period, dict(outcome or {})
 
     @property
     def origin(self) -> RunContext:
@@ -89,7 +89,7 @@ class LoopContext:
 
         arrays = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         return Run(
-            xr.Dataset(*self.label(arrays, complete_outcome(1, self._outcome))), self.describe(begin, lost), self.origin
+            xr.Dataset(*self.label(arrays, complete_outcome(1, self.outcome))), self.describe(begin, lost), self.origin
         )
 
     def make_run_of_moments(self, found: Moments) -> Run:

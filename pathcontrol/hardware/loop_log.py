@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -45,6 +46,7 @@ class LoopLog:
         law: the law of the loop.
         period: its period [s].
         path: the file to write, ``NAME.mcap``; None keeps the samples in memory.
+        outcome: gives what the law has to say when the log is closed, see :meth:`Controller.outcome`.
 
     Attributes:
         ring: the buffer that the loop fills.
@@ -55,8 +57,14 @@ class LoopLog:
         StorageError: the file cannot be written.
     """
 
-    def __init__(self, law: Controller, period: float, path: str | Path | None = None) -> None:
-        self._context = LoopContext(law, period)
+    def __init__(
+        self,
+        law: Controller,
+        period: float,
+        path: str | Path | None = None,
+        outcome: Callable[[], Mapping[str, Array]] = dict,
+    ) -> None:
+        self._context, self._outcome = LoopContext(law, period), outcome
         self._path = None if path is None else check_suffix(path, "a log", ".mcap")
         self.ring = SampleRing(law.robot.n, max(16, round(_SECONDS / period)))
         self._begin = 0.0  # s, time of the first sample
@@ -99,6 +107,7 @@ class LoopLog:
         self._drain()
         if self._last is not None:
             self._keep(self._last, self._sdot)
+        self._context.outcome = dict(self._outcome())
         if self._path is not None:
             self._end_file()
         if self._error is not None:
@@ -185,7 +194,7 @@ class LoopLog:
         try:
             with self._stream:
                 if self._writer is not None and self._error is None:
-                    outcome = label_outcome(complete_outcome(1, {}))
+                    outcome = label_outcome(complete_outcome(1, self._context.outcome))
                     upto = float(self._last["s"][0]) if self._last is not None else 0.0
                     self._writer.attach_context(self._describe(), self._context.origin.stored(upto))
                     self._writer.finish(outcome, list(outcome))

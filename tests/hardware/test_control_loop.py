@@ -196,6 +196,9 @@ def test_a_tick_goes_on_from_its_state_to_the_last_bit():
             for _ in range(3):
                 tick(q, qd)
         other.start_from(other.state, other.ticks)
+        for ticks in (-1, 1.5):
+            with pytest.raises(InputError, match="ticks"):
+                other.start_from(one.state, ticks)
         for _ in range(2):
             assert (one(q, qd) == other(q, qd)).all()
             assert (one.state == other.state).all()

@@ -63,6 +63,24 @@ def test_the_log_of_a_loop_is_the_run_that_it_replays(kind, where, tmp_path):
     assert repr(found.task) == repr(run.task)
 
 
+@pytest.mark.parametrize("where", ["memory", "file"])
+def test_what_a_law_has_to_say_at_the_end_is_in_the_log(where, tmp_path):
+    if where == "file":
+        pytest.importorskip("mcap")
+    law = pc.Learned(pc.Projection(ROBOT, EIGHT, 400.0, 40.0), nodes=16)
+    loop, q = loop_of(law), EIGHT.q_d(np.array(0.0))
+    with loop.record(tmp_path / "log.mcap" if where == "file" else None) as log:
+        loop.start(q)
+        for k in range(3):
+            loop.step(q, np.zeros(2), k * H)
+        z = loop.state
+        law.recall(z).forgotten[...], law.recall(z).time[...] = 2.0, 0.004
+        loop._plan._held.start_from(z, 3)
+    run = log.run()
+    assert run.array("forgotten").tolist() == [2]
+    assert run.array("forgotten_time").tolist() == [0.004]
+
+
 def test_faults_are_in_the_log(tmp_path):
     law = pc.ExtendedMotionPlan(ROBOT, EIGHT, 400.0, 40.0, k=20.0)
     run, loop = simulate(law), loop_of(law)
