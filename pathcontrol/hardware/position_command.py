@@ -24,6 +24,7 @@ from pathcontrol.simulation.arm.plant import Plant
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 
 _NO_LIMIT = 1e6  # rad/s: files without a limit give 0 or some huge number
+_JUMP = 0.05  # rad, what a measurement may change beyond the velocity limits, as in an envelope
 _PATIENCE = 5  # bad measurements in a row after which the plan is held
 _SLOWEST = 1e-12  # rad/s, no division by 0
 _WHOLE = 1e-9  # of a period, as which a rest counts as none
@@ -56,7 +57,8 @@ class PositionCommand:
     λ ≤ 1 of its time, the largest with |λq̇_c| ≤ v and, as far as λ̇ can, |λ²q̈_c + λ̇q̇_c| ≤ a. No step is larger than a
     velocity limit allows, in any case; none leaves the position limits of the arm.
 
-    A measurement that is no number is bridged by the last deviation; after 5 of them in a row the plan is held.
+    A measurement that is no number, or that jumps by more than 0.05 rad beyond a velocity limit, is bridged by the last
+    deviation; after 5 of them in a row the plan is held.
 
     Args:
         law: a law of the library or of one's own, best a path law, with one task and one set of gains. One without a
@@ -74,7 +76,7 @@ class PositionCommand:
         law: the law with its speed input.
         q: the last command [rad], (n,).
         qd: its velocity [rad/s], (n,), for arms that take velocities.
-        faults: number of measurements that were no numbers.
+        faults: number of measurements that were no numbers, or jumped.
 
     Raises:
         InputError: the law is for several rollouts, or an argument has another shape or sign.
@@ -163,7 +165,8 @@ class PositionCommand:
         """
         if not self._started:
             self.start(q)
-        self._watch(self._servo.expect(self.q).update(q))
+        reach = _JUMP + self._velocity * self.period * (self._bad + 1)
+        self._watch(self._servo.expect(self.q).update(q, reach))
         self._pace = self._choose_pace()
         self._passed += self._pace
         if self._passed > 1.0 + _WHOLE:
@@ -185,6 +188,7 @@ class PositionCommand:
     def resume(self) -> None:
         """Let the plan go forward again; see :meth:`LawWrapper.resume`."""
         self._bad = 0
+        self._servo.forget()
         self.law.go()
         self.law.resume()
 

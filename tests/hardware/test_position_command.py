@@ -203,6 +203,24 @@ def test_bad_measurements_are_bridged_and_many_hold_the_plan(again):
     assert np.abs(command.qd).max() > 0.3
 
 
+@pytest.mark.parametrize("ticks", [1, 5, 8])
+def test_measurements_that_jump_move_nothing_and_many_hold_the_plan(ticks):
+    """As of encoders that turn over, or a glitch on the line."""
+    law = law_of(2)
+    command, still = (pc.PositionCommand(law, H) for _ in range(2))
+    q = p = start_of(law)
+    command.start(q), still.start(p)
+    for k in range(200):
+        glitch = 100 <= k < 100 + ticks
+        q = command.step(q + 2 * np.pi if glitch else q)
+        p = still.step(np.full(2, np.nan) if glitch else p)
+        assert (q == p).all()
+    assert command.faults == ticks
+    command.resume()
+    command.step(q + 0.2)  # whoever goes on has looked where the arm is
+    assert command.faults == ticks
+
+
 @pytest.mark.parametrize("kind", [pc.Projection, pc.ExtendedMotionPlan])
 def test_an_arm_far_from_its_path_is_refused_also_by_a_step_without_a_start(kind):
     law = law_of(6, kind)
