@@ -13,7 +13,7 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "tau_limit": (
         ("rollout", "time", "joint"),
         "N m",
-        "its limit, in runs where rollouts differ in it or a disturbance lowers it",
+        "limit of the torque that acts, in runs where rollouts differ in it or a disturbance lowers it",
     ),
     "s": (("rollout", "time"), "1", "path parameter"),
     "sdot": (("rollout", "time"), "1/s", "rate of the path parameter"),

@@ -126,7 +126,7 @@ def power_balance(run: Run, controller: Controller | None = None, *, plant: Robo
     Args:
         run: a run of a law with a theorem, in any loop, or a log with q, q̇ and τ.
         controller: the law; by default that of the run, by its configuration.
-        plant: the arm that moved; by default the run's own.
+        plant: the arm that moved; by default the run's own. A loaded run of several arms knows the first one only.
 
     Raises:
         InputError: the law is not known or has no theorem here, the run has no torques or less than two samples,

@@ -69,7 +69,7 @@ class TickMap:
         _refuse_jumps(law)
         for name, what in (("encoders", loop.encoders), ("noise", loop.noise), ("torque_limits", loop.torque_limits)):
             if what is not False and what is not None:
-                raise InputError(f"{name} of the loop have no derivative; leave them out", argument="loop", value=name)
+                raise InputError(f"a loop with {name} has no derivative; leave {name} out", argument="loop", value=name)
         self.period, self._law, self._n = loop.period, law, law.robot.n
         self._sensors, self._substeps = loop.sensors(law.robot), loop.substeps
         whole, late = split_delay(loop.delay, loop.period)
