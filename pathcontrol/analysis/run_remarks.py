@@ -25,6 +25,7 @@ _NEAR = float(np.deg2rad(2.0))  # rad, within which an arm is at a point of its 
 _LARGE = 0.05  # of the size of a path, which is near on large ones: no fault of a law that follows roughly
 _WHOLE = 0.95  # of the path, below which an arm plainly missed more than the way to it from its start
 _SAMPLES = 200  # of a path, for its size
+_SLOW = 0.5  # of what was asked for, below which an arm that had the time is held by something
 _MOST = 3  # limit of rollouts that are named
 
 
@@ -57,7 +58,7 @@ def remedy(run: Run) -> str:
     """Return advice for an arm that stands still."""
     if _is_held(run):
         return "an operator's input or a contact holds its plan, or sends it back"
-    return _advise_on_friction(run) or "give the controller larger gains, or torque limits that hold and move the arm"
+    return advise_on_friction(run) or "give the controller larger gains, or torque limits that hold and move the arm"
 
 
 def _is_held(run: Run) -> bool:
@@ -78,10 +79,32 @@ def _find_faults(run: Run) -> dict[str, str]:
         if stands_still(run):
             found["still"] = f"the arm stands still after {100 * done:.3g} % of what was asked for: {remedy(run)}"
         else:
-            found["short"] = f"the arm did not get there: it made {100 * done:.3g} % of what was asked for in the time"
+            made = f"the arm did not get there: it made {100 * done:.3g} % of what was asked for in the time"
+            found["short"] = ": ".join(filter(None, (made, _advise_slow(run, done))))
     elif run.status[0] != "diverged":
         found |= _find_missed(run)
     return found | _find_forgotten(run)
+
+
+def _advise_slow(run: Run, done: float) -> str:
+    """Return what helps an arm that moved but did not get there, in a run of one rollout; "" where it is not known."""
+    needed = _planned_time(run)
+    if needed > run.time[-1]:
+        return f"by its profile the path takes {needed:.3g} s, which needs a longer duration than {run.time[-1]:.4g} s"
+    return advise_on_friction(run) if done < _SLOW and not _is_held(run) else ""
+
+
+def _planned_time(run: Run) -> float:
+    """Return the time [s] that the path takes by ϑ, or its laps that were asked for; 0 where none is known."""
+    task = run.task
+    if task is None or isinstance(task, TaskBatch) or laws(run.config)[-1].get("wrappers"):
+        return 0.0
+    asked = run.config.get("laps")
+    laps = 1 if task.period is None else asked if isinstance(asked, int) else 0
+    if not laps or not np.isfinite(task.one_traverse).all():
+        return 0.0
+    s = np.linspace(*task.one_traverse, _SAMPLES)
+    return laps * float(np.trapezoid(1 / (task.theta(s) + np.zeros_like(s)), s))
 
 
 def _say_share(share: float) -> str:
@@ -157,8 +180,8 @@ def _progress(run: Run) -> float:
     return 1.0 if np.isnan(done) else done
 
 
-def _advise_on_friction(run: Run) -> str:
-    """Return why dry friction holds the arm, "" where it is not known to."""
+def advise_on_friction(run: Run) -> str:
+    """Return why dry friction holds an arm that hardly moves, and what helps; "" where it is not known to."""
     try:
         arm, model = run.robot, run.model
     except InputError:

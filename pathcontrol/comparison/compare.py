@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from pathcontrol._arrays import Array, check_whole
 from pathcontrol._expect import expect, expect_choice
 from pathcontrol._json import to_json
+from pathcontrol.analysis.progress import is_unfinished
 from pathcontrol.analysis.readable import unit_of_joints
 from pathcontrol.comparison.laws import Laws, make_laws
 from pathcontrol.comparison.measures import MEASURES, measure
@@ -50,11 +52,25 @@ class Comparison:
     undisturbed: Mapping[str, Run]
     measures: Mapping[str, Mapping[str, Array]]
 
+    def __repr__(self) -> str:
+        means = ", ".join(f"{law} {self.mean(law, 'contour_peak'):.3g}" for law in self.measures)
+        count, unit = next(iter(self.runs.values())).rollouts, self.units["contour_peak"]
+        return f"Comparison({self.scenario.name}; rollout: {count}; contour_peak [{unit}]: {means})"
+
     @property
     def units(self) -> dict[str, str]:
         """The unit of each measure for the joints of the arm: rad becomes m, and N m becomes N, where they slide."""
         run = next(iter(self.runs.values()))
         return {name: unit_of_joints(unit, run) for name, unit in MEASURES.items()}
+
+    @cached_property
+    def stuck(self) -> dict[str, int]:
+        """The laws whose arm did not get along the path even undisturbed, with the number of rollouts in which.
+
+        An arm that stands still has the smallest errors, which say nothing.
+        """
+        counts = {law: int(is_unfinished(run).sum()) for law, run in self.undisturbed.items()}
+        return {law: count for law, count in counts.items() if count}
 
     def mean(self, law: str, measure: str) -> float:
         """Return the mean of a measure over the rollouts; inf if one of them never recovers, NaN where none is one."""
@@ -65,8 +81,11 @@ class Comparison:
         return _reduce(np.std, self._values(law, measure))
 
     def best(self, measure: str) -> list[str]:
-        """Return the laws whose mean of a measure is the least, within a thousandth; none where no mean is finite."""
-        known = self._sizes(measure)
+        """Return the laws whose mean of a measure is the least, within a thousandth; none where no mean is finite.
+
+        Laws that are ``stuck`` are left out.
+        """
+        known = {law: size for law, size in self._sizes(measure).items() if law not in self.stuck}
         least = min(known.values(), default=0.0)
         return [law for law, value in known.items() if value <= max(1.001 * least, self.rounding(measure))]
 
@@ -92,7 +111,7 @@ class Comparison:
     def to_dict(self) -> dict[str, Any]:
         """Return what JSON can hold: means by law and measure, ``spread``, ``rollouts`` and units; null for no number.
 
-        The numbers are in SI units.
+        ``stuck`` is the number of rollouts that did not get along the path even undisturbed. All is in SI units.
         """
         scenario = self.scenario
         return {
@@ -112,6 +131,7 @@ class Comparison:
         return to_json({name: self.mean(law, name) for name in values}) | {
             "spread": to_json({name: self.spread(law, name) for name in values}),
             "rollouts": to_json(values),
+            "stuck": self.stuck.get(law, 0),
             "diverged": int((self.runs[law].status == "diverged").sum()),
             "gains": gains,
         }

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pathcontrol.analysis.progress import is_unfinished
 from pathcontrol.analysis.readable import reading
+from pathcontrol.analysis.run_remarks import advise_on_friction
 from pathcontrol.comparison.compare import Comparison
 from pathcontrol.comparison.measures import MEASURES, RECOVERED
 from pathcontrol.control.motion_control import MotionController
@@ -24,7 +26,7 @@ def tabulate(compared: Comparison) -> list[list[str]]:
         factor, shown = reading(unit, np.array([compared.mean(law, name) for law in compared.measures]))
         label = f"{_in_words(name)} [{shown}]"
         best = compared.best(name)
-        best = [] if len(best) == len(compared.measures) else best
+        best = [] if len(best) == len(compared.measures) - len(compared.stuck) else best
         rows.append([label, *(_cell(compared, law, name, factor, law in best) for law in compared.measures)])
     return rows
 
@@ -44,12 +46,23 @@ def describe_comparison(compared: Comparison) -> list[str]:
     wins = [_in_words(name) for name in MEASURES if _is_won_by_motion(compared, name)]
     if wins:
         lines.append(f"Motion control is the best in: {', '.join(wins)}.")
+    lines += [_describe_stuck(compared, law, f"{stuck} of {count}") for law, stuck in compared.stuck.items()]
     lines += [
         f"{law_title(law)}: {lost} of {count} diverged, so that it has no numbers here."
         for law, run in compared.runs.items()
         if (lost := int((run.status == "diverged").sum()))
     ]
     return lines
+
+
+def _describe_stuck(compared: Comparison, law: str, share: str) -> str:
+    """Return a sentence on a law whose arm did not get along the path even undisturbed."""
+    calm = compared.undisturbed[law]
+    advice = advise_on_friction(calm.rollout(int(np.argmax(is_unfinished(calm)))))
+    return (
+        f"{law_title(law)}: {share} did not get along the path even undisturbed, so that small errors say nothing and "
+        f"none is marked{': ' * bool(advice)}{advice}."
+    )
 
 
 def law_title(law: str) -> str:
@@ -66,9 +79,10 @@ def _in_words(measure: str) -> str:
 
 
 def _is_won_by_motion(compared: Comparison, measure: str) -> bool:
-    """Return whether only laws of motion control have the least mean of a measure."""
+    """Return whether only laws of motion control have the least mean of a measure, and others could have it."""
+    motion = {law for law, made in compared.laws.items() if isinstance(unwrap(made), MotionController)}
     best = compared.best(measure)
-    return bool(best) and all(isinstance(unwrap(compared.laws[law]), MotionController) for law in best)
+    return bool(best) and motion.issuperset(best) and not motion.issuperset(compared.laws.keys() - compared.stuck)
 
 
 def _cell(compared: Comparison, law: str, measure: str, factor: float, best: bool) -> str:

@@ -89,8 +89,9 @@ class SweepResult:
         kept = [i for i in self.kept if i in columns["sample"]]  # a killed process may leave one without its numbers
         if not kept:
             raise InputError(
-                f"the sweep in {str(self.folder)!r} keeps no histories; give it keep=Keep(worst=3), or run one of its "
-                "samples: its table has their parameters",
+                f"the sweep in {str(self.folder)!r} keeps no histories; give it `keep = {{ worst = 3 }}` in the "
+                "[sweep] of its file, in Python keep=Keep(worst=3), or run one of its samples: its "
+                "table has their parameters",
                 file=str(self.folder),
             )
         rows = np.searchsorted(columns["sample"], kept)

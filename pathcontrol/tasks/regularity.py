@@ -1,4 +1,4 @@
-"""The regularity of a path: it neither stands still nor turns back."""
+"""The regularity of a path: it neither stands still nor turns back, nor has it corners."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from pathcontrol.tasks.base import Task
 _SAMPLES = 129
 _HALVINGS = 20  # of the stretch between two samples, to 1e-8 of the domain: nearer to a tip, computed q_d' is rounding
 _OPPOSITE = -0.99  # cosine of an angle
+_SHARPEST = 8  # stretches between samples that are searched for corners
+_CLOSER = 6  # halvings of these, and as many again: a bend turns 64 times less then, a corner as much
+_CORNER = 0.1  # rad, below which the turn at one place is no corner but may be the noise of a function
 _TINY = np.finfo(np.float64).tiny
 
 
@@ -59,6 +62,55 @@ def _check_cusps(task: Task, name: str, s: Array, directions: Array) -> None:
             "moves can turn round at once; end the path there, or round the tip",
             s=float(left[int(np.argmin(cosine))]),
         )
+
+
+def check_corners(task: Task) -> None:
+    """Check that the direction of a path jumps nowhere, by q_d itself: computed derivatives round a corner off.
+
+    Raises:
+        TaskError: it does, and where.
+    """
+    s = np.linspace(*task.sampled_interval, _SAMPLES)
+    if task.period is not None:
+        s = np.append(s, task.s0 + task.period + s[1:3] - s[0])  # over the seam
+    left, right = s[:-2], s[2:]  # of two stretches each, so that no corner is at an end only
+    sharpest = np.argsort(_turns(task, left, right))[-_SHARPEST:]
+    left, right = _approach(task, left[sharpest], right[sharpest])
+    before = _turns(task, left, right)
+    left, right = _approach(task, left, right)
+    turn = _turns(task, left, right)
+    corner = (turn > _CORNER) & (turn > 0.5 * before)
+    if corner.any():
+        i = int(np.argmax(np.where(corner, turn, 0.0)))
+        at = float(0.5 * (left[i] + right[i]))
+        raise TaskError(
+            f"{type(task).__name__}.q_d has a corner at s = {at:.6g}, where its direction turns by "
+            f"{np.rad2deg(turn[i]):.3g}° at once, expected a path that is twice continuously differentiable; round it, "
+            "as WaypointPath does, or end the path there and run the parts by simulate_sequence",
+            s=at,
+        )
+
+
+def _approach(task: Task, left: Array, right: Array) -> tuple[Array, Array]:
+    """Return the parts of stretches, 2^_CLOSER times shorter, in which the path turns the most."""
+    for _ in range(_CLOSER):
+        quarter = 0.25 * (right - left)
+        starts = np.stack([left + i * quarter for i in range(3)])
+        best = _turns(task, starts, starts + 2 * quarter).argmax(0)
+        left = starts[best, np.arange(len(left))]
+        right = left + 2 * quarter
+    return left, right
+
+
+def _turns(task: Task, left: Array, right: Array) -> Array:
+    """Return the angles [rad] between the chords of the first and of the last quarter of stretches."""
+    quarter = 0.25 * (right - left)
+    ends = np.stack([left, left + quarter, right - quarter, right])
+    q = np.asarray(task.q_d(ends.ravel())).reshape(*ends.shape, -1)
+    a, b = (
+        chord / np.maximum(np.linalg.norm(chord, axis=-1, keepdims=True), _TINY) for chord in (q[1] - q[0], q[3] - q[2])
+    )
+    return np.asarray(2 * np.arctan2(np.linalg.norm(b - a, axis=-1), np.linalg.norm(b + a, axis=-1)))
 
 
 def _directions(task: Task, s: Array) -> Array:

@@ -12,7 +12,8 @@ from pathcontrol._arrays import Array
 from pathcontrol._expect import describe, expect
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.batch.task_batch import TaskBatch
-from pathcontrol.tasks.regularity import check_moves
+from pathcontrol.tasks.function import FunctionPath
+from pathcontrol.tasks.regularity import check_corners, check_moves
 from pathcontrol.tasks.task import PathTask
 
 _SAMPLES = 129
@@ -59,7 +60,10 @@ def check_task(task: PathTask, n: int | None = None) -> None:
     for method in ("dq_d", "ddq_d", "dtheta"):
         _check_values(f"{name}.{method}", getattr(task, method), s, None if method == "dtheta" else n)
     check_moves(task)
-    if not type(task).__module__.startswith("pathcontrol."):
+    own = not type(task).__module__.startswith("pathcontrol.")
+    if own or isinstance(task, FunctionPath):
+        check_corners(task)
+    if own:
         _check_projection(task, name, s[1:-1:16])
     for function, derivative in (("q_d", "dq_d"), ("dq_d", "ddq_d"), ("theta", "dtheta")):
         _check_derivative(task, name, s, function, derivative)

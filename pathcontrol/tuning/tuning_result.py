@@ -267,8 +267,8 @@ def _describe_missed(tuning: Tuning) -> list[str]:
         over = beyond[name]
         kept = int((over <= 0).sum())
         value = tuning.candidate(int(over.argmin())).metrics[name]
-        said = f"kept by {kept}" if kept else f"kept by none, {100 * over.min():.0f} % beyond at best"
-        lines.append(f"  {_label(name)} {_describe_limit(tuning, name)}: {said}, {_format_number(name, value)}")
+        said = f"kept by {kept}, at best" if kept else f"kept by none, {100 * over.min():.0f} % beyond at best,"
+        lines.append(f"  {_label(name)} {_describe_limit(tuning, name)}: {said} {_format_number(name, value)}")
     if nearest is not None:
         lines += ["", "nearest to all of them", *_describe_candidate(tuning, nearest)]
         for name, over in beyond.items():

@@ -88,3 +88,18 @@ def test_an_arm_that_an_operator_holds_is_not_given_larger_gains(u, held):
     said = pc.remarks(run)[-1]
     assert ("holds its plan" in said) is held
     assert ("larger gains" in said) is not held
+
+
+@pytest.mark.parametrize("laps", [None, 2])
+def test_a_run_that_was_too_short_is_told_how_long_its_path_takes(laps):
+    task = LINE if laps is None else pc.Circle(0.5, 1.0, center=[0.3, 0.8])
+    needed = task.arc_length() * (laps or 1)  # at 1 rad/s
+    (said,) = of_path(run_of(task, 1.0, duration=0.4, laps=laps))
+    assert said.endswith(f"by its profile the path takes {needed:.3g} s, which needs a longer duration than 0.4 s")
+
+
+def test_an_arm_that_creeps_is_told_what_holds_it():
+    law = pc.Projection(ROBOT.with_friction(pc.Coulomb([2.0, 2.0])), pc.Circle(0.5, 0.1, center=[0.3, 0.8]), 40.0, 12.0)
+    run = pc.simulate(law, [0.81, 0.8], duration=2.0, progress=False)
+    (said,) = of_path(run)
+    assert 'give the controller friction="full"' in said

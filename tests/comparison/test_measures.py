@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from sliding_arm import sliding_arm
 
 import pathcontrol as pc
+from pathcontrol.comparison.comparison_table import describe_comparison, tabulate
 from pathcontrol.comparison.measures import MEASURES, RECOVERED, energy, measure, recovery_time
 from pathcontrol.simulation.acting_limits import acting_limits
 from pathcontrol.simulation.variables import VARIABLES
@@ -185,3 +186,20 @@ def test_a_rollout_that_diverged_has_no_numbers(arm, end):
 def test_beside_an_undisturbed_run_that_diverged_nothing_is_recovered_or_lost(arm, end):
     values = measure(made(arm, away=0.1), made(arm, outcome=LOST, time=TIME[:end]), (1.0, 4.0), 2.0)
     assert {name for name, value in values.items() if np.isnan(value).all()} == {"recovery_s", "time_lost_s"}
+
+
+def test_an_arm_that_stands_still_is_never_the_best_of_a_comparison():
+    arm = pc.load_robot("cicese_2dof")  # with dry friction, of which the laws know nothing
+    circle, gains = pc.Circle(1.0, 0.3), {"K_p": 40.0, "K_v": 12.0, "k": 20.0}
+    scenario = pc.Scenario("soft", "Soft gains.", arm, circle, [1.0, 0.0], duration=1.0, gains=gains)
+    compared = pc.compare(["computed_torque", "projection"], scenario, rollouts=2, progress=False)
+    assert compared.stuck == {"projection": 2}
+    assert compared.mean("projection", "speed_peak") < compared.mean("computed_torque", "speed_peak")
+    assert all(compared.best(name) == ["computed_torque"] for name in ("contour_peak", "speed_peak", "energy_j"))
+    said = " ".join(describe_comparison(compared))
+    assert "projection: 2 of 2 did not get along the path even undisturbed" in said
+    assert 'friction="full"' in said
+    assert "Motion control" not in said
+    assert "*" not in "".join(row[1] + row[2] for row in tabulate(compared)[1:])
+    assert compared.to_dict()["controllers"]["projection"]["stuck"] == 2
+    assert repr(compared).startswith("Comparison(soft; rollout: 2; contour_peak [rad]: computed_torque ")

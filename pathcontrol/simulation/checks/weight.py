@@ -94,6 +94,6 @@ def _describe_worst(robot: Arm, worst: _Worst, limits: Array, weak: int) -> str:
     unit, limit = "N m" if robot.position_units[worst.joint] == "rad" else "N", limits[worst.rollout, worst.joint]
     of = f" in rollout {worst.rollout}, the worst of {weak}," if len(limits) > 1 else ""
     return (
-        f"{robot.joint_names[worst.joint]} needs {worst.share * limit:.4g} {unit} {worst.place}{of} to hold the arm's "
-        f"own weight, its limit is {limit:.4g} {unit}; check the effort limits of the URDF"
+        f"{robot.joint_names[worst.joint]} needs {worst.share * limit:.4g} {unit} {worst.place}{of} to hold the arm "
+        f"and its load, its limit is {limit:.4g} {unit}; check the effort limits of the URDF, and payloads [kg]"
     )
