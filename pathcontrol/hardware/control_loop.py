@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike
 from pathcontrol._arrays import Array, as_joint_vector, as_scalar
 from pathcontrol._expect import expect
 from pathcontrol.control.base import Controller
+from pathcontrol.control.wrappers.pace_rule import PaceRule
+from pathcontrol.control.wrappers.wrapper import LawWrapper
+from pathcontrol.errors import warn
 from pathcontrol.hardware.envelope import Envelope
 from pathcontrol.hardware.held_plan import HeldPlan
 from pathcontrol.hardware.loop_log import LoopLog
@@ -90,6 +93,7 @@ class ControlLoop:
         limits = Envelope() if envelope is None else envelope
         expect("envelope", limits, Envelope)
         self.envelope = limits.complete(law.robot)
+        _question_pace(law, self.envelope.torque)
         self._plan = HeldPlan(law, self.period)
         self._damping = self._find_damping()
         self._rings: tuple[SampleRing, ...] = ()
@@ -329,3 +333,16 @@ class ControlLoop:
         M = robot.mass_matrix(np.asarray(self.law.task.q_d(np.array(self.law.task.s0))).reshape(robot.n))
         lightest = 1.0 / np.linalg.inv(M).diagonal()
         return np.minimum(self.envelope.torque / self.envelope.velocity, 0.3 * lightest / self.period)
+
+
+def _question_pace(law: Controller, torque: Array) -> None:
+    """Warn of a pace that counts on more than the ``torque`` that an envelope lets through [N m], (n,)."""
+    for rule in law.rules if isinstance(law, LawWrapper) else ():
+        if isinstance(rule, PaceRule) and (beyond := rule.torque > torque).any():
+            i = int(beyond.argmax())
+            unit = "N m" if law.robot.position_units[i] == "rad" else "N"
+            warn(
+                f"the pace counts on {rule.torque[i]:g} {unit} at {law.robot.joint_names[i]}, the envelope lets "
+                f"{torque[i]:g} through, and the arm may leave its path; give Paced(law, "
+                f"torque_limits={torque.tolist()})"
+            )

@@ -1,5 +1,7 @@
 """The control loop: the law's torques within the envelope, and one reaction to each fault."""
 
+import warnings
+
 import numpy as np
 import pytest
 from simulated_arm import BAD, H, Simulated, law_of
@@ -586,6 +588,18 @@ def test_reasons_name_the_joint_and_its_unit(joint, unit):
         assert said in loop.status.reason
     loop.start(q + 2.0 * move)
     assert " rad and m from the path, the tube is 0.5 rad and m" in loop.status.reason
+
+
+def test_a_pace_that_counts_on_more_than_the_envelope_lets_through_is_questioned():
+    law, torque = law_of(2), [75.0, 15.0]  # of 150 and 15 N m
+    paced = pc.Paced(law)
+    with pytest.warns(pc.PathControlWarning, match=r"150 N m at joint_1, the envelope lets 75 through"):
+        ControlLoop(pc.SpeedOverride(paced), H, Envelope(torque=torque))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ControlLoop(pc.Paced(law, torque_limits=torque), H, Envelope(torque=torque))
+        ControlLoop(paced, H)
+        ControlLoop(law, H, Envelope(torque=torque))
 
 
 def test_limits_that_are_missing_or_wrong_are_told():
