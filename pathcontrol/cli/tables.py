@@ -23,8 +23,8 @@ _BORDER = 3  # letters of a column beside its text: the line and a space on both
 
 def peaks_table(summary: dict[str, Any]) -> Table:
     """Return the table of steady-state peaks, beside the paper's."""
-    table = Table(title="Steady-state peaks: measured here, and in the paper")
-    for column in ("experiment", r"‖e_p‖ \[deg]", "paper", "", r"‖e_v‖ \[deg/s]", "paper", ""):
+    table = Table(title="Steady-state peaks in deg and deg/s: measured here, and in the paper")
+    for column in ("experiment", "‖e_p‖", "paper", "", "‖e_v‖", "paper", ""):
         table.add_column(column, justify="left" if column == "experiment" else "right")
     for name in ("extended_motion_plan", "projection"):
         measured, paper = summary[name], summary[name]["paper"]
@@ -77,10 +77,10 @@ def comparison_tables(compared: Comparison, width: int) -> list[Table]:
 def _deal_columns(rows: Sequence[Sequence[str]], labels: int, width: int, title: Text | None = None) -> list[Table]:
     """Return rows, heads first, as tables that no ``width`` breaks a word of: each has the first ``labels`` columns.
 
-    The other columns are dealt out to as many tables as that takes.
+    The other columns are dealt out to as many tables as that takes. A label that is blank in all rows is left out.
     """
     columns = list(zip(*rows, strict=True))
-    names, others = columns[:labels], columns[labels:]
+    names, others = [column for column in columns[:labels] if any(column)], columns[labels:]
     tables: list[list[Sequence[str]]] = []
     room = 0
     for column in others:
@@ -89,7 +89,7 @@ def _deal_columns(rows: Sequence[Sequence[str]], labels: int, width: int, title:
             tables.append([*names])
             room = width - 1 - sum(_least_width(each, width) + _BORDER for each in (*names, column))
         tables[-1].append(column)
-    return [_make_table(columns, labels, None if i else title, width) for i, columns in enumerate(tables)]
+    return [_make_table(columns, len(names), None if i else title, width) for i, columns in enumerate(tables)]
 
 
 def _least_width(column: Sequence[str], width: int) -> int:

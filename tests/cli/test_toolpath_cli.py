@@ -15,7 +15,7 @@ from rich.console import Console
 
 from pathcontrol import ExperimentError, Run
 from pathcontrol.cli import main
-from pathcontrol.cli.tables import toolpath_tables
+from pathcontrol.cli.tables import _deal_columns, peaks_table, toolpath_tables
 from pathcontrol.experiments.runner import load_setup, run_experiment
 from pathcontrol.view.figures.style import save_figure
 
@@ -207,6 +207,23 @@ def test_mistakes_are_told_by_key(experiment, old, new, message):
     experiment.write_text(text)
     with pytest.raises(ExperimentError, match=message):
         load_setup(experiment)
+
+
+def test_the_table_of_peaks_fits_into_80_letters_without_a_break():
+    row = {"e_p_peak_deg": 1.57, "e_v_peak_deg_s": 15.79, "paper": {"e_p_peak_deg": 1.5, "e_v_peak_deg_s": 14.5}}
+    console = Console(width=80)
+    with console.capture() as shown:
+        console.print(peaks_table({"extended_motion_plan": row, "projection": row}))
+    assert "extended motion plan" in shown.get()
+    assert len(shown.get().splitlines()) == 7  # title, head, two rows and three lines
+    assert "deg and deg/s" in shown.get()
+
+
+def test_a_table_has_no_blank_column_of_labels():
+    rows = [["contour", "", "time"], ["slot", "", "1.5"]]
+    assert [column.header.plain for column in _deal_columns(rows, 2, 80)[0].columns] == ["contour", "time"]
+    rows[1][1] = "rapid"
+    assert [column.header.plain for column in _deal_columns(rows, 2, 80)[0].columns] == ["contour", "", "time"]
 
 
 @pytest.mark.parametrize("width", [40, 60, 80, 120])
