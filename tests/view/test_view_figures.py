@@ -9,6 +9,7 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+import pathcontrol as pc
 from pathcontrol import (
     Circle,
     ExtendedMotionPlan,
@@ -114,6 +115,19 @@ def test_limits_are_drawn_where_they_are(runs, arm):
     assert [len([line for line in a.lines if np.ptp(line.get_ydata()) == 0]) for a in unbounded] == [0, 2]
     with pytest.raises(InputError, match="limits"):
         torque_figure(runs, limits=[1.0, 2.0, 3.0])
+
+
+def test_limits_that_drop_are_drawn_as_they_act(arm):
+    law = pc.Projection(arm, pc.Circle(1.0, 2.0), 800.0, [45.0, 100.0])
+    loop, drop = pc.SampledLoop(torque_limits=[60.0, 12.0]), pc.TorqueLimitDrop([0.5, 0.25], 0.05, 0.02)
+    run = pc.simulate(law, [0.7, 1.2], duration=0.1, loop=loop, disturbance=drop, progress=False)
+    for k, axes in enumerate(torque_figure(run).axes):
+        drawn = [line.get_ydata() for line in axes.lines if line.get_drawstyle() == "steps-post"]
+        limit = run.array("tau_limit")[0, :, k]
+        np.testing.assert_array_equal(drawn, [limit, -limit])
+        share = (np.abs(run.array("tau")[0, :, k]) / limit).max()
+        assert axes.get_title(loc="right") == f"peak {100 * share:.3g} % of its limit"
+        assert np.ptp(limit) > 0
 
 
 def test_the_speed_is_beside_its_profile(runs, circle):
