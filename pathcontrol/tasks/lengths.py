@@ -10,6 +10,9 @@ from pathcontrol._expect import expect
 from pathcontrol.errors import InputError, TaskError
 from pathcontrol.geometry.arc_length import ArcLength, curvature_vector
 from pathcontrol.tasks.base import Task
+from pathcontrol.tasks.values_check import check_path
+
+_SAMPLES = 17
 
 
 def arc_length(task: Task, s0: ArrayLike | None = None, s_end: ArrayLike | None = None) -> Array:
@@ -24,7 +27,7 @@ def arc_length(task: Task, s0: ArrayLike | None = None, s_end: ArrayLike | None 
 
     Raises:
         InputError: an end is outside an open path, or left out where there is none; the shapes do not fit.
-        TaskError: the path stands still somewhere.
+        TaskError: the path stands still somewhere, or returns a wrong shape or NaN.
     """
     expect("task", task, Task, error=TaskError)
     if s_end is None and not np.isfinite(last_parameter(task)):
@@ -60,6 +63,7 @@ def curvature(task: Task, s: ArrayLike) -> Array:
 
 def length_along(task: Task, lower: float, upper: float) -> ArcLength:
     """Return the arc length [rad] of a path from ``lower`` on, up to ``upper``, or all round a closed one."""
+    check_path(task, np.linspace(lower, upper, _SAMPLES))
     return ArcLength(task.dq_d, lower, upper, task.closed, task.knots, type(task).__name__)
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numbers
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +13,7 @@ from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.function import FunctionPath
 from pathcontrol.tasks.regularity import check_corners, check_moves
 from pathcontrol.tasks.task import PathTask
+from pathcontrol.tasks.values_check import check_values, count_joints
 
 _SAMPLES = 129
 _GOLDEN = (5**0.5 - 1) / 2
@@ -44,10 +43,10 @@ def check_task(task: PathTask, n: int | None = None) -> None:
     _check_domain(task, name)
     lower, upper = task.sampled_interval
     if n is None:
-        n = _count_joints(task, name, lower)
+        n = count_joints(task, name, lower)
     s = np.linspace(lower, upper, _SAMPLES)
-    _check_values(f"{name}.q_d", task.q_d, s, n)
-    theta = _check_values(f"{name}.theta", task.theta, s, None)
+    check_values(f"{name}.q_d", task.q_d, s, n)
+    theta = check_values(f"{name}.theta", task.theta, s, None)
     if not (theta > 0).all():
         i = int(np.argmax(~(theta > 0)))
         raise TaskError(
@@ -58,7 +57,7 @@ def check_task(task: PathTask, n: int | None = None) -> None:
         )
     _check_period(task, name)
     for method in ("dq_d", "ddq_d", "dtheta"):
-        _check_values(f"{name}.{method}", getattr(task, method), s, None if method == "dtheta" else n)
+        check_values(f"{name}.{method}", getattr(task, method), s, None if method == "dtheta" else n)
     check_moves(task)
     own = not type(task).__module__.startswith("pathcontrol.")
     if own or isinstance(task, FunctionPath):
@@ -67,18 +66,6 @@ def check_task(task: PathTask, n: int | None = None) -> None:
         _check_projection(task, name, s[1:-1:16])
     for function, derivative in (("q_d", "dq_d"), ("dq_d", "ddq_d"), ("theta", "dtheta")):
         _check_derivative(task, name, s, function, derivative)
-
-
-def _count_joints(task: PathTask, name: str, s: float) -> int:
-    """Return the number of joints that q_d is for."""
-    posture = _evaluate(f"{name}.q_d", task.q_d, np.float64(s))
-    if posture.ndim != 1:
-        raise TaskError(
-            f"{name}.q_d of a number s has shape {posture.shape}, expected (n,): a value for each joint",
-            value=posture.shape,
-            s=float(s),
-        )
-    return len(posture)
 
 
 def _check_each(batch: TaskBatch, n: int | None) -> None:
@@ -170,58 +157,3 @@ def _check_period(task: PathTask, name: str) -> None:
                 f"{apart.max():.3g}; correct the period, or leave it out and give s_end",
                 value=float(apart.max()),
             )
-
-
-def _check_values(label: str, function: Callable[[Any], Any], s: Array, n: int | None) -> Array:
-    """Check that values at s and at a single s have the shapes of the batch convention; return them."""
-    many, _ = (_check_shape(label, function, argument, n) for argument in (s, s[0]))
-    values = np.asarray(many, dtype=np.float64) + (np.zeros_like(s) if n is None else 0.0)
-    if not np.isfinite(values).all():
-        i = int(np.argwhere(~np.isfinite(values))[0][0])
-        raise TaskError(
-            f"{label}(s={s[i]:g}) = {values[i].tolist()}, expected finite numbers on the whole domain",
-            value=values[i].tolist(),
-            s=float(s[i]),
-        )
-    return values
-
-
-def _check_shape(label: str, function: Callable[[Any], Any], s: Any, n: int | None) -> Array:
-    """Check that values at s have the shape of the batch convention; return them."""
-    expected = np.shape(s) + (() if n is None else (n,))
-    value = _evaluate(label, function, s)
-    # ϑ may be a constant that broadcasts
-    if value.shape != expected and not (n is None and value.shape == ()):
-        raise TaskError(_shape_message(label, np.shape(s), value.shape, expected, n), value=value.shape)
-    return value
-
-
-def _evaluate(label: str, function: Callable[[Any], Any], s: Any) -> Array:
-    """Return what a method of the task gives at s, an array of real numbers."""
-    try:
-        value = function(s)
-        array = np.asarray(value)
-    except TaskError:
-        raise
-    except (TypeError, ValueError, IndexError) as error:
-        raise TaskError(
-            f"{label} fails for s of shape {np.shape(s)}: {error}; work on arrays, with np.cos rather than math.cos "
-            "and np.where rather than if"
-        ) from error
-    if value is None:
-        raise TaskError(f"{label} returns None, expected an array; does it end without a return?")
-    if array.dtype.kind not in "biufO":
-        raise TaskError(
-            f"{label} gives {array.dtype} numbers, expected real ones"
-            if array.dtype.kind == "c"
-            else f"{label} gives {value!r:.80}, expected an array of numbers",
-            value=value,
-        )
-    return array
-
-
-def _shape_message(label: str, given: Any, got: Any, expected: Any, n: int | None) -> str:
-    message = f"{label} of s with shape {given} has shape {got}, expected {expected}"
-    if n is not None and len(got) == len(expected) and got[:-1] == expected[:-1]:
-        return message + f": the path is for {got[-1]} joints, the arm has {n}"
-    return message + "; work on arrays and put the joints last, as in np.stack([...], axis=-1)"

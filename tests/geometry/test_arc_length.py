@@ -289,7 +289,7 @@ HERE = Wobble(np.zeros((1, 2)), np.zeros((1, 2)))
         (
             lambda: FunctionPath(lambda s: [s, np.nan], 1.0, s_end=1).arc_length(),
             TaskError,
-            ["FunctionPath has length nan", "standstill"],
+            ["FunctionPath.q_d(s=0) = [0.0, nan]", "finite"],
         ),
     ],
 )

@@ -14,7 +14,6 @@ from pathcontrol import (
     CartesianPath,
     Circle,
     InputError,
-    PathTask,
     ToolCurve,
     Viscous,
     WaypointPath,
@@ -39,25 +38,6 @@ def test_the_two_link_arm_has_the_published_dynamics(q1, q2, v1, v2):
 
 def random_path(seed):
     return WaypointPath(np.random.default_rng(seed).uniform(-1.2, 1.2, (4, 2)), 1.0)
-
-
-class Backwards(PathTask):
-    """An open path from its end to its start."""
-
-    def __init__(self, path):
-        self.path, (self.s0, self.s_end) = path, path.one_traverse
-
-    def q_d(self, s):
-        return self.path.q_d(self.s0 + self.s_end - s)
-
-    def dq_d(self, s):
-        return -self.path.dq_d(self.s0 + self.s_end - s)
-
-    def ddq_d(self, s):
-        return self.path.ddq_d(self.s0 + self.s_end - s)
-
-    def theta(self, s):
-        return self.path.theta(self.s0 + self.s_end - s)
 
 
 @pytest.mark.parametrize("viscous", [(0.0, 0.0), (4.0, 2.0)])
@@ -101,10 +81,10 @@ def by_linear_program(robot, path, s, first):
     weight = robot.gravity(q)
     inertia = robot.inverse_dynamics(q, 0 * q, dq) - weight
     centrifugal = robot.inverse_dynamics(q, dq, ddq) - weight
-    cells, width, n = np.arange(len(s) - 1), s[1] - s[0], robot.n
+    cells, width, n = np.arange(len(s) - 1), np.diff(s), robot.n
     rows, limits = [], []
     for end in (0, 1):
-        own, u = slice(end, len(s) - 1 + end), inertia[end : len(s) - 1 + end] / (2 * width)
+        own, u = slice(end, len(s) - 1 + end), inertia[end : len(s) - 1 + end] / (2 * width[:, None])
         for sign in (1, -1):
             for i in range(n):
                 here, there = (sign * (centrifugal[own, i] * side + slope * u[:, i]) for side, slope in _sides(end))
@@ -155,7 +135,7 @@ def test_no_given_rate_is_faster_than_a_free_one(seed, name, share):
 def test_without_friction_a_path_is_as_fast_backwards(seed):
     arm, path = ARM.with_friction(Viscous(np.zeros(2))), random_path(seed)
     there = time_optimal(arm, path, points=300, start_rate=0.1, end_rate="free")
-    back = time_optimal(arm, Backwards(path), points=300, start_rate="free", end_rate=0.1)
+    back = time_optimal(arm, path.reversed(), points=300, start_rate="free", end_rate=0.1)
     assert back.squared[::-1] == pytest.approx(there.squared, rel=1e-4)
 
 

@@ -18,6 +18,7 @@ from pathcontrol import (
     InputError,
     Line,
     PathTask,
+    SmoothStartStop,
     TaskError,
     UnknownNameError,
     WaypointPath,
@@ -29,6 +30,7 @@ from pathcontrol.profiles.limited.motion_limit import MotionLimit
 from pathcontrol.profiles.limited.two_pass import Lines, largest_sequence
 from pathcontrol.profiles.motion import JointMotion, ToolMotion
 from pathcontrol.profiles.tool_speed import ToolSpeed
+from pathcontrol.profiles.topp.time_optimal import time_optimal
 
 FRAMES = {"cicese_2dof": "tool", "ur5": "tool0", "panda": "panda_hand_tcp"}
 every_arm = pytest.mark.parametrize("name", FRAMES)
@@ -323,6 +325,39 @@ def test_bad_limits(make, kind, words):
     with pytest.raises(kind) as error:
         make()
     assert all(word in str(error.value) for word in words), str(error.value)
+
+
+class Wall(PathTask):
+    """A path with a stretch of NaN, or with the joints first."""
+
+    s_end = 2.0
+
+    def __init__(self, first):
+        self.first = first
+
+    def q_d(self, s):
+        return np.stack([s, s]) if self.first else np.stack([s, np.where(np.abs(s - 0.9) < 0.1, np.nan, 0 * s)], -1)
+
+    def theta(self, s):
+        return np.ones_like(s)
+
+
+@pytest.mark.parametrize(
+    ("first", "words"), [(False, r"Wall\.d?q_d\(s=.*nan"), (True, r"Wall\.q_d .*put the joints last")]
+)
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda path: limited(path, MotionLimit(speed=1.0, tangential=1.0, normal=1.0)),
+        lambda path: SmoothStartStop(path, ConstantSpeed(1.0), acceleration=1.0, jerk=10.0),
+        lambda path: time_optimal(arm("cicese_2dof"), path),
+        PathTask.arc_length,
+        PathTask.by_arc_length,
+    ],
+)
+def test_a_path_without_numbers_or_with_the_joints_first_is_refused_at_once(use, first, words):
+    with pytest.raises(TaskError, match=words):
+        use(Wall(first))
 
 
 def elbow():

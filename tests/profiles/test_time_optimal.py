@@ -108,6 +108,21 @@ def test_no_limit_is_exceeded_anywhere(name, seed, kind, closed, accelerations, 
     assert max(used.values()) < 1.001, used
 
 
+def test_no_limit_is_exceeded_on_a_path_of_many_pieces_whose_corners_of_curvature_are_at_knots():
+    robot = load("cicese_2dof")
+    path = spline(robot, 2, count=50, reach=0.5)
+    profile = time_optimal(robot, path, margin=0.0, points=200)
+    assert np.isin(path.knots, profile.s).all()
+    used = shares(robot, path.with_profile(profile).at(densely(profile, 20)), own_limits(robot))
+    assert max(used.values()) < 1.001, used
+
+
+def test_a_path_that_winds_much_is_resolved_whatever_the_points():
+    robot, path = load("cicese_2dof"), Lissajous([0.3, 0.3], [20, 21], 1.0)
+    few, many = (time_optimal(robot, path, points=points).traversal_time for points in (150, 1500))
+    assert few < 1.03 * many
+
+
 @every_arm
 def test_the_controllers_end_a_path_within_the_limits_if_the_profile_foresees_it(name):
     robot = load(name).with_friction(frictions(load(name))[2])

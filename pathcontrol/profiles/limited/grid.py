@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.profile import Path
+from pathcontrol.tasks.values_check import check_path
 
 _SHARES = np.linspace(0, 1, 5)
 _PEAK = 4.0
@@ -20,7 +21,7 @@ def edges(path: Path, cells: int) -> Array:
     """Return the edges of at least ``cells`` cells over one traverse of a path, each within one piece of it.
 
     Raises:
-        TaskError: the path neither ends nor closes.
+        TaskError: the path neither ends nor closes, or returns a wrong shape or NaN at the edges.
     """
     lower, upper = path.s0, path.s_end if path.period is None else path.s0 + path.period
     if not np.isfinite(upper):
@@ -31,7 +32,9 @@ def edges(path: Path, cells: int) -> Array:
     margin = 1e-9 * (upper - lower)
     pieces = np.concatenate([[lower], knots[(knots > lower + margin) & (knots < upper - margin)], [upper]])
     counts = np.ceil(np.diff(pieces) * cells / (upper - lower) - 1e-6).clip(1)
-    return np.interp(np.arange(counts.sum() + 1), np.append(0, np.cumsum(counts)), pieces)
+    s = np.interp(np.arange(counts.sum() + 1), np.append(0, np.cumsum(counts)), pieces)
+    check_path(path, s)  # where q_d' is NaN no cell would ever be small enough
+    return s
 
 
 def quarters(edges: Array) -> Array:

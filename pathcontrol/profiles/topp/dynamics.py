@@ -52,9 +52,9 @@ class Samples(NamedTuple):
         return over[np.arange(len(over)), farthest] * self.k / (self.k - 1)
 
 
-def sample(path: Path, knots: Array, n: int) -> Samples:
-    """Sample ``path``, for ``n`` joints, at the ``knots`` (N + 1,) and between."""
-    k = max(_SAMPLES, -(-_ALL // (len(knots) - 1)))
+def sample(path: Path, knots: Array, n: int, finer: int = 1) -> Samples:
+    """Sample ``path``, for ``n`` joints, at the ``knots`` (N + 1,) and between, ``finer`` times as densely."""
+    k = finer * max(_SAMPLES, -(-_ALL // (len(knots) - 1)))
     s = np.interp(np.arange(k * (len(knots) - 1) + 1) / k, np.arange(len(knots)), knots)
     q, dq, ddq = (np.asarray(f(s), dtype=np.float64) for f in (path.q_d, path.dq_d, path.ddq_d))
     for name, value in {"q_d": q, "dq_d": dq, "ddq_d": ddq}.items():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.profiles.topp.cell_constraints import Cells
@@ -15,6 +16,7 @@ from pathcontrol.profiles.topp.passes import Allowed
 from pathcontrol.robot.friction import viscous_of
 
 _ACCEPTED = 1 + 7e-4  # largest share at the samples, a little below what is promised between them
+_PROMISED = 1 + 1e-3
 _KEPT = 0.1  # share kept of the margin that standstill leaves
 
 
@@ -48,6 +50,12 @@ def find_excess(limits: JointLimits, samples: Samples, torques: Torques, cells: 
         np.where(ends > _ACCEPTED, ends - 1, 0.0),
         np.where(velocity > _ACCEPTED, velocity - 1, 0.0),
     )
+
+
+def find_broken(limits: JointLimits, samples: Samples, torques: Torques, x: Array) -> NDArray[np.bool_]:
+    """Return the mask of the cells, (N,), in which a sample of ṡ² = x exceeds a limit by more than is promised."""
+    rows, velocity = _inside(limits, samples, torques, x)
+    return np.asarray((rows > _PROMISED).any((1, 2)) | (velocity > _PROMISED))
 
 
 def tighten(allowed: Allowed, cells: Cells, over: Excess, x: Array) -> Allowed:

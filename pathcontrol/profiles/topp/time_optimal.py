@@ -5,20 +5,26 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array, as_scalar, as_whole, freeze
 from pathcontrol._expect import did_you_mean, expect
 from pathcontrol.arguments import Form, Rate, Unit
 from pathcontrol.errors import InputError, TaskError
+from pathcontrol.profiles.limited.grid import edges, refine
 from pathcontrol.profiles.tabulated import MOST_POINTS, TabulatedProfile
 from pathcontrol.profiles.topp.dynamics import sample, torques
 from pathcontrol.profiles.topp.joint_limits import LimitChoice, VelocityLimit, joint_limits
+from pathcontrol.profiles.topp.recheck import find_broken
 from pathcontrol.profiles.topp.traversal import Demand, fastest
 from pathcontrol.robot.model import RobotModel
 from pathcontrol.tasks.profile import Path
 from pathcontrol.tasks.task import PathTask
 
 _BINDING = 0.999
+_CHANGE = 0.25  # of q_d' within a cell, in shares of its length
+_FINER = 3
+_HALVINGS = 8
 _FREE = "free"
 
 
@@ -73,7 +79,8 @@ def time_optimal(
     pass takes the largest of them (reachability analysis: Pham and Pham, IEEE Trans. Robotics 34, 2018; viscous
     friction, with which the sets of allowed ϑ² and s̈ are not convex, is kept exactly, as quadratics in ϑ). Each limit
     is kept at both ends of every cell; where inverse dynamics between the knots finds more than 0.07 % too much, the
-    cell is given less and the passes are repeated: no limit is exceeded by more than 0.1 % anywhere.
+    cell is given less and the passes are repeated. The pieces of the path begin and end at knots, and cells are halved
+    where q_d' changes much, or where inverse dynamics on a finer grid finds more than 0.1 % too much.
 
     A joint that turns back within a cell is given the dry friction of both directions there. Friction that falls with
     velocity (Stribeck) is taken to be anything between its levels at rest and at high speed.
@@ -94,7 +101,7 @@ def time_optimal(
         acceleration: |q̈| ≤ ``acceleration`` [rad/s²], (n,); ``None`` for no limit.
         torque: |τ| ≤ ``torque`` [N m], (n,); ``True`` for the limits of the URDF, ``None`` for none.
         margin: share of each torque limit left for feedback, 0 ≤ margin < 1.
-        points: knots of the grid, 10 or more.
+        points: knots of the grid, 10 or more; there are more where cells are halved.
         start_rate: ϑ at the start of an open path [1/s], or ``"free"``. For a tool that begins with v [m/s] along a
             curve p(s) it is v/‖p'‖: v itself where s is the length of the curve.
         end_rate: ϑ at its end [1/s], or ``"free"``.
@@ -109,24 +116,38 @@ def time_optimal(
     expect("path", path, PathTask)
     limits = joint_limits(robot, velocity, acceleration, torque, margin)
     ends = _ends(path, start_rate=start_rate, end_rate=end_rate, end_time=end_time)
-    samples = sample(path, _knots(path, points), robot.n)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # bounds that do not exist are infinite
-        demand = Demand(limits, samples, torques(robot, samples), path.period is not None, *ends)
-        squared, binding = fastest(demand)
+    knots = _knots(path, as_whole("points", points, 10, MOST_POINTS))
+    for _ in range(_HALVINGS):
+        samples = sample(path, knots, robot.n)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # bounds that do not exist are infinite
+            demand = Demand(limits, samples, torques(robot, samples), path.period is not None, *ends)
+            squared, binding, coarse = fastest(demand)
+            finer = sample(path, knots, robot.n, _FINER)
+            coarse |= find_broken(limits, finer, torques(robot, finer), squared)
+        if not coarse.any():
+            break
+        knots = np.sort(np.append(knots, 0.5 * (knots[:-1] + knots[1:])[coarse]))
+    else:
+        where = samples.knots.s[coarse.argmax()]
+        raise TaskError(
+            f"{len(squared)} points do not resolve the path near s = {where:.6g}: limits are exceeded between them; "
+            "give more, or a path that is twice differentiable there",
+            s=float(where),
+        )
     names = robot.joint_names
     limiting = tuple(f"{kind} of {names[i]}" for kind, i in zip(binding.kinds, binding.joints, strict=True))
     return TimeOptimal(samples.knots.s, squared, path.period, limiting, binding.shares, margin)
 
 
 def _knots(path: Path, points: int) -> Array:
-    """Return the knots of the grid; the path must end or close."""
-    end = path.s_end if path.period is None else path.s0 + path.period
-    if not np.isfinite(end):
-        raise TaskError(
-            f"{type(path).__name__} neither ends nor closes, so ϑ cannot be tabulated; give it an s_end",
-            value=path.s_end,
-        )
-    return np.linspace(path.s0, end, as_whole("points", points, 10, MOST_POINTS))
+    """Return the knots of a grid of at least so many ``points``, with cells halved in which q_d' changes much."""
+
+    def resolved(s: Array) -> NDArray[np.bool_]:
+        dq = np.asarray(path.dq_d(s))
+        change = np.linalg.norm(np.diff(dq, axis=1), axis=-1).sum(-1)
+        return np.asarray(~(change > _CHANGE * np.linalg.norm(dq, axis=-1).mean(-1)))  # NaN is for the samples to tell
+
+    return refine(resolved, edges(path, points - 1))
 
 
 def _ends(path: Path, **ends: float | str | None) -> list[float | None]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.errors import InputError, TaskError
+from pathcontrol.errors import InputError
 from pathcontrol.profiles.topp.binding import Binding, check_rate, check_static_load, find_binding
 from pathcontrol.profiles.topp.cell_constraints import cells_of
 from pathcontrol.profiles.topp.dynamics import Samples, Torques
@@ -38,8 +39,10 @@ class Demand(NamedTuple):
     end_time: float | None
 
 
-def fastest(demand: Demand) -> tuple[Array, Binding]:
-    """Return ṡ² at the knots (N + 1,) of the fastest traversal, and the limits that bind there.
+def fastest(demand: Demand) -> tuple[Array, Binding, NDArray[np.bool_]]:
+    """Return ṡ² at the knots (N + 1,) of the fastest traversal, the limits that bind there, and the cells to be halved.
+
+    Those are the cells, (N,), within which limits are exceeded whatever is tightened.
 
     Raises:
         InputError: nothing limits the speed somewhere.
@@ -59,13 +62,9 @@ def fastest(demand: Demand) -> tuple[Array, Binding]:
         over = find_excess(limits, samples, torques, cells, x)
         if not over.cells.any():
             _check_bounded(samples, x, endless)
-            return x, find_binding(limits, samples, cells, x)
+            break
         allowed = tighten(allowed, cells, over, x)
-    where = samples.knots.s[over.cells.argmax()]
-    raise TaskError(
-        f"{len(x)} points do not resolve the path near s = {where:.6g}: limits are exceeded between them; give more",
-        s=float(where),
-    )
+    return x, find_binding(limits, samples, cells, x), over.cells
 
 
 def _traversal(demand: Demand, allowed: Allowed) -> Array:
