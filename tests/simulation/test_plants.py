@@ -198,9 +198,11 @@ def test_limits_and_encoders_of_each(arm, circle):
     loop = SampledLoop(torque_limits=limits, encoders=counts)
     run = simulate(law(arm, circle), [START, START], duration=0.2, loop=loop, progress=False)
     assert_array_equal(np.abs(run.array("tau")).max(1), limits)
+    assert_array_equal(run.array("tau_limit"), np.broadcast_to(limits[:, None], run.array("tau").shape))
+    without = run.with_data(run.data.drop_vars("tau_limit"))  # which a rollout alone has in its settings
     for i in range(2):
         one = SampledLoop(torque_limits=limits[i], encoders=counts[i])
-        assert_rows_equal(run, simulate(law(arm, circle), START, duration=0.2, loop=one, progress=False), i)
+        assert_rows_equal(without, simulate(law(arm, circle), START, duration=0.2, loop=one, progress=False), i)
     with pytest.raises(InputError, match="torque_limits has rows for 2 rollouts, expected 1 or 3"):
         simulate(law(arm, circle), [START] * 3, duration=0.2, loop=loop, progress=False)
 
