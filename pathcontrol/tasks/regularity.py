@@ -14,6 +14,8 @@ _OPPOSITE = -0.99  # cosine of an angle
 _SHARPEST = 8  # stretches between samples that are searched for corners
 _CLOSER = 6  # halvings of these, and as many again: a bend turns 64 times less then, a corner as much
 _CORNER = 0.1  # rad, below which the turn at one place is no corner but may be the noise of a function
+_JUMP_HALVINGS = 12
+_JUMP = 0.05  # of the chord between two samples; a smooth path has some 2^-12 left
 _TINY = np.finfo(np.float64).tiny
 
 
@@ -88,6 +90,32 @@ def check_corners(task: Task) -> None:
             f"{np.rad2deg(turn[i]):.3g}° at once, expected a path that is twice continuously differentiable; round it, "
             "as WaypointPath does, or end the path there and run the parts by simulate_sequence",
             s=at,
+        )
+
+
+def check_jumps(task: Task) -> None:
+    """Check that a path is continuous, by q_d itself: between any two samples the chord shrinks with the stretch.
+
+    Raises:
+        TaskError: it jumps, and where.
+    """
+    left, right = (s := np.linspace(*task.sampled_interval, _SAMPLES))[:-1], s[1:]
+    q_left, q_right = (q := np.asarray(task.q_d(s)))[:-1], q[1:]
+    whole = np.linalg.norm(q_right - q_left, axis=-1)
+    for _ in range(_JUMP_HALVINGS):
+        middle = 0.5 * (left + right)
+        q = np.asarray(task.q_d(middle))
+        first = np.linalg.norm(q - q_left, axis=-1) > np.linalg.norm(q_right - q, axis=-1)
+        left, right = np.where(first, left, middle), np.where(first, middle, right)
+        q_left, q_right = np.where(first[:, None], q_left, q), np.where(first[:, None], q, q_right)
+    jump = np.linalg.norm(q_right - q_left, axis=-1)
+    jump[jump <= _JUMP * whole] = 0.0
+    if jump.any():
+        i = int(jump.argmax())
+        raise TaskError(
+            f"{type(task).__name__}.q_d jumps by {jump[i]:.3g} at s = {right[i]:.6g}, expected a continuous path; "
+            "np.unwrap mends angles that jump by 2π, and simulate_sequence(…, gaps=True) runs parts that do not meet",
+            s=float(right[i]),
         )
 
 

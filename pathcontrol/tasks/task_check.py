@@ -11,7 +11,7 @@ from pathcontrol._expect import describe, expect
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.function import FunctionPath
-from pathcontrol.tasks.regularity import check_corners, check_moves
+from pathcontrol.tasks.regularity import check_corners, check_jumps, check_moves
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.tasks.values_check import check_values, count_joints
 
@@ -58,9 +58,12 @@ def check_task(task: PathTask, n: int | None = None) -> None:
     _check_period(task, name)
     for method in ("dq_d", "ddq_d", "dtheta"):
         check_values(f"{name}.{method}", getattr(task, method), s, None if method == "dtheta" else n)
-    check_moves(task)
     own = not type(task).__module__.startswith("pathcontrol.")
-    if own or isinstance(task, FunctionPath):
+    by_hand = own or isinstance(task, FunctionPath)
+    if by_hand:
+        check_jumps(task)  # beside a jump computed derivatives look like a cusp
+    check_moves(task)
+    if by_hand:
         check_corners(task)
     if own:
         _check_projection(task, name, s[1:-1:16])

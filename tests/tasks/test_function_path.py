@@ -7,7 +7,7 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import floats
 
@@ -212,3 +212,16 @@ def test_bad_functions(make, words):
 def test_wrong_values_are_found_by_the_check(path, word):
     with pytest.raises(TaskError, match=word):
         check_task(path, path.n)
+
+
+@pytest.mark.parametrize("jump", [2 * np.pi, 0.1, 2e-3])
+@given(st.floats(0.05, 1.95))
+@settings(max_examples=5)
+def test_a_path_of_ones_own_that_jumps_is_refused_where_it_does(jump, where):
+    def wrapped(s):
+        return np.stack([s, 0.3 * np.sin(s) + jump * (np.asarray(s) > where)], -1)
+
+    with pytest.raises(TaskError, match=r"FunctionPath\.q_d jumps by .* at s = ") as error:
+        check_task(FunctionPath(wrapped, speed=1.0, s_end=2.0))
+    assert error.value.s == pytest.approx(where, abs=1e-4)
+    check_task(FunctionPath(lambda s: wrapped(s) * [1.0, 0.0] + np.stack([0 * s, np.tanh(30 * s)], -1), 1.0, s_end=2.0))
