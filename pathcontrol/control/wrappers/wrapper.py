@@ -131,7 +131,7 @@ class LawWrapper(Controller):
         for rule in self.rules:
             x = rule.start(self.inner, position, velocity, own[..., 0])
             if rule.relative:
-                x = np.concatenate([(asked * x[..., 0])[..., None], x[..., 1:]], axis=-1)
+                x = join_columns([(asked * x[..., 0])[..., None], x[..., 1:]])
             parts.append(x)
             asked = x[..., 0]
         return join_columns(parts)
