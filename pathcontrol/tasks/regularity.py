@@ -15,7 +15,7 @@ _SHARPEST = 8  # stretches between samples that are searched for corners
 _CLOSER = 6  # halvings of these, and as many again: a bend turns 64 times less then, a corner as much
 _CORNER = 0.1  # rad, below which the turn at one place is no corner but may be the noise of a function
 _JUMP_HALVINGS = 12
-_JUMP = 0.05  # of the chord between two samples; a smooth path has some 2^-12 left
+_JUMP = 0.05  # of the longest chord between two samples; a smooth path has some 2^-12 left
 _TINY = np.finfo(np.float64).tiny
 
 
@@ -105,7 +105,8 @@ def check_jumps(task: Task) -> None:
     for _ in range(_JUMP_HALVINGS):
         middle = 0.5 * (left + right)
         q = np.asarray(task.q_d(middle))
-        first = np.linalg.norm(q - q_left, axis=-1) > np.linalg.norm(q_right - q, axis=-1)
+        before, after = np.linalg.norm(q - q_left, axis=-1), np.linalg.norm(q_right - q, axis=-1)
+        first, whole = before > after, np.maximum(whole, np.maximum(before, after))
         left, right = np.where(first, left, middle), np.where(first, middle, right)
         q_left, q_right = np.where(first[:, None], q_left, q), np.where(first[:, None], q, q_right)
     jump = np.linalg.norm(q_right - q_left, axis=-1)

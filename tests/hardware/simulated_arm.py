@@ -8,6 +8,8 @@ import pathcontrol as pc
 from pathcontrol.simulation.compiled_plant import CompiledPlant
 
 H = 2e-3
+#: an envelope that lets everything through
+WIDE = {"torque": 1e6, "torque_rate": 1e12, "velocity": 1e3, "lower": -1e3, "upper": 1e3, "tube": np.inf}
 
 #: what a measurement (q, q̇, t) is turned into
 BAD = {

@@ -4,17 +4,12 @@ import warnings
 
 import numpy as np
 import pytest
-from simulated_arm import BAD, H, Simulated, law_of
+from simulated_arm import BAD, WIDE, H, Simulated, law_of
 
 import pathcontrol as pc
-from pathcontrol.control.wrappers.stopping_rate import stopping_rate
 from pathcontrol.errors import InputError
 from pathcontrol.hardware.control_loop import ControlLoop, Mode
 from pathcontrol.hardware.envelope import Envelope
-from pathcontrol.simulation.compiled_plant import CompiledPlant
-
-WIDE = {"torque": 1e6, "torque_rate": 1e12, "velocity": 1e3, "lower": -1e3, "upper": 1e3, "tube": np.inf}
-
 
 GANTRY = """<robot name="gantry"><link name="base"/>
 <link name="slide"><inertial><mass value="8"/>
@@ -75,155 +70,6 @@ def test_what_pushes_the_arm_is_seen_in_the_loop():
     for q, qd, t in zip(run.array("q")[0], run.array("qd")[0], run.time, strict=True):
         loop.step(q, qd, t)
     np.testing.assert_allclose(law.observed_torque(loop.state), push, rtol=0, atol=0.01)
-
-
-class OwnProjection(pc.Projection):
-    """A law of a user, which is run in Python."""
-
-
-@pytest.mark.parametrize("kind", [pc.Projection, OwnProjection])
-def test_torques_that_the_envelope_takes_away_are_no_disturbance(kind):
-    arm, task = law_of(2).robot.with_friction(None), law_of(2).task
-    law = kind(arm, task, k_p=400.0, K_v=40.0, friction="observed")
-    loop = ControlLoop(law, H, Envelope(**WIDE | {"torque_rate": 500.0, "torque": [30.0, 4.0]}))
-    plant, seen, saturated = Simulated(law), [], []
-    loop.start(plant.q[0])
-    for _ in range(60):
-        plant.drive(loop, 1)
-        seen.append(law.observed_torque(loop.state))
-        saturated.append(loop.status.saturated)
-    assert np.mean(saturated) > 0.3
-    assert np.abs(seen).max() < 0.02
-
-
-@pytest.mark.parametrize("lost", ["measurements", "steps"])
-@pytest.mark.parametrize("kind", [pc.Projection, OwnProjection])
-def test_time_that_passes_without_a_tick_is_no_disturbance(kind, lost):
-    """After three periods in which the last torque acts, the error is that of a period four times as long."""
-    arm, task = law_of(2).robot.with_friction(None), law_of(2).task
-    loop = ControlLoop(kind(arm, task, k_p=400.0, K_v=40.0, friction="observed"), H, Envelope(**WIDE))
-    plant, seen = Simulated(loop.law), []
-    loop.start(plant.q[0])
-    plant.drive(loop, 40)
-    for _ in range(5):
-        if lost == "measurements":
-            plant.drive(loop, 3, lambda k, *measured: BAD["not a number"](*measured))
-        else:
-            for _ in range(3):
-                plant.q, plant.qd = plant.plant.advance(plant.q, plant.qd, loop._tau[None])
-            plant.t += 3 * H
-        plant.drive(loop, 1)
-        seen.append(loop.law.observed_torque(loop.state))
-    assert loop.status.faults["deadline"] == 5
-    assert np.abs(seen).max() < 0.02
-
-
-@pytest.mark.parametrize("kind", [pc.Projection, OwnProjection])
-def test_torques_beyond_the_effort_limits_of_the_robot_are_no_disturbance_where_the_envelope_has_more(kind):
-    arm, task = law_of(2).robot.with_friction(None), law_of(2).task
-    law = kind(arm, task, k_p=400.0, K_v=40.0, friction="observed")
-    loop, plant, seen, taus = ControlLoop(law, H, Envelope(**WIDE)), Simulated(law), [], []
-    plant.q += [0.6, -0.6]  # off the path, from where the law asks for much
-    loop.start(plant.q[0])
-    for _ in range(60):
-        taus.append(plant.drive(loop, 1)["tau"][0])
-        seen.append(law.observed_torque(loop.state))
-    assert (np.abs(taus) > 1.3 * arm.limits.effort).any()
-    assert np.abs(seen).max() < 0.02
-
-
-@pytest.mark.parametrize("kind", [pc.Projection, OwnProjection])
-def test_steps_at_irregular_times_are_no_disturbance(kind):
-    """Of periods that are shorter and longer, and of one that is no fault as ``late`` is large."""
-    arm, task = law_of(2).robot.with_friction(None), law_of(2).task
-    loop = ControlLoop(kind(arm, task, k_p=400.0, K_v=40.0, friction="observed"), H, Envelope(**WIDE, late=9.0))
-    plant, seen = Simulated(loop.law), []
-    loop.start(plant.q[0])
-    for share in np.random.default_rng(1).uniform(0.6, 2.5, 60):
-        tau = loop.step(plant.q[0], plant.qd[0], plant.t)
-        plant.q, plant.qd = CompiledPlant(arm, share * H).advance(plant.q, plant.qd, tau[None])
-        plant.t += share * H
-        seen.append(loop.law.observed_torque(loop.state))
-    assert loop.status.faults == {}
-    assert np.abs(seen).max() < 0.02
-
-
-class Remembering(pc.ComputedTorque):
-    """A law of a user, whose state has its time and the torque that acted."""
-
-    def start(self, q, qd):
-        return np.concatenate([super().start(q, qd), np.zeros_like(q), np.zeros_like(q[..., :1])], axis=-1)
-
-    def law(self, t, q, qd, z):
-        out = super().law(t, q, qd, z)
-        rates = np.concatenate([np.zeros_like(q), np.full_like(q[..., :1], t)], axis=-1)
-        return out._replace(zdot=np.concatenate([out.zdot, rates], axis=-1))
-
-    def advance(self, z, out, period):
-        return np.concatenate([super().advance(z, out, period), out.tau, out.zdot[..., -1:]], axis=-1)
-
-
-def test_a_law_of_ones_own_advances_with_the_torque_that_acts_and_its_time_goes_on():
-    plain = law_of(2)
-    law = Remembering(plain.robot, plain.task, 400.0, 40.0)
-    loop = ControlLoop(law, H, Envelope(**WIDE | {"torque_rate": 500.0, "torque": [30.0, 4.0]}))
-    arm, saturated = Simulated(law), []
-
-    def drive(ticks):
-        for _ in range(ticks):
-            tau = arm.drive(loop, 1)["tau"][0]
-            assert (loop.state[-3:-1] == tau).all()
-            assert loop.state[-1] == pytest.approx(H * len(saturated))
-            saturated.append(loop.status.saturated)
-
-    loop.start(arm.q[0])
-    drive(50)
-    loop.hold()
-    drive(50)
-    loop.resume()
-    drive(500)
-    assert loop._plan._tick is loop._plan._free
-    assert sum(saturated) > 20
-    loop._react(Mode.DAMP, "law", "")
-    loop.resume()
-    drive(50)
-
-
-def test_a_tick_goes_on_from_its_state_to_the_last_bit():
-    for law in (law_of(2).watching(), pc.SpeedOverride(Remembering(law_of(2).robot, law_of(2).task, 400.0, 40.0), 0.7)):
-        one, other = (pc.ControlTick(law, H) for _ in range(2))
-        q, qd = law.task.q_d(np.array(0.0)), np.array([0.3, -0.2])
-        for tick in (one, other):
-            tick.start(q, qd)
-            for _ in range(3):
-                tick(q, qd)
-        other.start_from(other.state, other.ticks)
-        for ticks in (-1, 1.5):
-            with pytest.raises(InputError, match="ticks"):
-                other.start_from(one.state, ticks)
-        for _ in range(2):
-            assert (one(q, qd) == other(q, qd)).all()
-            assert (one.state == other.state).all()
-
-
-def test_a_tick_is_told_which_torques_act():
-    law = law_of(2).watching()
-    told, not_told = (pc.ControlTick(law, H) for _ in range(2))
-    for tick in (told, not_told):
-        tick.start(law.task.q_d(np.array(0.0)))
-    q, qd = law.task.q_d(np.array(0.0)), np.array([0.3, -0.2])
-    for _ in range(2):
-        tau = np.clip(told(q, qd), -law.robot.limits.effort, law.robot.limits.effort)
-        not_told(q, qd)
-        told.act(tau + 9.0)
-        told.act(tau)  # the last word counts
-    np.testing.assert_allclose(told.state, not_told.state, rtol=0, atol=1e-12)
-    told.act(tau - [2.0, 1.0])
-    told(q, qd), not_told(q, qd)
-    share = (1 - np.exp(-2 * np.pi * 35.0 * H)) * np.array([2.0, 1.0])
-    np.testing.assert_allclose(told.state[1:3] - not_told.state[1:3], share, rtol=1e-9)  # behind the first low pass
-    with pytest.raises(InputError, match="tau"):
-        told.act([1.0, 2.0, 3.0])
 
 
 @pytest.mark.parametrize("kind", LAWS)
@@ -481,93 +327,6 @@ def test_a_law_that_breaks_is_damped(broken):
     assert loop.status.mode == Mode.DAMP
     assert np.isfinite(done["tau"]).all()
     assert np.abs(arm.qd).max() < 1e-2
-
-
-@pytest.mark.parametrize("n", [2, 7])
-def test_after_damping_the_loop_goes_on_from_where_the_arm_is_without_a_jump(n):
-    arm, loop = started(n)
-    arm.drive(loop, 20, lambda k, *measured: BAD["not a number"](*measured))
-    arm.drive(loop, 200)
-    assert loop.status.mode == Mode.DAMP
-    loop.resume()
-    done = arm.drive(loop, 150)
-    assert loop.status.mode == Mode.RUN
-    change = np.abs(np.diff(done["tau"], axis=0))
-    assert (change <= loop.envelope.torque_rate * H * (1 + 1e-9)).all()
-    assert loop._plan.distance(arm.q[0]) < 0.05
-
-
-@pytest.mark.parametrize("kind", LAWS)
-def test_after_damping_the_plan_begins_at_rest_and_speeds_up_within_its_bound(kind):
-    """Its factor w is 0, and at most at after a time t."""
-    law = law_of(2, kind)
-    arm, loop = Simulated(law), ControlLoop(law, H)
-    loop.start(arm.q[0], arm.qd[0])
-    arm.drive(loop, 100)
-    arm.drive(loop, 20, lambda k, *measured: BAD["not a number"](*measured))
-    arm.drive(loop, 200)
-    loop.resume()
-    assert loop._plan.factor == 0.0
-    for t in H * np.arange(1, 51):
-        arm.drive(loop, 1)
-        assert loop._plan.factor <= stopping_rate(law.robot, law.task) * t * (1 + 1e-9)
-    arm.drive(loop, 600)
-    assert loop._plan.factor == 1.0
-
-
-@pytest.mark.parametrize("broken", [False, True])
-def test_after_damping_what_was_learned_goes_on_unless_it_is_no_number(broken):
-    inner = pc.Projection(law_of(2).robot, pc.Circle(0.1, 12.0), k_p=800.0, K_v=40.0)
-    law = pc.Learned(inner, nodes=32)
-    arm, loop = Simulated(law), ControlLoop(law, H, Envelope(**WIDE))
-    loop.start(arm.q[0])
-    z = loop.state
-    learned = law.recall(z)  # views of z
-    learned.torque[:], learned.known[:], learned.fits[...], learned.weight[:] = 2.0, 1.0, 1.0, 0.1
-    loop._plan._held.start_from(z)
-    arm.drive(loop, 1)
-    loop._react(Mode.DAMP, "law", "")
-    if broken:
-        loop._plan._held._tick._z[:, 1:] = np.nan
-    loop.resume()
-    after = law.recall(loop.state)
-    for name in ("torque", "known", "fits"):
-        assert (getattr(after, name) == (0.0 if broken else getattr(learned, name))).all()
-    assert not after.weight.any()
-    assert np.abs(arm.drive(loop, 10)["tau"]).max() < 100.0
-    assert loop.status.mode == Mode.RUN
-
-
-class Lost(pc.Lissajous):
-    """A path that cannot say any more which point is nearest."""
-
-    lost = ""
-
-    def sigma_bar(self, q, near=None):
-        if Lost.lost == "raises":
-            raise RuntimeError("no nearest point")
-        return super().sigma_bar(q, near) * (np.nan if Lost.lost else 1.0)
-
-
-@pytest.mark.parametrize("lost", ["raises", "no number"])
-def test_a_law_that_cannot_go_on_leaves_the_arm_damped_and_resume_does_not_raise(lost, monkeypatch):
-    plain = law_of(2)
-    law = pc.ExtendedMotionPlan(plain.robot, Lost([0.3, 0.3], [1, 2], 0.5, center=[0.2, 0.4]), 400.0, 40.0, k=5.0)
-    arm, loop = Simulated(law), ControlLoop(law, H)
-    loop.start(arm.q[0], arm.qd[0])
-    arm.drive(loop, 50)
-    arm.drive(loop, 20, lambda k, *measured: BAD["not a number"](*measured))
-    arm.drive(loop, 50)
-    monkeypatch.setattr(Lost, "lost", lost)
-    loop.resume()
-    assert loop.status.mode == Mode.DAMP
-    assert "cannot go on" in loop.status.reason
-    assert loop.status.faults["law"] == 1
-    assert np.isfinite(arm.drive(loop, 50)["tau"]).all()
-    monkeypatch.setattr(Lost, "lost", "")
-    loop.resume()
-    arm.drive(loop, 50)
-    assert loop.status.mode == Mode.RUN
 
 
 # --- arguments -------------------------------------------------------------------------------------------------------

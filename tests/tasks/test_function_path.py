@@ -225,3 +225,13 @@ def test_a_path_of_ones_own_that_jumps_is_refused_where_it_does(jump, where):
         check_task(FunctionPath(wrapped, speed=1.0, s_end=2.0))
     assert error.value.s == pytest.approx(where, abs=1e-4)
     check_task(FunctionPath(lambda s: wrapped(s) * [1.0, 0.0] + np.stack([0 * s, np.tanh(30 * s)], -1), 1.0, s_end=2.0))
+
+
+@pytest.mark.parametrize("loops", [128, 255])
+def test_a_path_that_comes_back_between_two_samples_does_not_jump(loops):
+    """Circles whose centre moves slowly: each ends near to where it begins, at samples or between two."""
+
+    def weave(s):
+        return np.stack([np.cos(s) / 10 + np.cos(loops * s), np.sin(s) / 10 + np.sin(loops * s)], -1) / 10
+
+    check_task(FunctionPath(weave, speed=1.0, period=2 * np.pi))
