@@ -106,11 +106,11 @@ def check_jumps(task: Task) -> None:
         middle = 0.5 * (left + right)
         q = np.asarray(task.q_d(middle))
         before, after = np.linalg.norm(q - q_left, axis=-1), np.linalg.norm(q_right - q, axis=-1)
-        first, whole = before > after, np.maximum(whole, np.maximum(before, after))
+        first, whole = before > after, np.fmax(whole, np.fmax(before, after))  # no numbers are no jump
         left, right = np.where(first, left, middle), np.where(first, middle, right)
         q_left, q_right = np.where(first[:, None], q_left, q), np.where(first[:, None], q, q_right)
     jump = np.linalg.norm(q_right - q_left, axis=-1)
-    jump[jump <= _JUMP * whole] = 0.0
+    jump[~(jump > _JUMP * whole)] = 0.0
     if jump.any():
         i = int(jump.argmax())
         raise TaskError(

@@ -13,6 +13,7 @@ from strategies import floats
 
 from pathcontrol import Circle, InputError, Projection, TaskError, check_task, simulate
 from pathcontrol.tasks.function import FunctionPath
+from pathcontrol.tasks.regularity import check_jumps
 
 S = np.linspace(0.0, 2 * np.pi, 37)
 A, B = 1.2, 0.7
@@ -235,3 +236,13 @@ def test_a_path_that_comes_back_between_two_samples_does_not_jump(loops):
         return np.stack([np.cos(s) / 10 + np.cos(loops * s), np.sin(s) / 10 + np.sin(loops * s)], -1) / 10
 
     check_task(FunctionPath(weave, speed=1.0, period=2 * np.pi))
+
+
+@given(st.floats(0.0, 2 * np.pi), st.floats(1e-4, 0.3))
+def test_a_stretch_without_numbers_is_no_jump(centre, width):
+    """The checks of values, or the run, say what it is."""
+
+    def hole(s):
+        return np.where(np.abs(s - centre)[..., None] < width / 2, np.nan, np.stack([np.cos(s), np.sin(s)], -1))
+
+    check_jumps(FunctionPath(hole, speed=1.0, period=2 * np.pi))
