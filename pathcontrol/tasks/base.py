@@ -118,6 +118,11 @@ class Task(ABC):
         return int(np.asarray(self.q_d(np.asarray(self.s0, dtype=np.float64))).shape[-1])
 
     @property
+    def by_hand(self) -> bool:
+        """Whether q_d is written outside this library, so that nothing is known of its smoothness."""
+        return not type(self).__module__.startswith("pathcontrol.")
+
+    @property
     def closed(self) -> bool:
         """True if the path closes on itself."""
         return self.period is not None

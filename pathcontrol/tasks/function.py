@@ -80,6 +80,10 @@ class FunctionPath(PathTask):
             slope = vectorize("theta_derivative", theta_derivative, probes, ()) if theta_derivative else None
             self._profile = _FunctionProfile(rate, slope or partial(self._differentiator(rate), order=1))
 
+    @property
+    def by_hand(self) -> bool:
+        return True
+
     def q_d(self, s: Array) -> Array:
         return self._q_d(s)
 

@@ -1,4 +1,4 @@
-"""The regularity of a path: it neither stands still nor turns back, nor has it corners."""
+"""The regularity of a path: it neither stands still nor turns back, and one by hand neither jumps nor has corners."""
 
 from __future__ import annotations
 
@@ -9,14 +9,37 @@ from pathcontrol.errors import TaskError
 from pathcontrol.tasks.base import Task
 
 _SAMPLES = 129
+_GOLDEN = (5**0.5 - 1) / 2
 _HALVINGS = 20  # of the stretch between two samples, to 1e-8 of the domain: nearer to a tip, computed q_d' is rounding
 _OPPOSITE = -0.99  # cosine of an angle
 _SHARPEST = 8  # stretches between samples that are searched for corners
 _CLOSER = 6  # halvings of these, and as many again: a bend turns 64 times less then, a corner as much
 _CORNER = 0.1  # rad, below which the turn at one place is no corner but may be the noise of a function
+_BESIDE = 33  # stretches to each side of a corner in which a smooth path turns much less
+_NOISE = 0.1  # of the corner's turn
 _JUMP_HALVINGS = 12
 _JUMP = 0.05  # of the longest chord between two samples; a smooth path has some 2^-12 left
 _TINY = np.finfo(np.float64).tiny
+
+
+def check_regular(task: Task) -> None:
+    """Check that a path is regular, and if its q_d is by hand that it is continuous, without corners and noise.
+
+    Raises:
+        TaskError: it is not, and where.
+    """
+    if task.by_hand:
+        _check_precision(task)
+        check_jumps(task)  # beside a jump computed derivatives look like a cusp
+    check_moves(task)
+    if task.by_hand:
+        check_corners(task)
+
+
+def pick_irregular(task: Task) -> Array:
+    """Return places inside the domain of a path that are no round numbers and no kinks of tables and splines."""
+    lower, upper = task.sampled_interval
+    return lower + (upper - lower) * (0.01 + 0.98 * np.modf(_GOLDEN * np.arange(1, _SAMPLES))[0])
 
 
 def check_moves(task: Task) -> None:
@@ -66,6 +89,22 @@ def _check_cusps(task: Task, name: str, s: Array, directions: Array) -> None:
         )
 
 
+def _check_precision(task: Task) -> None:
+    """Check that q_d does not compute in single precision: over short stretches such a path turns at random."""
+    s = pick_irregular(task)
+    q = np.asarray(task.q_d(s), dtype=np.float64)
+    with np.errstate(over="ignore"):
+        single = (q == q.astype(np.float32)).all()
+    if single and len(np.unique(q)) > len(s) // 2:
+        raise TaskError(
+            f"{type(task).__name__}.q_d(s={s[0]:g}) = {q[0].tolist()} and all others are numbers of single precision, "
+            "expected double precision: derivatives and nearest points are rounding at seven digits; return "
+            'np.float64 (with JAX: jax.config.update("jax_enable_x64", True), with PyTorch: torch.float64)',
+            value=q[0].tolist(),
+            s=float(s[0]),
+        )
+
+
 def check_corners(task: Task) -> None:
     """Check that the direction of a path jumps nowhere, by q_d itself: computed derivatives round a corner off.
 
@@ -85,11 +124,27 @@ def check_corners(task: Task) -> None:
     if corner.any():
         i = int(np.argmax(np.where(corner, turn, 0.0)))
         at = float(0.5 * (left[i] + right[i]))
+        _check_smooth(task, left[i], right[i], turn[i])
         raise TaskError(
             f"{type(task).__name__}.q_d has a corner at s = {at:.6g}, where its direction turns by "
             f"{np.rad2deg(turn[i]):.3g}° at once, expected a path that is twice continuously differentiable; round it, "
             "as WaypointPath does, or end the path there and run the parts by simulate_sequence",
             s=at,
+        )
+
+
+def _check_smooth(task: Task, left: float, right: float, turn: float) -> None:
+    """Check that a path turns less beside a stretch in which it has the largest ``turn`` [rad]."""
+    beside = (right - left) * np.r_[-_BESIDE:-1, 2 : _BESIDE + 1]
+    lower, upper = task.sampled_interval
+    beside = beside[(left + beside >= lower) & (right + beside <= upper)]
+    around = float(np.median(_turns(task, left + beside, right + beside)))
+    if around > _NOISE * turn:
+        raise TaskError(
+            f"{type(task).__name__}.q_d is rough around s = {left:.6g}: over {right - left:.1e} of s its direction "
+            f"turns by {np.rad2deg(around):.3g}° everywhere, expected a path that is twice continuously "
+            "differentiable; compute it to full precision, or smooth samples of it by SplinePath.from_samples",
+            s=float(left),
         )
 
 

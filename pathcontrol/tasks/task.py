@@ -18,7 +18,7 @@ from pathcontrol.geometry.periodic import wrap
 from pathcontrol.tasks.base import PathPoint, Task, refuse_batch
 from pathcontrol.tasks.lengths import arc_length, curvature, last_parameter, length_along
 from pathcontrol.tasks.profile import VelocityProfile
-from pathcontrol.tasks.regularity import check_moves
+from pathcontrol.tasks.regularity import check_regular
 
 _MOST_PIECES = 10_000_000  # of a stretch of several laps
 
@@ -89,6 +89,10 @@ class Reprofiled(PathTask):
         self.keep_tool(path)
 
     @property
+    def by_hand(self) -> bool:
+        return self.path.by_hand
+
+    @property
     def polyline(self) -> Array | None:
         return self.path.polyline
 
@@ -137,6 +141,10 @@ class DerivedPath(PathTask):
         refuse_batch(f"the path of a {type(self).__name__}", path, "path")
         self.path = path
         self.keep_tool(path)
+
+    @property
+    def by_hand(self) -> bool:
+        return self.path.by_hand
 
     def q_d(self, s: Array) -> Array:
         return self.at(s).q_d
@@ -350,7 +358,7 @@ class ArcLengthPath(DerivedPath):
                 "of it, as in task.between(0.0, 10.0).by_arc_length()"
             )
         self._length = length_along(path, path.s0, last_parameter(path))
-        check_moves(path)
+        check_regular(path)
         self.s0 = 0.0
         if path.closed:
             self.period = self._length.total

@@ -10,13 +10,11 @@ from pathcontrol._arrays import Array
 from pathcontrol._expect import describe, expect
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.batch.task_batch import TaskBatch
-from pathcontrol.tasks.function import FunctionPath
-from pathcontrol.tasks.regularity import check_corners, check_jumps, check_moves
+from pathcontrol.tasks.regularity import check_regular, pick_irregular
 from pathcontrol.tasks.task import PathTask
 from pathcontrol.tasks.values_check import check_values, count_joints
 
 _SAMPLES = 129
-_GOLDEN = (5**0.5 - 1) / 2
 
 
 def check_task(task: PathTask, n: int | None = None) -> None:
@@ -58,17 +56,11 @@ def check_task(task: PathTask, n: int | None = None) -> None:
     _check_period(task, name)
     for method in ("dq_d", "ddq_d", "dtheta"):
         check_values(f"{name}.{method}", getattr(task, method), s, None if method == "dtheta" else n)
-    own = not type(task).__module__.startswith("pathcontrol.")
-    by_hand = own or isinstance(task, FunctionPath)
-    if by_hand:
-        check_jumps(task)  # beside a jump computed derivatives look like a cusp
-    check_moves(task)
-    if by_hand:
-        check_corners(task)
-    if own:
-        _check_projection(task, name, s[1:-1:16])
+    check_regular(task)
+    _check_projection(task, name, s[1:-1:16])
+    inside = pick_irregular(task)
     for function, derivative in (("q_d", "dq_d"), ("dq_d", "ddq_d"), ("theta", "dtheta")):
-        _check_derivative(task, name, s, function, derivative)
+        _check_derivative(task, name, inside, function, derivative)
 
 
 def _check_each(batch: TaskBatch, n: int | None) -> None:
@@ -101,7 +93,7 @@ def _check_domain(task: PathTask, name: str) -> None:
 
 def _check_projection(task: PathTask, name: str, s: Array) -> None:
     """Check that the projection of a class of one's own finds postures of the path on the path."""
-    if type(task).sigma_bar is PathTask.sigma_bar:
+    if type(task).sigma_bar is PathTask.sigma_bar or type(task).__module__.startswith("pathcontrol."):
         return
     label, q = f"{name}.sigma_bar", np.asarray(task.q_d(s), dtype=np.float64)
     for near in (None, s):
@@ -128,12 +120,9 @@ def _check_projection(task: PathTask, name: str, s: Array) -> None:
             )
 
 
-def _check_derivative(task: PathTask, name: str, s: Array, function: str, derivative: str) -> None:
-    """Check a derivative given by hand against its function at most samples; a few may be kinks."""
-    span = s[-1] - s[0]
-    h = 1e-5 * span
-    # irregular places, that the kinks of tables and splines do not fall on
-    inside = s[0] + span * (0.01 + 0.98 * np.modf(_GOLDEN * np.arange(1, _SAMPLES))[0])
+def _check_derivative(task: PathTask, name: str, inside: Array, function: str, derivative: str) -> None:
+    """Check a derivative given by hand against its function at most places inside; a few may be kinks."""
+    h = 1e-5 * float(np.ptp(task.sampled_interval))
     f, given = getattr(task, function), getattr(task, derivative)(inside)
     difference = (f(inside + h) - f(inside - h)) / (2 * h) + 0.0 * np.asarray(given)
     off = np.abs(difference - given) > 1e-3 * (np.abs(difference) + np.abs(difference).max()) + 1e-6
@@ -141,7 +130,8 @@ def _check_derivative(task: PathTask, name: str, s: Array, function: str, deriva
         i = tuple(np.argwhere(off)[0])
         raise TaskError(
             f"{name}.{derivative}(s={inside[i[0]]:g}) = {np.asarray(given)[i[0]]}, but {name}.{function} changes at "
-            f"the rate {difference[i[0]]}; correct it, or leave {derivative} out and have it computed",
+            f"the rate {difference[i[0]]}; correct it, or leave {derivative} out and have it computed; if "
+            f"it is, {function} is too rough to be differentiated",
             s=float(inside[i[0]]),
         )
 

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pathcontrol as pc
+from pathcontrol.tasks.profile import ConstantSpeed
 from pathcontrol.tasks.regularity import check_corners
 
 
@@ -72,3 +73,52 @@ def test_functions_and_own_derivatives_do_not_hide_a_corner():
         with pytest.raises(pc.TaskError, match="has a corner at s = ") as told:
             pc.check_task(path, 2)
         assert abs(told.value.s - 0.3) < 1e-5
+
+
+@pytest.mark.parametrize("convert", [np.float32, np.float64])
+def test_a_path_in_single_precision_is_told_as_such(convert):
+    """Whether its values have the type float32, as JAX has by default, or were made float64 afterwards."""
+
+    class Single(pc.Circle):
+        def q_d(self, s):
+            return super().q_d(np.asarray(s, np.float32)).astype(np.float32).astype(convert)
+
+    with pytest.raises(pc.TaskError, match="of single precision, expected double"):
+        pc.check_task(Single(1.0, 2.0), 2)
+
+
+@given(st.floats(-5, 5), st.floats(0.1, 3))
+def test_numbers_that_single_precision_holds_are_no_slip(start, slope):
+    a, b = np.float32([start, slope]).astype(float)
+    pc.check_task(pc.FunctionPath(lambda s: np.stack([a + 0 * s, b * s], -1), speed=1.0, s_end=128.0), 2)
+
+
+@given(st.floats(-6, -3), st.integers(0, 99))
+def test_a_rough_path_has_no_corner(exponent, seed):
+    """Noise, as of a solver that stops early, turns a path everywhere."""
+
+    def rough(s):
+        noise = np.random.default_rng([seed, *np.atleast_1d(s).view(np.uint64)]).normal(size=(*np.shape(s), 2))
+        return np.stack([s, s**2], -1) + 10**exponent * noise
+
+    with pytest.raises(pc.TaskError, match=r"q_d is rough around s = .* everywhere"):
+        check_corners(pc.FunctionPath(rough, speed=1.0, s_end=1.0))
+
+
+def test_what_is_made_of_a_path_with_a_corner_has_it_too(arm):
+    """The stretches up to the corner and from it on have none."""
+    path, after = Straights(1.0, 0.3), Straights(1.0, 2.0)
+    on = after.shifted(path.q_d(np.array(1.0)))
+    for make in (
+        path.by_arc_length,
+        lambda: pc.time_optimal(arm, path),
+        lambda: pc.concatenated([path, on], blend=0.1),
+        lambda: pc.PathSequence([path, on]),
+        lambda: pc.check_task(path.with_profile(ConstantSpeed(1.0)), 2),
+        lambda: pc.check_task(path.reversed(), 2),
+        lambda: pc.check_task(path.between(0.1, 0.5).scaled(2.0), 2),
+    ):
+        with pytest.raises(pc.TaskError, match="has a corner at s = "):
+            make()
+    for a, b in ((0.0, 0.3), (0.3, 1.0)):
+        pc.check_task(path.between(a, b).by_arc_length(), 2)

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.errors import TaskError
+from pathcontrol.tasks.base import Task
 from pathcontrol.tasks.profile import Path
+from pathcontrol.tasks.regularity import check_regular
 from pathcontrol.tasks.values_check import check_path
 
 _SHARES = np.linspace(0, 1, 5)
@@ -21,7 +23,7 @@ def edges(path: Path, cells: int) -> Array:
     """Return the edges of at least ``cells`` cells over one traverse of a path, each within one piece of it.
 
     Raises:
-        TaskError: the path neither ends nor closes, or returns a wrong shape or NaN at the edges.
+        TaskError: the path neither ends nor closes, returns a wrong shape or NaN at the edges, or is not regular.
     """
     lower, upper = path.s0, path.s_end if path.period is None else path.s0 + path.period
     if not np.isfinite(upper):
@@ -34,6 +36,8 @@ def edges(path: Path, cells: int) -> Array:
     counts = np.ceil(np.diff(pieces) * cells / (upper - lower) - 1e-6).clip(1)
     s = np.interp(np.arange(counts.sum() + 1), np.append(0, np.cumsum(counts)), pieces)
     check_path(path, s)  # where q_d' is NaN no cell would ever be small enough
+    if isinstance(path, Task):
+        check_regular(path)  # nor beside a corner
     return s
 
 

@@ -15,6 +15,7 @@ from pathcontrol.geometry.hermite import hermite_polynomials
 from pathcontrol.tasks.base import PathPoint, refuse_batch
 from pathcontrol.tasks.joined.junction import explain_gap, explain_jump, gap
 from pathcontrol.tasks.lengths import length_along
+from pathcontrol.tasks.regularity import check_regular
 from pathcontrol.tasks.task import PathTask
 
 _SLOWEST = 1e-3  # of the speed at its ends
@@ -37,6 +38,7 @@ def concatenated(paths: Sequence[PathTask], blend: float | None = None) -> Conca
     Raises:
         InputError: a path is not open; two do not meet, or not smoothly and there is no blend; a path is too short for
             its blends; a blend would turn straight back.
+        TaskError: a path is not regular.
     """
     return ConcatenatedPath(paths, blend)
 
@@ -213,6 +215,7 @@ def _check_paths(paths: Sequence[PathTask]) -> list[PathTask]:
                 argument=f"paths[{i}]",
                 value=path,
             )
+        check_regular(path)
     return checked
 
 

@@ -12,6 +12,7 @@ from pathcontrol._arrays import Array, as_array, freeze
 from pathcontrol._expect import expect
 from pathcontrol.errors import InputError
 from pathcontrol.tasks.base import refuse_batch
+from pathcontrol.tasks.regularity import check_regular
 from pathcontrol.tasks.task import PathTask
 
 _MEET = 1e-3  # rad
@@ -35,6 +36,7 @@ class PathSequence(PathTask):
     Raises:
         InputError: a path is closed or endless, is for another number of joints, or does not begin where the one
             before it ends and ``gaps`` are not allowed.
+        TaskError: a path is not regular.
     """
 
     def __init__(self, paths: Sequence[PathTask], *, gaps: bool = False) -> None:
@@ -50,6 +52,7 @@ class PathSequence(PathTask):
                     argument=f"paths[{i}]",
                     value=path,
                 )
+            check_regular(path)
         self._check_meeting()
         self.keep_tool(*self.paths)
         lengths = [path.s_end - path.s0 for path in self.paths]
