@@ -119,7 +119,7 @@ class Task(ABC):
 
     @property
     def by_hand(self) -> bool:
-        """Whether q_d is written outside this library, so that nothing is known of its smoothness."""
+        """True if q_d is written outside this library, so that nothing is known of its smoothness."""
         return not type(self).__module__.startswith("pathcontrol.")
 
     @property

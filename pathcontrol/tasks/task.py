@@ -18,7 +18,7 @@ from pathcontrol.geometry.periodic import wrap
 from pathcontrol.tasks.base import PathPoint, Task, refuse_batch
 from pathcontrol.tasks.lengths import arc_length, curvature, last_parameter, length_along
 from pathcontrol.tasks.profile import VelocityProfile
-from pathcontrol.tasks.regularity import check_regular
+from pathcontrol.tasks.regularity import check_moves
 
 _MOST_PIECES = 10_000_000  # of a stretch of several laps
 
@@ -358,7 +358,7 @@ class ArcLengthPath(DerivedPath):
                 "of it, as in task.between(0.0, 10.0).by_arc_length()"
             )
         self._length = length_along(path, path.s0, last_parameter(path))
-        check_regular(path)
+        check_moves(path)
         self.s0 = 0.0
         if path.closed:
             self.period = self._length.total

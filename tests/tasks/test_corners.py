@@ -110,7 +110,7 @@ def test_what_is_made_of_a_path_with_a_corner_has_it_too(arm):
     path, after = Straights(1.0, 0.3), Straights(1.0, 2.0)
     on = after.shifted(path.q_d(np.array(1.0)))
     for make in (
-        path.by_arc_length,
+        lambda: pc.check_task(path.by_arc_length(), 2),
         lambda: pc.time_optimal(arm, path),
         lambda: pc.concatenated([path, on], blend=0.1),
         lambda: pc.PathSequence([path, on]),
