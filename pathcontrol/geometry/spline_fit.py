@@ -21,8 +21,8 @@ _ROUNDS = 64  # of refinement; halving 10^5 samples takes 17
 _WORST = 0.25  # spans this near to the worst are divided together: where a step is not yet resolved, all others ring
 
 
-def fit_samples(q: ArrayLike, s: ArrayLike | None, tolerance: float, closed: bool) -> tuple[BSpline, float]:
-    """Fit a cubic spline; return it and its largest deviation; see :meth:`SplinePath.from_samples`."""
+def fit_samples(q: ArrayLike, s: ArrayLike | None, tolerance: float, closed: bool) -> tuple[BSpline, Array, Array]:
+    """Fit a cubic spline; return it, the samples (m, n) and their parameters (m,); see ``SplinePath.from_samples``."""
     tolerance = as_scalar("tolerance", tolerance, least=0.0)
     samples = _check_samples(q)
     if s is None:
@@ -38,8 +38,7 @@ def fit_samples(q: ArrayLike, s: ArrayLike | None, tolerance: float, closed: boo
             limit=least,
         )
     spline = _refine(samples, parameters, tolerance, closed) if tolerance else None
-    spline = spline or _interpolant(samples, parameters, closed)
-    return spline, float(_distances(spline(parameters[: len(samples)]), samples).max())
+    return spline or _interpolant(samples, parameters, closed), samples, parameters[: len(samples)]
 
 
 def _check_samples(q: ArrayLike) -> Array:

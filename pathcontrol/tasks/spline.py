@@ -70,9 +70,9 @@ class SplinePath(JointCurve):
         """
         from pathcontrol.geometry.spline_fit import fit_samples
 
-        spline, deviation = fit_samples(q, s, tolerance, closed)
+        spline, samples, parameters = fit_samples(q, s, tolerance, closed)
         path = SplinePath(spline, speed, closed)
-        path.deviation = deviation
+        path.deviation = float(np.linalg.norm(path.q_d(parameters) - samples, axis=-1).max())
         return path
 
     @property
