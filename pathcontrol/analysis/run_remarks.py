@@ -7,6 +7,7 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.analysis.limit_shares import RATIOS, find_worst_shares, is_passed
+from pathcontrol.analysis.planned_time import planned_time
 from pathcontrol.analysis.progress import ENOUGH, progress
 from pathcontrol.analysis.run_metrics import end_error, metrics
 from pathcontrol.analysis.speed_factor import speed_factor
@@ -89,22 +90,20 @@ def _find_faults(run: Run) -> dict[str, str]:
 def _advise_slow(run: Run, done: float) -> str:
     """Return what helps an arm that moved but did not get there, in a run of one rollout; "" where it is not known."""
     needed = _planned_time(run)
-    if needed > run.time[-1]:
+    if run.time[-1] < needed < np.inf:
         return f"by its profile the path takes {needed:.3g} s, which needs a longer duration than {run.time[-1]:.4g} s"
     return advise_on_friction(run) if done < _SLOW and not _is_held(run) else ""
 
 
 def _planned_time(run: Run) -> float:
-    """Return the time [s] that the path takes by ϑ, or its laps that were asked for; 0 where none is known."""
+    """Return the time [s] that the path takes by ϑ from where it began, or the laps asked for; 0 if unknown."""
     task = run.task
     if task is None or isinstance(task, TaskBatch) or laws(run.config)[-1].get("wrappers"):
         return 0.0
-    asked = run.config.get("laps")
-    laps = 1 if task.period is None else asked if isinstance(asked, int) else 0
-    if not laps or not np.isfinite(task.one_traverse).all():
-        return 0.0
-    s = np.linspace(*task.one_traverse, _SAMPLES)
-    return laps * float(np.trapezoid(1 / (task.theta(s) + np.zeros_like(s)), s))
+    if task.period is None:
+        return planned_time(task, float(run.array("s")[0, 0]), task.s_end) if np.isfinite(task.s_end) else 0.0
+    laps = run.config.get("laps")
+    return laps * planned_time(task, task.s0, task.s0 + task.period) if isinstance(laps, int) else 0.0
 
 
 def _say_share(share: float) -> str:

@@ -22,16 +22,18 @@ def find_event(disturbance: Disturbance | None, duration: float, override: Any =
         if isinstance(term, TimedDisturbance)
     ]
     timeless = len(times) < len(terms) or (override is not None and np.ndim(override) < 2)
-    if override is not None and np.ndim(override) == 2:
-        times.append(_time_of_steps(np.asarray(override), duration))
+    if np.ndim(override) == 2:
+        times += _find_steps(np.asarray(override), duration)
     if not times:
         return None
     begin, end = max(0.0, min(begin for begin, _ in times)), max(end for _, end in times)
     return (begin, duration if timeless else min(end, duration))
 
 
-def _time_of_steps(steps: Array, duration: float) -> tuple[float, float]:
-    """Return from when the speed of the steps [[t, u], …] is another one than that of the profile, and until when."""
+def _find_steps(steps: Array, duration: float) -> list[tuple[float, float]]:
+    """Return from when to when the steps [[t, u], …] ask for another speed than that of the profile, or nothing."""
     changed = np.flatnonzero(steps[:, 1] != 1.0)
+    if not changed.size:
+        return []
     last = changed[-1] + 1
-    return (float(steps[changed[0], 0]), float(steps[last, 0]) if last < len(steps) else duration)
+    return [(float(steps[changed[0], 0]), float(steps[last, 0]) if last < len(steps) else duration)]

@@ -136,7 +136,7 @@ class Controller(ABC):
         return np.concatenate([z[..., :1], memory, z[..., 1 + size :]], axis=-1)
 
     def recollect(self, z: Array, before: Array) -> Array:
-        """Return the first state z, with what the law has learned in a state ``before`` and the arm still is like."""
+        """Return the first state z with what the law had learned in an earlier state ``before``, (m,) each."""
         return z
 
     def rate(self, out: ControlOutput) -> Array:

@@ -178,6 +178,7 @@ class _CompiledTick:
         places = {"io": self._io, "memory": self._state, "most": self._most}
         self._call = Tick(setup=addressof(self._setup), **{name: address_of(array) for name, array in places.items()})
         self._address = addressof(self._call)
+        self._returned = np.zeros(n)  # by the last call; who asked may write into what it got
         self._told: Array | None = None  # the torques that act since the last call, where it was told
 
     @property
@@ -202,7 +203,7 @@ class _CompiledTick:
 
     def act(self, tau: Array) -> None:
         """Let the torques (n,) act up to the next call."""
-        assumed = np.clip(self._tau, -self._most, self._most) if self._told is None else self._told
+        assumed = np.clip(self._returned, -self._most, self._most) if self._told is None else self._told
         if self._observer is not None:
             self._observer.correct(self._state, tau - assumed)
         self._told = tau
@@ -223,6 +224,8 @@ class _CompiledTick:
         if self._setup.memory:  # else nothing depends on time
             self._listen()
         self._function(self._address)
+        if self._observer is not None:
+            self._returned[:] = self._tau
         self.ticks, self._told = self.ticks + 1, None
         return self._tau
 

@@ -19,8 +19,9 @@ def record_limits(
     disturbance: Disturbance | None,
 ) -> dict[str, Array]:
     """Return the variable ``tau_limit`` of a run with these ``arrays``, or none where its configuration says enough."""
-    limits = acting_limits(torque_limits(loop, robot), disturbance, time)
-    if limits is None or (limits == limits[:1, :1]).all():
+    whole = torque_limits(loop, robot)
+    limits = acting_limits(whole, disturbance, time)
+    if whole is None or limits is None or (limits == np.atleast_2d(whole)[0]).all():
         return {}
     tau = arrays["tau"]
     left, gone = np.broadcast_to(limits, tau.shape), np.isnan(tau)

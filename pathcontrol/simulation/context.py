@@ -135,11 +135,8 @@ class RunContext:
 
     def rollout(self, number: int) -> RunContext:
         """Return the context of one rollout."""
-        arm, known, row = (
-            self.robot if self._robots is None else self._robots[number],
-            self._model(),
-            number - self._first(),
-        )
+        arm, known = self.robot if self._robots is None else self._robots[number], self._model()
+        row = number - self._first()
         robot, model = (None if one is None else select_friction(one, row) for one in (arm, known))
         same = robot is arm and model is known
         if same and (self._stored is not None or (self._robots is None and not isinstance(self.task, TaskBatch))):

@@ -135,6 +135,8 @@ def initial_state(
     """Return q and q̇ as (N, n) each, broadcast against each other; one state serves all ``rollouts``."""
     n = len(joints)
     position = check_finite("q", as_joint_array("q", q, n, joints))
+    if not position.size:
+        raise InputError(f"q has shape {position.shape}, expected one initial state at least", argument="q", value=q)
     velocity = np.zeros(n) if qd is None else check_finite("qd", as_joint_array("qd", qd, n, joints))
     try:
         pair = np.broadcast_arrays(position, velocity)

@@ -219,6 +219,17 @@ def test_a_log_equals_the_run_it_came_from(name):
     assert np.abs(there.saturation).max() > 0
 
 
+def test_a_run_without_its_demands_is_limited_as_each_rollout_was():
+    law, drop = LAWS["projection"](FULL), pc.TorqueLimitDrop([[0.05, 0.1], [1.0, 0.05]], start=0.1, duration=0.1)
+    run = run_of(law, loop=pc.SampledLoop(period=2e-3, torque_limits=True), disturbance=drop)
+    arrays = {name: run.array(name) for name in run.data.data_vars if name != "tau_demand"}
+    joints = dict.fromkeys(FULL.joint_names, "rad")
+    log = pc.Run.from_arrays(run.time, joints, arrays, run.config, {}, robot=FULL, task=CIRCLE)
+    here, there = pc.power_balance(run), pc.power_balance(log, law)
+    np.testing.assert_allclose(there.saturation, here.saturation, rtol=1e-6, atol=1e-9)
+    assert (np.abs(here.saturation).max(-1) > 0.1).all()
+
+
 @pytest.mark.parametrize("suffix", ["nc", "mcap"])
 def test_a_loaded_run_knows_its_law(suffix, tmp_path):
     if suffix == "mcap":

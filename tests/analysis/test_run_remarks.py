@@ -98,6 +98,17 @@ def test_a_run_that_was_too_short_is_told_how_long_its_path_takes(laps):
     assert said.endswith(f"by its profile the path takes {needed:.3g} s, which needs a longer duration than 0.4 s")
 
 
+@pytest.mark.parametrize("start", ["s0", "nearest"])
+def test_the_time_that_a_path_takes_is_known_where_it_begins_and_ends_slowly(start):
+    profile = pc.SmoothStartStop(LINE, pc.ConstantSpeed(1.0), acceleration=5.0, jerk=100.0)
+    law = pc.ComputedTorque(arm(), LINE.with_profile(profile), 400.0, 40.0, start=start)
+    begin = LINE.start if start == "s0" else LINE.q_d(np.array(0.6 * LINE.s_end))
+    whole = pc.simulate(law, begin, duration=9.0, progress=False)
+    (said,) = of_path(pc.simulate(law, begin, duration=0.3, progress=False))
+    needed = float(said.split("the path takes ")[1].split()[0])
+    assert needed == pytest.approx(whole.finish_time[0], abs=0.1)  # in which the plan is braked at the end
+
+
 def test_an_arm_that_creeps_is_told_what_holds_it():
     sticky = ROBOT.with_friction(pc.Viscous([1.0, 1.0]) + pc.Coulomb([2.0, 2.0]))
     law = pc.Projection(sticky, pc.Circle(0.5, 0.1, center=[0.3, 0.8]), 400.0, 40.0)

@@ -108,6 +108,17 @@ def test_saturated_is_the_time_at_the_limit_of_any_joint(arm):
     assert measure(whole, made(arm), (1.0, 4.0), None)["saturated_s"] == 0.0  # nothing limits it
 
 
+def test_saturated_has_the_same_bits_for_a_rollout_alone(arm):
+    limits = arm.limits.effort
+    torque = np.random.default_rng(0).choice([0.0, 1.0], (5, len(TIME), 1)) * limits
+    alone = [made(arm, tau=tau) for tau in torque]
+    arrays = {name: np.concatenate([run.array(name) for run in alone]) for name in VARIABLES if name in alone[0]}
+    joints = dict.fromkeys(arm.joint_names, "rad")
+    together = pc.Run.from_arrays(TIME, joints, arrays, {}, {}, robot=arm, task=TASK)
+    of_all = measure(together, together, (0.0, 4.0), None, limits)["saturated_s"]
+    assert [measure(run, run, (0.0, 4.0), None, limits)["saturated_s"][0] for run in alone] == of_all.tolist()
+
+
 @pytest.mark.parametrize("factor", [0.25, [0.5, 0.25], [[0.25, 0.5]]])
 def test_saturated_is_at_the_limits_that_a_drop_leaves(arm, factor):
     limits = arm.limits.effort

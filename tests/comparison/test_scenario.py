@@ -32,6 +32,7 @@ def test_a_disturbance_or_an_operator_is_the_event_and_is_not_in_the_undisturbed
         assert_array_equal(values, long.measures["projection"][name])
     assert abs(short.mean("projection", "time_lost_s")) > 1e-4
     assert scenario().event is None
+    assert scenario(override=[[0.5, 1.0]]).event is None  # as fast as without it
     assert scenario(disturbance=pc.Harmonic([1.0, 0.0], 1.0)).event is None
 
 

@@ -70,6 +70,15 @@ def test_one_start_is_as_many_equal_ones(law):
         assert_array_equal(one.array(name), both.array(name))
 
 
+def test_no_starts_have_no_states():
+    plan, none = make_plan(), np.zeros((0, 2))
+    for law in (plan, pc.SpeedOverride(plan), pc.EventPlan(pc.Paced(plan)), pc.Learned(plan)):
+        z = law.start(none, none)
+        assert z.shape == (0, len(law.start(START, [0.0, 0.0])))
+        out = law.law(0.0, none, none, z)
+        assert (out.tau.shape, law.advance(z, out, 2.5e-3).shape) == (none.shape, z.shape)
+
+
 def test_other_numbers_of_rows_than_of_starts_are_refused_by_name():
     plan, three = make_plan(), [*THRESHOLDS, [60.0, 6.0]]
     for law, name in (

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 from simulated_arm import BAD, WIDE, H, Simulated, law_of
 
 import pathcontrol as pc
@@ -80,6 +81,20 @@ def test_steps_at_irregular_times_are_no_disturbance(kind):
         seen.append(loop.law.observed_torque(loop.state))
     assert loop.status.faults == {}
     assert np.abs(seen).max() < 0.02
+
+
+@pytest.mark.parametrize("kind", [pc.Projection, OwnProjection])
+def test_torques_that_are_written_into_the_returned_array_are_told_as_others_are(kind):
+    law = kind(law_of(2).robot, law_of(2).task, k_p=400.0, K_v=40.0, friction="observed")
+    q, states = law.task.q_d(np.array(0.02)), []
+    for write in (np.multiply, lambda tau, share, out: tau * share):
+        tick = pc.ControlTick(law, H)
+        tick.start(q)
+        for _ in range(3):
+            tau = tick(q, np.zeros(2))
+            tick.act(write(tau, 0.5, out=tau))
+        states.append(tick.state)
+    assert_array_equal(*states)
 
 
 class Remembering(pc.ComputedTorque):

@@ -269,6 +269,7 @@ def test_a_figure_of_eight_is_followed_branch_by_branch(arm):
     [
         ({"q": [0.0, 0.0, 0.0]}, ["q has shape (3,)", "2 joints"]),
         ({"q": [0.0, np.nan]}, ["q[1] is nan"]),
+        ({"q": np.zeros((0, 2))}, ["q has shape (0, 2)", "one initial state"]),
         ({"qd": [[1.0, 2.0, 3.0]]}, ["qd has shape (1, 3)"]),
         ({"q": np.zeros((3, 2)), "qd": np.zeros((4, 2))}, ["(3, 2)", "(4, 2)"]),
         ({"q": np.zeros((4, 2)), "rows": 3}, ["K_p of shape (3, 2)", "4 rollouts"]),

@@ -61,6 +61,15 @@ def test_a_share_of_no_limit_is_told():
         simulated(pc.TorqueLimitDrop(0.5), loop=pc.SampledLoop(torque_limits=[np.inf, 10.0]))
 
 
+def test_shares_are_of_what_is_left_in_a_run_that_is_weak_from_its_begin_to_its_end():
+    weak = simulated(pc.TorqueLimitDrop(0.5))
+    short = simulated(None, loop=pc.SampledLoop(torque_limits=0.5 * LIMITS))
+    for name in ("tau_demand_ratio", "torque_limit_ratio"):
+        assert_array_equal(pc.metrics(weak)[name], pc.metrics(short)[name])
+    assert_array_equal(weak.array("tau_limit"), np.broadcast_to(0.5 * LIMITS, weak.array("tau").shape))
+    assert "tau_limit" not in short
+
+
 def test_drops_compose_and_each_rollout_has_its_own():
     factor, start = np.array([[0.5, 0.1], [0.2, 1.0]]), np.array([0.0, 0.2])
     drops = pc.TorqueLimitDrop(factor, start, 0.3) + pc.TorqueLimitDrop(0.5, 0.1, 0.3)

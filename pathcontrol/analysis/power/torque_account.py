@@ -9,9 +9,9 @@ import numpy as np
 
 from pathcontrol._arrays import Array, average_neighbours
 from pathcontrol.analysis.disturbance_estimate import split_loop_delay, split_unexplained
+from pathcontrol.analysis.limit_shares import stack_torque_limits
 from pathcontrol.analysis.power.closed_loop_theorems import Energy, LoopState, Theorem
 from pathcontrol.analysis.power.law_of_run import LawRecord, has_demand
-from pathcontrol.analysis.torque_limits import torque_limits
 from pathcontrol.control.base import Controller
 from pathcontrol.errors import InputError
 from pathcontrol.robot.batch import select_friction
@@ -138,7 +138,8 @@ def _demand(run: Run, record: LawRecord, acting: tuple[Array, Array]) -> tuple[A
     """
     demand, (whole, late) = record.demand, split_loop_delay(run)
     if not has_demand(run):
-        limits, tau = _AT_LIMIT * torque_limits(run, run.robot), acting[0]
+        tau = acting[0]
+        limits = _AT_LIMIT * stack_torque_limits(run).swapaxes(0, 1)[: len(tau)]
         beyond = (np.abs(tau) >= limits) & (demand[:-1] * np.sign(tau) > np.abs(tau))
         held = np.where(beyond, demand[:-1], tau)
         return held, held

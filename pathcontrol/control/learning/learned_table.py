@@ -100,7 +100,8 @@ class LearnedTable:
         torque = rows[:, : self.nodes * self.joints].reshape(-1, self.nodes, self.joints)
         before, after, share = self._find_nodes(laps.reshape(-1))
         row, part = np.arange(len(rows)), share[:, None]
-        return np.asarray((1 - part) * torque[row, before] + part * torque[row, after]).reshape(*laps.shape, -1)
+        read = (1 - part) * torque[row, before] + part * torque[row, after]
+        return np.asarray(read.reshape(*laps.shape, self.joints))
 
     def write(self, memory: Array, laps: Array, torque: Array, time: Array, t: float) -> Array:
         """Return the memory after a ``torque`` u (*batch, n) was seen for a ``time`` [s], (*batch,), up to t [s].

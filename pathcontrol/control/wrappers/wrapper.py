@@ -160,7 +160,8 @@ class LawWrapper(Controller):
             InputError: it would go on at full speed when it is held.
         """
         z = own.reshape(-1, own.shape[-1])
-        q, qd = (np.broadcast_to(part, (*own.shape[:-1], self.robot.n)).reshape(len(z), -1) for part in (q, qd))
+        shape = (*own.shape[:-1], self.robot.n)
+        q, qd = (np.broadcast_to(part, shape).reshape(len(z), self.robot.n) for part in (q, qd))
         at_rest, at_full = (self.inner.at_speed(np.full(len(z), w)) for w in (0.0, 1.0))
         held, free = (law.law(0.0, q, qd, z) for law in (at_rest, at_full))
         moves = at_full.full_speed(free.s)[1] != 0

@@ -75,9 +75,8 @@ class Plant:
         """
         held = None if held is None or not held.any() else np.broadcast_to(held, q.shape)
         if held is not None and (moves := (held & (qd != 0)).any(-1)).any():
-            qd = _hold(
-                self.robot, q, qd, held & moves[:, None]
-            )  # the others keep their bits, and joints that stick stick
+            # rollouts that rest where they are held keep their bits, and their joints that stick stick
+            qd = _hold(self.robot, q, qd, held & moves[:, None])
         met = _Met(walls, q, self.step, held) if walls else None
         if met is not None:
             qd = met.stop(self.robot, q, qd)

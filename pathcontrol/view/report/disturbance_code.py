@@ -11,7 +11,7 @@ from pathcontrol.simulation.run import Run
 from pathcontrol.simulation.summaries import is_whole
 from pathcontrol.view.report.code import Code, call, class_code
 
-# axes of a value for a single rollout
+#: axes of a value for a single rollout
 _AXES = {Form.NUMBERS: 1, Form.GAIN: 1, Form.NUMBER: 0, Form.POSITIVE: 0, Form.POSITIVE_OR_INF: 0}
 _DEEPEST = 20  # sums in one another
 
