@@ -117,6 +117,7 @@ def test_path_data_are_taken_exactly_if_they_follow_the_grammar(data):
 
 BROKEN = ["M0,0 ,L 3 , 4", "M0,0,L3,4", "M,0,0", "M0,,0", "M0 0L1 2,z", "M0 0z,", ",M0 0", "M0 0L1 2 ,", "M0 0L1e 2"]
 BROKEN += ["M0 0L\u0661 2", "M0\xa00", "M0 0A1 1 0 0,,1 2 3", "M0 0A1 1 0 0 1 2 3,", "M0 0A1 1 0 01 2", "M0 0L- 1 2"]
+BROKEN += ["\xa0", "\xa0M0 0", "M0 0z\xa0", "M0 0 1 2\u2003"]
 
 
 @pytest.mark.parametrize("data", BROKEN)

@@ -12,6 +12,7 @@ from pathcontrol.toolpaths.svg.attributes import arcs, numbers
 from pathcontrol.toolpaths.svg.pen import Pen, Subpath
 
 _COMMAND = re.compile("([MmZzLlHhVvCcSsQqTtAa])")
+_BLANK = " \t\n\f\r"  # of the grammar, in which other spaces of Unicode are letters
 _TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7}
 
 
@@ -22,10 +23,10 @@ def parse_path(data: str) -> list[Subpath]:
         ToolpathError: it does not follow the grammar; nothing is drawn up to the mistake.
     """
     before, *parts = _COMMAND.split(data)
-    if before.strip() or (parts and parts[0] not in "Mm"):
+    if before.strip(_BLANK) or (parts and parts[0] not in "Mm"):
         raise ToolpathError(
-            f"path data begins with {data.strip()[:20]!r}, expected M or m: where the pen is set down",
-            value=data.strip(),
+            f"path data begins with {data.strip(_BLANK)[:20]!r}, expected M or m: where the pen is set down",
+            value=data.strip(_BLANK),
         )
     pen = Pen()
     for letter, arguments in zip(parts[::2], parts[1::2], strict=True):
@@ -37,9 +38,10 @@ def _draw(pen: Pen, letter: str, arguments: str) -> None:
     """Draw one command with all its arguments."""
     name, relative = letter.upper(), letter.islower()
     if name == "Z":
-        if arguments.strip():
+        if arguments.strip(_BLANK):
             raise ToolpathError(
-                f"path data has {arguments.strip()[:20]!r} after {letter}, expected a command", value=arguments.strip()
+                f"path data has {arguments.strip(_BLANK)[:20]!r} after {letter}, expected a command",
+                value=arguments.strip(_BLANK),
             )
         pen.close()
         return
