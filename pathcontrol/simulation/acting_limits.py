@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import reduce
 
 import numpy as np
 
 from pathcontrol._arrays import Array
-from pathcontrol.simulation.arm.disturbance import Disturbance
+from pathcontrol.simulation.arm.disturbance import Disturbance, list_terms
+from pathcontrol.simulation.arm.torque_limit_drop import TorqueLimitDrop
 from pathcontrol.simulation.loops import Arm, ContinuousTime, SampledLoop, torque_limits
 
 
@@ -36,9 +38,18 @@ def acting_limits(limits: Array | None, disturbance: Disturbance | None, time: A
     if limits is None:
         return None
     limits, middle = np.atleast_2d(limits), time + 0.5 * (time[1] - time[0] if len(time) > 1 else 0.0)
-    shares = [] if disturbance is None else [disturbance.torque_factor(t) for t in middle]
-    left = [limits if share is None else _lower(limits, share) for share in shares]
-    return np.stack(np.broadcast_arrays(*left), axis=1) if left else limits[:, None]
+    shares = [share for term in list_terms(disturbance) if (share := _share_of(term, middle)) is not None]
+    return _lower(limits[:, None], reduce(np.multiply, shares).swapaxes(0, 1)) if shares else limits[:, None]
+
+
+def _share_of(term: Disturbance, times: Array) -> Array | None:
+    """Return the share of the torque limits that a disturbance leaves, (time, 1 or N, 1 or n), ``None`` for all."""
+    if type(term).torque_factor is Disturbance.torque_factor:
+        return None
+    if type(term) is TorqueLimitDrop:  # takes all times at once; one of one's own may not
+        return term.torque_factor(times[:, None])
+    found = [term.torque_factor(t) for t in times]
+    return np.stack(np.broadcast_arrays(*(np.atleast_2d(1.0 if share is None else share) for share in found)))
 
 
 def _lower(limits: Array, share: Array) -> Array:

@@ -70,6 +70,28 @@ def test_shares_are_of_what_is_left_in_a_run_that_is_weak_from_its_begin_to_its_
     assert "tau_limit" not in short
 
 
+class Fading(pc.Disturbance):
+    """Motors that get weaker and weaker from 0.1 s on."""
+
+    def torque(self, t, q, qd):
+        return np.zeros_like(q)
+
+    def torque_factor(self, t):
+        return None if 0.0 < t < 0.1 else np.array([[1.0 - t, 1.0], [1.0, 1.0 - 2 * t]])
+
+
+def test_recorded_limits_are_those_that_act_whoever_lowers_them():
+    run = simulated(pc.TorqueLimitDrop(0.2, [0.1, 0.2], 0.1) + Fading())
+    left = np.broadcast_to(LIMITS, (2, len(run.time), 2)).copy()
+    middle = run.time + 1.25e-3
+    left[0, middle > 0.1, 0] *= 1.0 - middle[middle > 0.1]
+    left[1, middle > 0.1, 1] *= 1.0 - 2 * middle[middle > 0.1]
+    for rollout, start in enumerate([0.1, 0.2]):
+        left[rollout, (middle > start) & (middle < start + 0.1)] *= 0.2
+    assert_allclose(run.array("tau_limit"), left, rtol=0, atol=1e-12)
+    assert_allclose(run.array("tau"), np.clip(run.array("tau_demand"), -left, left), rtol=0, atol=1e-12)
+
+
 def test_drops_compose_and_each_rollout_has_its_own():
     factor, start = np.array([[0.5, 0.1], [0.2, 1.0]]), np.array([0.0, 0.2])
     drops = pc.TorqueLimitDrop(factor, start, 0.3) + pc.TorqueLimitDrop(0.5, 0.1, 0.3)

@@ -23,8 +23,8 @@ from pathcontrol.tasks.task import PathTask
 
 _BINDING = 0.999
 _CHANGE = 0.25  # of q_d' within a cell, in shares of its length
-_FINER = 3
-_HALVINGS = 8
+_FINER = 3  # samples of the last check for one of the passes
+_HALVINGS = 8  # of a cell, to 1/256, beyond which a path is rather a corner
 _FREE = "free"
 
 

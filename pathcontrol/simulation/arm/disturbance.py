@@ -149,8 +149,8 @@ class TimedDisturbance(Disturbance):
         self.duration = freeze(length)
         check_rollouts(**{name: self.start.shape}, duration=length.shape)
 
-    def share(self, t: float) -> Array:
-        """Return 1 while it acts and 0 else, (), or (N, 1)."""
+    def share(self, t: float | Array) -> Array:
+        """Return 1 while it acts and 0 else, (), or (N, 1); (k, 1 or N, 1) at times (k, 1)."""
         since = t - self.start
         acting = ((since >= 0) & (since < self.duration)).astype(np.float64)
         return acting[..., None] if acting.ndim else acting

@@ -45,5 +45,5 @@ class TorqueLimitDrop(TimedDisturbance):
         """Return zeros: it takes torque away and adds none."""
         return no_torques(q, self.share(t), self.factor)
 
-    def torque_factor(self, t: float) -> Array:
+    def torque_factor(self, t: float | Array) -> Array:
         return np.where(self.share(t) > 0, self.factor, 1.0)
