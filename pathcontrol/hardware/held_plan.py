@@ -17,7 +17,7 @@ _FULL = 1e-9  # of the speed that may be missing when the law goes on without th
 
 
 class HeldPlan:
-    """A law that runs compiled while nothing holds it, and with a speed input while something does.
+    """A law that runs by itself while nothing holds it, compiled where it can be, and else with a speed input.
 
     Args:
         law: the law; one that is wrapped, or has an observer, always keeps its speed input.
@@ -28,7 +28,7 @@ class HeldPlan:
         self._law = law
         self._wrapper = law.apart() if isinstance(law, LawWrapper) else SpeedOverride(law)
         self._held = ControlTick(self._wrapper, period)
-        self._free = None if isinstance(law, LawWrapper) or law.observer is not None else _compiled(law, period)
+        self._free = None if isinstance(law, LawWrapper) or law.observer is not None else _make_free_tick(law, period)
         self._tick = self._free or self._held
 
     @property
@@ -50,7 +50,7 @@ class HeldPlan:
     @property
     def outcome(self) -> dict[str, Array]:
         """The outcome of the law up to now, see :meth:`Controller.outcome`."""
-        return {} if self._tick is self._free else self._wrapper.outcome(self._held.state[None])
+        return self._law.outcome(self.state[None])
 
     def start(self, q: Array, qd: Array) -> None:
         """Start with an arm at (q, q̇), (n,), at the speed that the operator asks for."""
@@ -93,9 +93,10 @@ class HeldPlan:
             TaskError: the path does not say which point is nearest.
         """
         own, *speeds = self._wrapper.split(self._wrapper.start(q, qd))
-        before = self._held.state
-        if self._tick is self._held and np.isfinite(before).all():
-            own = self._wrapper.inner.recollect(own, self._wrapper.split(before)[0])
+        before = self._tick.state
+        if np.isfinite(before).all():
+            before = before if self._tick is self._free else self._wrapper.split(before)[0]
+            own = self._wrapper.inner.recollect(own, before)
         own[0] = self._law.task.sigma_bar(q)
         if not np.isfinite(own[0]):
             raise TaskError(
@@ -119,8 +120,8 @@ class HeldPlan:
             self._tick = free
 
 
-def _compiled(law: Controller, period: float) -> ControlTick | None:
-    """Return the compiled tick of a law, None where there is none."""
+def _make_free_tick(law: Controller, period: float) -> ControlTick | None:
+    """Return the tick of a law by itself, None where that is beyond the engine."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PathControlWarning)  # the tick with the speed input has said it

@@ -107,7 +107,7 @@ class LoopLog:
         self._drain()
         if self._last is not None:
             self._keep(self._last, self._sdot)
-        self._context.outcome = dict(self._outcome())
+        self._ask_outcome()
         if self._path is not None:
             self._end_file()
         if self._error is not None:
@@ -174,6 +174,13 @@ class LoopLog:
         if time.monotonic() - self._flushed > _FLUSH:
             self._writer.flush()
             self._flushed = time.monotonic()
+
+    def _ask_outcome(self) -> None:
+        """Ask for what the law has to say; what a law of one's own raises must not cost the log."""
+        try:
+            self._context.outcome = dict(self._outcome())
+        except Exception as error:
+            warn(f"the log has no outcomes: the law raised {type(error).__name__}: {error}")
 
     # --- the file -------------------------------------------------------------------------------------------
 

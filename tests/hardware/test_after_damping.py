@@ -70,6 +70,34 @@ def test_after_damping_what_was_learned_goes_on_unless_it_is_no_number(broken):
     assert loop.status.mode == Mode.RUN
 
 
+class Counting(pc.Projection):
+    """A law of a user, whose state has the number of its ticks, which it knows again."""
+
+    def start(self, q, qd):
+        return np.concatenate([super().start(q, qd), 0.0 * q[..., :1]], axis=-1)
+
+    def advance(self, z, out, period):
+        return np.concatenate([super().advance(z[..., :1], out, period), z[..., 1:] + 1], axis=-1)
+
+    def recollect(self, z, before):
+        return np.concatenate([z[..., :1], before[..., 1:]], axis=-1)
+
+    def outcome(self, z):
+        return {"forgotten": z[..., 1].astype(np.int64)}
+
+
+@pytest.mark.parametrize("wrap", [pc.SpeedOverride, lambda law: law])
+def test_what_a_law_of_one_s_own_remembers_goes_on_and_is_told_wrapped_or_not(wrap):
+    law = wrap(Counting(law_of(2).robot, law_of(2).task, k_p=400.0, K_v=40.0))
+    arm, loop = Simulated(law), ControlLoop(law, H)
+    loop.start(arm.q[0], arm.qd[0])
+    arm.drive(loop, 50)
+    loop._react(Mode.DAMP, "law", "")
+    loop.resume()
+    arm.drive(loop, 10)
+    assert loop.state[1] == loop.outcome["forgotten"] == 60
+
+
 class Lost(pc.Lissajous):
     """A path that cannot say any more which point is nearest."""
 

@@ -81,6 +81,27 @@ def test_what_a_law_has_to_say_at_the_end_is_in_the_log(where, tmp_path):
     assert run.array("forgotten_time").tolist() == [0.004]
 
 
+class Speechless(pc.ExtendedMotionPlan):
+    """A law of a user that fails where it is asked for what it has to say."""
+
+    def outcome(self, z):
+        raise KeyError("laps")
+
+
+@pytest.mark.parametrize("where", ["memory", "file"])
+def test_a_law_that_fails_at_the_end_does_not_cost_the_log(where, tmp_path):
+    if where == "file":
+        pytest.importorskip("mcap")
+    loop = loop_of(Speechless(ROBOT, EIGHT, 400.0, 40.0, k=20.0))
+    log = loop.record(tmp_path / "log.mcap" if where == "file" else None)
+    q = EIGHT.q_d(np.array(0.0))
+    loop.start(q)
+    for i in range(10):
+        loop.step(q, np.zeros(2), i * H)
+    with pytest.warns(PathControlWarning, match="no outcomes: the law raised KeyError: 'laps'"):
+        assert len(log.run().time) == 10
+
+
 def test_faults_are_in_the_log(tmp_path):
     law = pc.ExtendedMotionPlan(ROBOT, EIGHT, 400.0, 40.0, k=20.0)
     run, loop = simulate(law), loop_of(law)
