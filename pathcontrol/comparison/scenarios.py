@@ -51,6 +51,10 @@ _KINDS: dict[str, type] = {
 }
 
 
+class _FoundEvent(tuple[float, float]):
+    """An event that nobody gave, which ``replace`` finds anew."""
+
+
 @dataclass(frozen=True, eq=False)
 class Scenario:
     """A situation in which laws are compared, and the same one undisturbed.
@@ -131,8 +135,8 @@ class Scenario:
 
     def _find_event(self) -> tuple[float, float] | None:
         """Return the event that is given, or else that of disturbance and override."""
-        event = self.event
-        if event is None:
+        event, found = self.event, self.event is None or isinstance(self.event, _FoundEvent)
+        if found:
             event = find_event(self.disturbance, self.duration, self.override)
         if event is None:
             return None
@@ -144,7 +148,7 @@ class Scenario:
                 value=event,
                 limit=(0.0, self.duration),
             )
-        return float(times[0]), float(times[1])
+        return (_FoundEvent if found else tuple)(times.tolist())
 
     @property
     def calm(self) -> Scenario:
@@ -230,8 +234,7 @@ def _paper(name: str, sentence: str) -> Scenario:
 
 def _jam(calm: Scenario) -> Scenario:
     """Return the scenario with joint 2 held for a while."""
-    jam = JammedJoint(1, _JAM[0], _JAM[1] - _JAM[0])
-    return replace(calm, disturbance=jam, event=_JAM, undisturbed=calm)
+    return replace(calm, disturbance=JammedJoint(1, _JAM[0], _JAM[1] - _JAM[0]))
 
 
 def _meet_wall(calm: Scenario) -> Scenario:
@@ -245,7 +248,7 @@ def _meet_wall(calm: Scenario) -> Scenario:
         start=_WALL[0],
         duration=_WALL[1] - _WALL[0],
     )
-    return replace(calm, disturbance=wall, event=_WALL, undisturbed=calm, laws={"plan_small_k": _plan_with_small_k})
+    return replace(calm, disturbance=wall, laws={"plan_small_k": _plan_with_small_k})
 
 
 def _plan_with_small_k(robot: RobotModel, task: PathTask) -> Controller:
@@ -255,9 +258,7 @@ def _plan_with_small_k(robot: RobotModel, task: PathTask) -> Controller:
 
 def _lose_measurements(calm: Scenario) -> Scenario:
     """Return the scenario in which the law sees the same measurement for a while."""
-    return replace(
-        calm, disturbance=Dropout(_LOST[0], _LOST[1] - _LOST[0], "measurements"), event=_LOST, undisturbed=calm
-    )
+    return replace(calm, disturbance=Dropout(_LOST[0], _LOST[1] - _LOST[0], "measurements"))
 
 
 def _weaken(calm: Scenario) -> Scenario:
@@ -270,7 +271,7 @@ def _weaken(calm: Scenario) -> Scenario:
 
 def _hold(calm: Scenario) -> Scenario:
     """Return the scenario with an operator who holds all plans for a while."""
-    return replace(calm, override=[[_HOLD[0], 0.0], [_HOLD[1], 1.0]], event=_HOLD, undisturbed=calm)
+    return replace(calm, override=[[_HOLD[0], 0.0], [_HOLD[1], 1.0]])
 
 
 def _load(calm: Scenario) -> Scenario:

@@ -278,7 +278,7 @@ def test_what_does_not_fit_is_refused(arm, circle):
     with pytest.raises(pc.InputError, match="event"):
         pc.Scenario("late", "Too late.", arm, circle, np.zeros(2), 1.0, event=(2.0, 3.0))
     with pytest.raises(pc.InputError, match=r"samples each 0\.0025 s and loop each 0\.001 s"):
-        replace(pc.make_scenario("jammed-joint"), loop=pc.SampledLoop(1e-3))
+        replace(pc.make_scenario("payload"), loop=pc.SampledLoop(1e-3))
     with pytest.raises(pc.InputError, match="expected a Scenario"):
         pc.compare(None, 7)
 

@@ -36,6 +36,16 @@ def test_a_disturbance_or_an_operator_is_the_event_and_is_not_in_the_undisturbed
     assert scenario(disturbance=pc.Harmonic([1.0, 0.0], 1.0)).event is None
 
 
+def test_an_event_that_was_not_given_is_found_anew_where_a_scenario_is_changed():
+    earlier = pc.Push([0.0, 30.0], start=0.2, duration=0.1)
+    pushed = scenario(disturbance=PUSH)
+    assert replace(pushed, disturbance=earlier).event == pytest.approx((0.2, 0.3))
+    assert replace(pushed, disturbance=None).event is None
+    assert replace(scenario(disturbance=PUSH, event=(0.4, 0.8)), disturbance=earlier).event == (0.4, 0.8)
+    jammed = replace(pc.make_scenario("jammed-joint"), task=pc.Circle(0.8, 2.0))
+    assert jammed.calm.task is jammed.task
+
+
 def test_gains_are_a_table_or_one_after_another():
     one = scenario(gains={"K_p": 100.0, "K_v": [20.0, 30.0]})
     assert one.gains == scenario(gains=(100.0, [20.0, 30.0])).gains == scenario(gains=one.gains).gains
