@@ -28,7 +28,7 @@ def torque_metrics(run: Run, own: Samples, counted: Samples) -> dict[str, Array]
     values = {f"{name}_peak": own.reduce(_peak, run.array(name)).max(-1) for name in (_DEMAND, "tau") if name in run}
     limits = stack_torque_limits(run)
     if np.isfinite(limits).any():
-        shares = torque_shares(run.array(_DEMAND), _when_acting(limits, run))
+        shares = torque_shares(run.array(_DEMAND), _limits_of_demands(limits, run))
         values["tau_demand_ratio"] = own.reduce(_peak, shares).max(-1)
     lost = find_lost(run, filtered=False)
     noise = _expand_joints(counted.reduce(_noise, run.array(_DEMAND), _compensated_direction(run), lost), run)
@@ -41,8 +41,8 @@ def torque_metrics(run: Run, own: Samples, counted: Samples) -> dict[str, Array]
     return values
 
 
-def _when_acting(limits: Array, run: Run) -> Array:
-    """Return the least of the limits (rollout, 1 or time, n) while a demand acts, which a delay makes later."""
+def _limits_of_demands(limits: Array, run: Run) -> Array:
+    """Return the least of the limits (rollout, 1 or time, n) while each demand acts, which a delay makes later."""
     whole, late = split_loop_delay(run)
     last = limits.shape[1] - 1
     begin = np.minimum(np.arange(last + 1) + whole, last)

@@ -125,10 +125,13 @@ class ControlTick:
             self._tick.act(as_joint_array("tau", tau, self.law.robot.n).copy())
 
     def wait(self, time: float) -> None:
-        """Tell the law's observer that another time than a period passes up to the next call: by ``time`` [s] more.
+        """Tell the law's observer that the next call comes ``time`` [s] later than a period after this one.
 
-        It is less than 0 where less passes. The torques act on meanwhile. The plan waits, as it goes on by a period at
-        each call.
+        It comes earlier where that is below 0, by a period at most. The torques act on meanwhile. The plan waits, as it
+        goes on by a period at each call.
+
+        Raises:
+            InputError: it would come before this one.
         """
         if self.law.observer is not None:
             self._tick.wait(as_scalar("time", time, least=-self._period))

@@ -88,6 +88,17 @@ def test_charts_and_slider_of_the_page_mark_the_event(page):
         assert film.complaints == []
 
 
+def test_an_event_that_outlasts_the_film_is_marked_up_to_its_end(tmp_path):
+    unlimited = dataclasses.replace(pc.make_scenario("jammed-joint"), loop=pc.SampledLoop(0.01))
+    wild = {"wild": lambda arm, task: pc.Projection(arm, task, 1e6, 2e3)}
+    with pytest.warns(pc.PathControlWarning, match="unstable"):
+        compared = pc.compare(wild, unlimited, rollouts=1, progress=False)
+    assert compared.runs["wild"].time[-1] < 4.0  # it has diverged
+    with opened(pc.save_comparison(compared, tmp_path / "page.html"), (1000, 700), "#t=0") as film:
+        slider, band = (film.tab.locator(f"#track {part}").bounding_box() for part in ("#scrubber", ".event"))
+        assert band["x"] + band["width"] == pytest.approx(slider["x"] + slider["width"] - 8, abs=0.5)
+
+
 def test_a_page_without_an_event_has_none_and_another_name_is_refused(calm, tmp_path):
     with pytest.raises(pc.InputError, match=r"\.html"):
         pc.save_comparison(calm, tmp_path / "page.pdf")

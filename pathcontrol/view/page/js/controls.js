@@ -27,7 +27,7 @@ class Controls {
     const { clock, scrubber, speed } = this;
     document.getElementById("panel").hidden = false;
     scrubber.max = clock.duration;
-    scrubber.parentElement.append(...this.events.map((event) => this.band(...event.map((t) => t / clock.duration))));
+    scrubber.parentElement.append(...this.events.map((event) => this.band(...event.map((t) => Math.min(1, t / clock.duration)))));
     scrubber.addEventListener("input", () => clock.seek(Number(scrubber.value)));
     scrubber.addEventListener("pointerdown", () => clock.hold(true));
     for (const end of ["pointerup", "pointercancel"]) scrubber.addEventListener(end, () => clock.hold(false));
