@@ -40,6 +40,15 @@ class Deaf(pc.ExtendedMotionPlan):
         return np.zeros(s.shape, dtype=bool)
 
 
+class Waiting(pc.ExtendedMotionPlan):
+    """A law that waits at first, whatever a wrapper asks for."""
+
+    def law(self, t, q, qd, z):
+        if t >= 0.01 or self.speed is None:
+            return super().law(t, q, qd, z)
+        return pc.ExtendedMotionPlan.law(self.at_speed(np.zeros(q.shape[:-1])), t, q, qd, z)
+
+
 class Unmade(pc.Projection):
     """A law whose constructor does not call that of its base class."""
 
@@ -136,6 +145,12 @@ def test_a_law_that_does_not_go_by_its_speed_is_not_wrapped_in_silence(drive):
     for wrap in (pc.SpeedOverride, pc.EventPlan, lambda one: pc.SpeedOverride(pc.Learned(one), 0.5)):
         with pytest.raises(pc.InputError, match=r"Deaf\.law gives the same torques .* self\.point"):
             drive(wrap(law))
+
+
+def test_a_law_that_goes_by_its_speed_after_a_while_is_wrapped():
+    law = Waiting(ARM, TASK, 800.0, [45.0, 100.0], 20.0)
+    free, held = (run(pc.SpeedOverride(law, u), duration=0.2) for u in (1.0, [[0.1, 0.0]]))
+    assert free.array("s")[0, -1] > held.array("s")[0, -1] + 0.05
 
 
 def test_a_pace_without_limits_is_told_apart_from_an_arm_without():

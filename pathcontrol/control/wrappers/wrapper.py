@@ -16,6 +16,8 @@ from pathcontrol.control.wrappers.override_rule import Override, OverrideRule
 from pathcontrol.control.wrappers.speed_rule import Moment, Speed, SpeedRule
 from pathcontrol.errors import InputError
 
+_LATER = 1e3  # s, by when a law of one's own that waits at first goes by its speed
+
 
 class LawWrapper(Controller):
     """A law that goes along its path at a factor w(t) of the speed, chosen by rules.
@@ -163,10 +165,14 @@ class LawWrapper(Controller):
         shape = (*own.shape[:-1], self.robot.n)
         q, qd = (np.broadcast_to(part, shape).reshape(len(z), self.robot.n) for part in (q, qd))
         at_rest, at_full = (self.inner.at_speed(np.full(len(z), w)) for w in (0.0, 1.0))
-        held, free = (law.law(0.0, q, qd, z) for law in (at_rest, at_full))
-        moves = at_full.full_speed(free.s)[1] != 0
-        same = (held.sdot == free.sdot) & (held.tau == free.tau).all(-1)
-        if (same & moves).any():
+
+        def is_deaf(t: float) -> bool:
+            held, free = (law.law(t, q, qd, z) for law in (at_rest, at_full))
+            moves = at_full.full_speed(free.s)[1] != 0
+            same = (held.sdot == free.sdot) & (held.tau == free.tau).all(-1)
+            return bool((same & moves).any())
+
+        if is_deaf(0.0) and is_deaf(_LATER):
             kind = type(unwrap(self)).__name__
             raise InputError(
                 f"{kind}.law gives the same torques and ṡ held and at full speed, expected one that goes by its speed; "
