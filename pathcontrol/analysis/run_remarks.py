@@ -7,7 +7,6 @@ import numpy as np
 from pathcontrol._arrays import Array
 from pathcontrol._expect import expect
 from pathcontrol.analysis.limit_shares import RATIOS, find_worst_shares, is_passed
-from pathcontrol.analysis.planned_time import planned_time
 from pathcontrol.analysis.progress import ENOUGH, progress
 from pathcontrol.analysis.run_metrics import end_error, metrics
 from pathcontrol.analysis.speed_factor import speed_factor
@@ -25,7 +24,7 @@ _TIMES = 2.0  # limits, from which a share is not said in percent
 _NEAR = float(np.deg2rad(2.0))  # rad, within which an arm is at a point of its path: the band of the metrics
 _LARGE = 0.05  # of the size of a path, which is near on large ones: no fault of a law that follows roughly
 _WHOLE = 0.95  # of the path, below which an arm plainly missed more than the way to it from its start
-_SAMPLES = 200  # of a path, for its size
+_SAMPLES = 200  # of a path, for its size and its time
 _SLOW = 0.5  # of what was asked for, below which an arm that had the time is held by something
 _MOST = 3  # limit of rollouts that are named
 
@@ -90,7 +89,7 @@ def _find_faults(run: Run) -> dict[str, str]:
 def _advise_slow(run: Run, done: float) -> str:
     """Return what helps an arm that moved but did not get there, in a run of one rollout; "" where it is not known."""
     needed = _planned_time(run)
-    if run.time[-1] < needed < np.inf:
+    if needed > run.time[-1]:
         return f"by its profile the path takes {needed:.3g} s, which needs a longer duration than {run.time[-1]:.4g} s"
     return advise_on_friction(run) if done < _SLOW and not _is_held(run) else ""
 
@@ -100,10 +99,15 @@ def _planned_time(run: Run) -> float:
     task = run.task
     if task is None or isinstance(task, TaskBatch) or laws(run.config)[-1].get("wrappers"):
         return 0.0
-    if task.period is None:
-        return planned_time(task, float(run.array("s")[0, 0]), task.s_end) if np.isfinite(task.s_end) else 0.0
-    laps = run.config.get("laps")
-    return laps * planned_time(task, task.s0, task.s0 + task.period) if isinstance(laps, int) else 0.0
+    asked = run.config.get("laps")
+    laps = 1 if task.period is None else asked if isinstance(asked, int) else 0
+    begin = float(run.array("s")[0, 0]) if task.period is None else task.s0
+    end = task.s_end if task.period is None else task.s0 + task.period
+    if not laps or not np.isfinite(end):
+        return 0.0
+    s = begin + (end - begin) * 0.5 * (1 - np.cos(np.linspace(0, np.pi, _SAMPLES)))  # dense at the ends, often slow
+    theta = task.theta(s) + np.zeros_like(s)
+    return laps * float((2 * np.diff(s) / (theta[:-1] + theta[1:])).sum())  # exact where ϑ² is linear, as from rest
 
 
 def _say_share(share: float) -> str:

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
-from pathcontrol.analysis.planned_time import planned_time
 from pathcontrol.analysis.power.torque_account import acting_torque
 from pathcontrol.analysis.run_metrics import contour_error, lag_error, settling_time
 from pathcontrol.simulation.run import Run
@@ -27,6 +26,7 @@ MEASURES = {
 #: an arm has recovered when its contour error stays within this many times its own undisturbed peak
 RECOVERED = 1.1
 _LEAST_BAND = 1e-4  # rad or m, of an arm that follows its path exactly
+_ACCURACY, _MOST_PIECES = 1e-6, 500  # of a quadrature: s and relative, and pieces in which it parts the path
 _SLACK = 1e-6  # share of a period, as times of samples are rounded
 _AT_LIMIT = 1 - 1e-9  # share of a limit
 
@@ -96,10 +96,23 @@ def time_lost(run: Run, undisturbed: Run, task: PathTask) -> Array:
     ends = np.stack([one.array("s")[:, -1] for one in (run, undisturbed)])
     lost = np.full(run.rollouts, np.nan)
     known = np.isfinite(ends).all(0)
-    lost[known] = [planned_time(task, begin, end) for begin, end in ends[:, known].T]
+    lost[known] = [_planned_time(task, begin, end) for begin, end in ends[:, known].T]
     finished = [one.finish_time for one in (run, undisturbed)]
     both = np.isfinite(finished).all(0)
     return np.where(both, finished[0] - finished[1], lost)
+
+
+def _planned_time(task: PathTask, begin: float, end: float) -> float:
+    """Return ∫ds/ϑ(s) [s] from ``begin`` to ``end``, inf where ϑ falls to 0 too fast for it to have a value."""
+    from scipy.integrate import quad_vec  # takes a quarter of a second to load
+
+    def slowness(s: float) -> float:
+        with np.errstate(divide="ignore"):
+            return float(1 / np.asarray(task.theta(np.array(s)), dtype=np.float64))
+
+    with np.errstate(invalid="ignore"):  # of infinite values
+        time, error = quad_vec(slowness, begin, end, epsabs=_ACCURACY, epsrel=_ACCURACY, limit=_MOST_PIECES)
+    return time if error <= _ACCURACY * (1 + abs(time)) else float(np.copysign(np.inf, end - begin))
 
 
 def energy(run: Run, first: int, stop: int) -> Array:
