@@ -27,6 +27,8 @@ def find_event(disturbance: Disturbance | None, duration: float, override: Any =
     if not times:
         return None
     begin, end = max(0.0, min(begin for begin, _ in times)), max(end for _, end in times)
+    if begin >= duration:  # for the error that says so
+        return (begin, end)
     return (begin, duration if timeless else min(end, duration))
 
 

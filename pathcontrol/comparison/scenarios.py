@@ -142,8 +142,9 @@ class Scenario:
             return None
         times = as_array("event", event)
         if times.shape != (2,) or not 0 <= times[0] < min(times[1], self.duration):
+            remedy = "; start disturbance and override earlier, or give a longer duration" if found else ""
             raise InputError(
-                f"event = {event}, expected begin and end [s] with a begin in the run of {self.duration:g} s",
+                f"event = {event}, expected begin and end [s] with a begin in the run of {self.duration:g} s{remedy}",
                 argument="event",
                 value=event,
                 limit=(0.0, self.duration),

@@ -330,7 +330,7 @@ class Controller(ABC):
         if self.observer is None:
             name = type(self).__name__
             raise InputError(f"{name} has no observer; give it friction='observed', or take law.watching()", value=self)
-        return self.observer.recall(np.asarray(z, dtype=np.float64)[..., 1 : 1 + self.observer.size])
+        return self.observer.recall(np.atleast_1d(np.asarray(z, dtype=np.float64))[..., 1 : 1 + self.observer.size])
 
 
 def check_controller(name: str, controller: Any) -> None:

@@ -66,6 +66,11 @@ def test_gains_are_a_table_or_one_after_another():
         ("event", 5, "begin and end"),
         ("event", (1,), "begin and end"),
         ("event", (np.nan, 1.0), "begin and end"),
+        (
+            "disturbance",
+            pc.Push([0.0, 30.0], start=1.0, duration=0.5),
+            r"event = \(1\.0, 1\.5\).* in the run of 0\.9 s",
+        ),
         ("gains", 800.0, "K_p, K_v"),
         ("gains", {"Kp": 800.0}, "K_p, K_v"),
         ("engine", "fast", "compiled"),
