@@ -58,7 +58,8 @@ class PositionCommand:
     velocity limit allows, in any case; none leaves the position limits of the arm.
 
     A measurement that is no number, or that jumps by more than 0.05 rad beyond a velocity limit, is bridged by the last
-    deviation; after 5 of them in a row the plan is held.
+    deviation; after 5 of them in a row the plan is held, and what is farther than an arm comes in that time is bridged
+    until :meth:`resume` or :meth:`start`.
 
     Args:
         law: a law of the library or of one's own, best a path law, with one task and one set of gains. One without a
@@ -165,7 +166,8 @@ class PositionCommand:
         """
         if not self._started:
             self.start(q)
-        reach = _JUMP + self._velocity * self.period * (self._bad + 1)
+        missed = min(self._bad, _PATIENCE)  # where the plan is held, no time brings a jump within reach
+        reach = _JUMP + self._velocity * self.period * (missed + 1)
         self._watch(self._servo.expect(self.q).update(q, reach))
         self._pace = self._choose_pace()
         self._passed += self._pace
