@@ -399,3 +399,6 @@ def test_a_law_without_observer_says_that_it_sees_nothing():
     plain = law(ARMS[2], friction="none")
     with pytest.raises(InputError, match=r"no observer; give it friction='observed', or take law\.watching\(\)"):
         plain.observed_torque(plain.start(np.zeros(2), np.zeros(2)))
+    for other in (0.0, [0.3, 0.0]):
+        with pytest.raises(InputError, match="expected 9"):
+            plain.watching().observed_torque(other)

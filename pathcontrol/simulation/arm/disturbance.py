@@ -371,7 +371,7 @@ def check_rollouts(**axes: tuple[int, ...]) -> None:
 
 
 def no_torques(q: Array, *parts: ArrayLike) -> Array:
-    """Return zeros for the rollouts and joints of parts that broadcast to (N, n), with the joints of q (N, n)."""
+    """Return zeros (N, n) for the rollouts that ``parts`` have rows for, and their joints, or those of q (…, n)."""
     shape = np.broadcast_shapes(*map(np.shape, parts))
     return np.zeros((*shape[:-1], q.shape[-1] if shape[-1:] in ((), (1,)) else shape[-1]))
 
