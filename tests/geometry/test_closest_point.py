@@ -344,3 +344,20 @@ def test_a_path_with_a_hole_is_refused():
 
     with pytest.raises(TaskError, match=r"nan.*at s = 0\.49"):
         Hole().sigma_bar([0.2, 0.2])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_it_is_the_global_minimum_near_centres_of_curvature(seed):
+    """There the distance hardly changes along the path, and minima lie close together."""
+    rng = np.random.default_rng(seed)
+    task = WaypointPath(rng.normal(size=(12, 2)), speed=1.0)
+    point = task.at(rng.uniform(task.s0, task.s_end, 400))
+    square = np.square(point.dq_d).sum(-1, keepdims=True)
+    bend = (point.ddq_d - point.dq_d * (point.dq_d * point.ddq_d).sum(-1, keepdims=True) / square) / square
+    away = 1 + 10 ** rng.uniform(-4, -1, size=(400, 1)) * rng.normal(size=(400, 1))
+    q = point.q_d + away * bend / np.square(bend).sum(-1, keepdims=True)
+    s = task.sigma_bar(q)
+    distance = np.linalg.norm(task.q_d(s) - q, axis=-1)
+    best, _ = cKDTree(task.q_d(np.linspace(task.s0, task.s_end, 20_001))).query(q)
+    assert (distance <= best * (1 + 1e-9)).all()
+    assert (stationarity(task, s, q)[(s > task.s0) & (s < task.s_end)] < 1e-9).all()

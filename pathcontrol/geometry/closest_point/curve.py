@@ -49,7 +49,8 @@ def _find_root(g: Callable[[Array, NDArray[np.intp]], Array], a: Array, b: Array
         a, g_a = s, value
         best = np.where(np.abs(g_a) < np.abs(g_b), a, b)
         root[rows] = best
-        least = _LAST_DIGITS * (np.abs(best) + _TINY) / np.abs(b - a)
+        # a and b are one where rounding gives both the same sign
+        least = _LAST_DIGITS * (np.abs(best) + _TINY) / np.maximum(np.abs(b - a), _TINY)
         going = (least < 0.5) & (g_a != 0) & (g_b != 0)
         if not going.all():
             rows, a, b, c, g_a, g_b, g_c, least = (part[going] for part in (rows, a, b, c, g_a, g_b, g_c, least))

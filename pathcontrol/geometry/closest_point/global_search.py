@@ -7,6 +7,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pathcontrol._arrays import Array
 from pathcontrol.geometry.closest_point.cells import FARTHEST, Cells
@@ -15,10 +16,13 @@ from pathcontrol.geometry.closest_point.curve import Curve
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-_TURN = 1 / 8  # rad over a piece of a cell, which is taken to hold one minimum at most
+_TURN = 1 / 8  # rad over a piece of a cell, which holds one minimum at most but near a centre of curvature
 _SIZES, _RATIO = 6, 4.0  # how many groups of cells by size, and their sizes
 _BLOCK = 1 << 18  # pairs of a point and a cell held at once
 _PIECES = 1 << 20  # pieces of cells searched at once
+_DIVISIONS = 8  # by four, of pieces that hold several extrema
+_NEAR = 0.25  # of the mean of g': nearer to zero its parabola may be wrong about the sign
+_FLAT = 1e-12  # rad from normal to the curve, below which a slope is rounding
 _TIE = 1e-12  # by how much a sample must be nearer than a root: not by rounding alone
 
 
@@ -78,12 +82,9 @@ class GlobalSearch:
 
     def _search_cells(self, x: Array, row: Array, cell: Array) -> tuple[Array, Array, Array]:
         """Return the rows that occur in the pairs, with the distance to and the parameter of their nearest point."""
-        row, lower, upper = self._divide(row, cell)
-        s = np.stack([lower, upper])
-        difference = self._curve.p(s) - x[row]
-        slope, distance = np.vecdot(difference, self._curve.dp(s)), np.linalg.norm(difference, axis=-1)
+        row, s, slope, distance = self._evaluate(x, *self._divide(row, cell))
         i = np.flatnonzero((slope[0] < 0) & (slope[1] > 0))
-        root = self._curve.root(x[row[i]], lower[i], upper[i]) if i.size else np.empty(0)
+        root = self._curve.root(x[row[i]], *s[:, i]) if i.size else np.empty(0)
         # the ends of an open curve, and ends of pieces that are roots themselves
         every, best = np.arange(len(row)), distance.argmin(0)
         return _select_nearest(
@@ -92,6 +93,47 @@ class GlobalSearch:
             np.concatenate([root, s[best, every]]),
             len(root),
         )
+
+    def _evaluate(self, x: Array, row: Array, lower: Array, upper: Array) -> tuple[Array, ...]:
+        """Return the row (M,) of pieces, and s, g and the distance at their ends, (2, M) each.
+
+        Pieces with a minimum and a maximum beside each other, as near to a centre of curvature of the curve, are
+        divided until the two are told apart.
+        """
+        clear: list[tuple[Array, ...]] = []
+        for division in range(_DIVISIONS + 1):
+            s = np.stack([lower, upper])
+            difference, dp = self._curve.p(s) - x[row], self._curve.dp(s)
+            slope, distance = np.vecdot(difference, dp), np.linalg.norm(difference, axis=-1)
+            crowded = self._find_crowded(s, difference, dp, slope, division) & (division < _DIVISIONS)
+            clear.append(tuple(part[..., ~crowded] for part in (row, s, slope, distance)))
+            if not crowded.any():
+                break
+            row, lower, upper = _quarter(row[crowded], lower[crowded], upper[crowded])
+        return tuple(np.concatenate(parts, axis=-1) for parts in zip(*clear, strict=True))
+
+    def _find_crowded(self, s: Array, difference: Array, dp: Array, slope: Array, division: int) -> NDArray[np.bool_]:
+        """Return the mask (M,) of pieces in which g may have more roots than its signs at the ends tell.
+
+        That is where both signs are the same and g in between is not of it, or where they differ and g' comes near to
+        zero; a curve without p'' is divided there once. Slopes that are rounding tell nothing.
+        """
+        # derivatives by the share of a piece, whose products do not overflow
+        h, chord = s[1] - s[0], difference[1] - difference[0]
+        g = slope * h
+        least = (_FLAT * np.linalg.norm(difference[0], axis=-1) + self._rounding) * np.linalg.norm(chord, axis=-1)
+        # the mean of g is that of (½‖p − x‖²)', without cancellation
+        crowded = _crosses(g[0], g[1], 0.5 * np.vecdot(chord, difference[0] + difference[1]), least)
+        i = np.flatnonzero((np.sign(g[0]) * np.sign(g[1]) < 0) & (np.abs(g).max(0) > least))
+        if self._curve.ddp is None:
+            crowded[i] = division == 0
+        elif i.size:
+            h, dp, ddp = h[i, None], dp[:, i], self._curve.ddp(s[:, i])
+            bend = np.vecdot(h * dp, h * dp) + np.vecdot(difference[:, i], h * h * ddp)
+            mean = g[1, i] - g[0, i]
+            against = (bend * np.sign(mean)).min(0) <= 0
+            crowded[i] = against | _crosses(bend[0], bend[1], mean, -_NEAR * np.abs(mean))
+        return crowded
 
     def _divide(self, row: Array, cell: Array) -> tuple[Array, Array, Array]:
         """Divide the cells into pieces; return (row, lower end, upper end) of each piece."""
@@ -138,6 +180,27 @@ class _Group(NamedTuple):
         count = np.fromiter(map(len, found), int, len(x))
         index = np.fromiter(chain.from_iterable(found), int, count.sum())
         return np.repeat(np.arange(len(x)), count), self.cell[index]
+
+
+def _crosses(first: Array, last: Array, mean: Array, least: Array) -> NDArray[np.bool_]:
+    """Return the mask of functions with one sign at both ends of which the parabola with the same mean has another.
+
+    The parabola a + bt + ct², t = 0 … 1, goes through the values at the ends, and ``least`` beyond zero.
+    """
+    # in units of the largest, so that no square overflows
+    size = np.maximum.reduce([np.abs(first), np.abs(last), np.abs(mean), np.abs(least)])
+    size = np.copysign(np.maximum(size, np.finfo(float).tiny), first)
+    first, last, mean, least = first / size, last / size, mean / size, least / np.abs(size)
+    middle = 1.5 * mean - 0.25 * (first + last)
+    b, c = 4 * middle - 3 * first - last, 2 * (first + last - 2 * middle)
+    return (last > 0) & (b < 0) & (-b < 2 * c) & (b * b > 4 * c * (first + least))
+
+
+def _quarter(row: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
+    """Divide pieces (M,) into four each; return (row, lower end, upper end), (4M,) each."""
+    edges = lower + np.linspace(0, 1, 5)[:, None] * (upper - lower)
+    edges[-1] = upper
+    return np.tile(row, 4), edges[:-1].ravel(), edges[1:].ravel()
 
 
 def _group_by_size(cells: Cells) -> Iterator[_Group]:

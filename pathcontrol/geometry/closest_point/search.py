@@ -29,10 +29,10 @@ class ClosestPoint:
     """Nearest points of ``curve`` for s in [lower, upper]; a closed curve repeats with the period upper − lower.
 
     The curve is cut once into cells over which its tangent turns by half a radian at most; k-d trees of them give those
-    near a point, and a bound on the distance of each those that can hold the global minimum. Two minima within an
-    eighth of a radian of turn count as one; see :class:`~pathcontrol.geometry.closest_point.cells.Cells` for what the
-    cells may miss. The local search looks no farther than the distance falls, so it costs the same on a curve of any
-    length.
+    near a point, and a bound on the distance of each those that can hold the global minimum. Pieces of an eighth of a
+    radian in which minima crowd, as near a centre of curvature, are divided until they are told apart; see
+    :class:`~pathcontrol.geometry.closest_point.cells.Cells` for what the cells may miss. The local search looks no
+    farther than the distance falls, so it costs the same on a curve of any length.
 
     Attributes:
         curve: p(s) and its derivatives.
