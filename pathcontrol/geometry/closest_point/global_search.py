@@ -20,9 +20,9 @@ _TURN = 1 / 8  # rad over a piece of a cell, which holds one minimum at most but
 _SIZES, _RATIO = 6, 4.0  # how many groups of cells by size, and their sizes
 _BLOCK = 1 << 18  # pairs of a point and a cell held at once
 _PIECES = 1 << 20  # pieces of cells searched at once
-_DIVISIONS = 8  # by four, of pieces that hold several extrema
+_DIVISIONS = 2  # by four, of pieces that hold several extrema
 _NEAR = 0.25  # of the mean of g': nearer to zero its parabola may be wrong about the sign
-_FLAT = 1e-12  # rad from normal to the curve, below which a slope is rounding
+_WORTH = 1e-9  # of the squared distance; less is not gained by a division
 _TIE = 1e-12  # by how much a sample must be nearer than a root: not by rounding alone
 
 
@@ -116,12 +116,13 @@ class GlobalSearch:
         """Return the mask (M,) of pieces in which g may have more roots than its signs at the ends tell.
 
         That is where both signs are the same and g in between is not of it, or where they differ and g' comes near to
-        zero; a curve without p'' is divided there once. Slopes that are rounding tell nothing.
+        zero; a curve without p'' is divided there once. Slopes that are next to nothing tell nothing.
         """
         # derivatives by the share of a piece, whose products do not overflow
         h, chord = s[1] - s[0], difference[1] - difference[0]
         g = slope * h
-        least = (_FLAT * np.linalg.norm(difference[0], axis=-1) + self._rounding) * np.linalg.norm(chord, axis=-1)
+        away = np.linalg.norm(difference[0], axis=-1)
+        least = (_WORTH * away + self._rounding) * away
         # the mean of g is that of (½‖p − x‖²)', without cancellation
         crowded = _crosses(g[0], g[1], 0.5 * np.vecdot(chord, difference[0] + difference[1]), least)
         i = np.flatnonzero((np.sign(g[0]) * np.sign(g[1]) < 0) & (np.abs(g).max(0) > least))
