@@ -147,8 +147,16 @@ def test_a_law_that_does_not_go_by_its_speed_is_not_wrapped_in_silence(drive):
             drive(wrap(law))
 
 
-def test_a_law_that_goes_by_its_speed_after_a_while_is_wrapped():
-    law = Waiting(ARM, TASK, 800.0, [45.0, 100.0], 20.0)
+class Planned(Waiting):
+    """One that knows what to do for 10 s."""
+
+    def law(self, t, q, qd, z):
+        return [super().law][int(t // 10)](t, q, qd, z)
+
+
+@pytest.mark.parametrize("kind", [Waiting, Planned])
+def test_a_law_that_goes_by_its_speed_after_a_while_is_wrapped(kind):
+    law = kind(ARM, TASK, 800.0, [45.0, 100.0], 20.0)
     free, held = (run(pc.SpeedOverride(law, u), duration=0.2) for u in (1.0, [[0.1, 0.0]]))
     assert free.array("s")[0, -1] > held.array("s")[0, -1] + 0.05
 
