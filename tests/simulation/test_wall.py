@@ -345,45 +345,6 @@ def test_what_is_likely_a_slip_is_told():
         simulated(across(1e3, x=600.0), duration=0.01)
 
 
-def test_a_file_says_it(tmp_path):
-    file = tmp_path / "wall.toml"
-    file.write_text(
-        """
-        duration = 2.0
-        [robot]
-        source = "cicese_2dof"
-        [task]
-        type = "circle"
-        radius = 1.0
-        speed = 2.0
-        [start]
-        q = [0.2, 0.3]
-        [controller]
-        type = "extended_motion_plan"
-        K_p = 800.0
-        K_v = [45.0, 100.0]
-        k = 20.0
-        [[disturbance]]
-        type = "wall"
-        frame = "tool"
-        point = ["600 mm", 0.0, 0.0]
-        normal = [-1.0, 0.0, 0.0]
-        stiffness = 1e5
-        friction = 0.2
-        [[disturbance]]
-        type = "wall"
-        frame = "tool"
-        point = [-0.7, 0.0, 0.0]
-        normal = [1.0, 0.0, 0.0]
-        rigid = true
-        """
-    )
-    run = pc.run_experiment(file, tmp_path / "out", progress=False).run
-    x = ARM.frame_pose(run.array("q")[0], "tool")[:, 0, 3]
-    assert 0.6 < x.max() < 0.615  # 0.795 without it
-    assert run.config["engine"] == "compiled"
-
-
 @pytest.mark.parametrize(
     ("make", "said"),
     [
