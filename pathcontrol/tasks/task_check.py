@@ -11,7 +11,7 @@ from pathcontrol._expect import describe, expect
 from pathcontrol.errors import TaskError
 from pathcontrol.tasks.batch.task_batch import TaskBatch
 from pathcontrol.tasks.regularity import check_regular, pick_irregular
-from pathcontrol.tasks.task import PathTask
+from pathcontrol.tasks.task import PathTask, Reprofiled
 from pathcontrol.tasks.values_check import check_values, count_joints
 
 _SAMPLES = 129
@@ -93,6 +93,9 @@ def _check_domain(task: PathTask, name: str) -> None:
 
 def _check_projection(task: PathTask, name: str, s: Array) -> None:
     """Check that the projection of a class of one's own finds postures of the path on the path."""
+    if isinstance(task, Reprofiled):  # has that of the path underneath
+        _check_projection(task.path, type(task.path).__name__, s)
+        return
     if type(task).sigma_bar is PathTask.sigma_bar or type(task).__module__.startswith("pathcontrol."):
         return
     label, q = f"{name}.sigma_bar", np.asarray(task.q_d(s), dtype=np.float64)

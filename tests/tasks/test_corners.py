@@ -122,3 +122,20 @@ def test_what_is_made_of_a_path_with_a_corner_has_it_too(arm):
             make()
     for a, b in ((0.0, 0.3), (0.3, 1.0)):
         pc.check_task(path.between(a, b).by_arc_length(), 2)
+
+
+@pytest.mark.parametrize("off", [0.0, 0.3])
+def test_a_projection_that_is_wrong_is_told_with_another_profile_too(off):
+    class Turned(pc.Circle):
+        def sigma_bar(self, q, near=None):
+            return super().sigma_bar(q, near) + off
+
+    path = Turned(1.0, 2.0)
+    for task in (path, path.with_profile(ConstantSpeed(1.0)).with_profile(ConstantSpeed(0.5))):
+        if off:
+            with pytest.raises(
+                pc.TaskError, match=r"Turned\.sigma_bar\(q_d\(s=.*\)\) = .*, where the path is 0\.\d+ away"
+            ):
+                pc.check_task(task, 2)
+        else:
+            pc.check_task(task, 2)

@@ -97,8 +97,8 @@ class GlobalSearch:
     def _evaluate(self, x: Array, row: Array, lower: Array, upper: Array) -> tuple[Array, ...]:
         """Return the row (M,) of pieces, and s, g and the distance at their ends, (2, M) each.
 
-        Pieces with a minimum and a maximum beside each other, as near to a centre of curvature of the curve, are
-        divided until the two are told apart.
+        Pieces that may hold a minimum and a maximum beside each other, as near a centre of curvature of the curve, are
+        divided, and their quarters once more, so that the two are told apart.
         """
         clear: list[tuple[Array, ...]] = []
         for division in range(_DIVISIONS + 1):
@@ -184,9 +184,9 @@ class _Group(NamedTuple):
 
 
 def _crosses(first: Array, last: Array, mean: Array, least: Array) -> NDArray[np.bool_]:
-    """Return the mask of functions with one sign at both ends of which the parabola with the same mean has another.
+    """Return the mask of functions with one sign at both ends that seem to be beyond zero by ``least`` in between.
 
-    The parabola a + bt + ct², t = 0 … 1, goes through the values at the ends, and ``least`` beyond zero.
+    They are taken for the parabola a + bt + ct², t = 0 … 1, with the same values at the ends and the same mean.
     """
     # in units of the largest, so that no square overflows
     size = np.maximum.reduce([np.abs(first), np.abs(last), np.abs(mean), np.abs(least)])

@@ -30,7 +30,7 @@ class ClosestPoint:
 
     The curve is cut once into cells over which its tangent turns by half a radian at most; k-d trees of them give those
     near a point, and a bound on the distance of each those that can hold the global minimum. Pieces of an eighth of a
-    radian in which minima crowd, as near a centre of curvature, are divided until they are told apart; see
+    radian in which minima crowd, as near a centre of curvature, are divided by up to 16; see
     :class:`~pathcontrol.geometry.closest_point.cells.Cells` for what the cells may miss. The local search looks no
     farther than the distance falls, so it costs the same on a curve of any length.
 
